@@ -1,0 +1,1 @@
+//! Identification of constant error parameters from measurements.

@@ -1,0 +1,1 @@
+//! Error parameters that vary with the configuration: banks of fuzzy cells.

@@ -1,0 +1,1 @@
+//! Serial chains with Denavit-Hartenberg links: poses and Jacobians over lanes of eight.

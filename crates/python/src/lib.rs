@@ -1,0 +1,1 @@
+//! Python bindings: convert, release the lock, call, translate errors.

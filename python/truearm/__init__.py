@@ -1,0 +1,1 @@
+"""Robot arm calibration with Denavit-Hartenberg parameters that vary over the workspace."""
