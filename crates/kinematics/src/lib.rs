@@ -1,1 +1,29 @@
 //! Serial chains with Denavit-Hartenberg links: poses and Jacobians over lanes of eight.
+//!
+//! Lengths are metres, angles radians. A chain is `base`, its links in order, `end`; its parameters are
+//! ordered by link, and within a link theta, d, a, alpha, beta. A group of eight poses is worked on at
+//! once: every scalar of the textbook is a [`Lane`] of eight, and [`dispatch`] compiles the same plain
+//! loops for the instruction sets of the machine it may run on.
+
+mod batch;
+mod chain;
+mod error;
+mod isa;
+mod lane;
+mod parameters;
+mod quantity;
+mod rows;
+mod sweep;
+mod transform;
+mod trig;
+
+pub use batch::Batch;
+pub use chain::{Chain, Convention, Joint, Link};
+pub use error::KinematicsError;
+pub use isa::{InstructionSet, Isa, Kernel, dispatch, dispatch_on};
+pub use lane::{LANES, Lane};
+pub use parameters::{LaneParameters, Parameters, SharedParameters};
+pub use rows::{load_lanes, store_lanes};
+pub use sweep::{LaneFrame, Screw};
+pub use transform::{Transform, rotation_exp, rotation_log};
+pub use trig::sin_cos;

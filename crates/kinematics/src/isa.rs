@@ -1,0 +1,162 @@
+//! The choice of the instruction set, made once while the program runs.
+//!
+//! A kernel is generic over [`Isa`] and inlined as a whole into one function per instruction set, so that
+//! the compiler vectorises its plain loops with the registers of that set.
+
+use std::sync::OnceLock;
+
+use crate::error::KinematicsError;
+use crate::lane::Lane;
+
+/// What differs between instruction sets in plain code: whether a multiplication fuses with an addition.
+pub trait Isa {
+    /// The instruction set this stands for.
+    const LEVEL: InstructionSet;
+
+    /// a b + c, with one rounding only where the instruction set has it.
+    fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane;
+}
+
+/// Work that is compiled once for each instruction set.
+///
+/// `run` and everything it calls in its loops must be `#[inline(always)]`: what is not inlined is compiled
+/// for the plainest machine, and every `mul_add` in it becomes a library call.
+pub trait Kernel {
+    /// What the work gives back.
+    type Output;
+
+    /// Do the work.
+    fn run<I: Isa>(self) -> Self::Output;
+}
+
+/// An instruction set to choose, the lowest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum InstructionSet {
+    /// What every machine of the compiled architecture has.
+    Baseline,
+    /// 256-bit vectors and fused multiplication (x86-64).
+    Avx2,
+    /// 512-bit vectors (x86-64).
+    Avx512,
+}
+
+impl InstructionSet {
+    /// Every set, the lowest first.
+    pub const ALL: [InstructionSet; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
+
+    /// The highest set this machine has.
+    pub fn detected() -> InstructionSet {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+            let avx512 = is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl")
+                && is_x86_feature_detected!("avx512bw");
+            match (avx2, avx512) {
+                (true, true) => return Self::Avx512,
+                (true, false) => return Self::Avx2,
+                _ => {}
+            }
+        }
+        Self::Baseline
+    }
+
+    /// The set to use: the detected one, or a lower one asked for by `TRUEARM_ISA`.
+    ///
+    /// # Errors
+    /// [`KinematicsError::UnknownInstructionSet`] if the variable is set to anything but `baseline`, `avx2`
+    /// or `avx512`.
+    pub fn from_environment() -> Result<InstructionSet, KinematicsError> {
+        let Some(text) = std::env::var_os("TRUEARM_ISA") else {
+            return Ok(Self::detected());
+        };
+        let asked = match text.to_string_lossy().as_ref() {
+            "baseline" => Self::Baseline,
+            "avx2" => Self::Avx2,
+            "avx512" => Self::Avx512,
+            other => return Err(KinematicsError::UnknownInstructionSet(other.to_owned())),
+        };
+        Ok(asked.min(Self::detected()))
+    }
+}
+
+struct Plain;
+
+impl Isa for Plain {
+    const LEVEL: InstructionSet = InstructionSet::Baseline;
+
+    #[cfg(not(target_arch = "aarch64"))]
+    #[inline(always)]
+    fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
+        a * b + c
+    }
+
+    #[cfg(target_arch = "aarch64")]
+    #[inline(always)]
+    fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
+        Lane::from_fn(|i| a.0[i].mul_add(b.0[i], c.0[i]))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod fused {
+    use super::{InstructionSet, Isa, Kernel, Lane};
+
+    pub struct Avx2;
+    pub struct Avx512;
+
+    impl Isa for Avx2 {
+        const LEVEL: InstructionSet = InstructionSet::Avx2;
+        #[inline(always)]
+        fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
+            Lane::from_fn(|i| a.0[i].mul_add(b.0[i], c.0[i]))
+        }
+    }
+
+    impl Isa for Avx512 {
+        const LEVEL: InstructionSet = InstructionSet::Avx512;
+        #[inline(always)]
+        fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
+            Lane::from_fn(|i| a.0[i].mul_add(b.0[i], c.0[i]))
+        }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx2>()
+    }
+
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+    pub fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx512>()
+    }
+}
+
+/// Run a kernel with the best instruction set of this machine, or the lower one that `TRUEARM_ISA` names.
+///
+/// The variable is read once; a value that [`InstructionSet::from_environment`] refuses is the business of
+/// the program's start and is taken here as not set.
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    static CHOSEN: OnceLock<InstructionSet> = OnceLock::new();
+    let chosen = *CHOSEN
+        .get_or_init(|| InstructionSet::from_environment().unwrap_or(InstructionSet::detected()));
+    dispatch_on(chosen, kernel)
+}
+
+/// Run a kernel with one instruction set, or with the best this machine has if that is lower.
+#[inline]
+pub fn dispatch_on<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    match set.min(InstructionSet::detected()) {
+        // SAFETY: the processor has just been found to have these instructions.
+        InstructionSet::Avx512 => return unsafe { fused::run_avx512(kernel) },
+        // SAFETY: as above.
+        InstructionSet::Avx2 => return unsafe { fused::run_avx2(kernel) },
+        InstructionSet::Baseline => {}
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = set;
+    kernel.run::<Plain>()
+}

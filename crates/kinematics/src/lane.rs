@@ -1,0 +1,93 @@
+//! Eight numbers worked on at once.
+
+use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
+
+/// Poses in a group.
+pub const LANES: usize = 8;
+
+/// One value for each of eight poses; plain arithmetic element by element.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(align(64))]
+pub struct Lane(pub [f64; LANES]);
+
+impl Lane {
+    /// Zero for every pose.
+    pub const ZERO: Lane = Lane([0.0; LANES]);
+
+    /// The same value for every pose.
+    #[inline(always)]
+    pub const fn splat(value: f64) -> Lane {
+        Lane([value; LANES])
+    }
+
+    /// The values of `f(0)` to `f(7)`.
+    #[inline(always)]
+    pub fn from_fn(mut f: impl FnMut(usize) -> f64) -> Lane {
+        let mut out = [0.0; LANES];
+        for (i, value) in out.iter_mut().enumerate() {
+            *value = f(i);
+        }
+        Lane(out)
+    }
+
+    /// Sum of the eight values, in a fixed order.
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        let x = self.0;
+        ((x[0] + x[4]) + (x[1] + x[5])) + ((x[2] + x[6]) + (x[3] + x[7]))
+    }
+}
+
+impl Add for Lane {
+    type Output = Lane;
+    #[inline(always)]
+    fn add(self, other: Lane) -> Lane {
+        Lane::from_fn(|i| self.0[i] + other.0[i])
+    }
+}
+
+impl Sub for Lane {
+    type Output = Lane;
+    #[inline(always)]
+    fn sub(self, other: Lane) -> Lane {
+        Lane::from_fn(|i| self.0[i] - other.0[i])
+    }
+}
+
+impl Mul for Lane {
+    type Output = Lane;
+    #[inline(always)]
+    fn mul(self, other: Lane) -> Lane {
+        Lane::from_fn(|i| self.0[i] * other.0[i])
+    }
+}
+
+impl Mul<f64> for Lane {
+    type Output = Lane;
+    #[inline(always)]
+    fn mul(self, other: f64) -> Lane {
+        Lane::from_fn(|i| self.0[i] * other)
+    }
+}
+
+impl Neg for Lane {
+    type Output = Lane;
+    #[inline(always)]
+    fn neg(self) -> Lane {
+        Lane::from_fn(|i| -self.0[i])
+    }
+}
+
+impl AddAssign for Lane {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Lane) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Lane {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Lane) {
+        *self = *self - other;
+    }
+}
