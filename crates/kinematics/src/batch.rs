@@ -1,5 +1,7 @@
 //! Many poses at once: checks, threads, and the loop over groups of eight.
 
+use std::num::NonZeroUsize;
+
 use rayon::prelude::*;
 
 use crate::chain::Chain;
@@ -20,10 +22,10 @@ pub struct Batch<'a> {
 
 impl Chain {
     /// Batches on at most `threads` threads; `None`: as many as rayon has. Small batches use one.
-    pub fn batch(&self, threads: Option<usize>) -> Batch<'_> {
+    pub fn batch(&self, threads: Option<NonZeroUsize>) -> Batch<'_> {
         Batch {
             chain: self,
-            threads: threads.unwrap_or(usize::MAX).max(1),
+            threads: threads.map_or(usize::MAX, NonZeroUsize::get),
         }
     }
 

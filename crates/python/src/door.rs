@@ -1,0 +1,94 @@
+//! The one door into the core: it lets other Python threads run, honours Ctrl-C and translates errors.
+
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::create_exception;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use truearm_estimate::{Cancel, EstimateError};
+use truearm_kinematics::{InstructionSet, KinematicsError};
+
+create_exception!(
+    truearm._core,
+    CoreError,
+    PyValueError,
+    "The core refused its input; the message says the value, the rule and the way out."
+);
+
+/// Time between two looks at the signals: a person does not notice it, and it costs nothing measurable.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// An error of the core that becomes a Python exception.
+pub trait Failure {
+    /// The exception to raise.
+    fn into_exception(self) -> PyErr;
+}
+
+impl Failure for KinematicsError {
+    fn into_exception(self) -> PyErr {
+        CoreError::new_err(self.to_string())
+    }
+}
+
+impl Failure for EstimateError {
+    fn into_exception(self) -> PyErr {
+        CoreError::new_err(self.to_string())
+    }
+}
+
+/// Work of at most some tens of milliseconds, or that needs no interrupt: on this thread, without the lock.
+pub fn quick<T, E, F>(py: Python<'_>, work: F) -> PyResult<T>
+where
+    T: Send,
+    E: Failure + Send,
+    F: FnOnce() -> Result<T, E> + Send,
+{
+    py.detach(work).map_err(Failure::into_exception)
+}
+
+/// Long work on a thread of its own, while this one looks for signals.
+///
+/// When Python's handler of a signal raises (Ctrl-C), the token is set, the work is waited for, and what the
+/// handler raised is raised here whatever the work returned. The work must look at the token often.
+pub fn long<T, E, F>(py: Python<'_>, work: F) -> PyResult<T>
+where
+    T: Send,
+    E: Failure + Send,
+    F: FnOnce(&Cancel) -> Result<T, E> + Send,
+{
+    let cancel = Cancel::default();
+    let (finished, interrupt) = py.detach(|| {
+        thread::scope(|scope| {
+            let (running, ended) = channel::<()>();
+            let token = cancel.clone();
+            let worker = scope.spawn(move || {
+                let _running = running;
+                work(&token)
+            });
+            let mut interrupt = None;
+            while ended.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+                if let Err(raised) = Python::attach(|py| py.check_signals()) {
+                    cancel.request();
+                    interrupt.get_or_insert(raised);
+                }
+            }
+            (worker.join(), interrupt)
+        })
+    });
+    if let Some(raised) = interrupt {
+        return Err(raised);
+    }
+    match finished {
+        Ok(result) => result.map_err(Failure::into_exception),
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+}
+
+/// Refuse to start with a setting of the environment that nobody knows.
+pub fn check_environment() -> PyResult<()> {
+    InstructionSet::from_environment()
+        .map(|_| ())
+        .map_err(Failure::into_exception)
+}
