@@ -1,0 +1,94 @@
+# make demo | test | check | bench | docs, from a fresh clone. What each needs is set up in .venv once
+# and again only when what it was made from has changed. Override with: make PYTHON=/path/to/python3.12
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+CARGO ?= $(shell command -v cargo || { [ -x "$$HOME/.cargo/bin/cargo" ] && echo "$$HOME/.cargo/bin/cargo"; })
+VENV := $(CURDIR)/.venv
+BIN := $(VENV)/bin
+STAMPS := $(VENV)/stamps
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+
+export VIRTUAL_ENV := $(VENV)
+export PYO3_PYTHON := $(BIN)/python
+export PATH := $(BIN):$(if $(CARGO),$(dir $(CARGO)):)$(PATH)
+unexport CONDA_PREFIX
+
+RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -path '*/src/*') $(wildcard crates/*/Cargo.toml)
+PY_PATHS := python tests benches docs
+
+# The first interpreter that is new enough and can make a virtual environment.
+define FIND_PYTHON
+for name in python3 python3.13 python3.12 python3.14 python3.11; do \
+  if "$$name" -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+    "$$name" -c 'import sys; print(sys.executable)'; break; \
+  fi; \
+done
+endef
+PYTHON ?= $(shell $(FIND_PYTHON))
+
+.PHONY: help demo test check bench docs rust-test py-test clean
+
+help:
+	@echo 'make demo   calibrate a virtual RV-M2 and show what it gained'
+	@echo 'make test   Rust and Python tests'
+	@echo 'make check  formatting, lint, types and layers'
+	@echo 'make bench  speed against peers, with the ratio to reach beside each (BENCH=--write keeps them in docs/)'
+	@echo 'make docs   write the generated pages of docs/reference again'
+
+demo: $(STAMPS)/built
+	$(BIN)/truearm demo
+
+test: rust-test py-test
+
+rust-test: $(STAMPS)/tools
+	$(CARGO) test --locked --workspace --exclude truearm-python
+
+py-test: $(STAMPS)/built
+	$(BIN)/python -m pytest
+
+check: $(STAMPS)/built
+	$(BIN)/ruff check $(PY_PATHS)
+	$(BIN)/ruff format --check $(PY_PATHS)
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings -D clippy::too_many_lines
+
+bench: $(STAMPS)/built $(STAMPS)/bench
+	$(BIN)/python -m benches $(BENCH)
+
+docs: $(STAMPS)/built
+	$(BIN)/python docs/make_cli.py
+	$(BIN)/python docs/make_picture.py
+
+clean:
+	rm -rf $(VENV) target demo
+
+$(STAMPS)/venv:
+	@[ -n '$(PYTHON)' ] && '$(PYTHON)' -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo 'truearm needs Python 3.11 or newer with the venv module; none was found (PYTHON=$(PYTHON)).' >&2; \
+	  echo 'Install one, or name it: make PYTHON=/path/to/python3.12 $(MAKECMDGOALS)' >&2; exit 1; }
+	@[ -x '$(BIN)/python' ] || '$(PYTHON)' -m venv '$(VENV)'
+	@$(PIP) install --upgrade 'pip>=25.1'
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/tools: pyproject.toml $(STAMPS)/venv
+	@$(if $(CARGO),:,echo 'truearm needs Rust 1.89 or newer; cargo was not found.' >&2; \
+	  echo 'Install it from https://rustup.rs, or name it: make CARGO=/path/to/cargo $(MAKECMDGOALS)' >&2; exit 1)
+	@minor="$$($(CARGO) --version | cut -d. -f2)"; [ "$$minor" -ge 89 ] || { \
+	  echo "truearm needs Rust 1.89 or newer; $$($(CARGO) --version) was found. Try: rustup update stable" >&2; exit 1; }
+	$(PIP) install --group dev
+	@touch $@
+
+$(STAMPS)/bench: pyproject.toml $(STAMPS)/venv
+	$(PIP) install --group bench
+	@touch $@
+
+# The stamp is as old as the start of the build, so an edit made meanwhile is built next time.
+$(STAMPS)/built: $(RUST_SOURCES) pyproject.toml $(STAMPS)/tools
+	@touch $@.started
+	$(BIN)/maturin develop --release --locked --quiet
+	@mv $@.started $@

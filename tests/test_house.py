@@ -1,0 +1,80 @@
+"""The house keeps its own rules: layers of crates, sizes of files and functions, one version."""
+
+import ast
+import json
+import shutil
+import subprocess
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+CRATES = ["truearm-kinematics", "truearm-estimate", "truearm-field", "truearm-python"]
+LONGEST_FILE = 500
+LONGEST_FUNCTION = 60
+ROOT = Path(__file__).resolve().parents[1]
+PYTHON_FILES = [
+    path
+    for folder in ("python", "tests", "benches", "docs")
+    for path in sorted((ROOT / folder).rglob("*.py"))
+]
+RUST_FILES = sorted((ROOT / "crates").rglob("*.rs"))
+
+
+@pytest.fixture(scope="module")
+def workspace() -> dict[str, list[str]]:
+    """The crates of the workspace, each with those of ours that it depends on."""
+    cargo = shutil.which("cargo")
+    if cargo is None:
+        pytest.skip("cargo is not on the path")
+    command = [cargo, "metadata", "--format-version", "1", "--no-deps", "--offline"]
+    found = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    packages = json.loads(found.stdout)["packages"]
+    return {
+        package["name"]: [d["name"] for d in package["dependencies"] if d["name"].startswith("truearm-")]
+        for package in packages
+    }
+
+
+def test_crates_depend_one_way(workspace):
+    assert sorted(workspace) == sorted(CRATES)
+    for crate, needed in workspace.items():
+        below = CRATES[: CRATES.index(crate)]
+        assert set(needed) <= set(below), f"{crate} may depend on {below} only"
+
+
+def test_each_crate_stands_on_the_one_below(workspace):
+    for lower, upper in pairwise(CRATES):
+        assert lower in workspace[upper]
+
+
+def test_one_version_for_all():
+    workspace = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]
+    version = workspace["package"]["version"]
+    for manifest in (ROOT / "crates").glob("*/Cargo.toml"):
+        assert tomllib.loads(manifest.read_text())["package"]["version"] == {"workspace": True}, manifest
+    assert "version" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dynamic"]
+    assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_nothing_asks_for_one_processor():
+    settings = [*ROOT.glob(".cargo/*"), *ROOT.rglob("Cargo.toml"), ROOT / "pyproject.toml", ROOT / "Makefile"]
+    asking = [
+        str(path) for path in settings if ".venv" not in path.parts and "target-cpu" in path.read_text()
+    ]
+    assert asking == [], "one wheel serves all x86-64 machines: the instruction set is chosen at run time"
+
+
+@pytest.mark.parametrize("path", PYTHON_FILES + RUST_FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_are_short(path):
+    lines = len(path.read_text().splitlines())
+    assert lines <= LONGEST_FILE, "one idea, one file: divide it"
+
+
+@pytest.mark.parametrize("path", PYTHON_FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_python_functions_are_short(path):
+    tree = ast.parse(path.read_text())
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    long = {node.name: node.end_lineno - node.lineno + 1 for node in functions}
+    assert {name: lines for name, lines in long.items() if lines > LONGEST_FUNCTION} == {}
