@@ -1,0 +1,53 @@
+"""Arrays that come in from outside, checked once at the door: numbers, shape, finite."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.errors import InputError, list_rows
+
+
+def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.float64], bool]:
+    """`values` (n, columns) or (columns,) as a C-contiguous (n, columns) array.
+
+    Args:
+        values: Anything NumPy makes numbers of.
+        columns: Number of columns it must have.
+        what: What the values are, for messages, such as "joint readings".
+
+    Returns:
+        The array, and whether it was given as one row.
+
+    Raises:
+        InputError: If these are no numbers, the shape is another, or a value is not finite.
+    """
+    try:
+        array = np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} are not numbers: {error}") from None
+    single = np.ndim(values) == 1
+    rows = array.reshape(1, -1) if single else array
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        raise InputError(
+            f"{what} have shape {np.shape(values)}",
+            rule=f"The shape must be (n, {columns}), or ({columns},) for one",
+        )
+    check_finite(rows, what=what)
+    return rows, single
+
+
+def check_finite(rows: NDArray[np.float64], *, what: str) -> None:
+    """Raise InputError naming the rows of `rows` (n, ...) that hold NaN or infinite values."""
+    finite = np.isfinite(rows).reshape(len(rows), -1).all(axis=1)
+    if not finite.all():
+        bad = np.flatnonzero(~finite)
+        raise InputError(
+            f"{what} hold NaN or infinite values in {list_rows(bad.tolist())} (counted from 0)",
+            rule="All values must be finite",
+        )
+
+
+def frozen(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
+    """A read-only copy of `values` in the given shape."""
+    array = np.array(values, dtype=np.float64).reshape(shape)
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,105 @@
+"""Errors and notices of truearm: built from what went wrong, read by people.
+
+Every error says what was found, where, which rule it breaks and the way out. The command line shows
+the message and exits with status 1, or 2 for :class:`UsageError`.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+MAX_ROWS_NAMED = 10
+
+
+class TruearmError(Exception):
+    """Base of all errors that truearm raises on purpose."""
+
+
+class InputError(TruearmError):
+    """A file or a value that cannot be used.
+
+    Attributes:
+        what: What was found, with the value.
+        where: File, key, column or argument; empty when there is none.
+        rule: What it should have been.
+        way_out: What the user can do about it.
+    """
+
+    def __init__(self, what: str, *, where: str = "", rule: str = "", way_out: str = "") -> None:
+        self.what, self.where, self.rule, self.way_out = what, where, rule, way_out
+        head = f"{where}: {what}" if where else what
+        super().__init__(" ".join(_sentence(part) for part in (head, rule, way_out) if part))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), self.what, self.where, self.rule, self.way_out)
+
+    def at(self, where: str) -> "InputError":
+        """The same error, found in `where`; a place it already names stays behind it."""
+        place = f"{where}, {self.where}" if self.where else where
+        return type(self)(self.what, where=place, rule=self.rule, way_out=self.way_out)
+
+
+class UsageError(InputError):
+    """Options or arguments that contradict each other or cannot be read."""
+
+
+class WorkError(InputError):
+    """The input is well formed, and still the work could not be done."""
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something the user should know that stops nothing.
+
+    Attributes:
+        kind: Short name for programs, such as "limits" or "identical_rows".
+        message: The whole sentence for people.
+        rows: Data rows it is about, counted from 1 within their files.
+    """
+
+    kind: str
+    message: str
+    rows: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        return self.message
+
+
+def list_rows(rows: Iterable[int], noun: str = "row") -> str:
+    """The rows in words, the first ten by number: "row 3", "rows 1, 2 and 5", "rows 1, ... and 7 more"."""
+    numbers = [str(row) for row in rows]
+    if len(numbers) == 1:
+        return f"{noun} {numbers[0]}"
+    named, rest = numbers[:MAX_ROWS_NAMED], len(numbers) - MAX_ROWS_NAMED
+    if rest > 0:
+        return f"{noun}s {', '.join(named)} and {rest} more"
+    return f"{noun}s {', '.join(named[:-1])} and {named[-1]}"
+
+
+def list_names(names: Iterable[str], last: str = "and") -> str:
+    """Quoted names in words: "a", "b" and "c"."""
+    quoted = [f'"{name}"' for name in names]
+    if len(quoted) <= 1:
+        return "".join(quoted)
+    return f"{', '.join(quoted[:-1])} {last} {quoted[-1]}"
+
+
+def nearest(name: str, known: Sequence[str], count: int = 3) -> list[str]:
+    """The known names most like `name`, best first, case ignored; empty when none is like it."""
+    by_folded = {candidate.casefold(): candidate for candidate in known}
+    found = get_close_matches(name.casefold(), list(by_folded), n=count, cutoff=0.6)
+    return [by_folded[folded] for folded in found]
+
+
+def did_you_mean(name: str, known: Sequence[str]) -> str:
+    """A question naming the nearest known names, or nothing."""
+    near = nearest(name, known)
+    return f"Did you mean {list_names(near, last='or')}?" if near else ""
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith((".", "?", "!", ":")) else f"{text}."
+
+
+def _rebuild(kind: type[InputError], what: str, where: str, rule: str, way_out: str) -> InputError:
+    return kind(what, where=where, rule=rule, way_out=way_out)

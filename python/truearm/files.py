@@ -1,0 +1,93 @@
+"""Reading and writing whole files, with errors that name the file and the way out."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from truearm.errors import InputError
+
+_SIGNATURES = (
+    (b"PK\x03\x04", "a ZIP archive, such as an Excel workbook"),
+    (b"\xd0\xcf\x11\xe0", "an old Office document"),
+    (b"%PDF", "a PDF"),
+    (b"SQLite format 3\x00", "an SQLite database"),
+    (b"\x89PNG", "an image"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"\x89HDF", "an HDF5 file"),
+)
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a file.
+
+    Raises:
+        InputError: If there is no such file, it is a directory, or it may not be read.
+    """
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError("there is no such file", where=str(path)) from None
+    except IsADirectoryError:
+        raise InputError("this is a directory", where=str(path), rule="A file is needed") from None
+    except PermissionError:
+        raise InputError("no permission to read this file", where=str(path)) from None
+
+
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file, with or without byte order mark.
+
+    Raises:
+        InputError: As for :func:`read_bytes`, and if the file is not text in UTF-8.
+    """
+    return decode_text(read_bytes(path), where=str(path))
+
+
+def decode_text(content: bytes, *, where: str) -> str:
+    """`content` as UTF-8 text.
+
+    Raises:
+        InputError: If it is not text; says what it is where that can be told from its first bytes.
+    """
+    for signature, kind in _SIGNATURES:
+        if content.startswith(signature):
+            raise InputError(f"this is {kind}, not text", where=where, way_out="Export it as text")
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError("this is UTF-16 text", where=where, way_out="Save it as UTF-8")
+    if b"\x00" in content:
+        raise InputError("this is binary data, not text", where=where)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"line {line} holds bytes that are not UTF-8", where=where, way_out="Save it as UTF-8"
+        ) from None
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file completely or not at all: a neighbour is written, then renamed.
+
+    Raises:
+        InputError: If the directory does not exist or may not be written to.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    try:
+        handle, neighbour = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    except FileNotFoundError:
+        raise InputError("there is no such directory", where=str(path.parent)) from None
+    except PermissionError:
+        raise InputError("no permission to write here", where=str(path.parent)) from None
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(neighbour).chmod(0o666 & ~_umask())
+        Path(neighbour).replace(path)
+    except BaseException:
+        Path(neighbour).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

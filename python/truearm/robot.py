@@ -1,0 +1,275 @@
+"""The robot: nominal Denavit-Hartenberg table, fixed transforms, coupling and limits."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Literal, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm import robot_dict, robot_toml
+from truearm._core import Chain
+from truearm.arrays import as_rows, frozen
+from truearm.errors import InputError
+from truearm.files import read_text
+from truearm.library import library_text
+from truearm.robot_file import parse_robot_file
+from truearm.urdf import read_urdf
+
+Convention = Literal["standard", "modified"]
+Joint = Literal["revolute", "prismatic"]
+Floats = NDArray[np.float64]
+
+URDF_ENDINGS: Final = (".urdf", ".xml")
+MIN_COUPLING_DETERMINANT: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What the arm carried: mass, and centre of gravity in the flange frame."""
+
+    mass_kg: float
+    centre_of_gravity_mm: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A serial arm as its maker means it to be. SI units; all arrays are read-only.
+
+    Parameters are in the order links, base to flange, and within a link theta, d, a, alpha, beta.
+    A joint reading becomes a Denavit-Hartenberg joint value by q_dh = coupling . reading; it is added
+    to theta of a revolute joint's row, to d of a prismatic joint's row.
+
+    base_from_tool = base . A1 ... AN . flange . tool, where A is
+    Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) in the standard convention and
+    Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d) in the modified one.
+
+    Attributes:
+        name: What people call it.
+        source: Where its numbers come from.
+        convention: "standard" or "modified".
+        joints: "revolute" or "prismatic" for each of the N joints.
+        table: Nominal parameters (N, 5).
+        base: Fixed transform (4, 4) before the first link.
+        flange: Fixed transform (4, 4) after the last link.
+        tool: Fixed transform (4, 4) from flange to tool.
+        base_row: Denavit-Hartenberg row (5,) that `base` was given as, or None.
+        coupling: Joint values from readings (N, N), directions included.
+        limits: Lowest and highest reading (N, 2); infinite where there is none.
+        payload: What the arm carried, if stated.
+    """
+
+    name: str
+    source: str
+    convention: Convention
+    joints: tuple[Joint, ...]
+    table: Floats
+    base: Floats
+    flange: Floats
+    tool: Floats
+    base_row: Floats | None
+    coupling: Floats
+    limits: Floats
+    payload: Payload | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.joints)
+        shapes = {"table": (n, 5), "base": (4, 4), "flange": (4, 4), "tool": (4, 4)}
+        shapes |= {"coupling": (n, n), "limits": (n, 2)}
+        for field, shape in shapes.items():
+            object.__setattr__(self, field, _checked(field, getattr(self, field), shape))
+        if self.base_row is not None:
+            object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
+        if abs(np.linalg.det(self.coupling)) < MIN_COUPLING_DETERMINANT:
+            raise InputError(
+                "the coupling matrix is singular",
+                where="coupling",
+                rule="Every joint value must come from one set of readings only",
+            )
+
+    @classmethod
+    def load(cls, name_or_path: str | Path) -> "Robot":
+        """A robot of the library by name (case ignored), or from a TOML or URDF file.
+
+        A URDF's chain is given behind its path: "arm.urdf#tool0" or "arm.urdf#base_link,tool0".
+
+        Raises:
+            InputError: If there is no such robot or file, or the file breaks a rule.
+        """
+        given = str(name_or_path)
+        path = Path(given)
+        urdf, _, chain = given.partition("#")
+        if Path(urdf).suffix.lower() in URDF_ENDINGS:
+            *base, tip = [part.strip() or None for part in chain.split(",")]
+            return cls.from_urdf(urdf, base_link=base[0] if base else None, tip_link=tip)
+        if path.suffix.lower() == ".xacro":
+            raise InputError(
+                "this is a xacro macro, not a URDF",
+                where=given,
+                way_out=f"Expand it first: xacro {path.name} > {path.stem}.urdf",
+            )
+        if path.suffix.lower() == ".toml" or path.exists() or "/" in given or "\\" in given:
+            return cls.from_toml(read_text(path), where=given)
+        name, text = library_text(given)
+        return cls.from_toml(text, where=f"{name}.toml")
+
+    @classmethod
+    def from_toml(cls, text: str, *, where: str = "robot") -> "Robot":
+        """A robot from the text of a robot file; `where` names it in messages.
+
+        Raises:
+            InputError: If the text is no robot file; names the key and the rule.
+        """
+        file = parse_robot_file(text, where=where)
+        fields = robot_toml.fields_of(file)
+        payload = None
+        if file.payload is not None:
+            centre = file.payload.centre_of_gravity_mm
+            payload = Payload(file.payload.mass_kg, cast("Any", tuple(centre)) if centre else None)
+        try:
+            return cls(**fields, payload=payload)
+        except InputError as error:
+            raise error.at(where) from None
+
+    @classmethod
+    def from_urdf(
+        cls, path: str | Path, base_link: str | None = None, tip_link: str | None = None
+    ) -> "Robot":
+        """A robot from the chain of a URDF, converted exactly to standard Denavit-Hartenberg rows.
+
+        Args:
+            path: The URDF. Meshes are not read.
+            base_link: Link in whose frame poses are given; the root by default.
+            tip_link: Link that is the flange; the only leaf by default.
+
+        Raises:
+            InputError: If the file is no URDF, or the chain is not told, or is not serial.
+        """
+        chain = read_urdf(Path(path), base_link, tip_link)
+        return cls(
+            name=chain.name,
+            source=f"{Path(path).name}, {chain.base_link} to {chain.tip_link}",
+            convention="standard",
+            joints=chain.joints,
+            table=chain.table,
+            base=chain.base,
+            flange=chain.flange,
+            tool=np.eye(4),
+            base_row=None,
+            coupling=np.eye(len(chain.joints)),
+            limits=chain.limits,
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Robot) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.convention, self.joints, self.table.tobytes()))
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints, N."""
+        return len(self.joints)
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The compiled chain from base to tool, over Denavit-Hartenberg joint values."""
+        return self._chain(self.flange @ self.tool)
+
+    @cached_property
+    def flange_chain(self) -> Chain:
+        """The compiled chain from base to flange, over Denavit-Hartenberg joint values."""
+        return self._chain(self.flange)
+
+    def joints_from_readings(self, q: ArrayLike) -> Floats:
+        """Denavit-Hartenberg joint values of readings `q`, (n, N) or (N,)."""
+        rows, single = self._readings(q)
+        values = self._values(rows)
+        return values[0] if single else values
+
+    def readings_from_joints(self, q_dh: ArrayLike) -> Floats:
+        """Readings of Denavit-Hartenberg joint values `q_dh`, (n, N) or (N,)."""
+        rows, single = as_rows(q_dh, self.joint_count, what="joint values")
+        readings = np.linalg.solve(self.coupling, rows.T).T
+        return readings[0] if single else readings
+
+    def position(self, q: ArrayLike, out: Floats | None = None) -> Floats:
+        """Tool points in the base frame, m: (n, 3) for readings `q` (n, N), (3,) for (N,)."""
+        rows, single = self._readings(q)
+        result = self.chain.position(self._values(rows), out=_batched(out, single=single))
+        return result[0] if single else result
+
+    def pose(self, q: ArrayLike, out: Floats | None = None) -> Floats:
+        """base_from_tool: (n, 4, 4) for readings `q` (n, N), (4, 4) for (N,)."""
+        rows, single = self._readings(q)
+        result = self.chain.pose(self._values(rows), out=_batched(out, single=single))
+        return result[0] if single else result
+
+    def parameter_jacobian(self, q: ArrayLike, pose: bool = False, out: Floats | None = None) -> Floats:
+        """Derivatives with respect to the 5 N parameters of the links, link by link.
+
+        Args:
+            q: Readings (n, N) or (N,).
+            pose: Whether to add the rotation, as a rotation vector in the base frame.
+            out: Array to write to.
+
+        Returns:
+            (n, 3, 5 N), or (n, 6, 5 N) with translation first; without n for one reading.
+        """
+        rows, single = self._readings(q)
+        values, target = self._values(rows), _batched(out, single=single)
+        result = self.chain.parameter_jacobian(values, pose=pose, out=target)
+        return result[0] if single else result
+
+    def joint_jacobian(self, q: ArrayLike, pose: bool = False) -> Floats:
+        """Derivatives with respect to the readings: (n, 3, N), (n, 6, N) with `pose`; no n for (N,)."""
+        rows, single = self._readings(q)
+        result = self.chain.joint_jacobian(self._values(rows), pose=pose) @ self.coupling
+        return result[0] if single else result
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fields as JSON values; from_dict gives the same robot, bit for bit."""
+        return robot_dict.to_dict(self)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Robot":
+        """The robot that `to_dict` described.
+
+        Raises:
+            InputError: If a key is missing or a value has another shape.
+        """
+        fields = robot_dict.fields_of(content)
+        payload = fields.pop("payload")
+        return cls(**fields, payload=None if payload is None else Payload(**payload))
+
+    def to_toml(self) -> str:
+        """The text of a robot file in m and rad that from_toml reads back to this robot."""
+        return robot_toml.write(self)
+
+    def _chain(self, end: Floats) -> Chain:
+        return Chain(self.convention, list(self.joints), self.table, self.base, end)
+
+    def _readings(self, q: ArrayLike) -> tuple[Floats, bool]:
+        return as_rows(q, self.joint_count, what=f"joint readings of {self.name}")
+
+    def _values(self, readings: Floats) -> Floats:
+        return readings if self._uncoupled else np.ascontiguousarray(readings @ self.coupling.T)
+
+    @cached_property
+    def _uncoupled(self) -> bool:
+        return bool(np.array_equal(self.coupling, np.eye(self.joint_count)))
+
+
+def _batched(out: Floats | None, *, single: bool) -> Floats | None:
+    return out[None] if single and out is not None else out
+
+
+def _checked(field: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != shape:
+        raise InputError(f"shape {array.shape}", where=field, rule=f"The shape must be {shape}")
+    if field != "limits" and not np.isfinite(array).all():
+        raise InputError("NaN or infinite value", where=field, rule="All values must be finite")
+    return frozen(array, *shape)

@@ -1,0 +1,67 @@
+"""A Robot as JSON values, and back, bit for bit."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+
+if TYPE_CHECKING:
+    from truearm.robot import Robot
+
+TEXTS: Final = ("name", "source", "convention")
+ARRAYS: Final = ("table", "base", "flange", "tool", "coupling")
+
+
+def to_dict(robot: "Robot") -> dict[str, Any]:
+    """All fields as JSON values; an absent limit is null."""
+    content: dict[str, Any] = {key: getattr(robot, key) for key in TEXTS}
+    content["joints"] = list(robot.joints)
+    content |= {key: getattr(robot, key).tolist() for key in ARRAYS}
+    content["base_row"] = None if robot.base_row is None else robot.base_row.tolist()
+    content["limits"] = [[_finite_or_none(bound) for bound in row] for row in robot.limits.tolist()]
+    payload = robot.payload
+    content["payload"] = None
+    if payload is not None:
+        centre = payload.centre_of_gravity_mm
+        content["payload"] = {
+            "mass_kg": payload.mass_kg,
+            "centre_of_gravity_mm": None if centre is None else list(centre),
+        }
+    return content
+
+
+def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of Robot from what to_dict gave; the payload is a dictionary of its own.
+
+    Raises:
+        InputError: If a key is missing.
+    """
+    keys = (*TEXTS, *ARRAYS, "joints", "base_row", "limits", "payload")
+    missing = [key for key in keys if key not in content]
+    if missing:
+        raise InputError(f'key "{missing[0]}" is missing', where="robot")
+    fields: dict[str, Any] = {key: content[key] for key in TEXTS}
+    fields |= {key: np.array(content[key], dtype=np.float64) for key in ARRAYS}
+    fields["joints"] = tuple(content["joints"])
+    row = content["base_row"]
+    fields["base_row"] = None if row is None else np.array(row, dtype=np.float64)
+    fields["limits"] = _limits(content["limits"])
+    payload = content["payload"]
+    if payload is not None:
+        centre = payload["centre_of_gravity_mm"]
+        payload = {**payload, "centre_of_gravity_mm": None if centre is None else tuple(centre)}
+    fields["payload"] = payload
+    return fields
+
+
+def _finite_or_none(bound: float) -> float | None:
+    return bound if np.isfinite(bound) else None
+
+
+def _limits(rows: list[list[float | None]]) -> NDArray[np.float64]:
+    lower = [-np.inf if low is None else low for low, _ in rows]
+    upper = [np.inf if high is None else high for _, high in rows]
+    return np.column_stack([lower, upper]).astype(np.float64)

@@ -1,0 +1,32 @@
+"""Units at the edges: metres and radians per unit that a file or an option may state."""
+
+import math
+from typing import Final, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+LengthUnit = Literal["m", "mm"]
+AngleUnit = Literal["rad", "deg"]
+
+LENGTH_UNITS: Final = ("m", "mm")
+ANGLE_UNITS: Final = ("rad", "deg")
+RADIANS_PER_DEGREE: Final = math.pi / 180.0
+MM_PER_METRE: Final = 1e3
+
+Number = TypeVar("Number", float, NDArray[np.float64])
+
+
+def to_si(value: Number, unit: str) -> Number:
+    """`value` in metres or radians; millimetres are divided, so that decimal ones stay exact.
+
+    Raises:
+        KeyError: If `unit` is none of m, mm, rad and deg.
+    """
+    if unit == "mm":
+        return value / MM_PER_METRE
+    if unit == "deg":
+        return value * RADIANS_PER_DEGREE
+    if unit in ("m", "rad"):
+        return value
+    raise KeyError(unit)

@@ -1,0 +1,189 @@
+"""Reading a URDF: the chain from base link to tip link as standard Denavit-Hartenberg rows.
+
+Meshes, inertias and limits of effort are not read.
+"""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.dh_from_axes import Axis, dh_from_axes
+from truearm.errors import InputError, did_you_mean, list_names
+from truearm.files import read_text
+
+Floats = NDArray[np.float64]
+Kind = Literal["revolute", "prismatic"]
+MOVING: Final[Mapping[str, Kind]] = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+}
+
+
+@dataclass(frozen=True)
+class UrdfChain:
+    """A serial chain of a URDF in standard Denavit-Hartenberg form, SI units.
+
+    Attributes:
+        name: Name of the robot in the file.
+        base_link: First link of the chain.
+        tip_link: Last link of the chain.
+        joints: Kind of each of the N joints that move.
+        table: Parameters (N, 5).
+        base: Transform (4, 4) from the base link to the first row.
+        flange: Transform (4, 4) from the last row to the tip link.
+        limits: Lowest and highest joint value (N, 2).
+    """
+
+    name: str
+    base_link: str
+    tip_link: str
+    joints: tuple[Kind, ...]
+    table: Floats
+    base: Floats
+    flange: Floats
+    limits: Floats
+
+
+def read_urdf(path: Path, base_link: str | None = None, tip_link: str | None = None) -> UrdfChain:
+    """The chain from `base_link` (the root by default) to `tip_link` (the only leaf by default).
+
+    Raises:
+        InputError: If the file is no URDF, a link is unknown, several leaves leave the tip open, or
+            the chain has no joint that moves or one that is neither revolute nor prismatic.
+    """
+    try:
+        return _read(path, base_link, tip_link)
+    except InputError as error:
+        raise error if error.where.startswith(str(path)) else error.at(str(path)) from None
+
+
+def _read(path: Path, base_link: str | None, tip_link: str | None) -> UrdfChain:
+    robot = _parse(read_text(path))
+    joint_to = {joint.child: joint for joint in robot.joints}
+    parents = {joint.parent for joint in robot.joints}
+    links = [link.name for link in robot.links]
+    base = base_link or _only([name for name in links if name not in joint_to], "base_link", links)
+    leaves = [name for name in links if name not in parents]
+    tip = tip_link or _only(leaves, "tip_link", links)
+    for name in (base, tip):
+        if name not in links:
+            hint = did_you_mean(name, links) or f"Its links end in {list_names(leaves)}"
+            raise InputError(f'there is no link "{name}"', rule=hint)
+    joints = _path(joint_to, base, tip)
+    axes, base_from_tip = _axes(joints)
+    if not axes:
+        raise InputError(f'no joint moves between "{base}" and "{tip}"')
+    base_transform, table, flange = dh_from_axes(axes, base_from_tip)
+    return UrdfChain(
+        name=robot.name,
+        base_link=base,
+        tip_link=tip,
+        joints=tuple(axis.kind for axis in axes),
+        table=table,
+        base=base_transform,
+        flange=flange,
+        limits=np.array([_limits(joint) for joint in joints if joint.type in MOVING]),
+    )
+
+
+def _parse(text: str) -> Any:  # noqa: ANN401
+    """The parser's robot: links and joints with their origins, axes and limits."""
+    from yourdfpy import URDF  # noqa: PLC0415
+
+    _check_is_urdf(text)
+    try:
+        model = URDF.load(io.BytesIO(text.encode()), build_scene_graph=False, load_meshes=False)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"the URDF cannot be read: {error}",
+            rule="Every joint needs a name, a type, a parent, a child and numbers in its attributes",
+        ) from None
+    return model.robot
+
+
+def _check_is_urdf(text: str) -> None:
+    roots: list[str] = []
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda name, _: roots.append(name) if not roots else None
+    try:
+        parser.Parse(text.encode(), True)
+    except expat.ExpatError as error:
+        raise InputError(f"not XML: {error}", rule="A URDF is an XML file") from None
+    if roots != ["robot"]:
+        raise InputError(f"the XML is a <{roots[0]}>", rule="A URDF is a <robot>")
+
+
+def _only(candidates: Sequence[str], argument: str, links: Sequence[str]) -> str:
+    if len(candidates) == 1:
+        return candidates[0]
+    if not candidates:
+        raise InputError(f"its {len(links)} links form no tree")
+    way_out = f'Name one: {argument}=..., or "FILE.urdf#TIP" or "FILE.urdf#BASE,TIP" where a robot is named'
+    raise InputError(
+        f"the chain may {'end' if argument == 'tip_link' else 'start'} at {list_names(candidates, 'or')}",
+        way_out=way_out,
+    )
+
+
+def _path(joint_to: Mapping[str, Any], base: str, tip: str) -> list[Any]:
+    """Joints from `base` to `tip`, in this order."""
+    joints: list[Any] = []
+    link = tip
+    while link != base:
+        if link not in joint_to or len(joints) > len(joint_to):
+            raise InputError(f'link "{tip}" is not behind link "{base}"')
+        joints.insert(0, joint_to[link])
+        link = joint_to[link].parent
+    return joints
+
+
+def _axes(joints: Sequence[Any]) -> tuple[list[Axis], Floats]:
+    """Axes of the joints that move, and base_from_tip (4, 4), all joints at zero."""
+    frame = np.eye(4)
+    axes = []
+    for joint in joints:
+        if joint.origin is not None:
+            frame = frame @ joint.origin
+        if joint.type in MOVING:
+            if joint.mimic is not None:
+                raise InputError(
+                    f'it follows joint "{joint.mimic.joint}"',
+                    where=f'joint "{joint.name}"',
+                    rule="Every joint of the chain must move by itself",
+                    way_out="Describe the arm in a robot file with [coupling]",
+                )
+            axes.append(Axis(MOVING[joint.type], frame[:3, 3], frame[:3, :3] @ _direction(joint)))
+        elif joint.type != "fixed":
+            raise InputError(
+                f"its type is {joint.type}",
+                where=f'joint "{joint.name}"',
+                rule="The chain may have revolute, continuous, prismatic and fixed joints",
+            )
+    return axes, frame
+
+
+def _direction(joint: Any) -> Floats:  # noqa: ANN401
+    length = np.linalg.norm(joint.axis)
+    if joint.axis.shape != (3,) or not 0.0 < length < np.inf:
+        raise InputError(f"axis {joint.axis} has no direction", where=f'joint "{joint.name}"')
+    return np.asarray(joint.axis / length)
+
+
+def _limits(joint: Any) -> tuple[float, float]:  # noqa: ANN401
+    limit = joint.limit
+    if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
+        return -np.inf, np.inf
+    if limit.lower >= limit.upper:
+        raise InputError(
+            f"limits {limit.lower:g} to {limit.upper:g}",
+            where=f'joint "{joint.name}"',
+            rule="The lower limit must be below the upper one",
+        )
+    return limit.lower, limit.upper
