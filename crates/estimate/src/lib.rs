@@ -1,1 +1,41 @@
-//! Identification of constant error parameters from measurements.
+//! Identification of constant calibrated error parameters (CEPs) from measurements.
+//!
+//! The measurement model is that of one group (set-up):
+//! `measured target = world_from_base . base . A1 ... AN . flange . target`, with the links' parameters
+//! nominal + CEP, and `world_from_base` and the target points unknown in every group. All residuals and
+//! Jacobians are taken in the robot's base frame, where isotropic noise stays isotropic.
+//!
+//! Order of unknowns everywhere: active link parameters (links in order, within a link theta, d, a, alpha,
+//! beta), then group by group: translation (3) and rotation (3) of `world_from_base`, target points
+//! (3 each), target rotation (3, where orientation is measured), anchors (3 each, of distances).
+
+mod cancel;
+mod constant;
+pub mod dense;
+mod distance;
+mod error;
+mod identifiability;
+mod layout;
+mod measurements;
+mod minimise;
+mod noise;
+mod normal;
+mod packets;
+mod pass;
+mod robust;
+mod rows;
+mod setup;
+mod start;
+
+pub use cancel::Cancel;
+pub use constant::{ConstantFit, ConstantOptions, Prior, fit_constant};
+pub use distance::{Distance, DistanceTo};
+pub use error::EstimateError;
+pub use identifiability::{Confounded, Identifiability, identifiability};
+pub use layout::{Layout, Problem};
+pub use measurements::{MeasurementSet, Noise};
+pub use minimise::Reason;
+pub use robust::Robust;
+pub use rows::{Linearised, Point, linearise, residuals};
+pub use setup::{FrameMode, GroupSetup, Setup};
+pub use start::initial_setup;

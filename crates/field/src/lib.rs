@@ -1,1 +1,33 @@
-//! Error parameters that vary with the configuration: banks of fuzzy cells.
+//! Error parameters that vary with the configuration: a bank of fuzzy association cells (FCMAC blocks) whose
+//! weights are inferred from the measurements themselves.
+//!
+//! A measured residual is `r = J(q) CEP(q) + noise` with `CEP(q)` the sum of blocks, each a grid of cells over a
+//! few inputs whose B-spline memberships weigh the cells' CEPs. Each block's weights have a Gaussian prior
+//! (a kernel on its cells), so that fit, evidence and standard deviation are those of exact Gaussian inference.
+//!
+//! Blocks: `constant` (the constants, kernel one), `own` (theta of a revolute joint, d of a prismatic one, over that
+//! joint), `smooth` (all CEPs over each input separately), `major` (all CEPs over at most three joints together).
+
+mod bank;
+mod cells;
+mod error;
+mod evidence;
+mod fit;
+mod hyper;
+mod kernel;
+mod optimise;
+mod outliers;
+mod pairs;
+mod posterior;
+mod select;
+mod training;
+
+pub use bank::{Bank, Block};
+pub use cells::{Axis, Grid};
+pub use error::FieldError;
+pub use fit::{FieldFit, FieldOptions, fit_field, restore};
+pub use hyper::Hyper;
+pub use kernel::{Input, InputKind};
+pub use outliers::Judgement;
+pub use posterior::Posterior;
+pub use training::{Class, Column, Training};

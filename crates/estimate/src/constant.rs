@@ -1,0 +1,294 @@
+//! Constant CEPs: one correction of each identified parameter for the whole arm.
+//!
+//! Minimises `sum w |residual|^2 / (noise^2 + sigma^2) + sum (CEP / prior)^2`. Noise, prior scale and robust
+//! weights depend on the residuals and are renewed between minimisations until they rest: noise from the
+//! residual squares and the degrees of freedom that the prior leaves, the prior's scale by the evidence
+//! (MacKay 1992: sum of squares over the well-determined number of parameters).
+
+use faer::{Mat, Par};
+
+use crate::dense::Cholesky;
+use crate::layout::{Layout, Problem};
+use crate::measurements::Noise;
+use crate::minimise::{Minimum, Objective, Reason, State};
+use crate::noise::Squares;
+use crate::packets::Packets;
+use crate::robust::{Robust, scale_from_median};
+use crate::rows::{Point, residuals};
+use crate::setup::Setup;
+use crate::start::initial_setup;
+use crate::{Cancel, EstimateError};
+
+/// Gaussian prior of the corrections, zero mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Standard deviation of lengths, m.
+    pub length: f64,
+    /// Standard deviation of angles, rad.
+    pub angle: f64,
+    /// Whether the evidence scales both.
+    pub scaled: bool,
+}
+
+impl Default for Prior {
+    fn default() -> Self {
+        Self { length: 2e-3, angle: 2e-3, scaled: true }
+    }
+}
+
+impl Prior {
+    /// Standard deviation of the parameter with index 5 * link + (theta, d, a, alpha, beta).
+    pub fn of(&self, column: usize) -> f64 {
+        if matches!(column % 5, 1 | 2) { self.length } else { self.angle }
+    }
+}
+
+/// How constants are fitted.
+#[derive(Debug, Clone, Default)]
+pub struct ConstantOptions {
+    /// Prior of the corrections; none leaves them to the data alone.
+    pub prior: Option<Prior>,
+    /// Known noise; estimated from the residuals where there is none.
+    pub noise: Option<Noise>,
+    /// Loss; `None` is least squares.
+    pub robust: Option<Robust>,
+    /// A set-up to start from, instead of the closed form.
+    pub start: Option<Setup>,
+    /// Looked at between iterations.
+    pub cancel: Cancel,
+}
+
+/// Constant CEPs with what is needed to judge them.
+#[derive(Debug, Clone)]
+pub struct ConstantFit {
+    /// Absolute link parameters (5 L,).
+    pub parameters: Vec<f64>,
+    /// Frames, targets and anchors.
+    pub setup: Setup,
+    /// Covariance of all unknowns in the layout's order, (u, u), SI.
+    pub covariance: Mat<f64>,
+    /// Noise beside the rows' own sigma.
+    pub noise: Noise,
+    /// Factor on the prior's standard deviations that the evidence chose.
+    pub prior_scale: f64,
+    /// Unweighted residuals (n, m) in the base frame.
+    pub residuals: Vec<f64>,
+    /// Robust weights (n,), one where least squares was asked for.
+    pub weights: Vec<f64>,
+    /// Steps of the last minimisation.
+    pub iterations: usize,
+    /// Why it ended.
+    pub reason: Reason,
+}
+
+/// Rounds of noise, prior scale and weights at the most, and the relative change at which they rest.
+const ROUNDS: usize = 30;
+const REST: f64 = 1e-3;
+/// The evidence may shrink the prior to a tenth and widen it five times: beyond, weak priors bend the tool.
+const SCALE_RANGE: (f64, f64) = (0.1, 5.0);
+
+/// Fits the columns' constants and the set-up.
+///
+/// # Errors
+/// [`EstimateError`] where lengths or values are wrong, measurements are too few or too alike, or on request.
+pub fn fit_constant(problem: &Problem, options: &ConstantOptions) -> Result<ConstantFit, EstimateError> {
+    problem.check(options.prior.is_some())?;
+    let nominal = problem.chain.nominal();
+    let setup = match &options.start {
+        Some(setup) => setup.clone(),
+        None => initial_setup(problem, &nominal)?,
+    };
+    let fit = Fit { problem, options, packets: &Packets::new(problem.measurements), nominal: &nominal };
+    fit.run(State { parameters: nominal.clone(), setup })
+}
+
+struct Fit<'a> {
+    problem: &'a Problem<'a>,
+    options: &'a ConstantOptions,
+    packets: &'a Packets,
+    nominal: &'a [f64],
+}
+
+/// What is renewed between minimisations.
+#[derive(Clone)]
+struct Balance {
+    noise: Noise,
+    scale: f64,
+    weights: Vec<f64>,
+}
+
+impl Fit<'_> {
+    fn precision(&self, scale: f64) -> Vec<f64> {
+        let of = |&column: &usize| self.options.prior.map_or(0.0, |prior| (scale * prior.of(column)).powi(-2));
+        self.problem.columns.iter().map(of).collect()
+    }
+
+    fn minimise(&self, start: State, balance: &Balance) -> Result<Minimum, EstimateError> {
+        let objective = Objective {
+            problem: self.problem,
+            packets: self.packets,
+            weighting: Some((balance.noise, &balance.weights)),
+            precision: &self.precision(balance.scale),
+            nominal: self.nominal,
+            cancel: &self.options.cancel,
+        };
+        objective.minimise(start)
+    }
+
+    fn run(&self, start: State) -> Result<ConstantFit, EstimateError> {
+        let set = self.problem.measurements;
+        let noise = self.options.noise.unwrap_or(Noise::GUESS);
+        let mut balance = Balance { noise, scale: 1.0, weights: set.weight.clone() };
+        let mut minimum = self.minimise(start, &balance)?;
+        for _ in 0..ROUNDS {
+            let covariance = self.covariance(&minimum, &balance)?;
+            let residuals = self.residuals(&minimum.state)?;
+            let renewed = self.renewed(&balance, &minimum, &covariance, &residuals);
+            let settled = self.settled(&balance, &renewed);
+            balance = renewed;
+            if settled {
+                break;
+            }
+            minimum = self.minimise(minimum.state, &balance)?;
+        }
+        let covariance = self.covariance(&minimum, &balance)?;
+        let residuals = self.residuals(&minimum.state)?;
+        let Minimum { state, iterations, reason, .. } = minimum;
+        Ok(ConstantFit {
+            parameters: state.parameters,
+            setup: state.setup,
+            covariance,
+            noise: balance.noise,
+            prior_scale: balance.scale,
+            residuals,
+            weights: balance.weights,
+            iterations,
+            reason,
+        })
+    }
+
+    fn residuals(&self, state: &State) -> Result<Vec<f64>, EstimateError> {
+        residuals(self.problem, Point { parameters: &state.parameters, setup: &state.setup })
+    }
+
+    /// Inverse of the normal equations with the prior, rescaled to the balance's noise.
+    fn covariance(&self, minimum: &Minimum, balance: &Balance) -> Result<Mat<f64>, EstimateError> {
+        let mut matrix = minimum.normal.matrix.clone();
+        for (k, precision) in self.precision(balance.scale).into_iter().enumerate() {
+            matrix[(k, k)] += precision;
+        }
+        let n = matrix.nrows();
+        let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
+        let scaled = Mat::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        let factor = Cholesky::new(scaled, Par::Seq).ok_or_else(|| EstimateError::Singular {
+            unknowns: n,
+            rows: self.problem.measurements.measured_values(),
+        })?;
+        let inverse = factor.inverse();
+        Ok(Mat::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+    }
+
+    fn renewed(&self, old: &Balance, minimum: &Minimum, covariance: &Mat<f64>, residuals: &[f64]) -> Balance {
+        let arm = self.problem.columns.len();
+        let precision = self.precision(old.scale);
+        let determined = |k: usize| 1.0 - precision[k] * covariance[(k, k)];
+        let effective: f64 = (0..arm).map(determined).sum();
+        let fixed = (Layout::new(self.problem).len() - arm) as f64;
+        let noise = self.options.noise.unwrap_or_else(|| self.noise(old, residuals, effective + fixed));
+        let scale = match self.options.prior {
+            Some(prior) if prior.scaled && arm > 0 => self.prior_scale(&prior, minimum, effective),
+            _ => 1.0,
+        };
+        let weights = match self.options.robust {
+            Some(robust) => self.robust_weights(robust, noise, residuals),
+            None => old.weights.clone(),
+        };
+        Balance { noise, scale, weights }
+    }
+
+    fn prior_scale(&self, prior: &Prior, minimum: &Minimum, effective: f64) -> f64 {
+        let squares: f64 = self
+            .problem
+            .columns
+            .iter()
+            .map(|&column| ((minimum.state.parameters[column] - self.nominal[column]) / prior.of(column)).powi(2))
+            .sum();
+        (squares / effective.max(1.0)).sqrt().clamp(SCALE_RANGE.0, SCALE_RANGE.1)
+    }
+
+    /// Noise of positions (or distances) and of orientations; the unknowns are shared out by rows.
+    fn noise(&self, old: &Balance, residuals: &[f64], unknowns: f64) -> Noise {
+        let (position, orientation) = self.squares(residuals, &old.weights);
+        let rows = (position.rows.len() + orientation.rows.len()) as f64;
+        let of = |squares: &Squares| match self.options.robust {
+            Some(Robust::Huber | Robust::Cauchy) => {
+                let mut absolute: Vec<f64> = squares.rows.iter().map(|row| row.0.sqrt()).collect();
+                scale_from_median(&mut absolute) * (rows / (rows - unknowns).max(1.0)).sqrt()
+            }
+            _ => squares.noise(unknowns * squares.rows.len() as f64 / rows),
+        };
+        let noise = Noise { position: of(&position), orientation: of(&orientation) };
+        Noise { position: noise.position.max(NOISE_FLOOR), orientation: noise.orientation.max(NOISE_FLOOR) }
+    }
+
+    fn squares(&self, residuals: &[f64], weights: &[f64]) -> (Squares, Squares) {
+        let set = self.problem.measurements;
+        let (mut position, mut orientation) = (Squares::default(), Squares::default());
+        if set.is_distances() {
+            for (distance, residual) in set.distances.iter().zip(residuals) {
+                let own = set.sigma[distance.pose].powi(2);
+                position.rows.push((residual * residual, own, weights[distance.pose]));
+            }
+            return (position, orientation);
+        }
+        let rows = set.rows_per_pose();
+        for pose in (0..set.pose_count()).filter(|&pose| set.weight[pose] > 0.0) {
+            let own = set.sigma[pose].powi(2);
+            for row in 0..rows {
+                let square = residuals[pose * rows + row].powi(2);
+                let target = row / 3;
+                if target < set.target_count && set.has_target(pose, target) {
+                    position.rows.push((square, own, weights[pose]));
+                } else if target == set.target_count && set.has_rotation(pose) {
+                    orientation.rows.push((square, 0.0, weights[pose]));
+                }
+            }
+        }
+        (position, orientation)
+    }
+
+    /// A pose's weight from the root mean square of its standardised residuals.
+    fn robust_weights(&self, robust: Robust, noise: Noise, residuals: &[f64]) -> Vec<f64> {
+        let set = self.problem.measurements;
+        let rows = set.rows_per_pose();
+        let of_pose = |pose: usize| {
+            let standardised: Vec<f64> = (0..rows)
+                .filter(|row| if row / 3 < set.target_count { set.has_target(pose, row / 3) } else { set.has_rotation(pose) })
+                .map(|row| {
+                    let sigma = if row / 3 < set.target_count { noise.position.hypot(set.sigma[pose]) } else { noise.orientation };
+                    residuals[pose * rows + row] / sigma
+                })
+                .collect();
+            let mean = standardised.iter().map(|z| z * z).sum::<f64>() / standardised.len().max(1) as f64;
+            set.weight[pose] * robust.weight(mean.sqrt())
+        };
+        if set.is_distances() { set.weight.clone() } else { (0..set.pose_count()).map(of_pose).collect() }
+    }
+
+    /// Whether another minimisation would change nothing that matters.
+    fn settled(&self, old: &Balance, new: &Balance) -> bool {
+        let same = |a: f64, b: f64| (a - b).abs() <= REST * a.abs().max(b.abs());
+        let set = self.problem.measurements;
+        let noise = same(old.noise.position, new.noise.position)
+            && (!set.has_rotations() || same(old.noise.orientation, new.noise.orientation));
+        let only_scales_the_cost = self.options.prior.is_none()
+            && !set.has_rotations()
+            && set.sigma.iter().all(|&sigma| sigma == 0.0)
+            && self.options.robust.is_none_or(|robust| robust == Robust::None);
+        let weights = old.weights.iter().zip(&new.weights).all(|(a, b)| (a - b).abs() < 1e-2);
+        weights && (only_scales_the_cost || noise && same(old.scale, new.scale))
+    }
+}
+
+/// Below what any instrument resolves; keeps weights finite where data is exact.
+const NOISE_FLOOR: f64 = 1e-12;

@@ -1,0 +1,133 @@
+//! Cholesky factors of symmetric positive definite matrices, with the parallelism said by the caller.
+//!
+//! faer's results do not depend on the number of threads for the routines used here except when it solves
+//! for a single right-hand side, which is therefore always done sequentially.
+
+use faer::linalg::cholesky::llt::{factor, inverse};
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Mat, MatMut, MatRef, Par};
+
+/// The lower Cholesky factor L of a matrix A = L L^T, (n, n).
+#[derive(Debug, Clone)]
+pub struct Cholesky {
+    lower: Mat<f64>,
+    par: Par,
+}
+
+impl Cholesky {
+    /// Factors the lower triangle of `matrix`; `None` when it is not positive definite.
+    pub fn new(mut matrix: Mat<f64>, par: Par) -> Option<Self> {
+        let n = matrix.nrows();
+        let scratch = factor::cholesky_in_place_scratch::<f64>(n, par, Default::default());
+        let mut memory = faer::dyn_stack::MemBuffer::new(scratch);
+        let stack = faer::dyn_stack::MemStack::new(&mut memory);
+        factor::cholesky_in_place(matrix.as_mut(), Default::default(), par, stack, Default::default()).ok()?;
+        let finite = (0..n).all(|i| matrix[(i, i)].is_finite());
+        finite.then_some(Self { lower: matrix, par })
+    }
+
+    /// Rows of the matrix.
+    pub fn len(&self) -> usize {
+        self.lower.nrows()
+    }
+
+    /// Whether the matrix has no rows.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// log det A.
+    pub fn log_determinant(&self) -> f64 {
+        2.0 * (0..self.len()).map(|i| self.lower[(i, i)].ln()).sum::<f64>()
+    }
+
+    /// Overwrites `right` (n, k) with L^-1 right.
+    pub fn solve_lower(&self, right: MatMut<f64>) {
+        let par = if right.ncols() == 1 { Par::Seq } else { self.par };
+        solve_lower_triangular_in_place(self.lower.as_ref(), right, par);
+    }
+
+    /// Overwrites `right` (n, k) with A^-1 right.
+    pub fn solve(&self, mut right: MatMut<f64>) {
+        self.solve_lower(right.rb_mut());
+        let par = if right.ncols() == 1 { Par::Seq } else { self.par };
+        solve_upper_triangular_in_place(self.lower.transpose(), right, par);
+    }
+
+    /// A^-1 b for one right-hand side (n,).
+    pub fn solve_vector(&self, right: &[f64]) -> Vec<f64> {
+        let mut column = column(right);
+        self.solve(column.as_mut());
+        to_vec(column.as_ref())
+    }
+
+    /// A^-1, both triangles, (n, n).
+    pub fn inverse(&self) -> Mat<f64> {
+        let n = self.len();
+        let mut out = Mat::zeros(n, n);
+        let mut memory = faer::dyn_stack::MemBuffer::new(inverse::inverse_scratch::<f64>(n, self.par));
+        let stack = faer::dyn_stack::MemStack::new(&mut memory);
+        inverse::inverse(out.as_mut(), self.lower.as_ref(), self.par, stack);
+        mirror_lower(&mut out);
+        out
+    }
+}
+
+/// Copies the lower triangle onto the upper one.
+pub fn mirror_lower(matrix: &mut Mat<f64>) {
+    for j in 0..matrix.ncols() {
+        for i in 0..j {
+            matrix[(i, j)] = matrix[(j, i)];
+        }
+    }
+}
+
+/// A column matrix (n, 1) of a slice (n,).
+pub fn column(values: &[f64]) -> Mat<f64> {
+    Mat::from_fn(values.len(), 1, |i, _| values[i])
+}
+
+/// The first column (n,) of a matrix.
+pub fn to_vec(matrix: MatRef<f64>) -> Vec<f64> {
+    let matrix = matrix.rb();
+    (0..matrix.nrows()).map(|i| matrix[(i, 0)]).collect()
+}
+
+/// How many threads faer may use: those of rayon's current pool.
+pub fn parallelism() -> Par {
+    Par::rayon(rayon::current_num_threads())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn positive_definite(n: usize) -> Mat<f64> {
+        let a = Mat::from_fn(n, n, |i, j| ((3 * i + 7 * j) as f64).sin());
+        &a * a.transpose() + Mat::<f64>::identity(n, n)
+    }
+
+    #[test]
+    fn inverse_times_matrix_is_identity() {
+        let a = positive_definite(40);
+        let inverse = Cholesky::new(a.clone(), Par::Seq).unwrap().inverse();
+        let error = (&inverse * &a - Mat::<f64>::identity(40, 40)).norm_max();
+        assert!(error < 1e-10, "{error}");
+    }
+
+    #[test]
+    fn solution_satisfies_the_equations() {
+        let a = positive_definite(30);
+        let right: Vec<f64> = (0..30).map(|i| (i as f64).cos()).collect();
+        let solution = Cholesky::new(a.clone(), Par::Seq).unwrap().solve_vector(&right);
+        let error = (&a * column(&solution) - column(&right)).norm_max();
+        assert!(error < 1e-10, "{error}");
+    }
+
+    #[test]
+    fn indefinite_matrices_are_refused() {
+        let matrix = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 2.0 });
+        assert!(Cholesky::new(matrix, Par::Seq).is_none());
+    }
+}

@@ -1,0 +1,67 @@
+//! What can go wrong in an estimate, said with the value, the rule and the way out.
+
+use truearm_kinematics::KinematicsError;
+
+/// An estimate that could not be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EstimateError {
+    /// An array's length contradicts the counts that go with it.
+    #[error("{what} has {found} values where {expected} are needed: give one entry per pose")]
+    Length {
+        /// The array that was given.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that the counts ask for.
+        expected: usize,
+    },
+    /// There are fewer measured values than unknowns.
+    #[error(
+        "{rows} measured values cannot determine {unknowns} unknowns: measure at least {needed} poses{hint}"
+    )]
+    TooFew {
+        /// Measured values (rows of the least-squares problem).
+        rows: usize,
+        /// Unknowns without a prior.
+        unknowns: usize,
+        /// Poses that would be enough.
+        needed: usize,
+        /// A sentence on the group concerned, or nothing.
+        hint: String,
+    },
+    /// The normal equations are singular although the prior should prevent it.
+    #[error(
+        "the normal equations are singular ({unknowns} unknowns, {rows} measured values): the poses are too alike to \
+         determine the set-up; spread them over the workspace and turn the wrist"
+    )]
+    Singular {
+        /// Unknowns of the problem.
+        unknowns: usize,
+        /// Measured values.
+        rows: usize,
+    },
+    /// A value that must be finite is not.
+    #[error("{what} is not finite at pose {pose} (counted from 0): remove the row or mend the value")]
+    NotFinite {
+        /// The quantity concerned.
+        what: &'static str,
+        /// The first pose concerned.
+        pose: usize,
+    },
+    /// An option is out of its range.
+    #[error("{what} is {value}, but {rule}")]
+    Option {
+        /// The option.
+        what: &'static str,
+        /// The value given.
+        value: f64,
+        /// The rule that it breaks.
+        rule: &'static str,
+    },
+    /// The caller asked to stop.
+    #[error("stopped on request")]
+    Cancelled,
+    /// The chain refused its input.
+    #[error(transparent)]
+    Kinematics(#[from] KinematicsError),
+}

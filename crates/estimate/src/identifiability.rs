@@ -1,0 +1,184 @@
+//! Which of the arm's parameters the measurements determine at all, and with what the others are confounded.
+//!
+//! The columns of the Jacobian at the nominal arm, lengths in mm and angles in 1/300 rad, are taken in order:
+//! set-up first, then links in order. A column that the ones before it span is undetermined; its combination
+//! of them says with what it is confounded. The count of the others is
+//! `rank([arm, set-up]) - rank(set-up)`.
+
+use faer::linalg::solvers::{Qr, SolveLstsq};
+use faer::{Mat, MatRef};
+
+use crate::EstimateError;
+use crate::distance;
+use crate::layout::{Layout, Problem};
+use crate::rows::{Linearised, Point, linearise};
+use crate::setup::Setup;
+
+/// A column counts as spanned when less than this share of it stands out of the others' span.
+const INDEPENDENT_SHARE: f64 = 1e-6;
+/// Poses that the question is answered on; more do not change the answer.
+const POSES: usize = 1000;
+/// Parts of a combination below this are left out.
+const NOTEWORTHY: f64 = 0.02;
+/// mm per m, and mm per (1/300 rad) at 300 mm.
+const MM: f64 = 1e3;
+const ANGLE_UNIT: f64 = 300.0;
+
+/// A parameter that the data cannot tell from a combination of others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Confounded {
+    /// Index into the problem's columns.
+    pub column: usize,
+    /// Index into the problem's columns, and its part in the combination (scaled units).
+    pub with: Vec<(usize, f64)>,
+    /// Whether the set-up (frame, targets) takes part.
+    pub with_setup: bool,
+}
+
+/// The answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identifiability {
+    /// Indices into the problem's columns that the data determines, ascending.
+    pub determined: Vec<usize>,
+    /// The others.
+    pub undetermined: Vec<Confounded>,
+    /// Rank of set-up and arm together.
+    pub total_rank: usize,
+    /// 2-norm condition number of the determined columns and the set-up, scaled.
+    pub condition: f64,
+}
+
+/// Asks the measurements' poses, at given link parameters (5 L,) and set-up.
+///
+/// # Errors
+/// [`EstimateError::Kinematics`].
+pub fn identifiability(problem: &Problem, parameters: &[f64], setup: &Setup) -> Result<Identifiability, EstimateError> {
+    let point = Point { parameters, setup };
+    let layout = Layout::new(problem);
+    let columns = if problem.measurements.is_distances() {
+        dense_distances(problem, &layout, point)?
+    } else {
+        dense_rows(problem, &layout, &linearise(problem, point))
+    };
+    Ok(in_order(columns.as_ref(), layout.len() - layout.arm, layout.arm))
+}
+
+fn scale(problem: &Problem, layout: &Layout, column: usize) -> f64 {
+    let within = |at: usize| at < layout.frame && at >= 3 || at >= layout.frame + 3 * layout.targets;
+    let angle = if column < layout.arm {
+        !matches!(problem.columns[column] % 5, 1 | 2)
+    } else if column >= layout.arm + layout.groups * layout.group_width() {
+        false
+    } else {
+        within((column - layout.arm) % layout.group_width())
+    };
+    if angle { MM / ANGLE_UNIT } else { 1.0 }
+}
+
+/// Scaled columns, set-up first: rows of at most [`POSES`] poses, in mm (orientation rows at 300 mm).
+fn dense_rows(problem: &Problem, layout: &Layout, rows: &Linearised) -> Mat<f64> {
+    let set = problem.measurements;
+    let stride = set.pose_count().div_ceil(POSES).max(1);
+    let poses: Vec<usize> = (0..set.pose_count()).step_by(stride).collect();
+    let (width, own) = (layout.len(), layout.len() - layout.arm);
+    let mut dense = Mat::zeros(poses.len() * rows.rows, width);
+    for (index, &pose) in poses.iter().enumerate() {
+        let group = layout.group(set.group[pose]).start - layout.arm;
+        for row in 0..rows.rows {
+            let at = pose * rows.rows + row;
+            let unit = if row < 3 * layout.targets { 1.0 } else { 0.3 };
+            let line = index * rows.rows + row;
+            for k in 0..layout.arm {
+                dense[(line, own + k)] = unit * rows.arm[at * layout.arm + k] * scale(problem, layout, k);
+            }
+            for k in 0..layout.group_width() {
+                let value = rows.setup[at * layout.group_width() + k];
+                dense[(line, group + k)] = unit * value * scale(problem, layout, layout.arm + group + k);
+            }
+        }
+    }
+    dense
+}
+
+fn dense_distances(problem: &Problem, layout: &Layout, point: Point) -> Result<Mat<f64>, EstimateError> {
+    let (width, own) = (layout.len(), layout.len() - layout.arm);
+    let rows = distance::derivatives(problem, point)?;
+    Ok(Mat::from_fn(rows.len() / width, width, |row, column| {
+        let source = if column < own { layout.arm + column } else { column - own };
+        rows[row * width + source] * scale(problem, layout, source)
+    }))
+}
+
+/// Gram-Schmidt in order, twice over for accuracy; the first `own` columns belong to the set-up.
+fn in_order(columns: MatRef<f64>, own: usize, arm: usize) -> Identifiability {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    let mut accepted: Vec<usize> = Vec::new();
+    let mut rejected: Vec<usize> = Vec::new();
+    for column in 0..own + arm {
+        let original: Vec<f64> = (0..columns.nrows()).map(|row| columns[(row, column)]).collect();
+        let norm = length(&original);
+        let mut rest = original;
+        for _ in 0..2 {
+            for direction in &basis {
+                let part = dot(direction, &rest);
+                rest.iter_mut().zip(direction).for_each(|(x, d)| *x -= part * d);
+            }
+        }
+        let left = length(&rest);
+        if norm > 0.0 && left > INDEPENDENT_SHARE * norm {
+            basis.push(rest.into_iter().map(|x| x / left).collect());
+            accepted.push(column);
+        } else {
+            rejected.push(column);
+        }
+    }
+    let independent = Mat::from_fn(columns.nrows(), accepted.len(), |row, k| columns[(row, accepted[k])]);
+    let factors = independent.qr();
+    let undetermined = rejected
+        .iter()
+        .filter(|&&column| column >= own)
+        .map(|&column| confounded(columns, &factors, &accepted, own, column))
+        .collect();
+    Identifiability {
+        determined: accepted.iter().filter(|&&column| column >= own).map(|column| column - own).collect(),
+        undetermined,
+        total_rank: accepted.len(),
+        condition: condition(&independent),
+    }
+}
+
+fn confounded(
+    columns: MatRef<f64>,
+    factors: &Qr<f64>,
+    accepted: &[usize],
+    own: usize,
+    column: usize,
+) -> Confounded {
+    let target = Mat::from_fn(columns.nrows(), 1, |row, _| columns[(row, column)]);
+    let solution = factors.solve_lstsq(target);
+    let parts = accepted.iter().enumerate().map(|(k, &source)| (source, solution[(k, 0)]));
+    let noteworthy: Vec<(usize, f64)> = parts.filter(|part| part.1.abs() > NOTEWORTHY).collect();
+    Confounded {
+        column: column - own,
+        with: noteworthy.iter().filter(|part| part.0 >= own).map(|part| (part.0 - own, part.1)).collect(),
+        with_setup: noteworthy.iter().any(|part| part.0 < own),
+    }
+}
+
+fn condition(columns: &Mat<f64>) -> f64 {
+    match columns.singular_values() {
+        Ok(values) => match (values.first(), values.last()) {
+            (Some(largest), Some(smallest)) => largest / smallest,
+            _ => 1.0,
+        },
+        Err(_) => f64::INFINITY,
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn length(a: &[f64]) -> f64 {
+    dot(a, a).sqrt()
+}

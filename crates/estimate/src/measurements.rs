@@ -1,0 +1,139 @@
+//! What was measured, as plain arrays over the poses.
+
+use crate::distance::{Distance, DistanceTo};
+use crate::EstimateError;
+
+/// Standard deviations of what is measured beside each row's own sigma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Of each position component, m.
+    pub position: f64,
+    /// Of each rotation-vector component, rad.
+    pub orientation: f64,
+}
+
+/// Measurements of `n` poses in one or more groups (set-ups).
+#[derive(Debug, Clone, Default)]
+pub struct MeasurementSet {
+    /// Moving joints of the arm, J.
+    pub joint_count: usize,
+    /// Targets on the tool, T.
+    pub target_count: usize,
+    /// Groups, G.
+    pub group_count: usize,
+    /// D-H joint values, (n, J), rad or m.
+    pub joints: Vec<f64>,
+    /// Group of each pose, (n,), below G.
+    pub group: Vec<usize>,
+    /// Measured target points in world, (n, T, 3), m; NaN where a target was not measured.
+    pub targets: Vec<f64>,
+    /// Measured world_from_target rotations, (n, 9) row-major, or empty; NaN where not measured.
+    pub rotations: Vec<f64>,
+    /// The rows' own standard deviation of each position component, (n,), m.
+    pub sigma: Vec<f64>,
+    /// Weight of each pose in the fit, (n,), between 0 and 1.
+    pub weight: Vec<f64>,
+    /// Distances measured instead of points; poses then hold no targets.
+    pub distances: Vec<Distance>,
+    /// Fixed points that distances refer to, each an unknown in the base frame.
+    pub anchor_count: usize,
+}
+
+impl MeasurementSet {
+    /// Poses, n.
+    pub fn pose_count(&self) -> usize {
+        self.group.len()
+    }
+
+    /// Whether orientation was measured.
+    pub fn has_rotations(&self) -> bool {
+        !self.rotations.is_empty()
+    }
+
+    /// Whether distances stand in place of points.
+    pub fn is_distances(&self) -> bool {
+        !self.distances.is_empty()
+    }
+
+    /// Rows of the least-squares problem that each pose brings: three a target, three for orientation.
+    pub fn rows_per_pose(&self) -> usize {
+        3 * self.target_count + if self.has_rotations() { 3 } else { 0 }
+    }
+
+    /// Measured values that take part: rows that are neither missing nor of weight zero.
+    pub fn measured_values(&self) -> usize {
+        if self.is_distances() {
+            return self.distances.len();
+        }
+        (0..self.pose_count()).map(|pose| self.measured_values_of(pose)).sum()
+    }
+
+    /// Measured values of one pose.
+    pub fn measured_values_of(&self, pose: usize) -> usize {
+        if self.weight[pose] == 0.0 {
+            return 0;
+        }
+        let targets = (0..self.target_count).filter(|&target| self.has_target(pose, target)).count();
+        3 * (targets + usize::from(self.has_rotation(pose)))
+    }
+
+    /// Whether `target` was measured at `pose`.
+    pub fn has_target(&self, pose: usize, target: usize) -> bool {
+        !self.targets[3 * (pose * self.target_count + target)].is_nan()
+    }
+
+    /// Whether orientation was measured at `pose`.
+    pub fn has_rotation(&self, pose: usize) -> bool {
+        self.has_rotations() && !self.rotations[9 * pose].is_nan()
+    }
+
+    /// Checks lengths and values once, at the door.
+    ///
+    /// # Errors
+    /// [`EstimateError::Length`] and [`EstimateError::NotFinite`].
+    pub fn check(&self) -> Result<(), EstimateError> {
+        let n = self.pose_count();
+        let length = |what, found, expected| {
+            if found == expected { Ok(()) } else { Err(EstimateError::Length { what, found, expected }) }
+        };
+        length("joints", self.joints.len(), n * self.joint_count)?;
+        length("targets", self.targets.len(), 3 * n * self.target_count)?;
+        length("rotations", self.rotations.len(), if self.has_rotations() { 9 * n } else { 0 })?;
+        length("sigma", self.sigma.len(), n)?;
+        length("weight", self.weight.len(), n)?;
+        finite("joint value", &self.joints, self.joint_count)?;
+        let infinite = |what, values: &[f64], width: usize| match values.iter().position(|v| v.is_infinite()) {
+            Some(at) => Err(EstimateError::NotFinite { what, pose: at / width.max(1) }),
+            None => Ok(()),
+        };
+        infinite("target", &self.targets, 3 * self.target_count)?;
+        infinite("rotation", &self.rotations, 9)?;
+        finite("sigma", &self.sigma, 1)?;
+        finite("weight", &self.weight, 1)?;
+        self.check_distances()
+    }
+
+    fn check_distances(&self) -> Result<(), EstimateError> {
+        for distance in &self.distances {
+            let known = match distance.to {
+                DistanceTo::Pose(pose) => pose < self.pose_count(),
+                DistanceTo::Anchor(anchor) => anchor < self.anchor_count,
+            };
+            if !known || distance.pose >= self.pose_count() {
+                return Err(EstimateError::Length {
+                    what: "a distance's index",
+                    found: distance.pose,
+                    expected: self.pose_count(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn finite(what: &'static str, values: &[f64], width: usize) -> Result<(), EstimateError> {
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(at) => Err(EstimateError::NotFinite { what, pose: at / width.max(1) }),
+        None => Ok(()),
+    }
+}

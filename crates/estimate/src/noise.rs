@@ -1,0 +1,70 @@
+//! Weights of rows from noise, and noise from residuals.
+
+use crate::measurements::Noise;
+
+/// Weight (inverse variance) of a row: its own sigma on top of the noise, thinned by the outlier weight.
+#[inline(always)]
+pub fn row_weight(noise: f64, sigma: f64, weight: f64) -> f64 {
+    weight / (noise * noise + sigma * sigma)
+}
+
+/// Squared residuals of one kind of rows with their own variances and weights.
+#[derive(Debug, Clone, Default)]
+pub struct Squares {
+    /// Squared residual, own variance, outlier weight of every row.
+    pub rows: Vec<(f64, f64, f64)>,
+}
+
+impl Squares {
+    /// The noise for which the weighted squares add up to the degrees of freedom, or 0 when the rows' own
+    /// sigmas explain more than the residuals.
+    ///
+    /// `unknowns` is the number of effective unknowns that these rows determine.
+    pub fn noise(&self, unknowns: f64) -> f64 {
+        let freedom = (self.rows.iter().map(|row| row.2).sum::<f64>() - unknowns).max(1.0);
+        let excess = |variance: f64| {
+            let sum: f64 = self.rows.iter().map(|(square, own, weight)| weight * square / (own + variance)).sum();
+            sum - freedom
+        };
+        let largest = self.rows.iter().map(|row| row.2 * row.0).sum::<f64>() / freedom;
+        if largest == 0.0 || excess(largest * 1e-12) <= 0.0 {
+            return 0.0;
+        }
+        bisect(excess, largest * 1e-12, largest).sqrt()
+    }
+}
+
+/// Root of a falling function between two positive values, by bisection of the logarithm.
+fn bisect(falling: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const RELATIVE_TOLERANCE: f64 = 1e-9;
+    while high / low > 1.0 + RELATIVE_TOLERANCE {
+        let middle = (low * high).sqrt();
+        if falling(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    (low * high).sqrt()
+}
+
+impl Noise {
+    /// A first guess before any residual is known.
+    pub const GUESS: Noise = Noise { position: 1e-4, orientation: 3e-4 };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_of_equal_rows_is_their_root_mean_square() {
+        let squares = Squares { rows: vec![(4.0, 0.0, 1.0); 12] };
+        assert!((squares.noise(0.0) - 2.0).abs() < 1e-8);
+        assert!((squares.noise(3.0) - (48.0f64 / 9.0).sqrt()).abs() < 1e-8);
+    }
+
+    #[test]
+    fn own_sigma_is_taken_off() {
+        let squares = Squares { rows: vec![(4.0, 3.0, 1.0); 12] };
+        assert!((squares.noise(0.0) - 1.0).abs() < 1e-8);
+        let explained = Squares { rows: vec![(4.0, 5.0, 1.0); 12] };
+        assert_eq!(explained.noise(0.0), 0.0);
+    }
+}

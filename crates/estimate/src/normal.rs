@@ -1,0 +1,121 @@
+//! Normal equations accumulated over lanes: no Jacobian is ever stored whole.
+
+use truearm_kinematics::{Isa, LANES, Lane};
+
+/// Columns of a chunk of rows: `width` columns (the last is the residual) of `height` lanes each.
+pub struct Columns {
+    pub width: usize,
+    pub height: usize,
+    lanes: Vec<Lane>,
+}
+
+impl Columns {
+    /// Zeroed columns.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self { width, height, lanes: vec![Lane::splat(0.0); width * height] }
+    }
+
+    /// One entry.
+    #[inline(always)]
+    pub fn set(&mut self, column: usize, row: usize, value: Lane) {
+        self.lanes[column * self.height + row] = value;
+    }
+
+    /// One entry.
+    #[inline(always)]
+    pub fn get(&self, column: usize, row: usize) -> Lane {
+        self.lanes[column * self.height + row]
+    }
+
+    #[inline(always)]
+    fn column(&self, column: usize) -> &[Lane] {
+        &self.lanes[column * self.height..(column + 1) * self.height]
+    }
+
+    /// Adds the lower triangle of columns^T columns to `gram` (width, width) row-major.
+    ///
+    /// `rows` is how many of the lanes of each column are filled.
+    #[inline(always)]
+    pub fn add_gram<I: Isa>(&self, rows: usize, gram: &mut [f64]) {
+        let mut block = 0;
+        while block < self.width {
+            let mut other = 0;
+            while other <= block {
+                self.add_tile::<I>(rows, block, other, gram);
+                other += TILE;
+            }
+            block += TILE;
+        }
+    }
+
+    #[inline(always)]
+    fn add_tile<I: Isa>(&self, rows: usize, first: usize, second: usize, gram: &mut [f64]) {
+        // Columns past the end repeat the last one; their sums are dropped.
+        let last = self.width - 1;
+        let left: [&[Lane]; TILE] = std::array::from_fn(|i| &self.column((first + i).min(last))[..rows]);
+        let right: [&[Lane]; TILE] = std::array::from_fn(|i| &self.column((second + i).min(last))[..rows]);
+        let mut sums = [[Lane::splat(0.0); TILE]; TILE];
+        for row in 0..rows {
+            let a: [Lane; TILE] = std::array::from_fn(|i| left[i][row]);
+            for j in 0..TILE {
+                let b = right[j][row];
+                for i in 0..TILE {
+                    sums[i][j] = I::mul_add(a[i], b, sums[i][j]);
+                }
+            }
+        }
+        for (i, line) in sums.iter().enumerate().take(self.width - first) {
+            for (j, sum) in line.iter().enumerate().take(self.width - second) {
+                gram[(first + i) * self.width + second + j] += horizontal_sum(sum);
+            }
+        }
+    }
+}
+
+/// Columns that a tile of the Gram matrix takes from each side: 16 sums stay in registers.
+const TILE: usize = 4;
+
+#[inline(always)]
+fn horizontal_sum(lane: &Lane) -> f64 {
+    let mut half = [0.0; LANES / 2];
+    for i in 0..LANES / 2 {
+        half[i] = lane.0[i] + lane.0[i + LANES / 2];
+    }
+    (half[0] + half[2]) + (half[1] + half[3])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use truearm_kinematics::{Kernel, dispatch};
+
+    struct Gram<'a>(&'a Columns, &'a mut [f64]);
+
+    impl Kernel for Gram<'_> {
+        type Output = ();
+        fn run<I: Isa>(self) {
+            self.0.add_gram::<I>(5, self.1);
+        }
+    }
+
+    #[test]
+    fn gram_equals_the_dot_products() {
+        let (width, height) = (11, 6);
+        let value = |c: usize, r: usize, l: usize| ((c * 31 + r * 7 + l) as f64).sin();
+        let mut columns = Columns::new(width, height);
+        for c in 0..width {
+            for r in 0..height {
+                columns.set(c, r, Lane(std::array::from_fn(|l| value(c, r, l))));
+            }
+        }
+        let mut gram = vec![0.0; width * width];
+        dispatch(Gram(&columns, &mut gram));
+        for i in 0..width {
+            for j in 0..=i {
+                let expected: f64 =
+                    (0..5).flat_map(|r| (0..LANES).map(move |l| value(i, r, l) * value(j, r, l))).sum();
+                assert!((gram[i * width + j] - expected).abs() < 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! The unknowns of a measurement set-up: where the arm stands and where the targets sit on the tool.
+
+use truearm_kinematics::Transform;
+
+/// What stands between the measuring device's world and the arm's first link.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameMode {
+    /// `world_from_base` is an unknown of each group.
+    Free,
+    /// World is known: the base is part of the calibrated chain.
+    World,
+}
+
+/// The set-up of one group.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupSetup {
+    /// Where the robot's base stands in the measuring device's frame.
+    pub world_from_base: Transform,
+    /// Target points in the flange frame, m.
+    pub targets: Vec<[f64; 3]>,
+    /// Orientation of the measured target in the flange frame, row-major.
+    pub flange_from_target: [f64; 9],
+}
+
+/// The set-ups of all groups, and the anchors of distances.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setup {
+    /// One entry per group.
+    pub groups: Vec<GroupSetup>,
+    /// Fixed points in the base frame, m.
+    pub anchors: Vec<[f64; 3]>,
+}
+
+impl Setup {
+    /// World and base coincide, targets sit at the flange's origin, anchors at the base's.
+    pub fn identity(group_count: usize, target_count: usize, anchor_count: usize) -> Self {
+        let group = GroupSetup {
+            world_from_base: Transform::IDENTITY,
+            targets: vec![[0.0; 3]; target_count],
+            flange_from_target: Transform::IDENTITY.rotation,
+        };
+        Self { groups: vec![group; group_count], anchors: vec![[0.0; 3]; anchor_count] }
+    }
+}

@@ -1,0 +1,295 @@
+//! Fuzzy association cells: B-spline memberships over one input, and grids of them over several.
+
+use std::f64::consts::TAU;
+
+use crate::kernel::{Input, InputKind, Value};
+
+/// Largest number of cells that are active at once along one input (cubic memberships).
+pub const MOST_ACTIVE: usize = 4;
+
+/// Cells at equal distances along one input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// How raw values are scaled.
+    pub input: Input,
+    /// Scaled value at the centre of the first cell.
+    pub origin: f64,
+    /// Distance of neighbouring cells, scaled.
+    pub spacing: f64,
+    /// Number of cells.
+    pub count: usize,
+    /// Whether the last cell is the first one's neighbour (a full turn).
+    pub closed: bool,
+    /// Degree of the memberships, 2 or 3.
+    pub degree: usize,
+}
+
+/// Cells that a value excites, and how much; grades add up to one where the axis covers the value.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Active {
+    /// Cell of each grade.
+    pub cell: [u32; MOST_ACTIVE],
+    /// Membership grades; zero beyond the axis.
+    pub grade: [f64; MOST_ACTIVE],
+}
+
+/// Cells reach this many length scales beyond the data: there the kernel has fallen to one percent.
+const MARGIN: f64 = 3.0;
+/// Widest spacing, so that the first harmonics of a turn are well represented.
+const WIDEST: f64 = 0.6;
+/// Finest spacing: more cells than this on a turn are beyond any data set.
+const FINEST: f64 = 0.004;
+
+impl Axis {
+    /// An axis for the values of one input (raw), with `per_length` cells per length scale.
+    pub fn covering(input: Input, values: impl Iterator<Item = f64>, length: f64, per_length: f64, degree: usize) -> Self {
+        let spacing = (length / per_length).clamp(FINEST, WIDEST);
+        let mut scaled: Vec<f64> = values.map(|value| input.scale * value).collect();
+        let (low, high) = match input.kind {
+            InputKind::Line => range(&scaled),
+            InputKind::Angle => arc(&mut scaled),
+        };
+        let margin = MARGIN * length + spacing;
+        let open = high - low + 2.0 * margin;
+        if input.kind == InputKind::Angle && open >= TAU - spacing {
+            let count = ((TAU / spacing).ceil() as usize).max(2 * MOST_ACTIVE);
+            return Self { input, origin: low, spacing: TAU / count as f64, count, closed: true, degree };
+        }
+        let count = (open / spacing).ceil() as usize + 1;
+        let middle = 0.5 * (low + high);
+        let origin = middle - 0.5 * spacing * (count - 1) as f64;
+        Self { input, origin, spacing, count, closed: false, degree }
+    }
+
+    /// The cells that a raw value excites.
+    #[inline]
+    pub fn active(&self, value: f64) -> Active {
+        let mut offset = self.input.scale * value - self.origin;
+        if self.input.kind == InputKind::Angle {
+            // Folded to the turn whose middle is the axis's middle, so that the seam lies where no cells are.
+            let half = 0.5 * self.spacing * (self.count - 1) as f64;
+            offset -= TAU * ((offset - half) / TAU).round();
+        }
+        let position = offset / self.spacing;
+        let (first, grades) = if self.degree == 2 { quadratic(position) } else { cubic(position) };
+        let mut active = Active::default();
+        for (k, grade) in grades.into_iter().enumerate() {
+            let cell = first + k as i64;
+            if self.closed {
+                active.cell[k] = cell.rem_euclid(self.count as i64) as u32;
+                active.grade[k] = grade;
+            } else if (0..self.count as i64).contains(&cell) {
+                active.cell[k] = cell as u32;
+                active.grade[k] = grade;
+            }
+        }
+        active
+    }
+
+    /// Scaled value at the centre of a cell.
+    pub fn centre(&self, cell: usize) -> f64 {
+        self.origin + self.spacing * cell as f64
+    }
+}
+
+/// Quadratic B-spline: three cells.
+#[inline]
+fn quadratic(position: f64) -> (i64, [f64; MOST_ACTIVE]) {
+    let nearest = position.round();
+    let t = position - nearest;
+    let grades = [0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t), 0.0];
+    (nearest as i64 - 1, grades)
+}
+
+/// Cubic B-spline: four cells.
+#[inline]
+fn cubic(position: f64) -> (i64, [f64; MOST_ACTIVE]) {
+    let below = position.floor();
+    let t = position - below;
+    let s = 1.0 - t;
+    let grades = [
+        s * s * s / 6.0,
+        (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
+        (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
+        t * t * t / 6.0,
+    ];
+    (below as i64 - 1, grades)
+}
+
+fn range(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)))
+}
+
+/// The shortest arc that holds all angles: the turn without its largest gap.
+fn arc(values: &mut [f64]) -> (f64, f64) {
+    values.iter_mut().for_each(|x| *x = x.rem_euclid(TAU));
+    values.sort_by(f64::total_cmp);
+    let last = values.len() - 1;
+    let mut best = (TAU - values[last] + values[0], 0);
+    for k in 0..last {
+        let gap = values[k + 1] - values[k];
+        if gap > best.0 {
+            best = (gap, k + 1);
+        }
+    }
+    (values[best.1], values[best.1] + TAU - best.0)
+}
+
+/// A grid of cells over one to three inputs, the last running fastest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Index of each axis's input.
+    pub inputs: Vec<usize>,
+    /// The axes.
+    pub axes: Vec<Axis>,
+}
+
+impl Grid {
+    /// Cells of the grid.
+    pub fn cell_count(&self) -> usize {
+        self.axes.iter().map(|axis| axis.count).product()
+    }
+
+    /// Calls `visit(cell, grade)` for every cell that the inputs' values excite.
+    #[inline]
+    pub fn visit(&self, values: &[f64], mut visit: impl FnMut(usize, f64)) {
+        let active: [Active; 3] = std::array::from_fn(|k| match self.axes.get(k) {
+            Some(axis) => axis.active(values[self.inputs[k]]),
+            None => Active { grade: [1.0, 0.0, 0.0, 0.0], ..Active::default() },
+        });
+        let count = |k: usize| self.axes.get(k).map_or(1, |axis| axis.count);
+        for (cell_0, grade_0) in active[0].nonzero() {
+            for (cell_1, grade_1) in active[1].nonzero() {
+                for (cell_2, grade_2) in active[2].nonzero() {
+                    visit((cell_0 * count(1) + cell_1) * count(2) + cell_2, grade_0 * grade_1 * grade_2);
+                }
+            }
+        }
+    }
+}
+
+impl Active {
+    /// Excited cells with their grades.
+    #[inline]
+    pub fn nonzero(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.cell.iter().zip(&self.grade).filter(|entry| *entry.1 != 0.0).map(|(&cell, &grade)| (cell as usize, grade))
+    }
+}
+
+/// The prior of one axis's cells, and the kernel between values that it implies through the memberships.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellKernel {
+    /// The axis.
+    pub axis: Axis,
+    /// Prior correlation of cells by how many apart they are, (count,), scaled so that a value's variance is one on average.
+    pub correlation: Vec<f64>,
+}
+
+impl CellKernel {
+    /// The prior of an axis's cells under a kernel.
+    pub fn new(axis: Axis, kernel: impl Fn(f64) -> Value) -> Self {
+        let raw: Vec<f64> =
+            (0..axis.count).map(|apart| kernel(axis.input.distance_of(axis.spacing * apart as f64)).kernel).collect();
+        let mut cells = Self { axis, correlation: raw };
+        const SAMPLES: usize = 16;
+        let middle = cells.axis.centre(cells.axis.count / 2);
+        let mean = (0..SAMPLES)
+            .map(|k| {
+                let scaled = middle + cells.axis.spacing * k as f64 / SAMPLES as f64;
+                let active = cells.axis.active(scaled / cells.axis.input.scale);
+                cells.implied(&active, &active)
+            })
+            .sum::<f64>()
+            / SAMPLES as f64;
+        cells.correlation.iter_mut().for_each(|c| *c /= mean);
+        cells
+    }
+
+    /// Kernel between two values, given the cells that they excite.
+    #[inline]
+    pub fn implied(&self, a: &Active, b: &Active) -> f64 {
+        let mut sum = 0.0;
+        for (i, p) in a.nonzero() {
+            for (j, q) in b.nonzero() {
+                sum += p * q * self.correlation[i.abs_diff(j)];
+            }
+        }
+        sum
+    }
+
+    /// Multiplies cell values (outer, count, inner) with the prior correlation along the axis.
+    pub fn spread(&self, values: &[f64], inner: usize) -> Vec<f64> {
+        let count = self.axis.count;
+        let mut out = vec![0.0; values.len()];
+        for (block, target) in values.chunks_exact(count * inner).zip(out.chunks_exact_mut(count * inner)) {
+            for (i, line) in target.chunks_exact_mut(inner).enumerate() {
+                for (j, source) in block.chunks_exact(inner).enumerate() {
+                    let factor = self.correlation[i.abs_diff(j)];
+                    line.iter_mut().zip(source).for_each(|(x, y)| *x += factor * y);
+                }
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::{matern, squared_exponential};
+    use proptest::prelude::*;
+
+    fn closed(degree: usize) -> Axis {
+        Axis::covering(Input::ANGLE, (0..400).map(|k| f64::from(k) * 0.0157), 0.3, 2.0, degree)
+    }
+
+    fn open(degree: usize) -> Axis {
+        Axis::covering(Input::ANGLE, (0..50).map(|k| 2.9 + f64::from(k) * 0.02), 0.2, 2.0, degree)
+    }
+
+    proptest! {
+        #[test]
+        fn grades_add_up_to_one(value in -20.0..20.0f64) {
+            for degree in [2, 3] {
+                let sum: f64 = closed(degree).active(value).grade.iter().sum();
+                prop_assert!((sum - 1.0).abs() < 1e-12);
+            }
+        }
+
+        #[test]
+        fn a_turn_more_excites_the_same_cells(value in 2.9..3.9f64, turns in -3i32..3) {
+            for axis in [open(2), open(3), closed(2)] {
+                let (a, b) = (axis.active(value), axis.active(value + TAU * f64::from(turns)));
+                prop_assert_eq!(a.cell, b.cell);
+                for k in 0..MOST_ACTIVE {
+                    prop_assert!((a.grade[k] - b.grade[k]).abs() < 1e-10);
+                }
+            }
+        }
+
+        #[test]
+        fn implied_kernel_is_close_to_the_kernel(a in 0.0..6.2f64, b in 0.0..6.2f64) {
+            let cells = CellKernel::new(closed(2), |d| squared_exponential(d, 0.3));
+            let implied = cells.implied(&cells.axis.active(a), &cells.axis.active(b));
+            let exact = squared_exponential(Input::ANGLE.distance(a, b), 0.3).kernel;
+            prop_assert!((implied - exact).abs() < 0.06, "{implied} {exact}");
+        }
+    }
+
+    #[test]
+    fn open_axes_hold_no_cells_where_there_is_no_data() {
+        let axis = open(2);
+        assert!(!axis.closed);
+        assert_eq!(axis.active(0.5).grade, [0.0; MOST_ACTIVE]);
+    }
+
+    #[test]
+    fn spread_is_the_product_with_the_correlation_matrix() {
+        let cells = CellKernel::new(open(2), |d| matern(d, 0.2));
+        let (count, inner) = (cells.axis.count, 2);
+        let values: Vec<f64> = (0..count * inner).map(|k| (k as f64).sin()).collect();
+        let spread = cells.spread(&values, inner);
+        let expected: f64 = (0..count).map(|j| cells.correlation[j.abs_diff(3)] * values[j * inner + 1]).sum();
+        assert!((spread[3 * inner + 1] - expected).abs() < 1e-12);
+    }
+}

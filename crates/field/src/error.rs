@@ -1,0 +1,34 @@
+//! What can go wrong in fitting or evaluating a field.
+
+use truearm_estimate::EstimateError;
+use truearm_kinematics::KinematicsError;
+
+/// A field that could not be fitted or evaluated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FieldError {
+    /// A covariance matrix that is not positive definite.
+    #[error(
+        "the covariance of {rows} measured values is not positive definite: the measurements hold values far outside \
+         the model (look for wrong units or gross outliers)"
+    )]
+    NotPositiveDefinite {
+        /// Rows of the matrix.
+        rows: usize,
+    },
+    /// Array lengths that contradict each other.
+    #[error("{what} has {found} values where {expected} are needed")]
+    Length {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length needed.
+        expected: usize,
+    },
+    /// The constant stage failed.
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
+    /// The chain refused its input.
+    #[error(transparent)]
+    Kinematics(#[from] KinematicsError),
+}

@@ -1,0 +1,153 @@
+//! Linearised measurements that a field is inferred from.
+
+use crate::FieldError;
+use crate::kernel::Input;
+
+/// What a driven parameter is; each class has amplitudes of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// The joint's own angle.
+    Theta,
+    /// alpha or beta.
+    Angle,
+    /// d or a.
+    Length,
+}
+
+impl Class {
+    /// Class of the parameter with index 5 * link + (theta, d, a, alpha, beta).
+    pub fn of(parameter: usize) -> Self {
+        match parameter % 5 {
+            0 => Class::Theta,
+            1 | 2 => Class::Length,
+            _ => Class::Angle,
+        }
+    }
+
+    /// Position in arrays over the classes.
+    pub fn index(self) -> usize {
+        match self {
+            Class::Theta => 0,
+            Class::Angle => 1,
+            Class::Length => 2,
+        }
+    }
+}
+
+/// One column of the Jacobian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Column {
+    /// Index 5 * link + (theta, d, a, alpha, beta).
+    pub parameter: usize,
+    /// Prior standard deviation of its constant, m or rad; zero where the constant is held.
+    pub constant: f64,
+    /// Whether blocks drive it.
+    pub driven: bool,
+    /// The joint whose `own` block drives it.
+    pub own: Option<usize>,
+}
+
+/// Rows of `n` poses: `residual = jacobian CEP + setup s + noise`.
+#[derive(Debug, Clone)]
+pub struct Training {
+    /// Columns of the Jacobian, P.
+    pub columns: Vec<Column>,
+    /// Parameters of the chain, 5 L.
+    pub parameter_count: usize,
+    /// Inputs of the field, I: the joints in order, then features.
+    pub inputs: Vec<Input>,
+    /// Values of the inputs, (n, I).
+    pub values: Vec<f64>,
+    /// First row of each pose, (n + 1,).
+    pub offsets: Vec<usize>,
+    /// (R, P).
+    pub jacobian: Vec<f64>,
+    /// Set-up columns, (R, s), scaled to the order of one.
+    pub setup: Vec<f64>,
+    /// Set-up columns, s.
+    pub setup_width: usize,
+    /// (R,), m or rad.
+    pub residual: Vec<f64>,
+    /// Variance that each row has of its own, (R,).
+    pub variance: Vec<f64>,
+    /// Weight of each row, (R,): the noise variance is divided by it.
+    pub weight: Vec<f64>,
+    /// Whether a row is an orientation (else a position), (R,).
+    pub is_orientation: Vec<bool>,
+}
+
+impl Training {
+    /// Poses, n.
+    pub fn pose_count(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// Rows, R.
+    pub fn row_count(&self) -> usize {
+        self.residual.len()
+    }
+
+    /// Rows of a pose.
+    pub fn rows(&self, pose: usize) -> std::ops::Range<usize> {
+        self.offsets[pose]..self.offsets[pose + 1]
+    }
+
+    /// Values of a pose's inputs, (I,).
+    pub fn values_of(&self, pose: usize) -> &[f64] {
+        &self.values[pose * self.inputs.len()..(pose + 1) * self.inputs.len()]
+    }
+
+    /// Row of the Jacobian, (P,).
+    pub fn jacobian_row(&self, row: usize) -> &[f64] {
+        &self.jacobian[row * self.columns.len()..(row + 1) * self.columns.len()]
+    }
+
+    /// Variance of a row's noise, given the noise of positions and orientations.
+    pub fn noise_variance(&self, row: usize, noise: [f64; 2]) -> f64 {
+        let noise = noise[usize::from(self.is_orientation[row])];
+        (noise * noise + self.variance[row]) / self.weight[row]
+    }
+
+    /// The rows of some poses, in the given order.
+    pub fn select(&self, poses: &[usize]) -> Training {
+        let rows: Vec<usize> = poses.iter().flat_map(|&pose| self.rows(pose)).collect();
+        let mut offsets = vec![0];
+        for &pose in poses {
+            offsets.push(offsets[offsets.len() - 1] + self.rows(pose).len());
+        }
+        let take = |values: &[f64], width: usize| -> Vec<f64> {
+            rows.iter().flat_map(|&row| &values[row * width..(row + 1) * width]).copied().collect()
+        };
+        Training {
+            columns: self.columns.clone(),
+            parameter_count: self.parameter_count,
+            inputs: self.inputs.clone(),
+            values: poses.iter().flat_map(|&pose| self.values_of(pose)).copied().collect(),
+            offsets,
+            jacobian: take(&self.jacobian, self.columns.len()),
+            setup: take(&self.setup, self.setup_width),
+            setup_width: self.setup_width,
+            residual: take(&self.residual, 1),
+            variance: take(&self.variance, 1),
+            weight: take(&self.weight, 1),
+            is_orientation: rows.iter().map(|&row| self.is_orientation[row]).collect(),
+        }
+    }
+
+    /// Checks lengths once.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn check(&self) -> Result<(), FieldError> {
+        let rows = self.row_count();
+        let length = |what, found, expected| {
+            if found == expected { Ok(()) } else { Err(FieldError::Length { what, found, expected }) }
+        };
+        length("values", self.values.len(), self.pose_count() * self.inputs.len())?;
+        length("jacobian", self.jacobian.len(), rows * self.columns.len())?;
+        length("setup", self.setup.len(), rows * self.setup_width)?;
+        length("variance", self.variance.len(), rows)?;
+        length("weight", self.weight.len(), rows)?;
+        length("is_orientation", self.is_orientation.len(), rows)
+    }
+}
