@@ -29,9 +29,10 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help demo test check bench docs rust-test py-test clean
+.PHONY: help setup demo test check bench docs rust-test py-test clean
 
 help:
+	@echo 'make setup  make .venv with truearm in it'
 	@echo 'make demo   calibrate a virtual RV-M2 and show what it gained'
 	@echo 'make test   Rust and Python tests'
 	@echo 'make check  formatting, lint, types and layers'
@@ -63,6 +64,8 @@ bench: $(STAMPS)/built $(STAMPS)/bench
 docs: $(STAMPS)/built
 	$(BIN)/python docs/make_cli.py
 	$(BIN)/python docs/make_picture.py
+
+setup: $(STAMPS)/built
 
 clean:
 	rm -rf $(VENV) target demo
