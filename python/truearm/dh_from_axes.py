@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.dh_row import row_transform
+from truearm.rotations import rigid_inverse
 
 PARALLEL_RAD: Final = 0.01
 """Below this the common normal is more than a hundred offsets away: alpha and beta describe it better."""
@@ -58,7 +59,7 @@ def dh_from_axes(axes: Sequence[Axis], base_from_tip: Floats) -> tuple[Floats, F
         frame = frame @ row_transform(rows[-1], "standard")
     rows.append(_row(frame, base_from_tip[:3, 3], base_from_tip[:3, 2], keeps_point=True))
     frame = frame @ row_transform(rows[-1], "standard")
-    return base, np.array(rows), np.linalg.solve(frame, base_from_tip)
+    return base, np.array(rows), rigid_inverse(frame) @ base_from_tip
 
 
 def _first_frame(axis: Axis) -> Floats:

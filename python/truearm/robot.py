@@ -192,7 +192,7 @@ class Robot:
     def readings_from_joints(self, q_dh: ArrayLike) -> Floats:
         """Readings of Denavit-Hartenberg joint values `q_dh`, (n, N) or (N,)."""
         rows, single = as_rows(q_dh, self.joint_count, what="joint values")
-        readings = np.linalg.solve(self.coupling, rows.T).T
+        readings: Floats = np.asarray(np.linalg.solve(self.coupling, rows.T).T, dtype=np.float64)
         return readings[0] if single else readings
 
     def position(self, q: ArrayLike, out: Floats | None = None) -> Floats:

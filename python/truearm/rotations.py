@@ -67,6 +67,15 @@ def transform_from_parts(xyz: ArrayLike, quaternion_wxyz: ArrayLike) -> NDArray[
     return transform
 
 
+def rigid_inverse(transform: ArrayLike) -> NDArray[np.float64]:
+    """tool_from_base (4, 4) of a rigid base_from_tool (4, 4)."""
+    given = np.asarray(transform, dtype=np.float64)
+    inverse = np.eye(4)
+    inverse[:3, :3] = given[:3, :3].T
+    inverse[:3, 3] = -given[:3, :3].T @ given[:3, 3]
+    return inverse
+
+
 def _wxyz(rotation: Rotation) -> NDArray[np.float64]:
     q = np.atleast_2d(rotation.as_quat())[:, [3, 0, 1, 2]]
     return np.where(q[:, :1] < 0.0, -q, q)

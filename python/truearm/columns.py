@@ -1,0 +1,204 @@
+"""Which column of a measurement table means what, and in which unit."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final, TypeVar
+
+from truearm.errors import InputError, did_you_mean, list_names
+from truearm.units import ANGLE_UNITS, LENGTH_UNITS
+
+JOINT: Final = re.compile(r"q([1-9]\d*)(?:_(rad|deg|m|mm))?")
+TARGET: Final = re.compile(r"([xyz])([2-9]|[1-9]\d+)?(?:_(m|mm))?")
+SIGMA: Final = re.compile(r"sigma(?:_(m|mm))?")
+DISTANCE: Final = re.compile(r"distance(?:_(m|mm))?")
+QUATERNION: Final = ("qw", "qx", "qy", "qz")
+WORDS: Final = ("group", "anchor", "pair")
+AXES: Final = "xyz"
+K = TypeVar("K")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the table, and the unit its numbers are in."""
+
+    name: str
+    unit: str
+
+
+@dataclass
+class Layout:
+    """The meaning of a table's columns.
+
+    Attributes:
+        joints: Columns of joints 1 to N; the unit is "" where neither name nor option states one.
+        targets: Three columns for each measured point.
+        quaternion: Whether qw, qx, qy, qz are there.
+        sigma: Column of the standard deviation of the position.
+        distance: Column of measured distances.
+        words: Which of group, anchor and pair are there.
+        others: Names of all further columns.
+    """
+
+    joints: list[Column]
+    targets: list[tuple[Column, Column, Column]]
+    quaternion: bool = False
+    sigma: Column | None = None
+    distance: Column | None = None
+    words: tuple[str, ...] = ()
+    others: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class StatedUnits:
+    """What options say of columns that state no unit themselves; None where they say nothing.
+
+    `joints` tells the kinds, so that lengths and angles among the joints can be told apart.
+    """
+
+    length: str | None = None
+    angle: str | None = None
+    joints: Sequence[str] | None = None
+
+    def __post_init__(self) -> None:
+        for value, known in ((self.length, LENGTH_UNITS), (self.angle, ANGLE_UNITS)):
+            if value is not None and value not in known:
+                raise InputError(f'"{value}" is no unit here', rule=f"Known are {list_names(known)}")
+
+
+def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str) -> Layout:
+    """Find out what the columns mean.
+
+    Raises:
+        InputError: If joints or a coordinate are missing, two columns mean the same, or units are mixed.
+    """
+    finder = _Finder(names, stated, where)
+    layout = Layout(joints=finder.joints(), targets=finder.targets())
+    layout.quaternion = finder.has_quaternion()
+    layout.sigma = finder.single(SIGMA)
+    layout.distance = finder.single(DISTANCE)
+    layout.words = tuple(word for word in WORDS if word in names)
+    if not layout.targets and layout.distance is None:
+        raise finder.missing("z" if {"x", "y"} & set(names) else "x", "No position x, y, z and no distance")
+    layout.others = [name for name in names if name not in finder.used and name not in layout.words]
+    return layout
+
+
+def lookalikes(names: Sequence[str]) -> list[str]:
+    """Names that would mean something if case and blanks were written otherwise, such as "Sigma mm"."""
+    return [name for name in names if _means_something(name.casefold().replace(" ", "_").replace("-", "_"))]
+
+
+class _Finder:
+    def __init__(self, names: Sequence[str], stated: StatedUnits, where: str) -> None:
+        self.names, self.stated, self.where = names, stated, where
+        self.used: set[str] = set()
+
+    def joints(self) -> list[Column]:
+        found: dict[int, Column] = {}
+        for name in self.names:
+            match = JOINT.fullmatch(name)
+            if match:
+                self._claim(found, int(match[1]), Column(name, match[2] or ""))
+        if not found:
+            raise self.missing("q1", "There are no joint columns q1, q2, ...")
+        for number in range(1, max(found) + 1):
+            if number not in found:
+                raise self.missing(
+                    f"q{number}", f'Joint column "q{number}" is missing before "q{max(found)}"'
+                )
+        columns = [found[number] for number in sorted(found)]
+        self._same_unit([column for column in columns if column.unit not in LENGTH_UNITS])
+        return [self._with_stated(index, column) for index, column in enumerate(columns)]
+
+    def targets(self) -> list[tuple[Column, Column, Column]]:
+        found: dict[tuple[int, str], Column] = {}
+        for name in self.names:
+            match = TARGET.fullmatch(name)
+            if match:
+                self._claim(found, (int(match[2] or 1), match[1]), Column(name, match[3] or ""))
+        for number, axis in [(n, a) for n in sorted({n for n, _ in found}) for a in AXES]:
+            if (number, axis) not in found:
+                name = axis if number == 1 else f"{axis}{number}"
+                raise self.missing(name, f'Column "{name}" is missing')
+        self._same_unit(list(found.values()))
+        numbers = sorted({number for number, _ in found})
+        if numbers != list(range(1, len(numbers) + 1)):
+            raise self.missing("x", f"Target {numbers[-1]} is there without the targets before it")
+        columns = {key: self._length(column) for key, column in found.items()}
+        return [(columns[n, "x"], columns[n, "y"], columns[n, "z"]) for n in numbers]
+
+    def has_quaternion(self) -> bool:
+        present = [name for name in QUATERNION if name in self.names]
+        if present and len(present) < 4:
+            absent = next(name for name in QUATERNION if name not in present)
+            raise self.missing(absent, f'Column "{absent}" of the quaternion is missing')
+        self.used.update(present)
+        return bool(present)
+
+    def single(self, pattern: re.Pattern[str]) -> Column | None:
+        found: dict[str, Column] = {}
+        for name in self.names:
+            match = pattern.fullmatch(name)
+            if match:
+                self._claim(found, pattern.pattern, Column(name, match[1] or ""))
+        return self._length(next(iter(found.values()))) if found else None
+
+    def missing(self, name: str, what: str) -> InputError:
+        others = [other for other in self.names if other not in self.used]
+        return InputError(
+            what,
+            where=self.where,
+            rule=did_you_mean(name, others),
+            way_out=f"Its columns are {', '.join(self.names[:20])}{' ...' if len(self.names) > 20 else ''}. "
+            "Rename them, or bring the file in with: truearm import --map",
+        )
+
+    def _claim(self, found: dict[K, Column], key: K, column: Column) -> None:
+        if key in found:
+            raise InputError(
+                f'columns "{found[key].name}" and "{column.name}" mean the same',
+                where=self.where,
+                way_out="Keep one of them, rename the other",
+            )
+        found[key] = column
+        self.used.add(column.name)
+
+    def _same_unit(self, columns: Sequence[Column]) -> None:
+        for column in columns[1:]:
+            if column.unit != columns[0].unit:
+                raise InputError(
+                    f'mixed units: column "{columns[0].name}" is in {_unit_in_words(columns[0])}, '
+                    f'"{column.name}" in {_unit_in_words(column)}',
+                    where=self.where,
+                    rule="Columns of the same kind must be in the same unit",
+                )
+
+    def _with_stated(self, index: int, column: Column) -> Column:
+        kinds = self.stated.joints
+        is_length = column.unit in LENGTH_UNITS or (
+            not column.unit and kinds is not None and index < len(kinds) and kinds[index] == "prismatic"
+        )
+        return self._stated(column, self.stated.length if is_length else self.stated.angle)
+
+    def _length(self, column: Column) -> Column:
+        column = self._stated(column, self.stated.length)
+        return Column(column.name, column.unit or "m")
+
+    def _stated(self, column: Column, unit: str | None) -> Column:
+        if unit and column.unit and column.unit != unit:
+            raise InputError(
+                f'column "{column.name}" says {column.unit}, the options say {unit}',
+                where=self.where,
+                way_out="Leave out the option, or rename the column",
+            )
+        return Column(column.name, column.unit or unit or "")
+
+
+def _unit_in_words(column: Column) -> str:
+    return column.unit or "SI units, as it names none"
+
+
+def _means_something(name: str) -> bool:
+    patterns = (JOINT, TARGET, SIGMA, DISTANCE)
+    return name in QUATERNION + WORDS or any(pattern.fullmatch(name) for pattern in patterns)

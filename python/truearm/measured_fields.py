@@ -1,0 +1,192 @@
+"""From the columns of a table to the fields of Measurements: SI units, every row checked."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from truearm.columns import QUATERNION, Column, Layout, StatedUnits, lookalikes, read_layout
+from truearm.errors import InputError, Notice, list_names, list_rows
+from truearm.reading import Table, Texts
+from truearm.rotations import UNIT_TOLERANCE
+from truearm.units import to_si
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def read_fields(table: Table, stated: StatedUnits, *, default_group: str) -> dict[str, Any]:
+    """Arguments of Measurements.
+
+    Raises:
+        InputError: If a column is missing or a value breaks a rule; names the rows.
+    """
+    layout = read_layout(table.names, stated, where=table.where)
+    readings = _readings(table, layout)
+    targets = _targets(table, layout)
+    distance = _distances(table, layout)
+    _check_measured(table, targets, distance)
+    features, notices = _features(table, layout)
+    return {
+        "readings": readings,
+        "targets": targets,
+        "orientations": _orientations(table) if layout.quaternion else None,
+        "sigma_m": _sigma(table, layout.sigma) if layout.sigma else None,
+        "group": _group(table, layout, default_group),
+        "features": features,
+        "sources": np.full(table.row_count, table.where),
+        "rows": np.arange(1, table.row_count + 1),
+        "joint_units": tuple(column.unit for column in layout.joints),
+        "distance_m": distance,
+        **_ends(table, layout, distance),
+        "notices": tuple(notices),
+    }
+
+
+def _si(table: Table, column: Column) -> Floats:
+    values = table.numbers(column.name)
+    return to_si(values, column.unit) if column.unit else values.copy()
+
+
+def _readings(table: Table, layout: Layout) -> Floats:
+    readings = np.column_stack([_si(table, column) for column in layout.joints])
+    for column, values in zip(layout.joints, readings.T, strict=True):
+        _refuse(table, np.isnan(values), f'column "{column.name}" is empty in', "Every row needs all joints")
+    return readings
+
+
+def _targets(table: Table, layout: Layout) -> Floats:
+    targets = np.full((table.row_count, len(layout.targets), 3), np.nan)
+    for number, columns in enumerate(layout.targets):
+        targets[:, number] = np.column_stack([_si(table, column) for column in columns])
+        empty = np.isnan(targets[:, number])
+        names = list_names([column.name for column in columns])
+        rule = "A point is measured with all three coordinates, or all three cells are empty"
+        _refuse(table, _is_partial(empty), f"only some of {names} are given in", rule)
+    return targets
+
+
+def _orientations(table: Table) -> Floats:
+    q = np.column_stack([table.numbers(name) for name in QUATERNION])
+    empty = np.isnan(q)
+    rule = "An orientation has all four numbers, or all four cells are empty"
+    _refuse(table, _is_partial(empty), 'only some of "qw" to "qz" are given in', rule)
+    length: Floats = np.sqrt(np.square(q).sum(axis=1))
+    off = np.abs(length - 1.0) > UNIT_TOLERANCE
+    worst = length[np.nanargmax(np.abs(length - 1.0))] if off.any() else 1.0
+    _refuse(
+        table,
+        off,
+        f"the quaternion qw qx qy qz has not length 1 (up to {worst:.6g}) in",
+        "Orientations are unit quaternions, w first",
+        "Other notations come in by: truearm import --rotation",
+    )
+    return q / length[:, None]
+
+
+def _sigma(table: Table, column: Column) -> Floats:
+    sigma = _si(table, column)
+    bad = ~(sigma > 0.0)
+    _refuse(table, bad, f'column "{column.name}" is empty, zero or negative in', "A sigma is positive")
+    return sigma
+
+
+def _distances(table: Table, layout: Layout) -> Floats | None:
+    if layout.distance is None:
+        return None
+    distance = _si(table, layout.distance)
+    _refuse(
+        table,
+        distance <= 0.0,
+        f'column "{layout.distance.name}" is not positive in',
+        "Distances are positive",
+    )
+    return distance
+
+
+def _check_measured(table: Table, targets: Floats, distance: Floats | None) -> None:
+    measured = np.any(np.all(np.isfinite(targets), axis=2), axis=1)
+    if distance is not None:
+        measured = measured | np.isfinite(distance)
+    _refuse(table, ~measured, "nothing was measured in", "Every row needs a position or a distance")
+
+
+def _group(table: Table, layout: Layout, default: str) -> Texts:
+    if "group" not in layout.words:
+        return np.full(table.row_count, default)
+    groups = table.texts("group")
+    _refuse(
+        table,
+        ~_is_given(groups, table.row_count),
+        'column "group" is empty in',
+        "Every row needs the name of its set-up",
+    )
+    return groups
+
+
+def _ends(table: Table, layout: Layout, distance: Floats | None) -> dict[str, Texts | None]:
+    """What the distances lead to: `anchor` and `pair`, each None where there is no such column."""
+    anchor = table.texts("anchor") if "anchor" in layout.words else None
+    pair = table.texts("pair") if "pair" in layout.words else None
+    if distance is None:
+        return {"anchor": anchor, "pair": pair}
+    has_anchor, has_pair = (_is_given(word, table.row_count) for word in (anchor, pair))
+    rule = 'A distance leads to a fixed point named in "anchor", or to the other row of the same "pair"'
+    measured = np.isfinite(distance)
+    _refuse(table, measured & ~has_anchor & ~has_pair, "the distance leads nowhere in", rule)
+    _refuse(table, measured & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
+    if pair is not None:
+        _check_pairs(table, pair, distance)
+    return {"anchor": anchor, "pair": pair}
+
+
+def _is_given(words: Texts | None, count: int) -> Mask:
+    return np.zeros(count, dtype=np.bool_) if words is None else np.char.str_len(words) > 0
+
+
+def _is_partial(empty: Mask) -> Mask:
+    """Rows of `empty` (n, k) that have both empty and filled cells."""
+    return np.asarray(np.any(empty, axis=1) & ~np.all(empty, axis=1))
+
+
+def _check_pairs(table: Table, pair: Texts, distance: Floats) -> None:
+    _, index, count = np.unique(pair, return_inverse=True, return_counts=True)
+    lonely = (pair != "") & (count[index] != 2)
+    _refuse(table, lonely, 'not exactly two rows share the name in "pair" in', "A pair is two rows")
+    empty = (pair != "") & np.isnan(distance)
+    _refuse(table, empty, "the distance of a pair is empty in", "Both rows of a pair hold the same distance")
+    for name in np.unique(pair[pair != ""]):
+        first, second = distance[pair == name]
+        _refuse(
+            table,
+            (pair == name) & (first != second),
+            f'pair "{name}" has two distances, {first:g} m and {second:g} m, in',
+            "Both rows of a pair hold the same distance",
+        )
+
+
+def _features(table: Table, layout: Layout) -> tuple[pd.DataFrame, list[Notice]]:
+    numeric = [name for name in layout.others if table.is_numeric(name)]
+    notices = []
+    texts = [name for name in layout.others if name not in numeric]
+    if texts:
+        notices.append(
+            Notice("text_columns", f"{table.where}: left out, as not numeric: {list_names(texts)}.")
+        )
+    alike = lookalikes(layout.others)
+    if alike:
+        text = (
+            f"{table.where}: {list_names(alike)} kept as plain features; names are written in small letters."
+        )
+        notices.append(Notice("column_names", text))
+    index = pd.RangeIndex(table.row_count)
+    return pd.DataFrame({name: table.numbers(name) for name in numeric}, index=index), notices
+
+
+def _refuse(
+    table: Table, bad: Mask, what: str, rule: str, way_out: str = "Correct or remove the rows"
+) -> None:
+    if bad.any():
+        rows = list_rows((np.flatnonzero(bad) + 1).tolist())
+        raise InputError(f"{what} {rows}", where=table.where, rule=rule, way_out=way_out)

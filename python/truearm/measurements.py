@@ -1,0 +1,282 @@
+"""Measurements: joint readings and what was measured at them."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.columns import StatedUnits
+from truearm.errors import InputError, Notice, list_rows
+from truearm.measured_fields import read_fields
+from truearm.reading import read_csv_table, table_from_frame
+
+Floats = NDArray[np.float64]
+Texts = NDArray[np.str_]
+
+PER_ROW: Final = (
+    "readings",
+    "targets",
+    "orientations",
+    "sigma_m",
+    "group",
+    "distance_m",
+    "anchor",
+    "pair",
+    "sources",
+    "rows",
+)
+CONTENT: Final = PER_ROW[:-2]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """n poses of an N-joint arm and what was measured there. SI units; world is the device's frame.
+
+    Attributes:
+        readings: Joint readings (n, N), rad or m.
+        targets: Measured points on the tool, in world (n, T, 3); NaN where a point was not measured.
+        orientations: world_from_target as unit quaternions w x y z (n, 4), NaN rows where not
+            measured; None where no orientation was measured at all.
+        sigma_m: Standard deviation of the position (n,), NaN where not stated; None where never.
+        group: Name of the set-up (n,), hence which world_from_base and which tool.
+        features: All other numeric columns (n, ...), indexed from 0.
+        sources: File of each row (n,).
+        rows: Number of each row in its file (n,), the first data row being 1.
+        joint_units: Unit of each joint column in the file: "rad", "deg", "m", "mm", or "" where
+            nothing stated one and SI was assumed.
+        distance_m: Measured distance (n,), NaN where there is none; None where never. From target 1
+            to the fixed point `anchor`, or to target 1 of the other row of the same `pair`.
+        anchor: Name of the fixed point (n,), "" where there is none.
+        pair: Name of the pair of rows (n,), "" where there is none.
+        notices: What was noticed on reading.
+    """
+
+    readings: Floats
+    targets: Floats
+    orientations: Floats | None
+    sigma_m: Floats | None
+    group: Texts
+    features: pd.DataFrame
+    sources: Texts
+    rows: NDArray[np.int64]
+    joint_units: tuple[str, ...] = ()
+    distance_m: Floats | None = None
+    anchor: Texts | None = None
+    pair: Texts | None = None
+    notices: tuple[Notice, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in PER_ROW:
+            value = getattr(self, name)
+            if value is not None:
+                if len(value) != len(self):
+                    raise InputError(f"{len(value)} rows", where=name, rule=f"There are {len(self)} readings")
+                value.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.readings)
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints, N."""
+        return int(self.readings.shape[1])
+
+    @property
+    def target_count(self) -> int:
+        """Number of measured points on the tool, T; 0 where only distances were measured."""
+        return int(self.targets.shape[1])
+
+    @property
+    def groups(self) -> list[str]:
+        """Names of the set-ups, in order of appearance."""
+        return list(dict.fromkeys(self.group.tolist()))
+
+    @property
+    def files(self) -> list[str]:
+        """The files the rows came from, in order of appearance."""
+        return list(dict.fromkeys(self.sources.tolist()))
+
+    @classmethod
+    def read_csv(
+        cls,
+        path: str | Path,
+        *,
+        length_unit: str | None = None,
+        angle_unit: str | None = None,
+        joint_count: int | None = None,
+        joints: Sequence[str] | None = None,
+    ) -> "Measurements":
+        """Read a CSV file: UTF-8, a header line, commas between fields, points as decimal marks.
+
+        Args:
+            path: The file.
+            length_unit: "m" or "mm" for lengths whose column names no unit; m by default.
+            angle_unit: "rad" or "deg" for joint columns that name no unit; rad by default.
+            joint_count: Number of joints that the file must have.
+            joints: Kind of each joint, such as robot.joints; tells which columns are lengths.
+
+        Raises:
+            InputError: If the file is no such CSV, columns are missing, or values break a rule.
+        """
+        stated = StatedUnits(length_unit, angle_unit, joints)
+        table = read_csv_table(Path(path))
+        read = cls(**read_fields(table, stated, default_group=Path(path).stem))
+        read.require_joint_count(joint_count if joints is None else len(joints))
+        return read
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        frame: pd.DataFrame,
+        *,
+        name: str = "data",
+        length_unit: str | None = None,
+        angle_unit: str | None = None,
+    ) -> "Measurements":
+        """Measurements from a DataFrame with the columns of a measurement file.
+
+        Args:
+            frame: The table; NaN says that nothing was measured.
+            name: Stands for the file in messages, and names the group where there is no such column.
+            length_unit: As for read_csv.
+            angle_unit: As for read_csv.
+
+        Raises:
+            InputError: If columns are missing or values break a rule.
+        """
+        if len(frame) == 0:
+            raise InputError("there are no data rows", where=name)
+        stated = StatedUnits(length_unit, angle_unit)
+        return cls(**read_fields(table_from_frame(frame, where=name), stated, default_group=name))
+
+    @staticmethod
+    def concatenate(parts: Sequence["Measurements"]) -> "Measurements":
+        """All rows of several measurements, in order.
+
+        Points, orientations and features that a part lacks become NaN. Groups keep their names: equal
+        names mean the same set-up. Pairs never reach from one part to another.
+
+        Raises:
+            InputError: If there are no parts or the numbers of joints differ.
+        """
+        return _concatenate(parts)
+
+    def select(self, index: ArrayLike) -> "Measurements":
+        """The rows of a boolean mask (n,) or of row indices (m,), counted from 0."""
+        chosen = np.arange(len(self))[np.asarray(index)]
+        changes = {name: getattr(self, name)[chosen] for name in PER_ROW if getattr(self, name) is not None}
+        return replace(self, **changes, features=self.features.iloc[chosen].reset_index(drop=True))
+
+    def identical_rows(self) -> NDArray[np.bool_]:
+        """Mask (n,) of the rows equal to an earlier one in everything that was read."""
+        return np.asarray(self._as_frame().duplicated(keep="first"))
+
+    def deduplicated(self) -> "Measurements":
+        """Without rows that repeat an earlier one in everything that was read."""
+        repeated = self.identical_rows()
+        return self.select(~repeated) if repeated.any() else self
+
+    def hash(self) -> str:
+        """SHA-256 (hexadecimal) of all that was measured; file names and row numbers do not count."""
+        digest = hashlib.sha256()
+        for name in CONTENT:
+            value = getattr(self, name)
+            digest.update(f"{name}:{None if value is None else value.shape}:".encode())
+            if value is not None:
+                is_text = value.dtype.kind == "U"
+                digest.update("\n".join(value).encode() if is_text else np.ascontiguousarray(value).tobytes())
+        for column in self.features.columns:
+            digest.update(f"{column}:".encode())
+            digest.update(np.ascontiguousarray(self.features[column], dtype=np.float64).tobytes())
+        return digest.hexdigest()
+
+    def row_names(self, mask: NDArray[np.bool_]) -> str:
+        """The rows of a mask (n,) in words, by their numbers in their files."""
+        chosen = self.select(mask)
+        parts = [(file, list_rows(chosen.rows[chosen.sources == file].tolist())) for file in chosen.files]
+        if len(self.files) == 1:
+            return parts[0][1]
+        return "; ".join(f"{rows} of {file}" for file, rows in parts)
+
+    def require_joint_count(self, count: int | None) -> None:
+        """Raise InputError unless there are `count` joints; None asks for nothing."""
+        if count is not None and self.joint_count != count:
+            raise InputError(
+                f"there are {self.joint_count} joint columns",
+                where=", ".join(self.files),
+                rule=f"The robot has {count} joints",
+                way_out="Name the robot that was measured, or correct the columns",
+            )
+
+    def _as_frame(self) -> pd.DataFrame:
+        columns: dict[str, NDArray[np.generic]] = {}
+        for name in CONTENT:
+            value = getattr(self, name)
+            if value is not None:
+                flat = value.reshape(len(self), -1)
+                columns |= {f"{name}{k}": flat[:, k] for k in range(flat.shape[1])}
+        return pd.DataFrame(columns).join(self.features, rsuffix=" feature")
+
+
+def _concatenate(parts: Sequence[Measurements]) -> Measurements:
+    if not parts:
+        raise InputError("there are no measurements to put together")
+    first = parts[0]
+    for part in parts[1:]:
+        if part.joint_count != first.joint_count:
+            raise InputError(
+                f"{part.joint_count} joints in {part.files[0]}, {first.joint_count} in {first.files[0]}",
+                rule="All measurements must be of the same arm",
+            )
+    return Measurements(
+        readings=np.concatenate([part.readings for part in parts]),
+        targets=_padded_targets(parts),
+        orientations=_joined([(part.orientations, (len(part), 4)) for part in parts]),
+        sigma_m=_joined([(part.sigma_m, (len(part),)) for part in parts]),
+        group=np.concatenate([part.group for part in parts]),
+        features=pd.concat([part.features for part in parts], ignore_index=True),
+        sources=np.concatenate([part.sources for part in parts]),
+        rows=np.concatenate([part.rows for part in parts]),
+        joint_units=_common_units(parts),
+        distance_m=_joined([(part.distance_m, (len(part),)) for part in parts]),
+        anchor=_joined_words([(part.anchor, len(part)) for part in parts]),
+        pair=_joined_words([(_own_pairs(part, k), len(part)) for k, part in enumerate(parts)]),
+        notices=tuple(notice for part in parts for notice in part.notices),
+    )
+
+
+def _padded_targets(parts: Sequence[Measurements]) -> Floats:
+    count = max(part.target_count for part in parts)
+    padded = [np.full((len(part), count, 3), np.nan) for part in parts]
+    for target, part in zip(padded, parts, strict=True):
+        target[:, : part.target_count] = part.targets
+    return np.concatenate(padded)
+
+
+def _joined(values: Sequence[tuple[Floats | None, tuple[int, ...]]]) -> Floats | None:
+    if all(value is None for value, _ in values):
+        return None
+    return np.concatenate([np.full(shape, np.nan) if value is None else value for value, shape in values])
+
+
+def _joined_words(values: Sequence[tuple[Texts | None, int]]) -> Texts | None:
+    if all(value is None for value, _ in values):
+        return None
+    return np.concatenate([np.full(count, "") if value is None else value for value, count in values])
+
+
+def _own_pairs(part: Measurements, number: int) -> Texts | None:
+    if part.pair is None:
+        return None
+    return np.array([f"{name}#{number}" if name else "" for name in part.pair], dtype=np.str_)
+
+
+def _common_units(parts: Sequence[Measurements]) -> tuple[str, ...]:
+    """Unit of each joint where all parts state the same, else "" so that the values are looked at."""
+    units = zip(*(part.joint_units for part in parts), strict=True)
+    return tuple(unit[0] if len(set(unit)) == 1 else "" for unit in units)

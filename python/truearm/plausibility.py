@@ -1,0 +1,174 @@
+"""Whether measurements can be of a given robot: units, limits, poses that tell something."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError, Notice
+from truearm.measurements import Measurements
+from truearm.robot import Robot
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MAX_READING_RAD: Final = 4.0 * np.pi
+"""Beyond two turns either way, and beyond its limits, a reading stated in no unit is taken for degrees."""
+ALIKE_RAD_OR_M: Final = 1e-4
+LIMIT_TOLERANCE: Final = 1e-6
+SPREAD_FACTOR: Final = 30.0
+"""Between the factor that a long tool may stretch the poses by and the 1000 of a wrong unit."""
+TOOL_ALLOWANCE_M: Final = 0.1
+
+
+def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
+    """Check that measurements can be of `robot`.
+
+    Returns:
+        What the user should know: joints outside their limits, rows identical in everything.
+
+    Raises:
+        InputError: If the number or kind of joints differs, degrees were read as radians or the other
+            way round, millimetres as metres or the other way round, or all poses are alike.
+    """
+    measurements.require_joint_count(robot.joint_count)
+    _check_kinds(measurements, robot)
+    _check_degrees(measurements, robot)
+    _check_alike(measurements)
+    for group in measurements.groups:
+        _check_spread(measurements.select(measurements.group == group), robot, group)
+    return [*measurements.notices, *_limit_notices(measurements, robot), *_repetitions(measurements)]
+
+
+def _check_kinds(measurements: Measurements, robot: Robot) -> None:
+    for number, (unit, kind) in enumerate(zip(measurements.joint_units, robot.joints, strict=True), start=1):
+        if unit and (unit in ("m", "mm")) != (kind == "prismatic"):
+            raise InputError(
+                f"joint {number} is given in {unit}",
+                where=", ".join(measurements.files),
+                rule=f"Joint {number} of {robot.name} is {kind}",
+                way_out="Name the column with the unit it has, or the robot that was measured",
+            )
+
+
+def _check_degrees(measurements: Measurements, robot: Robot) -> None:
+    revolute = np.array([kind == "revolute" for kind in robot.joints])
+    unstated = revolute & (np.array(measurements.joint_units) == "")
+    readings = measurements.readings
+    outside = _outside(readings, robot.limits) & unstated
+    far = outside & (np.abs(readings) > MAX_READING_RAD)
+    as_degrees = np.where(unstated, readings * RADIANS_PER_DEGREE, readings)
+    fits = not (_outside(as_degrees, robot.limits) & unstated).any()
+    if far.any() or (outside.any(axis=1).mean() > 0.5 and fits):
+        rows = far.any(axis=1) if far.any() else outside.any(axis=1)
+        raise InputError(
+            f"joint readings up to {np.abs(readings[:, unstated]).max():.4g} rad in "
+            f"{measurements.row_names(rows)}, beyond what {robot.name} can reach",
+            where=", ".join(measurements.files),
+            rule="Revolute joints are in radians unless their columns say so (q1_deg)",
+            way_out="If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ...",
+        )
+
+
+def _check_alike(measurements: Measurements) -> None:
+    if len(measurements) < 2:
+        return
+    where, way_out = ", ".join(measurements.files), "Measure poses all over the workspace"
+    if (np.ptp(measurements.readings, axis=0) < ALIKE_RAD_OR_M).all():
+        raise InputError(
+            f"all {len(measurements)} poses are alike", where=where, rule="Joints must vary", way_out=way_out
+        )
+    points = measurements.targets.reshape(len(measurements), -1)
+    measured = points[:, np.isfinite(points).all(axis=0)]
+    if measured.size and (np.ptp(measured, axis=0) == 0.0).all():
+        raise InputError(
+            f"all {len(measurements)} measured positions are equal though the joints vary",
+            where=where,
+            way_out="The device may have repeated one reading: measure again",
+        )
+
+
+def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
+    """Compare how far the measured points lie apart with how far the nominal arm takes its flange.
+
+    Where the points are in world does not matter, and medians forgive single gross errors.
+    """
+    seen = np.isfinite(group.targets[:, :1]).all(axis=(1, 2))
+    if seen.sum() < 2:
+        return
+    nominal, measured = _spread(robot.position(group.readings[seen])), _spread(group.targets[seen, 0])
+    where = f"{', '.join(group.files)}, group {name}"
+    found = (
+        f"half of the measured points lie more than {measured:.4g} m from their middle, "
+        f"and {robot.name} takes its tool {nominal:.3g} m there"
+    )
+    if measured > SPREAD_FACTOR * (nominal + TOOL_ALLOWANCE_M):
+        raise InputError(
+            found,
+            where=where,
+            rule="Positions are in metres unless their columns say so (x_mm)",
+            way_out=_way_out_of_large(measured, nominal),
+        )
+    if _could_be_radians(group, robot) and measured > 3.0 * nominal + TOOL_ALLOWANCE_M:
+        raise InputError(
+            found,
+            where=where,
+            rule="The joint readings, stated in degrees, look like radians",
+            way_out="Give --angle-unit rad, or name the columns q1, q2, ...",
+        )
+    if nominal > TOOL_ALLOWANCE_M and measured < nominal / SPREAD_FACTOR:
+        raise InputError(
+            found,
+            where=where,
+            rule="The positions are far too close together for these poses",
+            way_out="If they are in metres, give --length-unit m, or name the columns x, y, z; "
+            "if they are not, check that the columns belong together",
+        )
+
+
+def _way_out_of_large(measured: float, nominal: float) -> str:
+    if measured / MM_PER_METRE < SPREAD_FACTOR * (nominal + TOOL_ALLOWANCE_M):
+        return "If these are millimetres, give --length-unit mm, or name the columns x_mm, y_mm, z_mm"
+    return "Check the columns and their unit"
+
+
+def _could_be_radians(group: Measurements, robot: Robot) -> bool:
+    degrees = np.array(group.joint_units) == "deg"
+    values = group.readings[:, degrees] / RADIANS_PER_DEGREE
+    return bool(degrees.any()) and bool((np.abs(values) <= 2.0 * np.pi).all())
+
+
+def _spread(points: Floats) -> float:
+    """Median distance of points (n, 3) from their median point."""
+    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
+
+
+def _outside(readings: Floats, limits: Floats) -> Mask:
+    return (readings < limits[:, 0] - LIMIT_TOLERANCE) | (readings > limits[:, 1] + LIMIT_TOLERANCE)
+
+
+def _limit_notices(measurements: Measurements, robot: Robot) -> list[Notice]:
+    notices = []
+    outside = _outside(measurements.readings, robot.limits)
+    for joint in np.flatnonzero(outside.any(axis=0)):
+        rows = outside[:, joint]
+        values = measurements.readings[rows, joint]
+        low, high = robot.limits[joint]
+        beyond = np.maximum(low - values, values - high)
+        revolute = robot.joints[joint] == "revolute"
+        factor, unit = (1.0 / RADIANS_PER_DEGREE, "deg") if revolute else (MM_PER_METRE, "mm")
+        message = (
+            f"Joint {joint + 1} is outside its limits ({low * factor:g} to {high * factor:g} {unit}) in "
+            f"{measurements.row_names(rows)}, up to {values[beyond.argmax()] * factor:.4g} {unit}."
+        )
+        notices.append(Notice("limits", message, tuple(measurements.rows[rows].tolist())))
+    return notices
+
+
+def _repetitions(measurements: Measurements) -> list[Notice]:
+    repeated = measurements.identical_rows()
+    if not repeated.any():
+        return []
+    message = f"Identical to an earlier row in everything, counted once: {measurements.row_names(repeated)}."
+    return [Notice("identical_rows", message, tuple(measurements.rows[repeated].tolist()))]

@@ -1,0 +1,217 @@
+"""Tables of text: strict CSV in, one column at a time out as numbers or as text."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from truearm.errors import InputError, list_rows
+from truearm.files import decode_text, read_bytes
+
+Floats = NDArray[np.float64]
+Texts = NDArray[np.str_]
+
+DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
+NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Named columns of equal length, as read.
+
+    Attributes:
+        where: File or other place it came from, for messages.
+        columns: Text as in the file, or numbers as in a DataFrame, by column name.
+        row_count: Number of data rows.
+    """
+
+    where: str
+    columns: dict[str, Texts | Floats]
+    row_count: int
+    _numbers: dict[str, Floats] = field(default_factory=dict, repr=False)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns in their order."""
+        return list(self.columns)
+
+    def texts(self, name: str) -> Texts:
+        """A column as text, without blanks around it."""
+        column = self.columns[name]
+        if column.dtype.kind == "U":
+            return np.char.strip(column.astype(np.str_))
+        return np.array([_in_words(value) for value in column.tolist()], dtype=np.str_)
+
+    def numbers(self, name: str) -> Floats:
+        """A column as numbers (n,), NaN where the cell is empty.
+
+        Raises:
+            InputError: If a cell holds text, NaN or an infinite value; names the rows.
+        """
+        column = self.columns[name]
+        if column.dtype.kind != "U":
+            return self._checked(name, column.astype(np.float64), np.isinf(column.astype(np.float64)))
+        if name not in self._numbers:
+            self._numbers[name] = self._parsed(name)
+        return self._numbers[name]
+
+    def is_numeric(self, name: str) -> bool:
+        """Whether every cell of a column that is not empty is a number, at least one is, and all finite."""
+        try:
+            return bool(np.isfinite(self.numbers(name)).any())
+        except InputError:
+            return False
+
+    def _parsed(self, name: str) -> Floats:
+        values = np.full(self.row_count, np.nan)
+        cells = self.texts(name).tolist()
+        infinite = np.array([cell.casefold() in NOT_FINITE for cell in cells])
+        for row, cell in enumerate(cells):
+            if not cell or infinite[row]:
+                continue
+            try:
+                values[row] = float(cell)
+            except ValueError:
+                raise self._no_number(name, row, cell) from None
+        return self._checked(name, values, infinite | np.isinf(values))
+
+    def _checked(self, name: str, values: Floats, bad: NDArray[np.bool_]) -> Floats:
+        if bad.any():
+            rows = list_rows((np.flatnonzero(bad) + 1).tolist())
+            raise InputError(
+                f'column "{name}" holds NaN or infinite values in {rows}',
+                where=self.where,
+                rule="All values must be finite; an empty cell says that nothing was measured",
+                way_out="Correct or remove the rows",
+            )
+        return values
+
+    def _no_number(self, name: str, row: int, cell: str) -> InputError:
+        way_out = "Correct the cell"
+        if "," in cell:
+            way_out = 'If this is a decimal comma, convert the file with: truearm import --decimal ","'
+        return InputError(
+            f'column "{name}" holds "{cell}" in row {row + 1}',
+            where=self.where,
+            rule="It must hold numbers",
+            way_out=way_out,
+        )
+
+
+def table_from_frame(frame: pd.DataFrame, *, where: str) -> Table:
+    """The columns of a DataFrame: numbers where pandas has numbers, else text."""
+    columns: dict[str, Texts | Floats] = {}
+    for name in frame.columns:
+        column = frame[name]
+        if pd.api.types.is_numeric_dtype(column):
+            columns[str(name)] = column.to_numpy(dtype=np.float64, na_value=np.nan)
+        else:
+            columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.str_)
+    if len(columns) != len(frame.columns):
+        raise InputError("two columns have the same name", where=where)
+    return Table(where, columns, len(frame))
+
+
+def read_csv_table(path: Path) -> Table:
+    """A plain CSV file: UTF-8, a header line, commas between fields, points as decimal marks.
+
+    Raises:
+        InputError: If the file is missing, empty, no CSV, or has lines of other lengths; says what it
+            looks like and how to bring it in.
+    """
+    where = str(path)
+    text = decode_text(read_bytes(path), where=where)
+    check_is_table(text, where=where)
+    header = text.lstrip().splitlines()[0]
+    other = [mark for mark in DELIMITERS if mark != "," and mark in header]
+    if other and header.count(",") < header.count(other[0]):
+        raise InputError(
+            f"its fields are separated by {DELIMITERS[other[0]]}",
+            where=where,
+            rule="Measurement files have commas between fields and points as decimal marks",
+            way_out=f"Convert it with: truearm import {path.name} -o measurements.csv "
+            f"--delimiter {quoted_delimiter(other[0])} --decimal ...",
+        )
+    return split_table(text, ",", where=where)
+
+
+def check_is_table(text: str, *, where: str) -> None:
+    """Raise InputError if a text is empty or plainly something other than a table."""
+    start = text.lstrip()[:200].casefold()
+    if not start:
+        raise InputError("the file is empty", where=where, rule="A header line and data rows are needed")
+    kinds = {"<!doctype html": "an HTML page", "<html": "an HTML page", "<": "XML", "{": "JSON", "[": "JSON"}
+    for beginning, kind in kinds.items():
+        if start.startswith(beginning):
+            raise InputError(
+                f"this is {kind}, not CSV", where=where, way_out="Export the measurements as CSV"
+            )
+
+
+def split_table(text: str, delimiter: str, *, where: str) -> Table:
+    """The fields of a text with a header line; every line must have as many as the header.
+
+    Raises:
+        InputError: If a name is missing or repeated, a line has another number of fields, or there
+            are no data rows.
+    """
+    try:
+        lines = [line for line in csv.reader(io.StringIO(text), delimiter=delimiter, strict=True) if line]
+    except csv.Error as error:
+        raise InputError(f"not CSV: {error}", where=where) from None
+    header = [name.strip() for name in lines[0]]
+    _check_header(header, where)
+    rows = lines[1:]
+    bad = [number for number, row in enumerate(rows, start=1) if len(row) != len(header)]
+    if bad:
+        raise InputError(
+            f"{list_rows(bad)} {'has' if len(bad) == 1 else 'have'} another number of fields than the "
+            f"header's {len(header)}; {list_rows(bad[:1])} has {len(rows[bad[0] - 1])}",
+            where=where,
+            way_out="Correct or remove them; if the decimal mark is a comma, use truearm import",
+        )
+    if not rows:
+        raise InputError("there are no data rows below the header", where=where)
+    cells = np.array(rows, dtype=np.str_)
+    return Table(where, {name: cells[:, k] for k, name in enumerate(header)}, len(rows))
+
+
+def quoted_delimiter(mark: str) -> str:
+    """A delimiter as it is typed on a command line."""
+    return "tab" if mark == "\t" else f'"{mark}"'
+
+
+def _check_header(header: Sequence[str], where: str) -> None:
+    if all(_is_number(name) for name in header):
+        raise InputError(
+            "the first line holds numbers only",
+            where=where,
+            rule="The first line must name the columns, such as q1,q2,q3,q4,q5,q6,x,y,z",
+        )
+    empty = [position for position, name in enumerate(header, start=1) if not name]
+    if empty:
+        raise InputError(f"{list_rows(empty, 'column')} has no name", where=where)
+    repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
+    if repeated:
+        raise InputError(f'column "{repeated[0]}" occurs more than once', where=where)
+
+
+def _in_words(number: float) -> str:
+    """A number as a name: whole ones without a point, NaN as nothing."""
+    if np.isnan(number):
+        return ""
+    return str(int(number)) if number == int(number) else repr(number)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
