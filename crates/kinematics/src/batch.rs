@@ -11,7 +11,10 @@ use crate::lane::{LANES, Lane};
 use crate::parameters::{LaneParameters, Parameters, SharedParameters};
 use crate::quantity::{Jacobian, Pose, Position, Quantity};
 use crate::rows::load_lanes;
-use crate::sweep::Screw;
+use crate::writer::LineWriter;
+
+/// Numbers of a result that is no longer found in the caches when it is read: 2 MB.
+const STREAM_FROM: usize = 1 << 18;
 
 /// A chain with a bound on the threads to use.
 #[derive(Debug, Clone, Copy)]
@@ -23,10 +26,7 @@ pub struct Batch<'a> {
 impl Chain {
     /// Batches on at most `threads` threads; `None`: as many as rayon has. Small batches use one.
     pub fn batch(&self, threads: Option<NonZeroUsize>) -> Batch<'_> {
-        Batch {
-            chain: self,
-            threads: threads.map_or(usize::MAX, NonZeroUsize::get),
-        }
+        Batch { chain: self, threads: threads.map_or(usize::MAX, NonZeroUsize::get) }
     }
 
     /// See [`Batch::positions`].
@@ -76,8 +76,7 @@ impl Chain {
         parameters: Parameters<'_>,
         out: &mut [f64],
     ) -> Result<(), KinematicsError> {
-        self.batch(None)
-            .joint_position_jacobian(joints, parameters, out)
+        self.batch(None).joint_position_jacobian(joints, parameters, out)
     }
 
     /// See [`Batch::joint_pose_jacobian`].
@@ -87,8 +86,7 @@ impl Chain {
         parameters: Parameters<'_>,
         out: &mut [f64],
     ) -> Result<(), KinematicsError> {
-        self.batch(None)
-            .joint_pose_jacobian(joints, parameters, out)
+        self.batch(None).joint_pose_jacobian(joints, parameters, out)
     }
 }
 
@@ -160,10 +158,7 @@ impl Batch<'_> {
         parameters: Parameters<'_>,
         out: &mut [f64],
     ) -> Result<(), KinematicsError> {
-        let quantity = Jacobian {
-            columns: self.chain.joint_columns(),
-            rows: 3,
-        };
+        let quantity = Jacobian { columns: self.chain.joint_columns(), rows: 3 };
         self.run(quantity, joints, parameters, out)
     }
 
@@ -177,10 +172,7 @@ impl Batch<'_> {
         parameters: Parameters<'_>,
         out: &mut [f64],
     ) -> Result<(), KinematicsError> {
-        let quantity = Jacobian {
-            columns: self.chain.joint_columns(),
-            rows: 6,
-        };
+        let quantity = Jacobian { columns: self.chain.joint_columns(), rows: 6 };
         self.run(quantity, joints, parameters, out)
     }
 
@@ -192,15 +184,7 @@ impl Batch<'_> {
         out: &mut [f64],
     ) -> Result<(), KinematicsError> {
         let columns: Vec<usize> = (0..self.chain.parameter_count()).collect();
-        self.run(
-            Jacobian {
-                columns: &columns,
-                rows,
-            },
-            joints,
-            parameters,
-            out,
-        )
+        self.run(Jacobian { columns: &columns, rows }, joints, parameters, out)
     }
 
     fn run<Q: Quantity>(
@@ -216,23 +200,15 @@ impl Batch<'_> {
             Parameters::Each(values) => Source::Each(values),
         };
         let width = quantity.width();
+        let stream = out.len() >= STREAM_FROM;
         let work = |first: usize, out: &mut [f64]| {
-            dispatch(Piece {
-                chain: self.chain,
-                quantity,
-                joints,
-                source: &source,
-                first,
-                out,
-            });
+            dispatch(Piece { chain: self.chain, quantity, joints, source: &source, first, out, stream });
         };
         if poses < quantity.parallel_from() || self.threads == 1 {
             work(0, out);
             return Ok(());
         }
-        let groups = poses
-            .div_ceil(LANES)
-            .div_ceil(self.threads.min(rayon::current_num_threads()));
+        let groups = poses.div_ceil(LANES).div_ceil(self.threads.min(rayon::current_num_threads()));
         let pieces = out.par_chunks_mut(groups * LANES * width).enumerate();
         pieces.for_each(|(index, out)| work(index * groups * LANES, out));
         Ok(())
@@ -256,11 +232,7 @@ impl Batch<'_> {
             ));
         }
         let (got, wanted, rule) = match parameters {
-            Parameters::One(values) => (
-                values.len(),
-                all,
-                format!("it must be {all}, five for each link"),
-            ),
+            Parameters::One(values) => (values.len(), all, format!("it must be {all}, five for each link")),
             Parameters::Each(values) => (
                 values.len(),
                 poses * all,
@@ -271,11 +243,7 @@ impl Batch<'_> {
             return Err(length("parameters", got, rule));
         }
         if out.len() != poses * width {
-            return Err(length(
-                "out",
-                out.len(),
-                format!("it must be {poses} x {width}"),
-            ));
+            return Err(length("out", out.len(), format!("it must be {poses} x {width}")));
         }
         Ok(poses)
     }
@@ -298,6 +266,8 @@ struct Piece<'a, Q> {
     source: &'a Source<'a>,
     first: usize,
     out: &'a mut [f64],
+    /// Write past the caches.
+    stream: bool,
 }
 
 impl<Q: Quantity> Kernel for Piece<'_, Q> {
@@ -305,29 +275,65 @@ impl<Q: Quantity> Kernel for Piece<'_, Q> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        let (width, count) = (self.chain.parameter_count(), self.chain.joint_count());
-        let mut joints = vec![Lane::ZERO; count];
-        let mut screws = vec![Screw::ZERO; self.quantity.screws()];
-        let mut own = match self.source {
-            Source::Shared(_) => Vec::new(),
-            Source::Each(_) => vec![Lane::ZERO; width],
-        };
-        for (index, rows) in self
-            .out
-            .chunks_mut(LANES * self.quantity.width())
-            .enumerate()
-        {
-            let first = self.first + index * LANES;
-            load_lanes(self.joints, count, first, &mut joints);
-            let parameters = match self.source {
-                Source::Shared(shared) => LaneParameters::Shared(shared),
-                Source::Each(values) => {
-                    load_lanes(values, width, first, &mut own);
-                    LaneParameters::Each(&own)
-                }
-            };
-            self.quantity
-                .group::<I>(self.chain, &joints, parameters, &mut screws, rows);
+        let group = LANES * self.quantity.width();
+        let mut reader = Reader::new(self.chain, self.joints, self.source, self.first);
+        let mut scratch = self.quantity.scratch();
+        if !self.stream {
+            for rows in self.out.chunks_mut(group) {
+                let (joints, parameters) = reader.next::<I>();
+                self.quantity.group::<I>(self.chain, joints, parameters, &mut scratch, rows);
+            }
+            return;
         }
+        let mut left = self.out.len();
+        let mut writer = LineWriter::new(self.out, group);
+        while left > 0 {
+            let count = left.min(group);
+            let (joints, parameters) = reader.next::<I>();
+            self.quantity.group::<I>(self.chain, joints, parameters, &mut scratch, writer.room(count));
+            writer.commit::<I>(count);
+            left -= count;
+        }
+        writer.finish::<I>();
+    }
+}
+
+/// Takes group after group of poses from the arrays of a batch.
+struct Reader<'a> {
+    joints: &'a [f64],
+    source: &'a Source<'a>,
+    first: usize,
+    joint_lanes: Vec<Lane>,
+    parameter_lanes: Vec<Lane>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(chain: &Chain, joints: &'a [f64], source: &'a Source<'a>, first: usize) -> Self {
+        let parameters = match source {
+            Source::Shared(_) => 0,
+            Source::Each(_) => chain.parameter_count(),
+        };
+        Self {
+            joints,
+            source,
+            first,
+            joint_lanes: vec![Lane::ZERO; chain.joint_count()],
+            parameter_lanes: vec![Lane::ZERO; parameters],
+        }
+    }
+
+    #[inline(always)]
+    fn next<I: Isa>(&mut self) -> (&[Lane], LaneParameters<'_>) {
+        let first = self.first;
+        self.first += LANES;
+        load_lanes::<I>(self.joints, self.joint_lanes.len(), first, &mut self.joint_lanes);
+        let parameters = match self.source {
+            Source::Shared(shared) => LaneParameters::Shared(shared),
+            Source::Each(values) => {
+                load_lanes::<I>(values, self.parameter_lanes.len(), first, &mut self.parameter_lanes);
+                LaneParameters::Each(&self.parameter_lanes)
+            }
+        };
+        (&self.joint_lanes, parameters)
     }
 }

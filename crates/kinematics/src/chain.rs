@@ -83,13 +83,7 @@ impl Chain {
         if joint_columns.is_empty() {
             return Err(KinematicsError::NoJoints { links: links.len() });
         }
-        Ok(Chain {
-            convention,
-            links,
-            base,
-            end,
-            joint_columns,
-        })
+        Ok(Chain { convention, links, base, end, joint_columns })
     }
 
     /// Number of joints, J.
@@ -143,10 +137,7 @@ impl Chain {
     /// [`KinematicsError::NotRigid`] if the transform is not rigid.
     pub fn with_end(&self, end: Transform) -> Result<Chain, KinematicsError> {
         end.check("end")?;
-        Ok(Chain {
-            end,
-            ..self.clone()
-        })
+        Ok(Chain { end, ..self.clone() })
     }
 
     /// The same chain with another base.
@@ -155,21 +146,14 @@ impl Chain {
     /// [`KinematicsError::NotRigid`] if the transform is not rigid.
     pub fn with_base(&self, base: Transform) -> Result<Chain, KinematicsError> {
         base.check("base")?;
-        Ok(Chain {
-            base,
-            ..self.clone()
-        })
+        Ok(Chain { base, ..self.clone() })
     }
 }
 
 fn check_finite(index: usize, link: &Link) -> Result<(), KinematicsError> {
     for (name, value) in PARAMETER_NAMES.into_iter().zip(link.parameters()) {
         if !value.is_finite() {
-            return Err(KinematicsError::LinkNotFinite {
-                link: index,
-                name,
-                value,
-            });
+            return Err(KinematicsError::LinkNotFinite { link: index, name, value });
         }
     }
     Ok(())

@@ -9,9 +9,7 @@ pub enum KinematicsError {
     #[error("a chain needs at least one link, none was given")]
     NoLinks,
     /// A chain in which nothing moves.
-    #[error(
-        "none of the {links} links has a joint: make at least one of them revolute or prismatic"
-    )]
+    #[error("none of the {links} links has a joint: make at least one of them revolute or prismatic")]
     NoJoints {
         /// Number of links.
         links: usize,

@@ -6,15 +6,36 @@
 use std::sync::OnceLock;
 
 use crate::error::KinematicsError;
-use crate::lane::Lane;
+use crate::lane::{LANES, Lane};
 
-/// What differs between instruction sets in plain code: whether a multiplication fuses with an addition.
+/// What differs between instruction sets: whether a multiplication fuses with an addition, and how rows are moved.
 pub trait Isa {
     /// The instruction set this stands for.
     const LEVEL: InstructionSet;
 
     /// a b + c, with one rounding only where the instruction set has it.
     fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane;
+
+    /// Swap rows and columns of 8 x 8 numbers.
+    #[inline(always)]
+    fn transpose(block: &mut [Lane; LANES]) {
+        let source = *block;
+        for (i, lane) in block.iter_mut().enumerate() {
+            for k in 0..LANES {
+                lane.0[k] = source[k].0[i];
+            }
+        }
+    }
+
+    /// Write a whole line of results that is not read again soon; where it can, past the caches.
+    #[inline(always)]
+    fn stream(line: &Lane, to: &mut [f64; LANES]) {
+        *to = line.0;
+    }
+
+    /// Let other threads see what was streamed.
+    #[inline(always)]
+    fn fence() {}
 }
 
 /// Work that is compiled once for each instruction set.
@@ -86,7 +107,13 @@ struct Plain;
 impl Isa for Plain {
     const LEVEL: InstructionSet = InstructionSet::Baseline;
 
-    #[cfg(not(target_arch = "aarch64"))]
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
+        crate::x86::mul_add_sse2(a, b, c)
+    }
+
+    #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     #[inline(always)]
     fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
         a * b + c
@@ -95,13 +122,18 @@ impl Isa for Plain {
     #[cfg(target_arch = "aarch64")]
     #[inline(always)]
     fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
-        Lane::from_fn(|i| a.0[i].mul_add(b.0[i], c.0[i]))
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = a.0[i].mul_add(b.0[i], c.0[i]);
+        }
+        Lane(out)
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-mod fused {
-    use super::{InstructionSet, Isa, Kernel, Lane};
+mod vector {
+    use super::{InstructionSet, Isa, Kernel, LANES, Lane};
+    use crate::x86;
 
     pub struct Avx2;
     pub struct Avx512;
@@ -110,7 +142,25 @@ mod fused {
         const LEVEL: InstructionSet = InstructionSet::Avx2;
         #[inline(always)]
         fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
-            Lane::from_fn(|i| a.0[i].mul_add(b.0[i], c.0[i]))
+            // SAFETY: this instruction set is only used on processors that have it.
+            unsafe { x86::mul_add_avx2(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn transpose(block: &mut [Lane; LANES]) {
+            // SAFETY: this instruction set is only used on processors that have it.
+            unsafe { x86::transpose_avx(block) }
+        }
+
+        #[inline(always)]
+        fn stream(line: &Lane, to: &mut [f64; LANES]) {
+            // SAFETY: as above.
+            unsafe { x86::stream_avx(line, to) }
+        }
+
+        #[inline(always)]
+        fn fence() {
+            x86::fence();
         }
     }
 
@@ -118,7 +168,25 @@ mod fused {
         const LEVEL: InstructionSet = InstructionSet::Avx512;
         #[inline(always)]
         fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
-            Lane::from_fn(|i| a.0[i].mul_add(b.0[i], c.0[i]))
+            // SAFETY: this instruction set is only used on processors that have it.
+            unsafe { x86::mul_add_avx512(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn transpose(block: &mut [Lane; LANES]) {
+            // SAFETY: this instruction set is only used on processors that have it.
+            unsafe { x86::transpose_avx512(block) }
+        }
+
+        #[inline(always)]
+        fn stream(line: &Lane, to: &mut [f64; LANES]) {
+            // SAFETY: as above.
+            unsafe { x86::stream_avx512(line, to) }
+        }
+
+        #[inline(always)]
+        fn fence() {
+            x86::fence();
         }
     }
 
@@ -140,8 +208,8 @@ mod fused {
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     static CHOSEN: OnceLock<InstructionSet> = OnceLock::new();
-    let chosen = *CHOSEN
-        .get_or_init(|| InstructionSet::from_environment().unwrap_or(InstructionSet::detected()));
+    let chosen =
+        *CHOSEN.get_or_init(|| InstructionSet::from_environment().unwrap_or(InstructionSet::detected()));
     dispatch_on(chosen, kernel)
 }
 
@@ -151,9 +219,9 @@ pub fn dispatch_on<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     match set.min(InstructionSet::detected()) {
         // SAFETY: the processor has just been found to have these instructions.
-        InstructionSet::Avx512 => return unsafe { fused::run_avx512(kernel) },
+        InstructionSet::Avx512 => return unsafe { vector::run_avx512(kernel) },
         // SAFETY: as above.
-        InstructionSet::Avx2 => return unsafe { fused::run_avx2(kernel) },
+        InstructionSet::Avx2 => return unsafe { vector::run_avx2(kernel) },
         InstructionSet::Baseline => {}
     }
     #[cfg(not(target_arch = "x86_64"))]

@@ -7,7 +7,7 @@ pub const LANES: usize = 8;
 
 /// One value for each of eight poses; plain arithmetic element by element.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 pub struct Lane(pub [f64; LANES]);
 
 impl Lane {
@@ -30,6 +30,12 @@ impl Lane {
         Lane(out)
     }
 
+    /// Lanes as one run of numbers.
+    pub(crate) fn numbers(lanes: &mut [Lane]) -> &mut [f64] {
+        // SAFETY: a lane is eight f64 without padding, its alignment a multiple of theirs.
+        unsafe { std::slice::from_raw_parts_mut(lanes.as_mut_ptr().cast(), lanes.len() * LANES) }
+    }
+
     /// Sum of the eight values, in a fixed order.
     #[inline(always)]
     pub fn sum(self) -> f64 {
@@ -42,7 +48,11 @@ impl Add for Lane {
     type Output = Lane;
     #[inline(always)]
     fn add(self, other: Lane) -> Lane {
-        Lane::from_fn(|i| self.0[i] + other.0[i])
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = self.0[i] + other.0[i];
+        }
+        Lane(out)
     }
 }
 
@@ -50,7 +60,11 @@ impl Sub for Lane {
     type Output = Lane;
     #[inline(always)]
     fn sub(self, other: Lane) -> Lane {
-        Lane::from_fn(|i| self.0[i] - other.0[i])
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = self.0[i] - other.0[i];
+        }
+        Lane(out)
     }
 }
 
@@ -58,7 +72,11 @@ impl Mul for Lane {
     type Output = Lane;
     #[inline(always)]
     fn mul(self, other: Lane) -> Lane {
-        Lane::from_fn(|i| self.0[i] * other.0[i])
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = self.0[i] * other.0[i];
+        }
+        Lane(out)
     }
 }
 
@@ -66,7 +84,11 @@ impl Mul<f64> for Lane {
     type Output = Lane;
     #[inline(always)]
     fn mul(self, other: f64) -> Lane {
-        Lane::from_fn(|i| self.0[i] * other)
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = self.0[i] * other;
+        }
+        Lane(out)
     }
 }
 
@@ -74,7 +96,11 @@ impl Neg for Lane {
     type Output = Lane;
     #[inline(always)]
     fn neg(self) -> Lane {
-        Lane::from_fn(|i| -self.0[i])
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = -self.0[i];
+        }
+        Lane(out)
     }
 }
 

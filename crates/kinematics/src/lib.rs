@@ -11,11 +11,14 @@ mod error;
 mod isa;
 mod lane;
 mod parameters;
+mod point;
 mod quantity;
 mod rows;
 mod sweep;
 mod transform;
 mod trig;
+mod writer;
+mod x86;
 
 pub use batch::Batch;
 pub use chain::{Chain, Convention, Joint, Link};

@@ -39,9 +39,7 @@ impl SharedParameters {
             beta: p[4].sin_cos(),
             bent: p[4] != 0.0,
         });
-        SharedParameters {
-            links: links.collect(),
-        }
+        SharedParameters { links: links.collect() }
     }
 }
 

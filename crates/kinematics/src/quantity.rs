@@ -16,8 +16,10 @@ pub(crate) trait Quantity: Copy + Sync {
     /// Poses from which a second thread pays.
     fn parallel_from(&self) -> usize;
 
-    /// Room that [`Quantity::group`] needs for screws.
-    fn screws(&self) -> usize;
+    /// What [`Quantity::group`] needs, made once for many groups.
+    fn scratch(&self) -> Scratch {
+        Scratch::default()
+    }
 
     /// Write the rows of a group; `rows` holds eight rows or, at the end of a batch, fewer.
     fn group<I: Isa>(
@@ -25,9 +27,16 @@ pub(crate) trait Quantity: Copy + Sync {
         chain: &Chain,
         joints: &[Lane],
         parameters: LaneParameters<'_>,
-        screws: &mut [Screw],
+        scratch: &mut Scratch,
         rows: &mut [f64],
     );
+}
+
+/// Screws of a group, and the lane of the screws that goes into each column of a row.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    screws: Vec<Screw>,
+    order: Vec<usize>,
 }
 
 /// The end's origin, 3 numbers.
@@ -51,11 +60,7 @@ impl Quantity for Position {
     }
 
     fn parallel_from(&self) -> usize {
-        4096
-    }
-
-    fn screws(&self) -> usize {
-        0
+        8192
     }
 
     #[inline(always)]
@@ -64,12 +69,17 @@ impl Quantity for Position {
         chain: &Chain,
         joints: &[Lane],
         parameters: LaneParameters<'_>,
-        _screws: &mut [Screw],
+        _scratch: &mut Scratch,
         rows: &mut [f64],
     ) {
-        let mut frame = LaneFrame::splat(&Transform::IDENTITY);
-        chain.sweep::<I>(joints, parameters, &[], &mut frame, &mut []);
-        store_lanes(&frame.position, rows);
+        let point = chain.end_point::<I>(joints, parameters);
+        let mut all = [0.0; 3 * LANES];
+        for i in 0..LANES {
+            for (k, lane) in point.iter().enumerate() {
+                all[3 * i + k] = lane.0[i];
+            }
+        }
+        rows.copy_from_slice(&all[..rows.len()]);
     }
 }
 
@@ -82,28 +92,23 @@ impl Quantity for Pose {
         4096
     }
 
-    fn screws(&self) -> usize {
-        0
-    }
-
     #[inline(always)]
     fn group<I: Isa>(
         &self,
         chain: &Chain,
         joints: &[Lane],
         parameters: LaneParameters<'_>,
-        _screws: &mut [Screw],
+        _scratch: &mut Scratch,
         rows: &mut [f64],
     ) {
+        const ORDER: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
         let mut frame = LaneFrame::splat(&Transform::IDENTITY);
         chain.sweep::<I>(joints, parameters, &[], &mut frame, &mut []);
         let (r, p) = (&frame.rotation, &frame.position);
         let (zero, one) = (Lane::ZERO, Lane::splat(1.0));
-        let matrix = [
-            r[0], r[1], r[2], p[0], r[3], r[4], r[5], p[1], r[6], r[7], r[8], p[2], zero, zero,
-            zero, one,
-        ];
-        store_lanes(&matrix, rows);
+        let matrix =
+            [r[0], r[1], r[2], p[0], r[3], r[4], r[5], p[1], r[6], r[7], r[8], p[2], zero, zero, zero, one];
+        store_lanes::<I>(&matrix, &ORDER, rows);
     }
 }
 
@@ -116,8 +121,11 @@ impl Quantity for Jacobian<'_> {
         1024
     }
 
-    fn screws(&self) -> usize {
-        self.columns.len()
+    fn scratch(&self) -> Scratch {
+        let lane = |row: usize, column: usize| 6 * column + (row + 3) % 6;
+        let columns = self.columns.len();
+        let order = (0..self.rows).flat_map(|row| (0..columns).map(move |column| lane(row, column)));
+        Scratch { screws: vec![Screw::ZERO; columns], order: order.collect() }
     }
 
     #[inline(always)]
@@ -126,23 +134,11 @@ impl Quantity for Jacobian<'_> {
         chain: &Chain,
         joints: &[Lane],
         parameters: LaneParameters<'_>,
-        screws: &mut [Screw],
+        scratch: &mut Scratch,
         rows: &mut [f64],
     ) {
         let mut frame = LaneFrame::splat(&Transform::IDENTITY);
-        chain.sweep::<I>(joints, parameters, self.columns, &mut frame, screws);
-        let columns = self.columns.len();
-        for (i, matrix) in rows.chunks_exact_mut(self.width()).take(LANES).enumerate() {
-            for (row, values) in matrix.chunks_exact_mut(columns).enumerate() {
-                for (value, screw) in values.iter_mut().zip(screws.iter()) {
-                    let motion = if row < 3 {
-                        &screw.linear[row]
-                    } else {
-                        &screw.angular[row - 3]
-                    };
-                    *value = motion.0[i];
-                }
-            }
-        }
+        chain.sweep::<I>(joints, parameters, self.columns, &mut frame, &mut scratch.screws);
+        store_lanes::<I>(Screw::lanes(&scratch.screws), &scratch.order, rows);
     }
 }

@@ -12,6 +12,7 @@ use crate::trig::sin_cos;
 /// The end's origin moves by `linear`, a point at offset r from it by `linear + angular x r`; the rotation
 /// changes to exp(`angular`) R.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub struct Screw {
     /// Rotation vector per unit.
     pub angular: [Lane; 3],
@@ -21,10 +22,13 @@ pub struct Screw {
 
 impl Screw {
     /// No motion.
-    pub const ZERO: Screw = Screw {
-        angular: [Lane::ZERO; 3],
-        linear: [Lane::ZERO; 3],
-    };
+    pub const ZERO: Screw = Screw { angular: [Lane::ZERO; 3], linear: [Lane::ZERO; 3] };
+
+    /// Screws as lanes: of each, `angular`, then `linear`.
+    pub(crate) fn lanes(screws: &[Screw]) -> &[Lane] {
+        // SAFETY: a screw is six lanes without padding, in the order of its fields.
+        unsafe { std::slice::from_raw_parts(screws.as_ptr().cast(), 6 * screws.len()) }
+    }
 }
 
 /// A frame of eight poses: base_from_frame.
@@ -40,10 +44,14 @@ impl LaneFrame {
     /// The same transform for all poses.
     #[inline(always)]
     pub fn splat(transform: &Transform) -> LaneFrame {
-        LaneFrame {
-            rotation: transform.rotation.map(Lane::splat),
-            position: transform.translation.map(Lane::splat),
+        let mut frame = LaneFrame { rotation: [Lane::ZERO; 9], position: [Lane::ZERO; 3] };
+        for (lane, value) in frame.rotation.iter_mut().zip(&transform.rotation) {
+            *lane = Lane::splat(*value);
         }
+        for (lane, value) in frame.position.iter_mut().zip(&transform.translation) {
+            *lane = Lane::splat(*value);
+        }
+        frame
     }
 
     #[inline(always)]
@@ -55,10 +63,7 @@ impl LaneFrame {
     #[inline(always)]
     fn turn<I: Isa>(&mut self, first: usize, second: usize, (sine, cosine): (Lane, Lane)) {
         for row in 0..3 {
-            let (u, v) = (
-                self.rotation[3 * row + first],
-                self.rotation[3 * row + second],
-            );
+            let (u, v) = (self.rotation[3 * row + first], self.rotation[3 * row + second]);
             self.rotation[3 * row + first] = I::mul_add(u, cosine, v * sine);
             self.rotation[3 * row + second] = I::mul_add(v, cosine, -(u * sine));
         }
@@ -124,14 +129,13 @@ impl Chain {
             LaneParameters::Shared(shared) => {
                 self.sweep_links::<I, _>(joints, shared, columns, frame, screws)
             }
-            LaneParameters::Each(lanes) => {
-                self.sweep_links::<I, _>(joints, lanes, columns, frame, screws)
-            }
+            LaneParameters::Each(lanes) => self.sweep_links::<I, _>(joints, lanes, columns, frame, screws),
         }
         for (screw, column) in screws.iter_mut().zip(columns) {
             if !matches!(column % 5, 1 | 2) {
                 let point = screw.linear;
-                let arm = [0, 1, 2].map(|i| frame.position[i] - point[i]);
+                let end = &frame.position;
+                let arm = [end[0] - point[0], end[1] - point[1], end[2] - point[2]];
                 screw.linear = cross::<I>(&screw.angular, &arm);
             }
         }
@@ -175,26 +179,11 @@ impl Axes {
     #[inline(always)]
     fn screw(&self, k: usize) -> Screw {
         match k {
-            0 => Screw {
-                angular: self.theta,
-                linear: self.theta_point,
-            },
-            1 => Screw {
-                angular: [Lane::ZERO; 3],
-                linear: self.theta,
-            },
-            2 => Screw {
-                angular: [Lane::ZERO; 3],
-                linear: self.a,
-            },
-            3 => Screw {
-                angular: self.a,
-                linear: self.beta_point,
-            },
-            _ => Screw {
-                angular: self.beta,
-                linear: self.beta_point,
-            },
+            0 => Screw { angular: self.theta, linear: self.theta_point },
+            1 => Screw { angular: [Lane::ZERO; 3], linear: self.theta },
+            2 => Screw { angular: [Lane::ZERO; 3], linear: self.a },
+            3 => Screw { angular: self.a, linear: self.beta_point },
+            _ => Screw { angular: self.beta, linear: self.beta_point },
         }
     }
 }
@@ -212,13 +201,7 @@ fn standard<I: Isa>(frame: &mut LaneFrame, link: &LinkValues<Lane>) -> Axes {
     if link.bent {
         frame.turn::<I>(2, 0, link.beta);
     }
-    Axes {
-        theta,
-        a,
-        beta,
-        theta_point,
-        beta_point: frame.position,
-    }
+    Axes { theta, a, beta, theta_point, beta_point: frame.position }
 }
 
 /// Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d).
@@ -234,16 +217,14 @@ fn modified<I: Isa>(frame: &mut LaneFrame, link: &LinkValues<Lane>) -> Axes {
     let (theta, point) = (frame.axis(2), frame.position);
     frame.turn::<I>(0, 1, sin_cos::<I>(link.theta));
     frame.shift::<I>(2, link.d);
-    Axes {
-        theta,
-        a,
-        beta,
-        theta_point: point,
-        beta_point: point,
-    }
+    Axes { theta, a, beta, theta_point: point, beta_point: point }
 }
 
 #[inline(always)]
 fn cross<I: Isa>(u: &[Lane; 3], v: &[Lane; 3]) -> [Lane; 3] {
-    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| I::mul_add(u[i], v[j], -(u[j] * v[i])))
+    [
+        I::mul_add(u[1], v[2], -(u[2] * v[1])),
+        I::mul_add(u[2], v[0], -(u[0] * v[2])),
+        I::mul_add(u[0], v[1], -(u[1] * v[0])),
+    ]
 }

@@ -22,17 +22,12 @@ impl Default for Transform {
 
 impl Transform {
     /// No motion.
-    pub const IDENTITY: Transform = Transform {
-        rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        translation: [0.0; 3],
-    };
+    pub const IDENTITY: Transform =
+        Transform { rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], translation: [0.0; 3] };
 
     /// A rotation by a rotation vector (axis times angle, radians), then a translation (metres).
     pub fn from_rotation_vector(rotation_vector: [f64; 3], translation: [f64; 3]) -> Transform {
-        Transform {
-            rotation: rotation_exp(rotation_vector),
-            translation,
-        }
+        Transform { rotation: rotation_exp(rotation_vector), translation }
     }
 
     /// From a homogeneous 4x4 matrix, row-major; the last row is not looked at.
@@ -46,10 +41,7 @@ impl Transform {
     /// The homogeneous 4x4 matrix, row-major.
     pub fn to_matrix(&self) -> [f64; 16] {
         let (r, t) = (&self.rotation, &self.translation);
-        [
-            r[0], r[1], r[2], t[0], r[3], r[4], r[5], t[1], r[6], r[7], r[8], t[2], 0.0, 0.0, 0.0,
-            1.0,
-        ]
+        [r[0], r[1], r[2], t[0], r[3], r[4], r[5], t[1], r[6], r[7], r[8], t[2], 0.0, 0.0, 0.0, 1.0]
     }
 
     /// The rotation as a rotation vector, its length between 0 and pi.
@@ -74,14 +66,9 @@ impl Transform {
         let mut rotation = [0.0; 9];
         for (index, value) in rotation.iter_mut().enumerate() {
             let (i, j) = (index / 3, index % 3);
-            *value = (0..3)
-                .map(|k| self.rotation[3 * i + k] * other.rotation[3 * k + j])
-                .sum();
+            *value = (0..3).map(|k| self.rotation[3 * i + k] * other.rotation[3 * k + j]).sum();
         }
-        Transform {
-            rotation,
-            translation: self.apply(other.translation),
-        }
+        Transform { rotation, translation: self.apply(other.translation) }
     }
 
     /// `b_from_a`.
@@ -92,10 +79,7 @@ impl Transform {
             translation: [0.0; 3],
         };
         let moved = back.rotate(self.translation);
-        Transform {
-            translation: moved.map(|x| -x),
-            ..back
-        }
+        Transform { translation: moved.map(|x| -x), ..back }
     }
 
     /// Check that this is a rigid motion; `name` is for the message.
@@ -124,16 +108,8 @@ pub fn rotation_exp(w: [f64; 3]) -> [f64; 9] {
     let [x, y, z] = w;
     let square = x * x + y * y + z * z;
     let angle = square.sqrt();
-    let sinc = if square < 1e-16 {
-        1.0 - square / 6.0
-    } else {
-        angle.sin() / angle
-    };
-    let half = if square < 1e-16 {
-        1.0
-    } else {
-        (0.5 * angle).sin() / (0.5 * angle)
-    };
+    let sinc = if square < 1e-16 { 1.0 - square / 6.0 } else { angle.sin() / angle };
+    let half = if square < 1e-16 { 1.0 } else { (0.5 * angle).sin() / (0.5 * angle) };
     let k = 0.5 * half * half;
     [
         1.0 - k * (y * y + z * z),
@@ -158,27 +134,15 @@ pub fn rotation_log(r: &[f64; 9]) -> [f64; 3] {
     let vector = [q[1] * sign, q[2] * sign, q[3] * sign];
     let sine = (vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]).sqrt();
     let cosine = q[0] * sign;
-    let scale = if sine < 1e-9 {
-        2.0 / cosine
-    } else {
-        2.0 * sine.atan2(cosine) / sine
-    };
+    let scale = if sine < 1e-9 { 2.0 / cosine } else { 2.0 * sine.atan2(cosine) / sine };
     vector.map(|x| x * scale)
 }
 
 /// Unit quaternion w x y z of a rotation matrix, of either sign.
 fn quaternion(r: &[f64; 9]) -> [f64; 4] {
-    let squares = [
-        r[0] + r[4] + r[8],
-        r[0] - r[4] - r[8],
-        r[4] - r[0] - r[8],
-        r[8] - r[0] - r[4],
-    ]
-    .map(|x| 1.0 + x);
-    let largest = (1..4).fold(
-        0,
-        |best, i| if squares[i] > squares[best] { i } else { best },
-    );
+    let squares =
+        [r[0] + r[4] + r[8], r[0] - r[4] - r[8], r[4] - r[0] - r[8], r[8] - r[0] - r[4]].map(|x| 1.0 + x);
+    let largest = (1..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
     let (xy, xz, yz) = (r[1] + r[3], r[2] + r[6], r[5] + r[7]);
     let (wx, wy, wz) = (r[7] - r[5], r[2] - r[6], r[3] - r[1]);
     let raw = match largest {

@@ -8,11 +8,7 @@ const LIMIT: f64 = 1.0e6;
 /// Added and taken away, rounds to the nearest integer and leaves it in the low bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 /// pi/2 in three parts: two of 33 bits, and the rest.
-const QUARTER: [f64; 3] = [
-    1.570_796_326_734_125_6,
-    6.077_100_506_303_966e-11,
-    2.022_266_248_795_950_6e-21,
-];
+const QUARTER: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
 /// Taylor's series does to 1e-17 what is needed between -pi/4 and pi/4; (sin r - r) / r^3 in r^2.
 const SINE: [f64; 7] = [
     -1.0 / 6.0,
@@ -41,11 +37,7 @@ const COSINE: [f64; 7] = [
 #[inline(always)]
 pub fn sin_cos<I: Isa>(angle: Lane) -> (Lane, Lane) {
     let (mut sine, mut cosine) = reduced::<I>(angle);
-    if angle
-        .0
-        .iter()
-        .fold(false, |beyond, x| beyond | !(x.abs() <= LIMIT))
-    {
+    if angle.0.iter().fold(false, |beyond, x| beyond | !(x.abs() <= LIMIT)) {
         by_library(&angle, &mut sine, &mut cosine);
     }
     (sine, cosine)
@@ -53,11 +45,7 @@ pub fn sin_cos<I: Isa>(angle: Lane) -> (Lane, Lane) {
 
 #[inline(always)]
 fn reduced<I: Isa>(angle: Lane) -> (Lane, Lane) {
-    let shifted = I::mul_add(
-        angle,
-        Lane::splat(std::f64::consts::FRAC_2_PI),
-        Lane::splat(ROUND),
-    );
+    let shifted = I::mul_add(angle, Lane::splat(std::f64::consts::FRAC_2_PI), Lane::splat(ROUND));
     let turns = shifted - Lane::splat(ROUND);
     let mut r = angle;
     for part in QUARTER {
@@ -65,11 +53,7 @@ fn reduced<I: Isa>(angle: Lane) -> (Lane, Lane) {
     }
     let square = r * r;
     let s = I::mul_add(polynomial::<I>(&SINE, square) * square, r, r);
-    let c = I::mul_add(
-        polynomial::<I>(&COSINE, square),
-        square * square,
-        Lane::splat(1.0) - square * 0.5,
-    );
+    let c = I::mul_add(polynomial::<I>(&COSINE, square), square * square, Lane::splat(1.0) - square * 0.5);
     (quadrant(shifted, s, c, 0), quadrant(shifted, c, s, 1))
 }
 
@@ -85,12 +69,14 @@ fn polynomial<I: Isa>(coefficients: &[f64; 7], x: Lane) -> Lane {
 /// `even` or `odd` by the lowest bit of the quarter turns, with the sign of the second bit; `shift` quarter turns on.
 #[inline(always)]
 fn quadrant(shifted: Lane, even: Lane, odd: Lane, shift: u64) -> Lane {
-    Lane::from_fn(|i| {
+    let mut out = [0.0; LANES];
+    for i in 0..LANES {
         let turns = shifted.0[i].to_bits();
         let swap = 0u64.wrapping_sub(turns & 1);
         let value = (even.0[i].to_bits() & !swap) | (odd.0[i].to_bits() & swap);
-        f64::from_bits(value ^ ((turns.wrapping_add(shift) & 2) << 62))
-    })
+        out[i] = f64::from_bits(value ^ ((turns.wrapping_add(shift) & 2) << 62));
+    }
+    Lane(out)
 }
 
 #[cold]

@@ -20,9 +20,7 @@ fn worst(angles: impl Iterator<Item = f64>, set: InstructionSet) -> f64 {
         let lane = Lane::from_fn(|i| group[i]);
         let (sine, cosine) = dispatch_on(set, Both(lane));
         for i in 0..LANES {
-            worst = worst
-                .max((sine.0[i] - group[i].sin()).abs())
-                .max((cosine.0[i] - group[i].cos()).abs());
+            worst = worst.max((sine.0[i] - group[i].sin()).abs()).max((cosine.0[i] - group[i].cos()).abs());
         }
     }
     worst
@@ -34,16 +32,13 @@ fn error_is_below_the_bound_everywhere() {
     let bound = 2.3e-16 + 0.56e-16;
     for set in InstructionSet::ALL {
         for scale in [1.0, 10.0, 1e3, 1e5, 9.9e5] {
-            let angles = (0..400_000)
-                .map(|i| scale * ((f64::from(i) * 0.618_033_988_749_895).fract() * 2.0 - 1.0));
+            let angles =
+                (0..400_000).map(|i| scale * ((f64::from(i) * 0.618_033_988_749_895).fract() * 2.0 - 1.0));
             let error = worst(angles, set);
             assert!(error <= bound, "{set:?} to {scale}: {error:e}");
         }
         let near = (0..80_000).map(|i| f64::from(i - 40_000) * std::f64::consts::FRAC_PI_4);
-        assert!(
-            worst(near, set) <= bound,
-            "{set:?} near multiples of an eighth turn"
-        );
+        assert!(worst(near, set) <= bound, "{set:?} near multiples of an eighth turn");
     }
 }
 
@@ -59,16 +54,7 @@ fn angles_beyond_the_reduction_go_to_the_library() {
 
 #[test]
 fn what_is_no_angle_gives_nan_and_harms_no_neighbour() {
-    let lane = Lane([
-        f64::NAN,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        1.0,
-        2.0,
-        3.0,
-        4.0,
-        5.0,
-    ]);
+    let lane = Lane([f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1.0, 2.0, 3.0, 4.0, 5.0]);
     for set in InstructionSet::ALL {
         let (sine, cosine) = dispatch_on(set, Both(lane));
         for i in 0..3 {
@@ -76,8 +62,7 @@ fn what_is_no_angle_gives_nan_and_harms_no_neighbour() {
         }
         for i in 3..LANES {
             assert!(
-                (sine.0[i] - lane.0[i].sin()).abs() < 3e-16
-                    && (cosine.0[i] - lane.0[i].cos()).abs() < 3e-16
+                (sine.0[i] - lane.0[i].sin()).abs() < 3e-16 && (cosine.0[i] - lane.0[i].cos()).abs() < 3e-16
             );
         }
     }

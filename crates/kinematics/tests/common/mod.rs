@@ -1,46 +1,26 @@
 //! What the tests share: arms, a slow textbook reference, and the one helper that differentiates.
-#![allow(
-    dead_code,
-    missing_docs,
-    clippy::unwrap_used,
-    reason = "each test binary uses a part of it"
-)]
+#![allow(dead_code, missing_docs, clippy::unwrap_used, reason = "each test binary uses a part of it")]
 
 use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
 
 /// A repeatable stream of numbers between -1 and 1 (an additive recurrence, well spread).
 pub fn spread(count: usize, seed: usize) -> Vec<f64> {
-    (0..count)
-        .map(|i| ((i + 1000 * seed + 1) as f64 * 0.618_033_988_749_895).fract() * 2.0 - 1.0)
-        .collect()
+    (0..count).map(|i| ((i + 1000 * seed + 1) as f64 * 0.618_033_988_749_895).fract() * 2.0 - 1.0).collect()
 }
 
 pub fn link(joint: Joint, p: [f64; 5]) -> Link {
-    Link {
-        joint,
-        theta: p[0],
-        d: p[1],
-        a: p[2],
-        alpha: p[3],
-        beta: p[4],
-    }
+    Link { joint, theta: p[0], d: p[1], a: p[2], alpha: p[3], beta: p[4] }
 }
 
 /// A chain with revolute, prismatic and fixed rows, beta, and fixed transforms at both ends.
 pub fn mixed(convention: Convention) -> Chain {
     use Joint::{Fixed, Prismatic, Revolute};
-    let kinds = [
-        Fixed, Revolute, Revolute, Prismatic, Revolute, Fixed, Revolute, Prismatic, Fixed,
-    ];
+    let kinds = [Fixed, Revolute, Revolute, Prismatic, Revolute, Fixed, Revolute, Prismatic, Fixed];
     let values = spread(5 * kinds.len(), 3);
-    let links = kinds
-        .iter()
-        .zip(values.chunks(5))
-        .enumerate()
-        .map(|(i, (kind, p))| {
-            let beta = if i % 2 == 0 { 0.0 } else { 0.3 * p[4] };
-            link(*kind, [p[0], 0.5 * p[1], 0.5 * p[2], 2.0 * p[3], beta])
-        });
+    let links = kinds.iter().zip(values.chunks(5)).enumerate().map(|(i, (kind, p))| {
+        let beta = if i % 2 == 0 { 0.0 } else { 0.3 * p[4] };
+        link(*kind, [p[0], 0.5 * p[1], 0.5 * p[2], 2.0 * p[3], beta])
+    });
     let base = Transform::from_rotation_vector([0.3, -0.2, 1.1], [0.1, -0.4, 0.7]);
     let end = Transform::from_rotation_vector([-0.9, 0.5, 0.2], [0.05, 0.02, 0.21]);
     Chain::new(convention, links.collect(), base, end).unwrap()
@@ -58,10 +38,7 @@ pub fn six_axis() -> Chain {
         [0.0, 0.0922, 0.0, 0.0, 0.0],
     ];
     let links = rows.map(|p| link(Joint::Revolute, p)).to_vec();
-    let end = Transform {
-        translation: [0.01, 0.02, 0.15],
-        ..Transform::IDENTITY
-    };
+    let end = Transform { translation: [0.01, 0.02, 0.15], ..Transform::IDENTITY };
     Chain::new(Convention::Standard, links, Transform::IDENTITY, end).unwrap()
 }
 
@@ -85,9 +62,7 @@ pub fn reference(chain: &Chain, joints: &[f64], parameters: &[f64]) -> Transform
             Convention::Standard => [rz, tz, tx, rx, ry],
             Convention::Modified => [rx, tx, ry, rz, tz],
         };
-        base_from_here = order
-            .iter()
-            .fold(base_from_here, |sum, step| sum.compose(step));
+        base_from_here = order.iter().fold(base_from_here, |sum, step| sum.compose(step));
     }
     base_from_here.compose(chain.end())
 }
@@ -117,10 +92,6 @@ pub fn differences(pose: impl Fn(&[f64]) -> Transform, x: &[f64]) -> Vec<f64> {
 pub fn assert_close(got: &[f64], wanted: &[f64], tolerance: f64) {
     assert_eq!(got.len(), wanted.len());
     for (i, (a, b)) in got.iter().zip(wanted).enumerate() {
-        assert!(
-            (a - b).abs() <= tolerance,
-            "entry {i}: {a} differs from {b} by {:e}",
-            (a - b).abs()
-        );
+        assert!((a - b).abs() <= tolerance, "entry {i}: {a} differs from {b} by {:e}", (a - b).abs());
     }
 }

@@ -1,0 +1,167 @@
+//! The few loops that the compiler does not vectorise by itself: transposition in registers, and stores past the caches.
+#![cfg(target_arch = "x86_64")]
+
+use std::arch::x86_64::{
+    __m128d, __m256d, __m512d, _mm_add_pd, _mm_mul_pd, _mm_sfence, _mm256_fmadd_pd, _mm256_loadu_pd,
+    _mm256_permute2f128_pd, _mm256_storeu_pd, _mm256_stream_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
+    _mm512_fmadd_pd, _mm512_loadu_pd, _mm512_shuffle_f64x2, _mm512_storeu_pd, _mm512_stream_pd,
+    _mm512_unpackhi_pd, _mm512_unpacklo_pd,
+};
+use std::mem::transmute;
+
+use crate::lane::{LANES, Lane};
+
+/// Bytes of a cache line, and of a lane.
+const LINE: usize = 64;
+
+/// a b + c with one rounding.
+///
+/// Said in vectors it keeps the plain operations around it in vectors: the compiler looks back through a dozen scalar
+/// operations only before it gives up joining them.
+///
+/// # Safety
+/// The processor must have AVX-512F.
+#[inline(always)]
+pub unsafe fn mul_add_avx512(a: Lane, b: Lane, c: Lane) -> Lane {
+    // SAFETY: a lane is a vector of eight f64; the caller vouches for the instruction.
+    unsafe { transmute(_mm512_fmadd_pd(transmute(a), transmute(b), transmute(c))) }
+}
+
+/// a b + c with one rounding, see [`mul_add_avx512`].
+///
+/// # Safety
+/// The processor must have AVX2 and FMA.
+#[inline(always)]
+pub unsafe fn mul_add_avx2(a: Lane, b: Lane, c: Lane) -> Lane {
+    // SAFETY: a lane is two vectors of four f64; the caller vouches for the instruction.
+    unsafe {
+        let (a, b, c): ([__m256d; 2], [__m256d; 2], [__m256d; 2]) =
+            (transmute(a), transmute(b), transmute(c));
+        transmute([_mm256_fmadd_pd(a[0], b[0], c[0]), _mm256_fmadd_pd(a[1], b[1], c[1])])
+    }
+}
+
+/// a b + c with two roundings, see [`mul_add_avx512`].
+#[inline(always)]
+pub fn mul_add_sse2(a: Lane, b: Lane, c: Lane) -> Lane {
+    // SAFETY: a lane is four vectors of two f64, and every x86-64 machine has the instructions.
+    unsafe {
+        let (a, b, c): ([__m128d; 4], [__m128d; 4], [__m128d; 4]) =
+            (transmute(a), transmute(b), transmute(c));
+        transmute([
+            _mm_add_pd(_mm_mul_pd(a[0], b[0]), c[0]),
+            _mm_add_pd(_mm_mul_pd(a[1], b[1]), c[1]),
+            _mm_add_pd(_mm_mul_pd(a[2], b[2]), c[2]),
+            _mm_add_pd(_mm_mul_pd(a[3], b[3]), c[3]),
+        ])
+    }
+}
+
+/// Transpose 8 x 8 numbers.
+///
+/// # Safety
+/// The processor must have AVX-512F.
+#[inline(always)]
+pub unsafe fn transpose_avx512(block: &mut [Lane; LANES]) {
+    // SAFETY: loads and stores are of the eight numbers of a lane; the caller vouches for the instructions.
+    unsafe {
+        let row = |i: usize| _mm512_loadu_pd(block[i].0.as_ptr());
+        let low = |i: usize| _mm512_unpacklo_pd(row(2 * i), row(2 * i + 1));
+        let high = |i: usize| _mm512_unpackhi_pd(row(2 * i), row(2 * i + 1));
+        let even = quarters([low(0), low(1), low(2), low(3)]);
+        let odd = quarters([high(0), high(1), high(2), high(3)]);
+        for k in 0..4 {
+            _mm512_storeu_pd(block[2 * k].0.as_mut_ptr(), even[k]);
+            _mm512_storeu_pd(block[2 * k + 1].0.as_mut_ptr(), odd[k]);
+        }
+    }
+}
+
+/// Transpose 4 x 4 pairs of numbers.
+#[inline(always)]
+unsafe fn quarters(x: [__m512d; 4]) -> [__m512d; 4] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let front = [_mm512_shuffle_f64x2::<0x88>(x[0], x[1]), _mm512_shuffle_f64x2::<0x88>(x[2], x[3])];
+        let back = [_mm512_shuffle_f64x2::<0xdd>(x[0], x[1]), _mm512_shuffle_f64x2::<0xdd>(x[2], x[3])];
+        [
+            _mm512_shuffle_f64x2::<0x88>(front[0], front[1]),
+            _mm512_shuffle_f64x2::<0x88>(back[0], back[1]),
+            _mm512_shuffle_f64x2::<0xdd>(front[0], front[1]),
+            _mm512_shuffle_f64x2::<0xdd>(back[0], back[1]),
+        ]
+    }
+}
+
+/// Transpose 8 x 8 numbers.
+///
+/// # Safety
+/// The processor must have AVX.
+#[inline(always)]
+pub unsafe fn transpose_avx(block: &mut [Lane; LANES]) {
+    let source = *block;
+    for (row, column) in [(0, 0), (0, 4), (4, 0), (4, 4)] {
+        // SAFETY: four numbers from index 0 or 4 of a lane; the caller vouches for the instructions.
+        unsafe {
+            let r = |i: usize| _mm256_loadu_pd(source[row + i].0.as_ptr().add(column));
+            let turned = fours([r(0), r(1), r(2), r(3)]);
+            for (i, value) in turned.into_iter().enumerate() {
+                _mm256_storeu_pd(block[column + i].0.as_mut_ptr().add(row), value);
+            }
+        }
+    }
+}
+
+/// Transpose 4 x 4 numbers.
+#[inline(always)]
+unsafe fn fours(r: [__m256d; 4]) -> [__m256d; 4] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let (a, b) = (_mm256_unpacklo_pd(r[0], r[1]), _mm256_unpackhi_pd(r[0], r[1]));
+        let (c, d) = (_mm256_unpacklo_pd(r[2], r[3]), _mm256_unpackhi_pd(r[2], r[3]));
+        [
+            _mm256_permute2f128_pd::<0x20>(a, c),
+            _mm256_permute2f128_pd::<0x20>(b, d),
+            _mm256_permute2f128_pd::<0x31>(a, c),
+            _mm256_permute2f128_pd::<0x31>(b, d),
+        ]
+    }
+}
+
+/// Write a whole cache line past the caches, or plainly where `to` does not begin one.
+///
+/// # Safety
+/// The processor must have AVX-512F.
+#[inline(always)]
+pub unsafe fn stream_avx512(line: &Lane, to: &mut [f64; LANES]) {
+    if !to.as_ptr().addr().is_multiple_of(LINE) {
+        *to = line.0;
+        return;
+    }
+    // SAFETY: the address is that of eight numbers and has just been found aligned.
+    unsafe { _mm512_stream_pd(to.as_mut_ptr(), _mm512_loadu_pd(line.0.as_ptr())) }
+}
+
+/// Write a whole cache line past the caches, or plainly where `to` does not begin one.
+///
+/// # Safety
+/// The processor must have AVX.
+#[inline(always)]
+pub unsafe fn stream_avx(line: &Lane, to: &mut [f64; LANES]) {
+    if !to.as_ptr().addr().is_multiple_of(LINE) {
+        *to = line.0;
+        return;
+    }
+    // SAFETY: the addresses are of two times four numbers and have just been found aligned.
+    unsafe {
+        _mm256_stream_pd(to.as_mut_ptr(), _mm256_loadu_pd(line.0.as_ptr()));
+        _mm256_stream_pd(to.as_mut_ptr().add(4), _mm256_loadu_pd(line.0.as_ptr().add(4)));
+    }
+}
+
+/// Let other threads see what was streamed before what follows.
+#[inline(always)]
+pub fn fence() {
+    // SAFETY: every x86-64 machine has the instruction.
+    unsafe { _mm_sfence() }
+}
