@@ -1,0 +1,1 @@
+"""Speed of truearm beside its peers, measured in the same run: python -m benches."""
