@@ -15,6 +15,7 @@ from truearm.arrays import as_rows, frozen
 from truearm.errors import InputError
 from truearm.files import read_text
 from truearm.library import library_text
+from truearm.robot_checks import check_sizes
 from truearm.robot_file import parse_robot_file
 from truearm.urdf import read_urdf
 
@@ -129,9 +130,11 @@ class Robot:
             centre = file.payload.centre_of_gravity_mm
             payload = Payload(file.payload.mass_kg, cast("Any", tuple(centre)) if centre else None)
         try:
-            return cls(**fields, payload=payload)
+            robot = cls(**fields, payload=payload)
+            check_sizes(robot)
         except InputError as error:
             raise error.at(where) from None
+        return robot
 
     @classmethod
     def from_urdf(

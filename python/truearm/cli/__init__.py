@@ -1,0 +1,36 @@
+"""The command line: `truearm COMMAND`, one module a command, loaded when it is called.
+
+To add a command, write a module with a function `command` whose signature and docstring are its
+options and its help, and name it in :data:`COMMANDS`.
+"""
+
+import sys
+from collections.abc import Sequence
+from typing import Final
+
+from truearm.cli import console
+from truearm.cli.lazy import Entry, build
+
+COMMANDS: Final = (
+    Entry("demo", "truearm.cli.demo", "The whole way on a virtual arm."),
+    Entry("robots", "truearm.cli.robots", "List the library of arms, show and check a robot."),
+    Entry("import", "truearm.cli.import_", "Bring in other people's measurement tables."),
+    Entry("calibrate", "truearm.cli.calibrate", "Learn an arm's parameters and validate them."),
+    Entry("evaluate", "truearm.cli.evaluate", "Errors of a calibration on other measurements."),
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; its exit status: 0 done, 1 could not be done, 2 wrong usage, 130 interrupted.
+
+    Args:
+        arguments: Words behind `truearm`; those of the process by default.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return build(COMMANDS)(given)
+    except (Exception, KeyboardInterrupt) as error:
+        status = console.exit_status(error)
+        if status is None:
+            raise
+        return status

@@ -1,0 +1,92 @@
+"""What commands share: printing for people and programs, and errors as exit statuses."""
+
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, Final
+
+from truearm.errors import Notice, TruearmError, UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+DONE: Final = 0
+FAILED: Final = 1
+USAGE: Final = 2
+INTERRUPTED: Final = 130
+WIDTH: Final = 80
+
+
+def say(text: str = "") -> None:
+    """Print a line of result on stdout."""
+    sys.stdout.write(f"{text}\n")
+
+
+def say_wrapped(text: str) -> None:
+    """Print a paragraph on stdout in lines of at most 80 columns."""
+    say(fill(text, WIDTH))
+
+
+def tell(text: str) -> None:
+    """Print a line about the work on stderr, where it does not mix with results."""
+    sys.stderr.write(f"{text}\n")
+
+
+def warn(notices: Iterable[Notice]) -> None:
+    """Print notices on stderr."""
+    for notice in notices:
+        tell(f"Warning: {notice}")
+
+
+def print_json(value: Any) -> None:  # noqa: ANN401
+    """Print a value as JSON on stdout; NaN and infinity are errors of the caller."""
+    say(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def print_table(
+    columns: Sequence[str], rows: Iterable[Sequence[str]], *, title: str = "", left: Sequence[int] = (0,)
+) -> None:
+    """Print a table of at most 80 columns on stdout.
+
+    Args:
+        columns: Headings, with units.
+        rows: Texts of each row.
+        title: Line above it.
+        left: Columns to set flush left; the others are flush right.
+    """
+    from rich.box import SIMPLE_HEAD  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(box=SIMPLE_HEAD, title=title or None, title_justify="left", pad_edge=False)
+    for position, heading in enumerate(columns):
+        table.add_column(Text(heading), justify="left" if position in left else "right")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    _console().print(table)
+
+
+def exit_status(error: BaseException) -> int | None:
+    """Say an error on stderr; its exit status, or None if it is not one that people can act on."""
+    if isinstance(error, TruearmError) or type(error).__module__ == "truearm._core":
+        tell(f"Error: {error}")
+        return USAGE if isinstance(error, UsageError) else FAILED
+    if isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        tell(f"Error: {place}{error.strerror or error}.")
+        return FAILED
+    if isinstance(error, MemoryError):
+        tell("Error: not enough memory for this; use fewer measurements.")
+        return FAILED
+    if isinstance(error, KeyboardInterrupt):
+        tell("Interrupted.")
+        return INTERRUPTED
+    return None
+
+
+def _console() -> "Console":
+    from rich.console import Console  # noqa: PLC0415
+
+    console = Console(highlight=False)
+    return Console(highlight=False, width=min(console.width, WIDTH))

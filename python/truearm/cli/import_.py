@@ -1,0 +1,118 @@
+"""`truearm import`: other people's tables as measurement files."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truearm.cli.console import print_json, tell
+from truearm.errors import UsageError
+from truearm.files import write_whole
+from truearm.importing import ImportPlan, import_table, unused_columns
+from truearm.reading import quoted_delimiter
+from truearm.rotation_columns import RotationColumns
+
+DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
+
+
+def command(
+    raw: Annotated[Path, typer.Argument(metavar="RAW", help="The table to bring in.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The measurement file to write.")],
+    columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map", metavar="OURS=THEIRS[:UNIT]", help="q1=J1, x=px:mm, sigma=..., group=...; repeat."
+        ),
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NEW=]THEIRS[:UNIT]", help="A further column to keep, in SI if a unit is given."
+        ),
+    ] = None,
+    rotation: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND=COLUMNS",
+            help="euler:XYZ:deg=RX,RY,RZ (capitals moving, small letters fixed axes), "
+            "vector:rad=RX,RY,RZ or quaternion:xyzw=A,B,C,D.",
+        ),
+    ] = None,
+    joint_unit: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of the joints.")] = None,
+    length_unit: Annotated[str | None, typer.Option(metavar="mm|m", help="Unit of positions.")] = None,
+    delimiter: Annotated[str | None, typer.Option(help='Mark between fields: ";", tab, ...')] = None,
+    decimal: Annotated[str | None, typer.Option(help='Decimal mark: "." or ",".')] = None,
+    skip_lines: Annotated[int, typer.Option(min=0, help="Lines above the header.")] = 0,
+    encoding: Annotated[str, typer.Option(help="Encoding of the text.")] = "utf-8",
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Write a measurement file in rad and m from a table with other columns, units or marks.
+
+    Nothing is guessed: what is not plain CSV in our columns and units has to be stated.
+    """
+    _check_choices(joint_unit, length_unit, decimal)
+    if output.exists() and raw.exists() and output.samefile(raw):
+        raise UsageError("the output is the table itself", where=str(output), way_out="Name another file")
+    plan = ImportPlan(
+        columns=_pairs(columns or [], "--map"),
+        keep=_pairs(keep or [], "--keep"),
+        rotation=RotationColumns.parse(rotation) if rotation else None,
+        joint_unit=joint_unit,
+        length_unit=length_unit,
+        delimiter=_delimiter(delimiter),
+        decimal=decimal,
+        skip_lines=skip_lines,
+        encoding=encoding,
+    )
+    frame = import_table(raw, plan)
+    left_out = unused_columns(raw, plan)
+    write_whole(output, frame.to_csv(index=False, lineterminator="\n"))
+    if as_json:
+        names = [str(name) for name in frame.columns]
+        print_json({"output": str(output), "rows": len(frame), "columns": names, "left_out": left_out})
+        return
+    tell(f"{output}: {len(frame)} rows, {', '.join(frame.columns)}.")
+    if left_out:
+        tell(f"Left out: {', '.join(left_out)}. Keep them with --keep.")
+
+
+def _pairs(options: list[str], option: str) -> dict[str, str]:
+    """OURS=THEIRS by OURS; without "=" both are the same but for the unit."""
+    pairs: dict[str, str] = {}
+    for text in options:
+        ours, mark, theirs = text.partition("=")
+        if not mark and option == "--keep":
+            ours, theirs = (
+                text.rpartition(":")[0] if text.endswith((":mm", ":deg", ":m", ":rad")) else text,
+                text,
+            )
+        if not ours or not theirs:
+            raise UsageError(f'"{text}" is no pair of columns', where=option, rule="Write OURS=THEIRS")
+        if ours in pairs:
+            raise UsageError(f'column "{ours}" is named twice', where=option)
+        pairs[ours] = theirs
+    return pairs
+
+
+def _delimiter(text: str | None) -> str | None:
+    if text is None:
+        return None
+    mark = DELIMITER_WORDS.get(text, text)
+    if len(mark) != 1:
+        raise UsageError(
+            f'"{text}" is no delimiter',
+            where="--delimiter",
+            rule=f"One mark, such as {quoted_delimiter(';')} or tab",
+        )
+    return mark
+
+
+def _check_choices(joint_unit: str | None, length_unit: str | None, decimal: str | None) -> None:
+    choices = (
+        ("--joint-unit", joint_unit, ("deg", "rad")),
+        ("--length-unit", length_unit, ("mm", "m")),
+        ("--decimal", decimal, (".", ",")),
+    )
+    for option, value, known in choices:
+        if value is not None and value not in known:
+            raise UsageError(f'"{value}" is not known', where=option, rule=f"Either {known[0]} or {known[1]}")

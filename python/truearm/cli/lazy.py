@@ -1,0 +1,82 @@
+"""Commands that are imported when they are called, so that help and completion are quick."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import version
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+INTERRUPTED_BY_TYPER = 130
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A command of the table: its name, its module with a function `command`, and one line of help."""
+
+    name: str
+    module: str
+    summary: str
+
+
+class LazyCommand(TyperCommand):
+    """Stands for a command in lists; becomes the real one when it is to run."""
+
+    def __init__(self, entry: Entry) -> None:
+        super().__init__(name=entry.name, help=entry.summary, rich_markup_mode=None)
+        self._entry = entry
+
+    def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> Any:  # noqa: ANN401
+        """The context of the real command."""
+        return self._load().make_context(info_name, args, *more, **extra)
+
+    def _load(self) -> Any:  # noqa: ANN401
+        application = typer.Typer(add_completion=False, rich_markup_mode=None)
+        application.command(self._entry.name)(import_module(self._entry.module).command)
+        return typer.main.get_command(application)
+
+
+def build(entries: Sequence[Entry]) -> Callable[[list[str]], int]:
+    """The program over a table of commands: takes the words behind its name, returns the exit status."""
+
+    class Group(TyperGroup):
+        def __init__(self, **attributes: Any) -> None:
+            super().__init__(**attributes)
+            self.commands = {entry.name: LazyCommand(entry) for entry in entries}
+
+        def list_commands(self, ctx: Any) -> list[str]:  # noqa: ANN401
+            return list(self.commands)
+
+    application = typer.Typer(
+        cls=Group, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+    )
+    application.callback(no_args_is_help=True)(_program)
+    program = typer.main.get_command(application)
+
+    def run(arguments: list[str]) -> int:
+        try:
+            program(args=arguments, prog_name="truearm")
+        except SystemExit as stop:
+            if stop.code == INTERRUPTED_BY_TYPER:
+                raise KeyboardInterrupt from None
+            return stop.code if isinstance(stop.code, int) else 0
+        return 0
+
+    return run
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"truearm {version('truearm')}")
+        raise typer.Exit
+
+
+def _program(
+    asked_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit."),
+    ] = False,
+) -> None:
+    """Robot arm calibration with Denavit-Hartenberg parameters that vary over the workspace."""

@@ -1,0 +1,258 @@
+"""Other people's tables as measurement tables: what is in them is stated, never guessed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from truearm.columns import DISTANCE, JOINT, QUATERNION, SIGMA, TARGET, WORDS
+from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.files import decode_text, read_bytes
+from truearm.measurements import Measurements
+from truearm.reading import DELIMITERS, Table, check_is_table, quoted_delimiter, split_table
+from truearm.rotation_columns import RotationColumns
+from truearm.units import ANGLE_UNITS, LENGTH_UNITS, to_si
+
+Floats = NDArray[np.float64]
+
+UNITS: Final = LENGTH_UNITS + ANGLE_UNITS
+DECIMAL_MARKS: Final = (".", ",")
+
+
+@dataclass(frozen=True)
+class ImportPlan:
+    """What a table looks like and what its columns mean.
+
+    Attributes:
+        columns: Their column of each of ours (q1, x, x2, sigma, group, ...); a unit may stand behind
+            it, as in "J1:deg". Columns that have our names already need not be named.
+        keep: Their column, with or without unit, of each further column to keep.
+        rotation: Columns of the orientation, unless they are qw, qx, qy, qz in `columns`.
+        joint_unit: Unit of joints whose column states none: "rad" or "deg".
+        length_unit: Unit of positions, sigma and distances that state none: "m" or "mm".
+        delimiter: Mark between fields; None takes commas where the file is plainly made of them.
+        decimal: Decimal mark, "." or ","; None takes points.
+        skip_lines: Lines before the header.
+        encoding: Encoding of the text.
+    """
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    keep: Mapping[str, str] = field(default_factory=dict)
+    rotation: RotationColumns | None = None
+    joint_unit: str | None = None
+    length_unit: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    skip_lines: int = 0
+    encoding: str = "utf-8"
+
+
+def import_table(path: Path, plan: ImportPlan) -> pd.DataFrame:
+    """Read a table as `plan` says it is, as a table that Measurements.from_dataframe takes.
+
+    Returns:
+        Joints, positions, orientation and what was kept, in rad and m, all rows.
+
+    Raises:
+        InputError: If the file is not what the plan says, or the measurements break a rule.
+        UsageError: If the plan names columns that are not there, or leaves a unit open.
+    """
+    table = _read(path, plan)
+    columns: dict[str, Floats | NDArray[np.str_]] = {}
+    for ours, theirs in _all_columns(table, plan).items():
+        columns[ours] = _converted(table, ours, theirs, plan)
+    if plan.rotation is not None:
+        columns |= _orientation(table, plan.rotation, plan)
+    for ours, theirs in plan.keep.items():
+        if ours in columns:
+            raise UsageError(f'column "{ours}" is named twice', where="--keep")
+        columns[ours] = _kept(table, ours, theirs, plan)
+    frame = pd.DataFrame(columns)
+    Measurements.from_dataframe(frame, name=str(path))
+    return frame
+
+
+def unused_columns(path: Path, plan: ImportPlan) -> list[str]:
+    """Their columns that nothing is taken from."""
+    table = _read(path, plan)
+    mentioned = [*_all_columns(table, plan).values(), *plan.keep.values()]
+    used = {_split_unit(table, theirs)[0] for theirs in mentioned}
+    used |= set(plan.rotation.columns) if plan.rotation else set()
+    return [name for name in table.names if name not in used]
+
+
+def _read(path: Path, plan: ImportPlan) -> Table:
+    where = str(path)
+    content = read_bytes(path)
+    if plan.encoding.casefold() in ("utf-8", "utf8"):
+        text = decode_text(content, where=where)
+    else:
+        text = _decode(content, plan.encoding, where)
+    lines = text.splitlines(keepends=True)
+    if plan.skip_lines >= len(lines) > 0:
+        raise UsageError(f"{plan.skip_lines} lines to skip, the file has {len(lines)}", where=where)
+    text = "".join(lines[plan.skip_lines :])
+    check_is_table(text, where=where)
+    delimiter = plan.delimiter or _plain_delimiter(text, where)
+    if delimiter == plan.decimal:
+        raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
+    return split_table(text, delimiter, where=where)
+
+
+def _decode(content: bytes, encoding: str, where: str) -> str:
+    try:
+        return content.decode(encoding)
+    except LookupError:
+        raise UsageError(f'"{encoding}" is no known encoding', where="--encoding") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"the text is not {encoding}: {error.reason}", where=where) from None
+
+
+def _plain_delimiter(text: str, where: str) -> str:
+    header = text.lstrip().splitlines()[0]
+    counts = {mark: header.count(mark) for mark in DELIMITERS}
+    best = max(counts, key=lambda mark: counts[mark])
+    if counts[best] == 0:
+        raise UsageError(
+            f'the header is one field: "{header[:60]}"',
+            where=where,
+            way_out="Say what is between fields with --delimiter, and --skip-lines if the header is lower",
+        )
+    if best != ",":
+        raise UsageError(
+            f"its fields seem to be separated by {DELIMITERS[best]}",
+            where=where,
+            way_out=f"If so, give --delimiter {quoted_delimiter(best)}",
+        )
+    return best
+
+
+def _all_columns(table: Table, plan: ImportPlan) -> dict[str, str]:
+    """Their column of each of ours: those of the plan, and those that have our names already."""
+    for ours in plan.columns:
+        if not _is_ours(ours):
+            known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "distance", *WORDS]
+            raise UsageError(
+                f'"{ours}" is no measurement column',
+                where="--map",
+                rule=did_you_mean(ours, known) or f"Known are {list_names(known)} and their like",
+                way_out="Further columns are kept with --keep",
+            )
+    taken = {_split_unit(table, theirs)[0] for theirs in plan.columns.values()}
+    taken |= {_split_unit(table, theirs)[0] for theirs in plan.keep.values()}
+    named = dict(plan.columns)
+    for name in table.names:
+        bare, _, unit = name.rpartition("_")
+        ours = bare if unit in UNITS and _is_ours(bare) else name
+        if name not in taken and _is_ours(ours) and ours not in named:
+            named[ours] = name if ours == name else f"{name}:{unit}"
+    return dict(sorted(named.items(), key=lambda item: _order(item[0])))
+
+
+def _converted(table: Table, ours: str, theirs: str, plan: ImportPlan) -> Floats | NDArray[np.str_]:
+    name, unit = _split_unit(table, theirs)
+    if ours in WORDS:
+        return table.texts(name)
+    values = _numbers(table, name, plan)
+    if ours in QUATERNION:
+        return values
+    return to_si(values, unit or _stated_unit(ours, plan))
+
+
+def _stated_unit(ours: str, plan: ImportPlan) -> str:
+    is_joint = JOINT.fullmatch(ours) is not None
+    unit = plan.joint_unit if is_joint else plan.length_unit
+    if unit is None:
+        option, units = ("--joint-unit", ANGLE_UNITS) if is_joint else ("--length-unit", LENGTH_UNITS)
+        raise UsageError(
+            f'the unit of column "{ours}" is not stated',
+            way_out=f"Give {option} {' or '.join(units)}, or name it: --map {ours}=COLUMN:{units[1]}",
+        )
+    return unit
+
+
+def _orientation(table: Table, rotation: RotationColumns, plan: ImportPlan) -> dict[str, Floats]:
+    values = np.column_stack([_numbers(table, _existing(table, name), plan) for name in rotation.columns])
+    quaternions = rotation.quaternions(values)
+    return {name: quaternions[:, k] for k, name in enumerate(QUATERNION)}
+
+
+def _kept(table: Table, ours: str, theirs: str, plan: ImportPlan) -> Floats | NDArray[np.str_]:
+    if _is_ours(ours):
+        raise UsageError(f'"{ours}" is a measurement column', where="--keep", way_out="Give it with --map")
+    name, unit = _split_unit(table, theirs)
+    if unit:
+        return to_si(_numbers(table, name, plan), unit)
+    try:
+        return _numbers(table, name, plan)
+    except InputError:
+        return table.texts(name)
+
+
+def _numbers(table: Table, name: str, plan: ImportPlan) -> Floats:
+    if plan.decimal != ",":
+        return table.numbers(name) if plan.decimal else _numbers_or_hint(table, name)
+    cells = table.texts(name)
+    pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
+    if pointed:
+        raise InputError(
+            f'column "{name}" holds "{cells[pointed[0] - 1]}" in row {pointed[0]}',
+            where=table.where,
+            rule="With a decimal comma there must be no points",
+            way_out="Write numbers without marks between thousands, or leave out --decimal",
+        )
+    return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count).numbers(name)
+
+
+def _numbers_or_hint(table: Table, name: str) -> Floats:
+    try:
+        return table.numbers(name)
+    except InputError as error:
+        commas = [cell for cell in table.texts(name) if "," in cell]
+        if not commas:
+            raise
+        raise UsageError(
+            f'column "{name}" holds "{commas[0]}"',
+            where=table.where,
+            way_out='If this is a decimal comma, give --decimal ","',
+        ) from error
+
+
+def _split_unit(table: Table, theirs: str) -> tuple[str, str]:
+    """Their column and the unit behind it, "" where there is none."""
+    name, mark, unit = theirs.rpartition(":")
+    if mark and unit in UNITS and theirs not in table.columns:
+        return _existing(table, name), unit
+    return _existing(table, theirs), ""
+
+
+def _existing(table: Table, name: str) -> str:
+    if name not in table.columns:
+        raise UsageError(
+            f'there is no column "{name}"',
+            where=table.where,
+            rule=did_you_mean(name, table.names),
+            way_out=f"Its columns are {', '.join(table.names)}",
+        )
+    return name
+
+
+def _is_ours(name: str) -> bool:
+    """Whether a name, without unit, is one of a measurement column."""
+    matches = (pattern.fullmatch(name) for pattern in (JOINT, TARGET, SIGMA, DISTANCE))
+    has_unit = any(name.endswith(f"_{unit}") for unit in UNITS)
+    return name in QUATERNION + WORDS or (any(matches) and not has_unit)
+
+
+def _order(ours: str) -> tuple[int, int, str]:
+    """Joints, targets, quaternion, then the rest."""
+    joint, target = JOINT.fullmatch(ours), TARGET.fullmatch(ours)
+    if joint:
+        return 0, int(joint[1]), ""
+    if target:
+        return 1 if not target[2] else 3, int(target[2] or 1), target[1]
+    return (2, QUATERNION.index(ours), "") if ours in QUATERNION else (4, 0, ours)

@@ -1,0 +1,64 @@
+"""Whether a robot's numbers can be those of an arm: mostly, whether their units can be right."""
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from truearm.errors import InputError, Notice, list_rows
+from truearm.units import RADIANS_PER_DEGREE
+
+if TYPE_CHECKING:
+    from truearm.robot import Robot
+
+MAX_LENGTH_M: Final = 50.0
+MAX_ANGLE_RAD: Final = 2.0 * np.pi + 1e-6
+MAX_LIMIT_RAD: Final = 40.0 * np.pi
+RIGHT_ANGLE_TOLERANCE: Final = 1e-3
+ANGLES: Final = {0: "theta", 3: "alpha", 4: "beta"}
+LENGTHS: Final = {1: "d", 2: "a"}
+
+
+def check_sizes(robot: "Robot") -> None:
+    """Raise InputError if an angle or a length can only come from a wrong unit."""
+    for column, name in ANGLES.items():
+        _refuse_large(robot, column, name, MAX_ANGLE_RAD, ("rad", "angle_unit"))
+    for column, name in LENGTHS.items():
+        _refuse_large(robot, column, name, MAX_LENGTH_M, ("m", "length_unit"))
+    for index, (kind, limits) in enumerate(zip(robot.joints, robot.limits, strict=True), start=1):
+        largest = np.abs(limits[np.isfinite(limits)]).max(initial=0.0)
+        bound, unit = (MAX_LIMIT_RAD, "rad") if kind == "revolute" else (MAX_LENGTH_M, "m")
+        if largest > bound:
+            raise InputError(
+                f"a limit of {largest:.6g} {unit}",
+                where=f"link {index}, limits",
+                way_out="Check length_unit and angle_unit",
+            )
+
+
+def robot_notices(robot: "Robot") -> list[Notice]:
+    """What is allowed and still strange: no limits at all, radians written where degrees were stated."""
+    notices = []
+    if np.isinf(robot.limits).all():
+        text = "No joint has limits, so readings in a wrong unit may go unnoticed."
+        notices.append(Notice("no_limits", text))
+    written = robot.table[:, [0, 3]] / RADIANS_PER_DEGREE
+    quarters = np.round(written / (np.pi / 2))
+    strange = (quarters != 0.0) & (np.abs(written - quarters * np.pi / 2) < RIGHT_ANGLE_TOLERANCE)
+    if strange.any():
+        links = (np.flatnonzero(strange.any(axis=1)) + 1).tolist()
+        value = written[strange][0]
+        text = f"{value:.6g} deg in {list_rows(links, 'link')} looks like radians: check angle_unit."
+        notices.append(Notice("radians_as_degrees", text, tuple(links)))
+    return notices
+
+
+def _refuse_large(robot: "Robot", column: int, name: str, bound: float, unit: tuple[str, str]) -> None:
+    values = np.abs(robot.table[:, column])
+    if values.max() > bound:
+        link = int(values.argmax())
+        raise InputError(
+            f"{robot.table[link, column]:.6g} {unit[0]}",
+            where=f"link {link + 1}, {name}",
+            rule=f"No {'angle is beyond one turn' if unit[0] == 'rad' else 'link is longer than 50 m'}",
+            way_out=f"Check {unit[1]}",
+        )
