@@ -1,0 +1,189 @@
+"""The robot: what its file says is what its kinematics do."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from truearm.errors import InputError
+from truearm.library import library_names
+from truearm.robot import Payload, Robot
+
+LINK = """
+[[link]]
+joint = "revolute"
+theta = 0.0
+d = 100.0
+a = 50.0
+alpha = 90.0
+"""
+HEAD = 'name = "arm"\nconvention = "standard"\nlength_unit = "mm"\nangle_unit = "deg"\n'
+
+
+def arm(tail="", head=HEAD, links=LINK * 2):
+    return Robot.from_toml(head + links + tail, where="arm.toml")
+
+
+def test_units_become_si():
+    robot = arm()
+    np.testing.assert_allclose(robot.table, [[0, 0.1, 0.05, np.pi / 2, 0]] * 2, rtol=0, atol=0)
+    metres = arm(
+        head=HEAD.replace("mm", "m").replace("deg", "rad"),
+        links=LINK.replace("100.0", "1.0").replace("90.0", "1.5") * 2,
+    )
+    np.testing.assert_array_equal(metres.table[0, [1, 3]], [1.0, 1.5])
+
+
+def test_limits_are_degrees_for_revolute_and_lengths_for_prismatic():
+    slide = LINK.replace("revolute", "prismatic") + "limits = [0, 210]\n"
+    robot = arm(links=LINK + "limits = [-90, 180]\n" + slide + LINK)
+    np.testing.assert_allclose(robot.limits, [[-np.pi / 2, np.pi], [0, 0.21], [-np.inf, np.inf]])
+
+
+def test_paper_arm_has_the_forward_kinematics_of_the_fixtures(root):
+    path = root.parent / "shared" / "reference" / "rv_m2_fixtures.json"
+    if not path.is_file():
+        pytest.skip(f"no fixtures at {path}")
+    fixtures = json.loads(path.read_text())
+    position_mm = 1000 * Robot.load("rv-m2").position(fixtures["q_rad"])
+    np.testing.assert_allclose(position_mm, fixtures["nominal_mm"], atol=1e-9)
+
+
+def test_base_given_as_a_row_is_kept_as_one():
+    robot = Robot.load("RV-M2")
+    np.testing.assert_allclose(robot.base_row, [np.pi / 2, 0.4, -0.08, np.pi, 0.0])
+    assert arm().base_row is None
+
+
+def test_direction_and_coupling_make_joint_values_from_readings():
+    """q_dh = matrix . (direction * reading)."""
+    robot = arm("[coupling]\nmatrix = [[1, 0], [1, 1]]\n", links=LINK + LINK + "direction = -1\n")
+    np.testing.assert_array_equal(robot.joints_from_readings([0.3, 0.1]), [0.3, 0.3 - 0.1])
+    plain = arm()
+    q = np.random.default_rng(0).uniform(-1, 1, (9, 2))
+    np.testing.assert_allclose(robot.pose(q), plain.pose(robot.joints_from_readings(q)), atol=1e-15)
+    np.testing.assert_allclose(robot.readings_from_joints(robot.joints_from_readings(q)), q, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["fanuc-lr-mate-200id", "kuka-kr-6-r900", "adept-cobra-600", "franka-panda"])
+def test_joint_jacobian_is_with_respect_to_readings(name):
+    robot, step = Robot.load(name), 1e-6
+    q = np.random.default_rng(4).uniform(-1, 1, robot.joint_count)
+    for joint in range(robot.joint_count):
+        ahead, behind = q.copy(), q.copy()
+        ahead[joint] += step
+        behind[joint] -= step
+        slope = (robot.position(ahead) - robot.position(behind)) / (2 * step)
+        np.testing.assert_allclose(robot.joint_jacobian(q)[:, joint], slope, atol=1e-8)
+
+
+def test_parameter_jacobian_against_a_changed_table():
+    robot, step = Robot.load("ur10"), 1e-6
+    q = np.linspace(-1, 1, 6)
+    jacobian = robot.parameter_jacobian(q)
+    assert jacobian.shape == (3, 30)
+    for k in (0, 7, 13, 29):
+        change = np.zeros(30)
+        change[k] = step
+        ahead, behind = (
+            {**robot.to_dict(), "table": (robot.table + s * change.reshape(6, 5)).tolist()} for s in (1, -1)
+        )
+        slope = (Robot.from_dict(ahead).position(q) - Robot.from_dict(behind).position(q)) / (2 * step)
+        np.testing.assert_allclose(jacobian[:, k], slope, atol=1e-8)
+
+
+def test_shapes_follow_the_readings():
+    robot = Robot.load("ur5")
+    one, many = np.zeros(6), np.zeros((4, 6))
+    assert robot.position(one).shape == (3,)
+    assert robot.pose(one).shape == (4, 4)
+    assert robot.position(many).shape == (4, 3)
+    assert robot.pose(many).shape == (4, 4, 4)
+    assert robot.parameter_jacobian(many, pose=True).shape == (4, 6, 30)
+    assert robot.joint_jacobian(one, pose=True).shape == (6, 6)
+    assert robot.position(np.empty((0, 6))).shape == (0, 3)
+
+
+def test_out_is_written_to():
+    robot, q = Robot.load("ur5"), np.random.default_rng(5).uniform(-1, 1, (7, 6))
+    out = np.empty((7, 3))
+    assert robot.position(q, out=out) is out
+    np.testing.assert_array_equal(out, robot.position(q))
+    single = np.empty(3)
+    robot.position(q[0], out=single)
+    np.testing.assert_array_equal(single, out[0])
+
+
+@pytest.mark.parametrize(
+    ("q", "message"),
+    [
+        (np.zeros(5), r"shape \(5,\).*must be \(n, 6\), or \(6,\)"),
+        (np.zeros((2, 3, 6)), "shape"),
+        (0.0, "shape"),
+        ([0, 0, np.nan, 0, 0, 0], "NaN or infinite values in row 0"),
+        (["a"] * 6, "are not numbers"),
+        ([[0] * 6, [0] * 5], "are not numbers"),
+    ],
+)
+def test_readings_are_checked_at_the_door(q, message):
+    with pytest.raises(InputError, match=f"joint readings of UR5.*{message}|{message}"):
+        Robot.load("ur5").position(q)
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_dictionary_and_toml_bring_back_the_same_robot(name):
+    robot = Robot.load(name)
+    assert Robot.from_dict(json.loads(json.dumps(robot.to_dict(), allow_nan=False))) == robot
+    assert Robot.from_toml(robot.to_toml()) == robot
+
+
+numbers = st.floats(-3.0, 3.0)
+
+
+@given(
+    table=st.lists(st.tuples(*[numbers] * 5), min_size=2, max_size=2),
+    coupling=st.sampled_from([np.eye(2), np.diag([1.0, -1.0]), np.array([[1.0, 0.0], [0.7, -1.0]])]),
+    text=st.text(min_size=1).filter(lambda t: "\r" not in t),
+    lower=st.sampled_from([-np.inf, -1.0]),
+)
+def test_any_robot_comes_back_bit_for_bit(table, coupling, text, lower):
+    upper = np.inf if np.isinf(lower) else 2.0
+    robot = Robot(
+        name=text,
+        source=text,
+        convention="modified",
+        joints=("revolute", "prismatic"),
+        table=np.array(table),
+        base=np.eye(4),
+        flange=np.eye(4),
+        tool=np.eye(4),
+        base_row=None,
+        coupling=coupling,
+        limits=np.array([[lower, upper], [-0.1, 0.2]]),
+        payload=Payload(2.5, (1.0, 2.0, 3.0)),
+    )
+    assert Robot.from_dict(json.loads(json.dumps(robot.to_dict()))) == robot
+    assert Robot.from_toml(robot.to_toml()) == robot
+
+
+def test_transforms_by_quaternion():
+    robot = arm("[tool]\nxyz = [0, 0, 100]\nquaternion_wxyz = [0.7071, 0, 0.7071, 0]\n")
+    np.testing.assert_allclose(robot.tool[:3, 3], [0, 0, 0.1])
+    np.testing.assert_allclose(robot.tool[:3, :3], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], atol=1e-15)
+    np.testing.assert_allclose(robot.pose([0, 0]), robot.flange_chain.pose(np.zeros((1, 2)))[0] @ robot.tool)
+
+
+def test_arrays_cannot_be_changed():
+    with pytest.raises(ValueError, match="read-only"):
+        Robot.load("ur5").table[0, 0] = 1.0
+
+
+@pytest.mark.parametrize("name", ["UR10", "ur 10", "Ur-10", "rv_m2", "KUKA KR 6 R900"])
+def test_library_names_forgive_case_and_separators(name):
+    assert Robot.load(name).joint_count in (5, 6)
+
+
+def test_unknown_names_bring_the_nearest():
+    with pytest.raises(InputError, match='no robot "ur12" .*Did you mean .*"ur10".*truearm robots'):
+        Robot.load("ur12")

@@ -1,0 +1,196 @@
+"""URDF chains: the Denavit-Hartenberg form has the very forward kinematics of the file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from truearm.errors import InputError
+from truearm.robot import Robot
+
+SPECIAL = ["0 0 1", "0 0 -1", "1 0 0", "0 -1 0", "0.6 0 0.8", "0.00001 0 1", "0 0.002 -1"]
+QUARTERS = [0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, -1.570796]
+numbers = st.floats(-1.0, 1.0).map(lambda value: round(value, 4))
+triples = st.tuples(numbers, numbers, numbers)
+axes = st.one_of(
+    st.sampled_from(SPECIAL),
+    triples.filter(lambda t: sum(v * v for v in t) > 0.01).map(lambda t: f"{t[0]} {t[1]} {t[2]}"),
+)
+origins = st.one_of(
+    st.just((0.0, 0.0, 0.0)),
+    st.tuples(st.just(0.0), st.just(0.0), numbers),
+    st.tuples(numbers, numbers, numbers),
+)
+angles = st.one_of(
+    st.tuples(st.sampled_from(QUARTERS), st.sampled_from(QUARTERS), st.just(0.0)),
+    st.tuples(*(st.floats(-3.0, 3.0),) * 3),
+)
+kinds = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
+joints = st.tuples(kinds, origins, angles, axes)
+
+
+def urdf(chain):
+    parts = ['<robot name="arm"><link name="l0"/>']
+    for i, (kind, xyz, rpy, axis) in enumerate(chain):
+        parts.append(
+            f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}"><parent link="l{i}"/><child link="l{i + 1}"/>'
+            f'<origin xyz="{" ".join(map(repr, xyz))}" rpy="{" ".join(map(repr, rpy))}"/><axis xyz="{axis}"/>'
+            '<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>'
+        )
+    return "".join(parts) + "</robot>"
+
+
+def forward(chain, q):
+    """The definition of a URDF: origin, then motion along or about the axis, joint by joint."""
+    pose, values = np.eye(4), iter(q)
+    for kind, xyz, rpy, axis in chain:
+        step = np.eye(4)
+        step[:3, :3], step[:3, 3] = Rotation.from_euler("xyz", rpy).as_matrix(), xyz
+        pose = pose @ step
+        if kind == "fixed":
+            continue
+        unit = np.array(axis.split(), dtype=float)
+        unit /= np.linalg.norm(unit)
+        motion = np.eye(4)
+        if kind == "prismatic":
+            motion[:3, 3] = next(values) * unit
+        else:
+            motion[:3, :3] = Rotation.from_rotvec(next(values) * unit).as_matrix()
+        pose = pose @ motion
+    return pose
+
+
+def load(tmp_path, chain):
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf(chain))
+    return Robot.from_urdf(path)
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(chain=st.lists(joints, min_size=1, max_size=8), seed=st.integers(0, 2**32 - 1))
+def test_any_chain_keeps_its_forward_kinematics(tmp_path, chain, seed):
+    chain = [
+        *chain,
+        ("revolute", (0.1, 0.0, 0.2), (0.0, 0.0, 0.0), "0 0 1"),
+        ("fixed", (0.0, 0.0, 0.1), (0.3, 0.0, 0.0), "1 0 0"),
+    ]
+    robot = load(tmp_path, chain)
+    moving = sum(kind != "fixed" for kind, *_ in chain)
+    assert robot.joint_count == moving
+    q = np.random.default_rng(seed).uniform(-2.0, 2.0, (5, moving))
+    expected = np.array([forward(chain, row) for row in q])
+    np.testing.assert_allclose(robot.pose(q), expected, atol=1e-9)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(chain=st.lists(joints, min_size=2, max_size=6))
+def test_no_row_is_far_away(tmp_path, chain):
+    """Near-parallel axes do not send a common normal a hundred metres off."""
+    chain = [*chain, ("revolute", (0.1, 0.0, 0.2), (0.0, 0.0, 0.0), "0 0 1")]
+    assert np.abs(load(tmp_path, chain).table[:, 1:3]).max() < 1000.0
+
+
+def test_parallel_axes_have_beta_only_where_they_are_not_exactly_parallel(tmp_path):
+    z = ("revolute", (0.3, 0.0, 0.0), (0.0, 0.0, 0.0), "0 0 1")
+    tilted = ("revolute", (0.3, 0.0, 0.0), (0.0, 1e-4, 0.0), "0 0 1")
+    table = load(tmp_path, [z, z, tilted, z]).table
+    np.testing.assert_allclose(table[:, 4], [0.0, 1e-4, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(table[:, 2], [0.3, 0.3, 0.3, 0.0], atol=1e-15)
+
+
+def test_a_ur_urdf_gives_the_makers_table(tmp_path):
+    """Axes of a UR10 as its URDF has them come out with the d, a and alpha of the library."""
+    chain = [
+        ("revolute", (0.0, 0.0, 0.1273), (0.0, 0.0, 0.0), "0 0 1"),
+        ("revolute", (0.0, 0.220941, 0.0), (0.0, np.pi / 2, 0.0), "0 1 0"),
+        ("revolute", (0.0, -0.1719, 0.612), (0.0, 0.0, 0.0), "0 1 0"),
+        ("revolute", (0.0, 0.0, 0.5723), (0.0, np.pi / 2, 0.0), "0 1 0"),
+        ("revolute", (0.0, 0.1149, 0.0), (0.0, 0.0, 0.0), "0 0 1"),
+        ("revolute", (0.0, 0.0, 0.1157), (0.0, 0.0, 0.0), "0 1 0"),
+        ("fixed", (0.0, 0.0922, 0.0), (-np.pi / 2, 0.0, 0.0), "1 0 0"),
+    ]
+    table, library = load(tmp_path, chain).table, Robot.load("ur10").table
+    np.testing.assert_allclose(np.abs(table[:, 1:4]), np.abs(library[:, 1:4]), atol=1e-12)
+
+
+def test_the_parsers_own_kinematics_agree(tmp_path):
+    import yourdfpy
+
+    rng = np.random.default_rng(3)
+    places = rng.uniform(-3, 3, (6, 2, 3)).tolist()
+    chain = [("revolute", tuple(xyz), tuple(rpy), "0 0.6 -0.8") for xyz, rpy in places]
+    robot = load(tmp_path, chain)
+    model = yourdfpy.URDF.load(str(tmp_path / "arm.urdf"), load_meshes=False)
+    q = rng.uniform(-2, 2, 6)
+    model.update_cfg(q)
+    np.testing.assert_allclose(robot.pose(q), model.get_transform("l6", "l0"), atol=1e-9)
+
+
+def test_limits_and_kinds(tmp_path):
+    xyz, rpy = (0.0, 0.0, 0.1), (0.0, 0.0, 0.0)
+    robot = load(
+        tmp_path,
+        [
+            ("revolute", xyz, rpy, "0 0 1"),
+            ("continuous", xyz, rpy, "1 0 0"),
+            ("prismatic", xyz, rpy, "0 0 1"),
+        ],
+    )
+    assert robot.joints == ("revolute", "revolute", "prismatic")
+    np.testing.assert_array_equal(robot.limits, [[-2, 2], [-np.inf, np.inf], [-2, 2]])
+
+
+BRANCHED = """<robot name="arm"><link name="base"/><link name="a"/><link name="tool0"/><link name="camera"/>
+<joint name="j1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/></joint>
+<joint name="f1" type="fixed"><parent link="a"/><child link="tool0"/></joint>
+<joint name="f2" type="fixed"><parent link="a"/><child link="camera"/></joint></robot>"""
+
+
+def test_the_tip_is_chosen_behind_a_hash(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(BRANCHED)
+    assert Robot.load(f"{path}#tool0").source == "arm.urdf, base to tool0"
+    assert Robot.load(f"{path}#base,camera").joint_count == 1
+    with pytest.raises(InputError, match='the chain may end at "tool0" or "camera"'):
+        Robot.load(path)
+    with pytest.raises(InputError, match='no link "tool1".*Did you mean "tool0"'):
+        Robot.load(f"{path}#tool1")
+    with pytest.raises(InputError, match='no joint moves between "a" and "camera"'):
+        Robot.load(f"{path}#a,camera")
+    with pytest.raises(InputError, match='"base" is not behind link "a"'):
+        Robot.load(f"{path}#a,base")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("<robot", "not XML: .*A URDF is an XML file"),
+        ("<sdf/>", "the XML is a <sdf>"),
+        ("", "not XML"),
+        ('<robot name="a"><link name="b"/></robot>', "no joint moves"),
+        ('<robot name="a"><joint name="j"/></robot>', "cannot be read"),
+        (urdf([("floating", (0, 0, 0), (0, 0, 0), "0 0 1")]), 'joint "j0": its type is floating'),
+        (urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 0")]), "has no direction"),
+        (
+            urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 1")]).replace('lower="-2"', 'lower="3"'),
+            "limits 3 to 2",
+        ),
+        (
+            urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 1")]).replace("<axis", '<mimic joint="x"/><axis'),
+            'follows joint "x".*coupling',
+        ),
+    ],
+)
+def test_bad_files_are_explained(tmp_path, content, message):
+    path = tmp_path / "arm.urdf"
+    path.write_text(content)
+    with pytest.raises(InputError, match=message) as caught:
+        Robot.from_urdf(path)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_xacro_is_told_apart():
+    with pytest.raises(InputError, match="xacro macro.*Expand it first"):
+        Robot.load(Path("arm.urdf.xacro"))
