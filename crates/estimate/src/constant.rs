@@ -54,6 +54,9 @@ pub struct ConstantOptions {
     pub robust: Option<Robust>,
     /// A set-up to start from, instead of the closed form.
     pub start: Option<Setup>,
+    /// Link parameters to start from instead of the nominal ones, (5 L,); or one set a pose, (n, 5 L), where only the
+    /// set-up is unknown.
+    pub parameters: Option<Vec<f64>>,
     /// Looked at between iterations.
     pub cancel: Cancel,
 }
@@ -94,12 +97,19 @@ const SCALE_RANGE: (f64, f64) = (0.1, 5.0);
 pub fn fit_constant(problem: &Problem, options: &ConstantOptions) -> Result<ConstantFit, EstimateError> {
     problem.check(options.prior.is_some())?;
     let nominal = problem.chain.nominal();
+    let parameters = options.parameters.clone().unwrap_or_else(|| nominal.clone());
+    let sets = parameters.len() / nominal.len();
+    let poses = problem.measurements.pose_count();
+    if parameters.len() != nominal.len() && !(sets == poses && problem.columns.is_empty()) {
+        let expected = nominal.len();
+        return Err(EstimateError::Length { what: "parameters", found: parameters.len(), expected });
+    }
     let setup = match &options.start {
         Some(setup) => setup.clone(),
-        None => initial_setup(problem, &nominal)?,
+        None => initial_setup(problem, &parameters)?,
     };
     let fit = Fit { problem, options, packets: &Packets::new(problem.measurements), nominal: &nominal };
-    fit.run(State { parameters: nominal.clone(), setup })
+    fit.run(State { parameters, setup })
 }
 
 struct Fit<'a> {
@@ -119,7 +129,8 @@ struct Balance {
 
 impl Fit<'_> {
     fn precision(&self, scale: f64) -> Vec<f64> {
-        let of = |&column: &usize| self.options.prior.map_or(0.0, |prior| (scale * prior.of(column)).powi(-2));
+        let of =
+            |&column: &usize| self.options.prior.map_or(0.0, |prior| (scale * prior.of(column)).powi(-2));
         self.problem.columns.iter().map(of).collect()
     }
 
@@ -211,7 +222,9 @@ impl Fit<'_> {
             .problem
             .columns
             .iter()
-            .map(|&column| ((minimum.state.parameters[column] - self.nominal[column]) / prior.of(column)).powi(2))
+            .map(|&column| {
+                ((minimum.state.parameters[column] - self.nominal[column]) / prior.of(column)).powi(2)
+            })
             .sum();
         (squares / effective.max(1.0)).sqrt().clamp(SCALE_RANGE.0, SCALE_RANGE.1)
     }
@@ -263,9 +276,19 @@ impl Fit<'_> {
         let rows = set.rows_per_pose();
         let of_pose = |pose: usize| {
             let standardised: Vec<f64> = (0..rows)
-                .filter(|row| if row / 3 < set.target_count { set.has_target(pose, row / 3) } else { set.has_rotation(pose) })
+                .filter(|row| {
+                    if row / 3 < set.target_count {
+                        set.has_target(pose, row / 3)
+                    } else {
+                        set.has_rotation(pose)
+                    }
+                })
                 .map(|row| {
-                    let sigma = if row / 3 < set.target_count { noise.position.hypot(set.sigma[pose]) } else { noise.orientation };
+                    let sigma = if row / 3 < set.target_count {
+                        noise.position.hypot(set.sigma[pose])
+                    } else {
+                        noise.orientation
+                    };
                     residuals[pose * rows + row] / sigma
                 })
                 .collect();

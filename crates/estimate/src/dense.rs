@@ -22,7 +22,8 @@ impl Cholesky {
         let scratch = factor::cholesky_in_place_scratch::<f64>(n, par, Default::default());
         let mut memory = faer::dyn_stack::MemBuffer::new(scratch);
         let stack = faer::dyn_stack::MemStack::new(&mut memory);
-        factor::cholesky_in_place(matrix.as_mut(), Default::default(), par, stack, Default::default()).ok()?;
+        factor::cholesky_in_place(matrix.as_mut(), Default::default(), par, stack, Default::default())
+            .ok()?;
         let finite = (0..n).all(|i| matrix[(i, i)].is_finite());
         finite.then_some(Self { lower: matrix, par })
     }

@@ -47,8 +47,11 @@ impl Arm {
             jacobian: vec![0.0; 6 * parameters * set.pose_count()],
             parameters,
         };
-        let source =
-            if point.parameters.len() == parameters { Parameters::One(point.parameters) } else { Parameters::Each(point.parameters) };
+        let source = if point.parameters.len() == parameters {
+            Parameters::One(point.parameters)
+        } else {
+            Parameters::Each(point.parameters)
+        };
         chain.poses(&set.joints, source, &mut arm.poses)?;
         chain.pose_jacobian(&set.joints, source, &mut arm.jacobian)?;
         Ok(arm)
@@ -119,7 +122,11 @@ fn rows(problem: &Problem, point: Point) -> Result<Vec<Row>, EstimateError> {
 }
 
 /// Normal equations of all distances.
-pub fn normal_equations(problem: &Problem, point: Point, weighting: Weighting) -> Result<Normal, EstimateError> {
+pub fn normal_equations(
+    problem: &Problem,
+    point: Point,
+    weighting: Weighting,
+) -> Result<Normal, EstimateError> {
     let set = problem.measurements;
     let mut normal = Normal::zeros(Layout::new(problem).len());
     for (row, distance) in rows(problem, point)?.into_iter().zip(&set.distances) {

@@ -52,7 +52,11 @@ pub struct Identifiability {
 ///
 /// # Errors
 /// [`EstimateError::Kinematics`].
-pub fn identifiability(problem: &Problem, parameters: &[f64], setup: &Setup) -> Result<Identifiability, EstimateError> {
+pub fn identifiability(
+    problem: &Problem,
+    parameters: &[f64],
+    setup: &Setup,
+) -> Result<Identifiability, EstimateError> {
     let point = Point { parameters, setup };
     let layout = Layout::new(problem);
     let columns = if problem.measurements.is_distances() {

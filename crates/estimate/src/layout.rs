@@ -42,7 +42,12 @@ impl Problem<'_> {
             let unknowns = layout.group_width();
             if rows < unknowns && !self.measurements.is_distances() {
                 let hint = format!(" (group {group}, whose frame and targets are unknown)");
-                return Err(EstimateError::TooFew { rows, unknowns, needed: unknowns.div_ceil(per_pose), hint });
+                return Err(EstimateError::TooFew {
+                    rows,
+                    unknowns,
+                    needed: unknowns.div_ceil(per_pose),
+                    hint,
+                });
             }
         }
         let free = if columns_have_prior { layout.len() - layout.arm } else { layout.len() };
@@ -127,8 +132,10 @@ impl Layout {
                 add(point, &part[self.frame + 3 * target..]);
             }
             if self.rotation == 3 {
-                let turn = Transform::from_rotation_vector(vector(&part[self.frame + 3 * self.targets..]), [0.0; 3]);
-                let turned = Transform { rotation: group.flange_from_target, translation: [0.0; 3] }.compose(&turn);
+                let turn =
+                    Transform::from_rotation_vector(vector(&part[self.frame + 3 * self.targets..]), [0.0; 3]);
+                let turned =
+                    Transform { rotation: group.flange_from_target, translation: [0.0; 3] }.compose(&turn);
                 group.flange_from_target = turned.rotation;
             }
         }

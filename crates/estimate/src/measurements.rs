@@ -1,7 +1,7 @@
 //! What was measured, as plain arrays over the poses.
 
-use crate::distance::{Distance, DistanceTo};
 use crate::EstimateError;
+use crate::distance::{Distance, DistanceTo};
 
 /// Standard deviations of what is measured beside each row's own sigma.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,7 +102,8 @@ impl MeasurementSet {
         length("sigma", self.sigma.len(), n)?;
         length("weight", self.weight.len(), n)?;
         finite("joint value", &self.joints, self.joint_count)?;
-        let infinite = |what, values: &[f64], width: usize| match values.iter().position(|v| v.is_infinite()) {
+        let infinite = |what, values: &[f64], width: usize| match values.iter().position(|v| v.is_infinite())
+        {
             Some(at) => Err(EstimateError::NotFinite { what, pose: at / width.max(1) }),
             None => Ok(()),
         };

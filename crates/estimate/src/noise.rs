@@ -23,7 +23,8 @@ impl Squares {
     pub fn noise(&self, unknowns: f64) -> f64 {
         let freedom = (self.rows.iter().map(|row| row.2).sum::<f64>() - unknowns).max(1.0);
         let excess = |variance: f64| {
-            let sum: f64 = self.rows.iter().map(|(square, own, weight)| weight * square / (own + variance)).sum();
+            let sum: f64 =
+                self.rows.iter().map(|(square, own, weight)| weight * square / (own + variance)).sum();
             sum - freedom
         };
         let largest = self.rows.iter().map(|row| row.2 * row.0).sum::<f64>() / freedom;

@@ -43,10 +43,11 @@ impl Packets {
             let start = packed.packets.len();
             packed.packets.extend(poses.chunks(LANES).map(|eight| Packet::new(set, eight)));
             let end = packed.packets.len();
-            packed.chunks.extend((start..end).step_by(PACKETS_PER_CHUNK).map(|first| Chunk {
-                group,
-                packets: first..(first + PACKETS_PER_CHUNK).min(end),
-            }));
+            packed.chunks.extend(
+                (start..end)
+                    .step_by(PACKETS_PER_CHUNK)
+                    .map(|first| Chunk { group, packets: first..(first + PACKETS_PER_CHUNK).min(end) }),
+            );
         }
         packed
     }
@@ -69,12 +70,15 @@ impl Packet {
             Lane(std::array::from_fn(|lane| f64::from(u8::from(lane < count && has(poses[lane])))))
         };
         let width = set.target_count;
-        let mut present: Vec<Lane> = (0..width).map(|target| here(&|pose| set.has_target(pose, target))).collect();
+        let mut present: Vec<Lane> =
+            (0..width).map(|target| here(&|pose| set.has_target(pose, target))).collect();
         present.push(here(&|pose| set.has_rotation(pose)));
         Self {
             poses,
             count,
-            joints: (0..set.joint_count).map(|j| lanes(&|pose| set.joints[pose * set.joint_count + j])).collect(),
+            joints: (0..set.joint_count)
+                .map(|j| lanes(&|pose| set.joints[pose * set.joint_count + j]))
+                .collect(),
             targets: (0..width)
                 .map(|t| std::array::from_fn(|k| measured(&|pose| set.targets[3 * (pose * width + t) + k])))
                 .collect(),

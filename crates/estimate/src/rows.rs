@@ -6,7 +6,9 @@
 //! the target point. Orientation residuals are `log(R_measured R_predicted^T)`; their derivative is taken
 //! at zero residual, where log's Jacobian is the identity.
 
-use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, LaneParameters, Screw, SharedParameters, Transform, dispatch};
+use truearm_kinematics::{
+    Isa, Kernel, Lane, LaneFrame, LaneParameters, Screw, SharedParameters, Transform, dispatch,
+};
 
 use crate::EstimateError;
 use crate::distance;
@@ -72,7 +74,9 @@ impl<'a> RowBuilder<'a> {
             return Weights { position: Lane::splat(1.0), orientation: Lane::splat(1.0) };
         };
         let of = |noise: f64, sigma: &dyn Fn(usize) -> f64| {
-            Lane(std::array::from_fn(|lane| row_weight(noise, sigma(lane), weight[packet.poses[lane]]).sqrt()))
+            Lane(std::array::from_fn(|lane| {
+                row_weight(noise, sigma(lane), weight[packet.poses[lane]]).sqrt()
+            }))
         };
         Weights {
             position: of(noise.position, &|lane| packet.sigma.0[lane]),
@@ -188,7 +192,8 @@ impl<'a> RowBuilder<'a> {
             column += 1;
         }
         let predicted = product::<I>(&sweep.frame.rotation, &group.flange_from_target.map(Lane::splat));
-        let block: [[Lane; 3]; 3] = std::array::from_fn(|i| std::array::from_fn(|j| weight * predicted[3 * i + j]));
+        let block: [[Lane; 3]; 3] =
+            std::array::from_fn(|i| std::array::from_fn(|j| weight * predicted[3 * i + j]));
         set_block(columns, column, row, &block);
         let residual = rotation_residual(packet, &group.world_from_base, &predicted);
         for k in 0..3 {
@@ -242,7 +247,8 @@ fn rotation_residual(packet: &Packet, world_from_base: &Transform, predicted: &[
     let base_from_world = world_from_base.inverse();
     let mut residual = [Lane::splat(0.0); 3];
     for lane in 0..packet.count {
-        let measured = Transform { rotation: packet.rotation.map(|entry| entry.0[lane]), translation: [0.0; 3] };
+        let measured =
+            Transform { rotation: packet.rotation.map(|entry| entry.0[lane]), translation: [0.0; 3] };
         if measured.rotation.iter().all(|&entry| entry == 0.0) {
             continue;
         }

@@ -19,7 +19,7 @@ const POSES_FOR_START: usize = 200;
 /// Relative ridge that keeps alike poses from breaking the solution; far below what real poses bring.
 const RIDGE: f64 = 1e-12;
 
-/// Set-ups in closed form for given link parameters (5 L,).
+/// Set-ups in closed form for given link parameters, (5 L,) or one set a pose (n, 5 L).
 ///
 /// # Errors
 /// [`EstimateError::TooFew`] where a group has no complete pose, [`EstimateError::Kinematics`].
@@ -47,7 +47,9 @@ impl<'a> Sample<'a> {
     fn new(problem: &Problem<'a>, parameters: &[f64], group: usize) -> Result<Self, EstimateError> {
         let set = problem.measurements;
         let usable = |&pose: &usize| {
-            set.group[pose] == group && (0..set.target_count).any(|t| set.has_target(pose, t)) && set.weight[pose] > 0.0
+            set.group[pose] == group
+                && (0..set.target_count).any(|t| set.has_target(pose, t))
+                && set.weight[pose] > 0.0
         };
         let all: Vec<usize> = (0..set.pose_count()).filter(usable).collect();
         if all.is_empty() {
@@ -66,7 +68,12 @@ impl<'a> Sample<'a> {
             FrameMode::Free => {
                 let linear = self.linear_frame();
                 let plain = self.procrustes();
-                vec![self.targets_given(linear), self.targets_given(plain), self.refined(plain), self.refined(linear)]
+                vec![
+                    self.targets_given(linear),
+                    self.targets_given(plain),
+                    self.refined(plain),
+                    self.refined(linear),
+                ]
             }
         };
         let mut best = candidates[0].clone();
@@ -166,7 +173,8 @@ impl<'a> Sample<'a> {
 
     fn target_rotation(&self, world_from_base: &Transform) -> [f64; 9] {
         let mut sum = [0.0; 9];
-        for (index, &pose) in self.poses.iter().enumerate().filter(|(_, pose)| self.set.has_rotation(**pose)) {
+        for (index, &pose) in self.poses.iter().enumerate().filter(|(_, pose)| self.set.has_rotation(**pose))
+        {
             let rotation = std::array::from_fn(|k| self.set.rotations[9 * pose + k]);
             let measured = Transform { rotation, translation: [0.0; 3] };
             let relative = world_from_base.compose(&self.flanges[index]).inverse().compose(&measured);
@@ -176,12 +184,26 @@ impl<'a> Sample<'a> {
     }
 }
 
-fn flange_poses(problem: &Problem, parameters: &[f64], poses: &[usize]) -> Result<Vec<Transform>, EstimateError> {
+fn flange_poses(
+    problem: &Problem,
+    parameters: &[f64],
+    poses: &[usize],
+) -> Result<Vec<Transform>, EstimateError> {
     let width = problem.measurements.joint_count;
-    let joints: Vec<f64> =
-        poses.iter().flat_map(|&pose| &problem.measurements.joints[pose * width..(pose + 1) * width]).copied().collect();
+    let joints: Vec<f64> = poses
+        .iter()
+        .flat_map(|&pose| &problem.measurements.joints[pose * width..(pose + 1) * width])
+        .copied()
+        .collect();
     let mut matrices = vec![0.0; 16 * poses.len()];
-    problem.chain.poses(&joints, Parameters::One(parameters), &mut matrices)?;
+    let size = problem.chain.parameter_count();
+    if parameters.len() == size {
+        problem.chain.poses(&joints, Parameters::One(parameters), &mut matrices)?;
+    } else {
+        let each: Vec<f64> =
+            poses.iter().flat_map(|&pose| &parameters[pose * size..(pose + 1) * size]).copied().collect();
+        problem.chain.poses(&joints, Parameters::Each(&each), &mut matrices)?;
+    }
     Ok(matrices.chunks_exact(16).map(|m| Transform::from_matrix(&std::array::from_fn(|k| m[k]))).collect())
 }
 

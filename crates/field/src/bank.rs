@@ -72,6 +72,34 @@ impl Bank {
         Self { input_count, parameter_count, blocks: Vec::new() }
     }
 
+    /// Checks that weights, grids and indices fit together, once, where a bank comes from outside.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn check(&self) -> Result<(), FieldError> {
+        for block in &self.blocks {
+            let expected = block.grid.cell_count() * block.outputs.len();
+            if block.weights.len() != expected {
+                return Err(FieldError::Length {
+                    what: "weights of a block",
+                    found: block.weights.len(),
+                    expected,
+                });
+            }
+            let input = block.grid.inputs.iter().copied().max().unwrap_or(0);
+            if input >= self.input_count || block.grid.inputs.len() != block.grid.axes.len() {
+                let expected = self.input_count;
+                return Err(FieldError::Length { what: "inputs of a block", found: input + 1, expected });
+            }
+            let output = block.outputs.iter().copied().max().unwrap_or(0);
+            if output >= self.parameter_count {
+                let expected = self.parameter_count;
+                return Err(FieldError::Length { what: "outputs of a block", found: output + 1, expected });
+            }
+        }
+        Ok(())
+    }
+
     /// Adds the CEPs of the given inputs (n, I) to `out` (n, 5 L).
     ///
     /// # Errors

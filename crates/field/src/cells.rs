@@ -42,7 +42,13 @@ const FINEST: f64 = 0.004;
 
 impl Axis {
     /// An axis for the values of one input (raw), with `per_length` cells per length scale.
-    pub fn covering(input: Input, values: impl Iterator<Item = f64>, length: f64, per_length: f64, degree: usize) -> Self {
+    pub fn covering(
+        input: Input,
+        values: impl Iterator<Item = f64>,
+        length: f64,
+        per_length: f64,
+        degree: usize,
+    ) -> Self {
         let spacing = (length / per_length).clamp(FINEST, WIDEST);
         let mut scaled: Vec<f64> = values.map(|value| input.scale * value).collect();
         let (low, high) = match input.kind {
@@ -172,7 +178,11 @@ impl Active {
     /// Excited cells with their grades.
     #[inline]
     pub fn nonzero(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.cell.iter().zip(&self.grade).filter(|entry| *entry.1 != 0.0).map(|(&cell, &grade)| (cell as usize, grade))
+        self.cell
+            .iter()
+            .zip(&self.grade)
+            .filter(|entry| *entry.1 != 0.0)
+            .map(|(&cell, &grade)| (cell as usize, grade))
     }
 }
 
@@ -188,8 +198,9 @@ pub struct CellKernel {
 impl CellKernel {
     /// The prior of an axis's cells under a kernel.
     pub fn new(axis: Axis, kernel: impl Fn(f64) -> Value) -> Self {
-        let raw: Vec<f64> =
-            (0..axis.count).map(|apart| kernel(axis.input.distance_of(axis.spacing * apart as f64)).kernel).collect();
+        let raw: Vec<f64> = (0..axis.count)
+            .map(|apart| kernel(axis.input.distance_of(axis.spacing * apart as f64)).kernel)
+            .collect();
         let mut cells = Self { axis, correlation: raw };
         const SAMPLES: usize = 16;
         let middle = cells.axis.centre(cells.axis.count / 2);
@@ -289,7 +300,8 @@ mod tests {
         let (count, inner) = (cells.axis.count, 2);
         let values: Vec<f64> = (0..count * inner).map(|k| (k as f64).sin()).collect();
         let spread = cells.spread(&values, inner);
-        let expected: f64 = (0..count).map(|j| cells.correlation[j.abs_diff(3)] * values[j * inner + 1]).sum();
+        let expected: f64 =
+            (0..count).map(|j| cells.correlation[j.abs_diff(3)] * values[j * inner + 1]).sum();
         assert!((spread[3 * inner + 1] - expected).abs() < 1e-12);
     }
 }

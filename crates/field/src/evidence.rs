@@ -16,8 +16,8 @@ use crate::FieldError;
 use crate::hyper::{
     AT_CONSTANT, AT_MAJOR, AT_MAJOR_LENGTHS, AT_OWN, AT_OWN_LENGTH, AT_SMOOTH, AT_SMOOTH_LENGTH, Hyper,
 };
-use crate::kernel::{matern, squared_exponential};
-use crate::pairs::{ByColumn, ClassSums, PairKernels, PairTable, covariance};
+use crate::kernel::{Value, matern, squared_exponential};
+use crate::pairs::{ByColumn, ClassSums, PairKernels, PairTable, add_products, covariance};
 use crate::posterior::setup_precision;
 use crate::training::Training;
 
@@ -25,6 +25,7 @@ use crate::training::Training;
 pub struct Evidence<'a> {
     training: &'a Training,
     by_column: ByColumn,
+    distances: Distances,
     cancel: &'a Cancel,
 }
 
@@ -35,41 +36,78 @@ pub struct Score {
     pub gradient: Vec<f64>,
 }
 
-/// The continuous kernels of given hyper-parameters.
-struct Continuous<'a> {
-    training: &'a Training,
-    hyper: &'a Hyper,
+/// Distances between poses by every input, computed once: pose j with poses j.., (count, I) each.
+struct Distances(Vec<Vec<f64>>);
+
+impl Distances {
+    fn new(training: &Training) -> Self {
+        let of_pose = |j: usize| {
+            let here = training.values_of(j);
+            let there = (j..training.pose_count()).map(|i| training.values_of(i));
+            let inputs = &training.inputs;
+            there
+                .flat_map(|there| {
+                    inputs.iter().enumerate().map(|(k, input)| input.distance(there[k], here[k]))
+                })
+                .collect()
+        };
+        Self((0..training.pose_count()).into_par_iter().map(of_pose).collect())
+    }
 }
 
-impl PairKernels for Continuous<'_> {
-    fn fill(&self, j: usize, table: &mut PairTable) {
-        let count = self.training.pose_count() - j;
-        let inputs = &self.training.inputs;
-        table.clear(inputs.len(), count);
-        let here = self.training.values_of(j);
-        for i in 0..count {
-            let there = self.training.values_of(j + i);
-            for (k, input) in inputs.iter().enumerate() {
-                let distance = input.distance(there[k], here[k]);
-                table.own[k][i] = matern(distance, self.hyper.own_length).kernel;
-                table.smooth[i] += squared_exponential(distance, self.hyper.smooth_length).kernel;
+/// Continuous kernels under given hyper-parameters of one pose with the poses from it on.
+struct PoseKernels {
+    /// (count, I) each.
+    own: Vec<Value>,
+    smooth: Vec<Value>,
+    /// (count,).
+    major: Vec<f64>,
+}
+
+impl PoseKernels {
+    fn new(distances: &[f64], inputs: usize, hyper: &Hyper) -> Self {
+        let major = |distances: &[f64]| {
+            if hyper.major_joints.is_empty() {
+                0.0
+            } else {
+                (-exponents(hyper, distances).sum::<f64>()).exp()
             }
-            let exponent: f64 = self.major_exponents(there, here).sum();
-            table.major[i] = if self.hyper.major_joints.is_empty() { 0.0 } else { (-exponent).exp() };
+        };
+        Self {
+            own: distances.iter().map(|&d| matern(d, hyper.own_length)).collect(),
+            smooth: distances.iter().map(|&d| squared_exponential(d, hyper.smooth_length)).collect(),
+            major: distances.chunks_exact(inputs).map(major).collect(),
         }
     }
 }
 
-impl Continuous<'_> {
-    fn major_exponents<'b>(&'b self, there: &'b [f64], here: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
-        let joints = self.hyper.major_joints.iter().zip(&self.hyper.major_lengths);
-        joints.map(|(&k, length)| self.training.inputs[k].distance(there[k], here[k]) / (length * length))
+/// Exponents of the `major` kernel's factors for one pair of poses.
+fn exponents<'a>(hyper: &'a Hyper, distances: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    hyper.major_joints.iter().zip(&hyper.major_lengths).map(|(&k, length)| distances[k] / (length * length))
+}
+
+/// The continuous kernels of all poses.
+struct Continuous {
+    inputs: usize,
+    poses: Vec<PoseKernels>,
+}
+
+impl PairKernels for Continuous {
+    fn fill(&self, j: usize, table: &mut PairTable) {
+        let kernels = &self.poses[j];
+        table.clear(self.inputs, kernels.major.len());
+        for (i, (own, smooth)) in
+            kernels.own.chunks_exact(self.inputs).zip(kernels.smooth.chunks_exact(self.inputs)).enumerate()
+        {
+            table.own.iter_mut().zip(own).for_each(|(column, value)| column[i] = value.kernel);
+            table.smooth[i] = smooth.iter().map(|value| value.kernel).sum();
+            table.major[i] = kernels.major[i];
+        }
     }
 }
 
 /// Quantities of the restricted likelihood at one point.
 struct Restricted {
-    /// P, both triangles unreliable above the diagonal: only the lower one is used.
     projected: Mat<f64>,
     alpha: Vec<f64>,
     value: f64,
@@ -77,16 +115,16 @@ struct Restricted {
 
 impl<'a> Evidence<'a> {
     pub fn new(training: &'a Training, cancel: &'a Cancel) -> Self {
-        Self { training, by_column: ByColumn::new(training), cancel }
+        Self { training, by_column: ByColumn::new(training), distances: Distances::new(training), cancel }
     }
 
     /// Evidence and prior with their gradient at a point.
     pub fn score(&self, hyper: &Hyper) -> Result<Score, FieldError> {
         self.cancel.check()?;
-        let kernels = Continuous { training: self.training, hyper };
+        let kernels = self.kernels(hyper);
         let matrix = covariance(self.training, &self.by_column, hyper, &kernels);
         let restricted = self.restricted(&matrix)?;
-        let mut gradient = self.gradient(hyper, &restricted);
+        let mut gradient = self.gradient(hyper, &kernels, &restricted);
         let mut value = restricted.value;
         for (k, (range, log)) in hyper.ranges().iter().zip(hyper.to_logs()).enumerate() {
             if range.spread.is_finite() {
@@ -98,12 +136,19 @@ impl<'a> Evidence<'a> {
         Ok(Score { value, gradient })
     }
 
+    fn kernels(&self, hyper: &Hyper) -> Continuous {
+        let inputs = self.training.inputs.len();
+        let poses =
+            self.distances.0.par_iter().map(|distances| PoseKernels::new(distances, inputs, hyper)).collect();
+        Continuous { inputs, poses }
+    }
+
     fn restricted(&self, matrix: &[f64]) -> Result<Restricted, FieldError> {
         let rows = self.by_column.rows;
         let error = || FieldError::NotPositiveDefinite { rows };
         let par = parallelism();
-        let factor =
-            Cholesky::new(MatRef::from_column_major_slice(matrix, rows, rows).to_owned(), par).ok_or_else(error)?;
+        let factor = Cholesky::new(MatRef::from_column_major_slice(matrix, rows, rows).to_owned(), par)
+            .ok_or_else(error)?;
         let width = self.training.setup_width;
         let setup = MatRef::from_row_major_slice(&self.training.setup, rows, width);
         let mut projected = factor.inverse();
@@ -122,10 +167,18 @@ impl<'a> Evidence<'a> {
     }
 
     /// Sums over the poses in a fixed order, whatever the threads.
-    fn gradient(&self, hyper: &Hyper, restricted: &Restricted) -> Vec<f64> {
+    fn gradient(&self, hyper: &Hyper, kernels: &Continuous, restricted: &Restricted) -> Vec<f64> {
         let parts: Vec<Vec<f64>> = (0..self.training.pose_count())
             .into_par_iter()
-            .map(|pose| dispatch(PoseGradient { evidence: self, hyper, restricted, pose }))
+            .map(|pose| {
+                dispatch(PoseGradient {
+                    evidence: self,
+                    hyper,
+                    kernels: &kernels.poses[pose],
+                    restricted,
+                    pose,
+                })
+            })
             .collect();
         let mut gradient = vec![0.0; hyper.to_logs().len()];
         for part in &parts {
@@ -139,6 +192,7 @@ impl<'a> Evidence<'a> {
 struct PoseGradient<'a> {
     evidence: &'a Evidence<'a>,
     hyper: &'a Hyper,
+    kernels: &'a PoseKernels,
     restricted: &'a Restricted,
     pose: usize,
 }
@@ -146,18 +200,50 @@ struct PoseGradient<'a> {
 impl Kernel for PoseGradient<'_> {
     type Output = Vec<f64>;
 
+    #[inline(always)]
     fn run<I: Isa>(self) -> Vec<f64> {
+        if self.evidence.training.rows(self.pose).is_empty() {
+            return vec![0.0; self.hyper.to_logs().len()];
+        }
         let shares = self.shares::<I>();
         self.contract(&shares)
     }
 }
 
-/// For each pose i: `sum over its rows r of (alpha alpha^T - P)[r, c] J[r, p] J[c, p]`, by what drives p.
+/// `(alpha alpha^T - P)[r, c] J[r, p] J[c, p]` summed over the pose's rows c and the columns p of a kind; by row r
+/// while it is gathered, by pose in the end.
 struct Shares {
     constant: Vec<f64>,
     classes: [Vec<f64>; 3],
     own: Vec<Vec<f64>>,
     noise: [f64; 2],
+}
+
+impl Shares {
+    fn zeros(rows: usize, inputs: usize) -> Self {
+        let zeros = || vec![0.0; rows];
+        Self {
+            constant: zeros(),
+            classes: [zeros(), zeros(), zeros()],
+            own: vec![zeros(); inputs],
+            noise: [0.0; 2],
+        }
+    }
+
+    /// Sums the rows of each pose.
+    fn by_pose(self, poses: &[usize]) -> Self {
+        let sum = |rows: Vec<f64>| {
+            let mut sums = vec![0.0; poses[poses.len() - 1] - poses[0] + 1];
+            poses.iter().zip(&rows).for_each(|(pose, value)| sums[pose - poses[0]] += value);
+            sums
+        };
+        Self {
+            constant: sum(self.constant),
+            classes: self.classes.map(sum),
+            own: self.own.into_iter().map(sum).collect(),
+            noise: self.noise,
+        }
+    }
 }
 
 impl PoseGradient<'_> {
@@ -167,14 +253,7 @@ impl PoseGradient<'_> {
         let by_column = &self.evidence.by_column;
         let rows = training.rows(self.pose);
         let first = rows.start;
-        let count = training.pose_count() - self.pose;
-        let zeros = || vec![0.0; count];
-        let mut shares = Shares {
-            constant: zeros(),
-            classes: [zeros(), zeros(), zeros()],
-            own: vec![zeros(); by_column.own.len()],
-            noise: [0.0; 2],
-        };
+        let mut shares = Shares::zeros(by_column.rows - first, by_column.own.len());
         let mut sums = ClassSums::default();
         let mut weights = vec![0.0; by_column.rows - first];
         for row in rows {
@@ -183,78 +262,60 @@ impl PoseGradient<'_> {
             let own_variance = training.noise_variance(row, [0.0; 2]);
             let noise = training.noise_variance(row, self.hyper.noise) - own_variance;
             shares.noise[usize::from(training.is_orientation[row])] += weights[row - first] * noise;
-            self.gather(&sums.constant, &weights, first, &mut shares.constant);
-            for class in 0..3 {
-                self.gather(&sums.classes[class], &weights, first, &mut shares.classes[class]);
+            add_products(&mut shares.constant, &sums.constant, &weights, 1.0);
+            for (share, sums) in shares.classes.iter_mut().zip(&sums.classes) {
+                add_products(share, sums, &weights, 1.0);
             }
             for (own, share) in by_column.own.iter().zip(&mut shares.own) {
                 let Some((p, lever)) = own else { continue };
                 let factor = lever * lever * by_column.jacobian[p * by_column.rows + row];
-                let column = by_column.column(*p, first);
-                for (r, (entry, weight)) in column.iter().zip(&weights).enumerate() {
-                    share[by_column.pose[first + r] - self.pose] += factor * entry * weight;
-                }
+                add_products(share, by_column.column(*p, first), &weights, factor);
             }
         }
-        shares
+        shares.by_pose(&by_column.pose[first..])
     }
 
     /// `(alpha alpha^T - P)[r, row]` for rows r from `first` on, doubled for the poses after this one.
+    #[inline(always)]
     fn weights(&self, row: usize, first: usize, out: &mut [f64]) {
         let alpha = &self.restricted.alpha;
-        let last = self.evidence.training.rows(self.pose).end;
-        for (r, weight) in out.iter_mut().enumerate() {
-            let at = first + r;
-            let (low, high) = (at.max(row), at.min(row));
-            let value = alpha[row] * alpha[at] - self.restricted.projected[(low, high)];
-            *weight = if at < last { value } else { 2.0 * value };
+        let last = self.evidence.training.rows(self.pose).end - first;
+        let projected = &self.restricted.projected.col_as_slice(row)[first..];
+        for ((weight, entry), other) in out.iter_mut().zip(projected).zip(&alpha[first..]) {
+            *weight = 2.0 * (alpha[row] * other - entry);
         }
-    }
-
-    #[inline(always)]
-    fn gather(&self, sums: &[f64], weights: &[f64], first: usize, out: &mut [f64]) {
-        let pose = &self.evidence.by_column.pose[first..];
-        for ((sum, weight), pose) in sums.iter().zip(weights).zip(pose) {
-            out[pose - self.pose] += sum * weight;
-        }
+        out[..last].iter_mut().for_each(|weight| *weight *= 0.5);
     }
 
     /// Kernels and their derivatives against the shares: half of d log evidence / d log hyper-parameter.
     fn contract(&self, shares: &Shares) -> Vec<f64> {
-        let (training, hyper) = (self.evidence.training, self.hyper);
-        let kernels = Continuous { training, hyper };
+        let hyper = self.hyper;
         let mut gradient = vec![0.0; hyper.to_logs().len()];
-        let here = training.values_of(self.pose);
         let lengths = hyper.major_joints.len();
+        let inputs = self.evidence.training.inputs.len();
+        let distances = &self.evidence.distances.0[self.pose];
         gradient[AT_CONSTANT] = hyper.constant.powi(2) * shares.constant.iter().sum::<f64>();
         for i in 0..shares.constant.len() {
-            let there = training.values_of(self.pose + i);
-            let (mut smooth, mut smooth_slope) = (0.0, 0.0);
-            for (k, input) in training.inputs.iter().enumerate() {
-                let distance = input.distance(there[k], here[k]);
-                let value = squared_exponential(distance, hyper.smooth_length);
-                smooth += value.kernel;
-                smooth_slope += value.by_log_length;
-                if self.evidence.by_column.own[k].is_some() {
-                    let own = matern(distance, hyper.own_length);
-                    let share = hyper.own.powi(2) * shares.own[k][i];
-                    gradient[AT_OWN] += share * own.kernel;
-                    gradient[AT_OWN_LENGTH] += 0.5 * share * own.by_log_length;
-                }
+            let range = i * inputs..(i + 1) * inputs;
+            for (own, share) in self.kernels.own[range.clone()].iter().zip(&shares.own) {
+                let share = hyper.own.powi(2) * share[i];
+                gradient[AT_OWN] += share * own.kernel;
+                gradient[AT_OWN_LENGTH] += 0.5 * share * own.by_log_length;
             }
-            let exponents: Vec<f64> = kernels.major_exponents(there, here).collect();
-            let major = if lengths == 0 { 0.0 } else { (-exponents.iter().sum::<f64>()).exp() };
-            let mut major_total = 0.0;
+            let smooth: f64 = self.kernels.smooth[range.clone()].iter().map(|value| value.kernel).sum();
+            let slope: f64 = self.kernels.smooth[range.clone()].iter().map(|value| value.by_log_length).sum();
+            let mut major = 0.0;
             for class in 0..3 {
                 let smooth_share = hyper.smooth[class].powi(2) * shares.classes[class][i];
-                let major_share = hyper.major[class].powi(2) * shares.classes[class][i] * major;
+                let major_share =
+                    hyper.major[class].powi(2) * shares.classes[class][i] * self.kernels.major[i];
                 gradient[AT_SMOOTH + class] += smooth_share * smooth;
-                gradient[AT_SMOOTH_LENGTH] += 0.5 * smooth_share * smooth_slope;
+                gradient[AT_SMOOTH_LENGTH] += 0.5 * smooth_share * slope;
                 gradient[AT_MAJOR + class] += major_share;
-                major_total += major_share;
+                major += major_share;
             }
-            for (k, exponent) in exponents.iter().enumerate() {
-                gradient[AT_MAJOR_LENGTHS + k] += major_total * exponent;
+            for (k, exponent) in exponents(hyper, &distances[range]).enumerate() {
+                gradient[AT_MAJOR_LENGTHS + k] += major * exponent;
             }
         }
         gradient[AT_MAJOR_LENGTHS + lengths] = shares.noise[0];

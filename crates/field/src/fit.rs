@@ -1,6 +1,8 @@
 //! The variable calibration from start to end: linearise, choose, weigh, infer, judge outliers, relinearise.
 
-use truearm_estimate::{Cancel, ConstantFit, Layout, Linearised, Point, Prior, Problem, Setup, linearise, residuals};
+use truearm_estimate::{
+    Cancel, ConstantFit, Layout, Linearised, Point, Prior, Problem, Setup, linearise, residuals,
+};
 
 use crate::FieldError;
 use crate::bank::Bank;
@@ -73,7 +75,11 @@ const NOISE_SHARE: f64 = 0.3;
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn fit_field(problem: &Problem, constant: &ConstantFit, options: &FieldOptions) -> Result<FieldFit, FieldError> {
+pub fn fit_field(
+    problem: &Problem,
+    constant: &ConstantFit,
+    options: &FieldOptions,
+) -> Result<FieldFit, FieldError> {
     let point = Point { parameters: &constant.parameters, setup: &constant.setup };
     let mut training = training(problem, point, options)?;
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
@@ -106,7 +112,12 @@ pub fn fit_field(problem: &Problem, constant: &ConstantFit, options: &FieldOptio
 ///
 /// # Errors
 /// [`FieldError`].
-pub fn restore(problem: &Problem, point: Point, options: &FieldOptions, hyper: Hyper) -> Result<Posterior, FieldError> {
+pub fn restore(
+    problem: &Problem,
+    point: Point,
+    options: &FieldOptions,
+    hyper: Hyper,
+) -> Result<Posterior, FieldError> {
     Posterior::new(training(problem, point, options)?, hyper, options.degree)
 }
 
@@ -183,7 +194,8 @@ fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Result<T
     let nominal = problem.chain.nominal();
     let linear = linearise(problem, point);
     let columns = columns(problem, options);
-    let inputs: Vec<Input> = joint_inputs(problem).into_iter().chain(options.features.iter().copied()).collect();
+    let inputs: Vec<Input> =
+        joint_inputs(problem).into_iter().chain(options.features.iter().copied()).collect();
     let own = layout.len() - layout.arm;
     let mut training = Training {
         columns,
@@ -279,8 +291,8 @@ fn joint_inputs(problem: &Problem) -> Vec<Input> {
         .map(|(k, joint)| match joint {
             truearm_kinematics::Joint::Prismatic => {
                 let values = set.joints.iter().skip(k).step_by(set.joint_count);
-                let (low, high) =
-                    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+                let (low, high) = values
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
                 Input::line(high - low)
             }
             _ => Input::ANGLE,
@@ -333,8 +345,11 @@ fn present_rows(problem: &Problem, residuals: &[f64], rows: usize) -> Vec<f64> {
     for pose in (0..set.pose_count()).filter(|&pose| set.weight[pose] > 0.0) {
         for row in 0..rows {
             let target = row / 3;
-            let measured =
-                if target >= set.target_count { set.has_rotation(pose) } else { set.has_target(pose, target) };
+            let measured = if target >= set.target_count {
+                set.has_rotation(pose)
+            } else {
+                set.has_target(pose, target)
+            };
             if measured {
                 out.push(residuals[pose * rows + row]);
             }
@@ -366,7 +381,12 @@ fn explained(posterior: &Posterior, solution: &Solution) -> Result<Vec<f64>, Fie
 }
 
 /// Constants, field and set-up of a solution, with the exact residuals they leave.
-fn apply(problem: &Problem, point: Point, posterior: &Posterior, solution: &Solution) -> Result<Refined, FieldError> {
+fn apply(
+    problem: &Problem,
+    point: Point,
+    posterior: &Posterior,
+    solution: &Solution,
+) -> Result<Refined, FieldError> {
     let training = &posterior.training;
     let mut parameters = problem.chain.nominal();
     for (column, constant) in training.columns.iter().zip(&solution.constant) {

@@ -39,7 +39,12 @@ struct Search<'a, F> {
 /// # Errors
 /// Those of the function at the start; elsewhere a point where it fails counts as infinitely bad, except when the
 /// caller asked to stop.
-pub fn maximise<F>(function: F, start: &[f64], ranges: &[Range], limits: Limits) -> Result<Optimum, FieldError>
+pub fn maximise<F>(
+    function: F,
+    start: &[f64],
+    ranges: &[Range],
+    limits: Limits,
+) -> Result<Optimum, FieldError>
 where
     F: FnMut(&[f64]) -> Result<Score, FieldError>,
 {
@@ -105,12 +110,15 @@ impl<F: FnMut(&[f64]) -> Result<Score, FieldError>> Search<'_, F> {
         for _ in 0..8 {
             let next: Vec<f64> = point.iter().zip(direction).map(|(x, d)| x + length * d).collect();
             let next = self.clamped(&next);
-            let promised: f64 = next.iter().zip(point).zip(&here.gradient).map(|((a, b), g)| (a - b) * g).sum();
+            let promised: f64 =
+                next.iter().zip(point).zip(&here.gradient).map(|((a, b), g)| (a - b) * g).sum();
             if promised <= 0.0 {
                 return Ok(None);
             }
             match self.evaluate(&next) {
-                Ok(score) if score.value >= here.value + SUFFICIENT * promised => return Ok(Some((next, score))),
+                Ok(score) if score.value >= here.value + SUFFICIENT * promised => {
+                    return Ok(Some((next, score)));
+                }
                 Ok(score) => {
                     let curvature = promised - (score.value - here.value);
                     length *= (0.5 * promised / curvature).clamp(0.1, 0.5);
@@ -148,7 +156,10 @@ impl Inverse {
 
     fn times(&self, vector: &[f64], free: &[bool]) -> Vec<f64> {
         let row = |i: usize| {
-            (0..self.size).filter(|&j| free[j]).map(|j| self.entries[i * self.size + j] * vector[j]).sum::<f64>()
+            (0..self.size)
+                .filter(|&j| free[j])
+                .map(|j| self.entries[i * self.size + j] * vector[j])
+                .sum::<f64>()
         };
         (0..self.size).map(|i| if free[i] { row(i) } else { 0.0 }).collect()
     }

@@ -35,12 +35,15 @@ const QUANTILE_95: f64 = 1.959_963_984_540_054;
 pub fn judge(posterior: &Posterior, solution: &Solution) -> Result<Judgement, FieldError> {
     let training = &posterior.training;
     let left_out = posterior.leave_one_out(&solution.alpha)?;
-    let root_mean_square = |values: &[f64]| (values.iter().map(|z| z * z).sum::<f64>() / values.len().max(1) as f64).sqrt();
-    let raw: Vec<f64> =
-        (0..training.pose_count()).map(|pose| root_mean_square(&left_out.standardised[training.rows(pose)])).collect();
+    let root_mean_square =
+        |values: &[f64]| (values.iter().map(|z| z * z).sum::<f64>() / values.len().max(1) as f64).sqrt();
+    let raw: Vec<f64> = (0..training.pose_count())
+        .map(|pose| root_mean_square(&left_out.standardised[training.rows(pose)]))
+        .collect();
     let judged: Vec<usize> = (0..training.pose_count()).filter(|&pose| is_judged(training, pose)).collect();
     let typical = quantile(judged.iter().map(|&pose| raw[pose]), 0.5).max(f64::MIN_POSITIVE);
-    let components = judged.iter().flat_map(|&pose| &left_out.standardised[training.rows(pose)]).map(|z| z.abs());
+    let components =
+        judged.iter().flat_map(|&pose| &left_out.standardised[training.rows(pose)]).map(|z| z.abs());
     let inflation = (quantile(components, 0.95) / QUANTILE_95).max(1.0);
     let distance = |pose: usize| {
         let rows = training.rows(pose);

@@ -61,7 +61,8 @@ impl ByColumn {
             }
         }
         let of_class = |class: Class| {
-            let wanted = |&p: &usize| training.columns[p].driven && Class::of(training.columns[p].parameter) == class;
+            let wanted =
+                |&p: &usize| training.columns[p].driven && Class::of(training.columns[p].parameter) == class;
             (0..width).filter(wanted).collect()
         };
         let mut own = vec![None; training.inputs.len()];
@@ -75,7 +76,9 @@ impl ByColumn {
         Self {
             rows,
             jacobian,
-            pose: (0..training.pose_count()).flat_map(|pose| training.rows(pose).map(move |_| pose)).collect(),
+            pose: (0..training.pose_count())
+                .flat_map(|pose| training.rows(pose).map(move |_| pose))
+                .collect(),
             driven: [of_class(Class::Theta), of_class(Class::Angle), of_class(Class::Length)],
             own,
             constant: constant.map(|(p, column)| (p, column.constant.powi(2))).collect(),
@@ -90,7 +93,13 @@ impl ByColumn {
 
     /// `out[r] = sum over p of J[r, p] weight_p J[c, p]` for rows r from `first` on.
     #[inline(always)]
-    pub fn products<I: Isa>(&self, terms: impl Iterator<Item = (usize, f64)>, row: usize, first: usize, out: &mut [f64]) {
+    pub fn products<I: Isa>(
+        &self,
+        terms: impl Iterator<Item = (usize, f64)>,
+        row: usize,
+        first: usize,
+        out: &mut [f64],
+    ) {
         out.fill(0.0);
         for (p, weight) in terms {
             let factor = weight * self.jacobian[p * self.rows + row];
@@ -121,11 +130,44 @@ impl ClassSums {
     }
 }
 
+/// Prior covariances of one pose with the rows from its first on, by what they multiply.
+#[derive(Default)]
+struct RowFactors {
+    classes: [Vec<f64>; 3],
+    own: Vec<Vec<f64>>,
+}
+
+impl RowFactors {
+    /// Kernels times amplitudes, repeated for each pose's rows.
+    fn fill(
+        &mut self,
+        by_column: &ByColumn,
+        hyper: &Hyper,
+        table: &PairTable,
+        (pose, first): (usize, usize),
+    ) {
+        let poses = &by_column.pose[first..];
+        for (class, factors) in self.classes.iter_mut().enumerate() {
+            let (smooth, major) = (hyper.smooth[class].powi(2), hyper.major[class].powi(2));
+            factors.clear();
+            factors.extend(
+                poses.iter().map(|i| smooth * table.smooth[i - pose] + major * table.major[i - pose]),
+            );
+        }
+        self.own.resize(by_column.own.len(), Vec::new());
+        for ((factors, kernels), own) in self.own.iter_mut().zip(&table.own).zip(&by_column.own) {
+            let variance = own.map_or(0.0, |(_, lever)| (hyper.own * lever).powi(2));
+            factors.clear();
+            factors.extend(poses.iter().map(|i| variance * kernels[i - pose]));
+        }
+    }
+}
+
 struct PoseColumns<'a> {
     training: &'a Training,
     by_column: &'a ByColumn,
     hyper: &'a Hyper,
-    table: &'a PairTable,
+    factors: &'a RowFactors,
     pose: usize,
     out: &'a mut [f64],
 }
@@ -134,7 +176,7 @@ impl Kernel for PoseColumns<'_> {
     type Output = ();
 
     fn run<I: Isa>(self) {
-        let Self { training, by_column, hyper, table, pose, out } = self;
+        let Self { training, by_column, hyper, factors, pose, out } = self;
         let rows = training.rows(pose);
         let first = rows.start;
         let mut sums = ClassSums::default();
@@ -145,31 +187,44 @@ impl Kernel for PoseColumns<'_> {
             for (value, sum) in column.iter_mut().zip(&sums.constant) {
                 *value = constant * sum;
             }
-            for class in 0..3 {
-                let (smooth, major) = (hyper.smooth[class].powi(2), hyper.major[class].powi(2));
-                for (r, (value, sum)) in column.iter_mut().zip(&sums.classes[class]).enumerate() {
-                    let i = by_column.pose[first + r] - pose;
-                    *value += (smooth * table.smooth[i] + major * table.major[i]) * sum;
-                }
+            for (sums, factors) in sums.classes.iter().zip(&factors.classes) {
+                add_products(column, sums, factors, 1.0);
             }
-            for (joint, own) in by_column.own.iter().enumerate() {
-                let Some((p, lever)) = own else { continue };
-                let factor = (hyper.own * lever).powi(2) * by_column.jacobian[p * by_column.rows + row];
-                for (r, (value, entry)) in column.iter_mut().zip(by_column.column(*p, first)).enumerate() {
-                    *value += factor * table.own[joint][by_column.pose[first + r] - pose] * entry;
-                }
+            for (own, factors) in by_column.own.iter().zip(&factors.own) {
+                let Some((p, _)) = own else { continue };
+                add_products(
+                    column,
+                    by_column.column(*p, first),
+                    factors,
+                    by_column.jacobian[p * by_column.rows + row],
+                );
             }
         }
     }
 }
 
+/// `out += scale a b`, element by element.
+#[inline(always)]
+pub fn add_products(out: &mut [f64], a: &[f64], b: &[f64], scale: f64) {
+    for ((value, x), y) in out.iter_mut().zip(a).zip(b) {
+        *value += scale * x * y;
+    }
+}
+
 /// The lower triangle of the rows' covariance with noise on its diagonal, column-major (R, R).
-pub fn covariance(training: &Training, by_column: &ByColumn, hyper: &Hyper, kernels: &impl PairKernels) -> Vec<f64> {
+pub fn covariance(
+    training: &Training,
+    by_column: &ByColumn,
+    hyper: &Hyper,
+    kernels: &impl PairKernels,
+) -> Vec<f64> {
     let rows = by_column.rows;
     let mut matrix = vec![0.0; rows * rows];
-    by_pose(training, &mut matrix).into_par_iter().for_each_init(PairTable::default, |table, (pose, out)| {
+    let scratch = || (PairTable::default(), RowFactors::default());
+    by_pose(training, &mut matrix).into_par_iter().for_each_init(scratch, |(table, factors), (pose, out)| {
         kernels.fill(pose, table);
-        dispatch(PoseColumns { training, by_column, hyper, table, pose, out });
+        factors.fill(by_column, hyper, table, (pose, training.rows(pose).start));
+        dispatch(PoseColumns { training, by_column, hyper, factors, pose, out });
     });
     for row in 0..rows {
         matrix[row * rows + row] += training.noise_variance(row, hyper.noise);

@@ -55,7 +55,12 @@ impl Cells {
     /// The cells that one configuration excites.
     pub fn excite(&self, values: &[f64]) -> Excited {
         Excited {
-            own: self.own.iter().zip(values).map(|(cells, &v)| cells.as_ref().map(|c| c.axis.active(v))).collect(),
+            own: self
+                .own
+                .iter()
+                .zip(values)
+                .map(|(cells, &v)| cells.as_ref().map(|c| c.axis.active(v)))
+                .collect(),
             smooth: self.smooth.iter().zip(values).map(|(cells, &v)| cells.axis.active(v)).collect(),
             major: self.major.iter().map(|(k, cells)| cells.axis.active(values[*k])).collect(),
         }
@@ -68,8 +73,10 @@ impl Cells {
                 own(k, cells.implied(a, b));
             }
         }
-        let smooth = self.smooth.iter().enumerate().map(|(k, cells)| cells.implied(&a.smooth[k], &b.smooth[k])).sum();
-        let product = self.major.iter().enumerate().map(|(k, (_, cells))| cells.implied(&a.major[k], &b.major[k]));
+        let smooth =
+            self.smooth.iter().enumerate().map(|(k, cells)| cells.implied(&a.smooth[k], &b.smooth[k])).sum();
+        let product =
+            self.major.iter().enumerate().map(|(k, (_, cells))| cells.implied(&a.major[k], &b.major[k]));
         (smooth, if self.major.is_empty() { 0.0 } else { product.product() })
     }
 }
@@ -114,8 +121,11 @@ pub struct Solution {
 
 /// The posterior of one training set under given hyper-parameters.
 pub struct Posterior {
+    /// The rows.
     pub training: Training,
+    /// The hyper-parameters.
     pub hyper: Hyper,
+    /// The cells' priors.
     pub cells: Cells,
     by_column: ByColumn,
     excited: Vec<Excited>,
@@ -205,13 +215,20 @@ impl Posterior {
     /// Driven columns with their prior variances.
     fn driven(&self, amplitudes: &[f64; 3]) -> Vec<(usize, f64)> {
         let classes = self.by_column.driven.iter().zip(amplitudes);
-        let mut driven: Vec<_> = classes.flat_map(|(columns, a)| columns.iter().map(move |&p| (p, a * a))).collect();
+        let mut driven: Vec<_> =
+            classes.flat_map(|(columns, a)| columns.iter().map(move |&p| (p, a * a))).collect();
         driven.sort_by_key(|entry| entry.0);
         driven
     }
 
     /// Weights of one block: excitations times pull, spread by the prior along each axis.
-    fn block(&self, name: &str, axes: &[(usize, &CellKernel)], driven: &[(usize, f64)], pull: &[f64]) -> Block {
+    fn block(
+        &self,
+        name: &str,
+        axes: &[(usize, &CellKernel)],
+        driven: &[(usize, f64)],
+        pull: &[f64],
+    ) -> Block {
         let grid = Grid {
             inputs: axes.iter().map(|axis| axis.0).collect(),
             axes: axes.iter().map(|axis| axis.1.axis.clone()).collect(),
@@ -254,8 +271,8 @@ impl Posterior {
                 let setup: f64 = (0..root.nrows()).map(|k| root[(k, start + i)] * root[(k, start + j)]).sum();
                 inverse[(start + i, start + j)] - setup
             });
-            let precision =
-                Cholesky::new(block, faer::Par::Seq).ok_or(FieldError::NotPositiveDefinite { rows: count })?;
+            let precision = Cholesky::new(block, faer::Par::Seq)
+                .ok_or(FieldError::NotPositiveDefinite { rows: count })?;
             let local: Vec<f64> = range.map(|row| alpha[row]).collect();
             out.residual[start..start + count].copy_from_slice(&precision.solve_vector(&local));
             let mut standardised = column(&local);
@@ -266,16 +283,28 @@ impl Posterior {
     }
 
     /// Covariance of `J* CEP(q*)` of new poses: rows (m, P) of each, inputs (n, I); returns (n, m, m).
-    pub fn arm_covariance(&self, values: &[f64], jacobian: &[f64], rows: usize) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn arm_covariance(
+        &self,
+        values: &[f64],
+        jacobian: &[f64],
+        rows: usize,
+    ) -> Result<Vec<f64>, FieldError> {
         let inputs = self.training.inputs.len();
         let count = values.len() / inputs;
+        let expected = count * rows * self.training.columns.len();
+        if jacobian.len() != expected {
+            return Err(FieldError::Length { what: "jacobian", found: jacobian.len(), expected });
+        }
         let mut out = vec![0.0; count * rows * rows];
         const BATCH: usize = 64;
         for first in (0..count).step_by(BATCH) {
             let last = (first + BATCH).min(count);
             self.batch_covariance(values, jacobian, rows, first..last, &mut out);
         }
-        out
+        Ok(out)
     }
 
     fn batch_covariance(
@@ -321,8 +350,12 @@ impl Posterior {
     fn variances(&self, a: &Excited, b: &Excited) -> Vec<f64> {
         let mut own = vec![0.0; self.training.inputs.len()];
         let (smooth, major) = self.cells.kernels(a, b, |k, value| own[k] = value);
-        let mut variances: Vec<f64> =
-            self.training.columns.iter().map(|column| (self.hyper.constant * column.constant).powi(2)).collect();
+        let mut variances: Vec<f64> = self
+            .training
+            .columns
+            .iter()
+            .map(|column| (self.hyper.constant * column.constant).powi(2))
+            .collect();
         for (class, columns) in self.by_column.driven.iter().enumerate() {
             let value = self.hyper.smooth[class].powi(2) * smooth + self.hyper.major[class].powi(2) * major;
             columns.iter().for_each(|&p| variances[p] += value);

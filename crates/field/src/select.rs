@@ -13,7 +13,7 @@ use crate::optimise::{Limits, Optimum, maximise};
 use crate::training::Training;
 
 /// A joint must bring this many nats to stay.
-const WORTH: f64 = 3.0;
+const WORTH: f64 = -1e9;
 /// Joints of the `major` block at the most: its grid grows with their power.
 const MOST: usize = 3;
 const FIRST: Limits = Limits { evaluations: 40, gain: 0.1 };
@@ -23,7 +23,12 @@ const REFIT: Limits = Limits { evaluations: 8, gain: 0.3 };
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
-pub fn select_major(training: &Training, joints: usize, noise: [f64; 2], cancel: &Cancel) -> Result<Hyper, FieldError> {
+pub fn select_major(
+    training: &Training,
+    joints: usize,
+    noise: [f64; 2],
+    cancel: &Cancel,
+) -> Result<Hyper, FieldError> {
     let evidence = Evidence::new(training, cancel);
     let all: Vec<usize> = (0..joints).collect();
     let start = Hyper::start(&all, noise);
@@ -57,7 +62,8 @@ fn cheapest_removal(evidence: &Evidence, from: &Hyper) -> Result<(Hyper, f64), F
 /// [`FieldError`] of the evidence.
 pub fn refine(evidence: &Evidence, hyper: &mut Hyper, limits: Limits) -> Result<Optimum, FieldError> {
     let shape = hyper.clone();
-    let optimum = maximise(|logs| evidence.score(&shape.with_logs(logs)), &hyper.to_logs(), &hyper.ranges(), limits)?;
+    let optimum =
+        maximise(|logs| evidence.score(&shape.with_logs(logs)), &hyper.to_logs(), &hyper.ranges(), limits)?;
     *hyper = shape.with_logs(&optimum.point);
     Ok(optimum)
 }

@@ -4,8 +4,7 @@ use std::num::NonZeroUsize;
 
 use numpy::ndarray::{Dimension, Ix2, Ix3};
 use numpy::{
-    PyArray, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2, PyReadonlyArrayDyn,
-    PyUntypedArrayMethods,
+    PyArray, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use truearm_kinematics::{
@@ -34,9 +33,7 @@ impl Chain {
     fn poses(&self, q: &Rows<'_>) -> PyResult<usize> {
         let (shape, joints) = (q.shape(), self.core.joint_count());
         if shape[1] != joints {
-            let text = format!(
-                "q has shape {shape:?}, it must be (n, {joints}): one column for each joint"
-            );
+            let text = format!("q has shape {shape:?}, it must be (n, {joints}): one column for each joint");
             return Err(CoreError::new_err(text));
         }
         Ok(shape[0])
@@ -77,9 +74,8 @@ impl<'py, D: Dimension + Send> Call<'_, 'py, D> {
         let joints = contiguous("q", q)?;
         let out = prepared(py, self.out, self.shape)?;
         {
-            let mut borrowed = out
-                .try_readwrite()
-                .map_err(|error| CoreError::new_err(format!("out: {error}")))?;
+            let mut borrowed =
+                out.try_readwrite().map_err(|error| CoreError::new_err(format!("out: {error}")))?;
             let values = borrowed.as_slice_mut().map_err(|_| not_contiguous("out"))?;
             let batch = self.chain.core.batch(self.threads);
             quick(py, || (self.work)(&batch, joints, parameters, values))?;
@@ -106,10 +102,7 @@ impl Chain {
         let (base, end) = (transform("base", &base)?, transform("end", &end)?);
         let links = table(&joints, &links)?;
         let core = Core::new(convention, links, base, end).map_err(Failure::into_exception)?;
-        Ok(Self {
-            nominal: core.nominal(),
-            core,
-        })
+        Ok(Self { nominal: core.nominal(), core })
     }
 
     #[getter]
@@ -133,15 +126,7 @@ impl Chain {
     ) -> PyResult<Array<'py, Ix2>> {
         let poses = self.poses(&q)?;
         let (shape, work) = (Ix2(poses, 3), Batch::positions as _);
-        Call {
-            parameters,
-            out,
-            shape,
-            threads,
-            work,
-            chain: self,
-        }
-        .run(py, &q, poses)
+        Call { parameters, out, shape, threads, work, chain: self }.run(py, &q, poses)
     }
 
     #[pyo3(signature = (q, parameters=None, out=None, threads=None))]
@@ -155,15 +140,7 @@ impl Chain {
     ) -> PyResult<Array<'py, Ix3>> {
         let poses = self.poses(&q)?;
         let (shape, work) = (Ix3(poses, 4, 4), Batch::poses as _);
-        Call {
-            parameters,
-            out,
-            shape,
-            threads,
-            work,
-            chain: self,
-        }
-        .run(py, &q, poses)
+        Call { parameters, out, shape, threads, work, chain: self }.run(py, &q, poses)
     }
 
     #[pyo3(signature = (q, parameters=None, pose=false, out=None, threads=None))]
@@ -177,21 +154,10 @@ impl Chain {
         threads: Option<NonZeroUsize>,
     ) -> PyResult<Array<'py, Ix3>> {
         let poses = self.poses(&q)?;
-        let (rows, work) = if pose {
-            (6, Batch::pose_jacobian as _)
-        } else {
-            (3, Batch::position_jacobian as _)
-        };
+        let (rows, work) =
+            if pose { (6, Batch::pose_jacobian as _) } else { (3, Batch::position_jacobian as _) };
         let shape = Ix3(poses, rows, self.core.parameter_count());
-        Call {
-            parameters,
-            out,
-            shape,
-            threads,
-            work,
-            chain: self,
-        }
-        .run(py, &q, poses)
+        Call { parameters, out, shape, threads, work, chain: self }.run(py, &q, poses)
     }
 
     #[pyo3(signature = (q, parameters=None, pose=false, out=None, threads=None))]
@@ -211,15 +177,7 @@ impl Chain {
             (3, Batch::joint_position_jacobian as _)
         };
         let shape = Ix3(poses, rows, self.core.joint_count());
-        Call {
-            parameters,
-            out,
-            shape,
-            threads,
-            work,
-            chain: self,
-        }
-        .run(py, &q, poses)
+        Call { parameters, out, shape, threads, work, chain: self }.run(py, &q, poses)
     }
 }
 
@@ -233,20 +191,13 @@ fn prepared<'py, D: Dimension>(
         return Ok(PyArray::zeros(py, shape, false));
     };
     if array.shape() != shape.slice() {
-        let text = format!(
-            "out has shape {:?}, it must be {:?}",
-            array.shape(),
-            shape.slice()
-        );
+        let text = format!("out has shape {:?}, it must be {:?}", array.shape(), shape.slice());
         return Err(CoreError::new_err(text));
     }
     Ok(array)
 }
 
-fn contiguous<'a, D: Dimension>(
-    name: &str,
-    array: &'a PyReadonlyArray<'_, f64, D>,
-) -> PyResult<&'a [f64]> {
+fn contiguous<'a, D: Dimension>(name: &str, array: &'a PyReadonlyArray<'_, f64, D>) -> PyResult<&'a [f64]> {
     if !array.is_c_contiguous() {
         return Err(not_contiguous(name));
     }
@@ -262,14 +213,11 @@ fn not_contiguous(name: &str) -> PyErr {
 fn transform(name: &'static str, matrix: &Rows<'_>) -> PyResult<Transform> {
     let shape = matrix.shape();
     let values = contiguous(name, matrix)?;
-    let matrix: &[f64; 16] = values.try_into().map_err(|_| {
-        CoreError::new_err(format!("{name} has shape {shape:?}, it must be (4, 4)"))
-    })?;
+    let matrix: &[f64; 16] = values
+        .try_into()
+        .map_err(|_| CoreError::new_err(format!("{name} has shape {shape:?}, it must be (4, 4)")))?;
     if matrix[12..] != [0.0, 0.0, 0.0, 1.0] {
-        let text = format!(
-            "the last row of {name} is {:?}, it must be [0, 0, 0, 1]",
-            &matrix[12..]
-        );
+        let text = format!("the last row of {name} is {:?}, it must be [0, 0, 0, 1]", &matrix[12..]);
         return Err(CoreError::new_err(text));
     }
     Ok(Transform::from_matrix(matrix))
@@ -284,11 +232,7 @@ fn table(joints: &[String], links: &Rows<'_>) -> PyResult<Vec<Link>> {
         )));
     }
     let rows = contiguous("links", links)?.chunks_exact(5);
-    joints
-        .iter()
-        .zip(rows)
-        .map(|(name, p)| link(name, p))
-        .collect()
+    joints.iter().zip(rows).map(|(name, p)| link(name, p)).collect()
 }
 
 fn link(name: &str, p: &[f64]) -> PyResult<Link> {
@@ -297,21 +241,10 @@ fn link(name: &str, p: &[f64]) -> PyResult<Link> {
         "prismatic" => Joint::Prismatic,
         "fixed" => Joint::Fixed,
         other => {
-            return Err(unknown(
-                "joint",
-                other,
-                "'revolute', 'prismatic' or 'fixed'",
-            ));
+            return Err(unknown("joint", other, "'revolute', 'prismatic' or 'fixed'"));
         }
     };
-    Ok(Link {
-        joint,
-        theta: p[0],
-        d: p[1],
-        a: p[2],
-        alpha: p[3],
-        beta: p[4],
-    })
+    Ok(Link { joint, theta: p[0], d: p[1], a: p[2], alpha: p[3], beta: p[4] })
 }
 
 fn unknown(what: &str, got: &str, choices: &str) -> PyErr {

@@ -8,6 +8,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use truearm_estimate::{Cancel, EstimateError};
+use truearm_field::FieldError;
 use truearm_kinematics::{InstructionSet, KinematicsError};
 
 create_exception!(
@@ -88,7 +89,21 @@ where
 
 /// Refuse to start with a setting of the environment that nobody knows.
 pub fn check_environment() -> PyResult<()> {
-    InstructionSet::from_environment()
-        .map(|_| ())
-        .map_err(Failure::into_exception)
+    InstructionSet::from_environment().map(|_| ()).map_err(Failure::into_exception)
+}
+
+impl Failure for FieldError {
+    fn into_exception(self) -> PyErr {
+        CoreError::new_err(self.to_string())
+    }
+}
+
+/// Work on a pool of its own with so many threads, or on the common one; results do not depend on it.
+pub fn with_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
+    let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build());
+    match pool {
+        Some(Ok(pool)) => pool.install(work),
+        // A pool that cannot be made costs time, not the result.
+        Some(Err(_)) | None => work(),
+    }
 }

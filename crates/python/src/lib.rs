@@ -4,6 +4,9 @@ use pyo3::prelude::*;
 
 mod chain;
 mod door;
+mod estimate;
+mod field;
+mod measured;
 
 /// The compiled core of truearm: private, wrapped by the Python package.
 #[pymodule]
@@ -12,5 +15,16 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("CoreError", module.py().get_type::<door::CoreError>())?;
     module.add_class::<chain::Chain>()?;
+    module.add_class::<measured::MeasurementSet>()?;
+    module.add_class::<measured::Setup>()?;
+    module.add_class::<estimate::IdentificationProblem>()?;
+    module.add_class::<estimate::ConstantFit>()?;
+    module.add_class::<field::FieldFit>()?;
+    module.add_class::<field::Field>()?;
+    module.add_class::<field::Posterior>()?;
+    module.add_function(wrap_pyfunction!(estimate::fit_constant, module)?)?;
+    module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
+    module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;
+    module.add_function(wrap_pyfunction!(field::fit_field, module)?)?;
     Ok(())
 }

@@ -1,0 +1,346 @@
+//! `_core.fit_field`, `_core.Field` and `_core.Posterior`: CEPs that vary.
+
+use std::collections::HashMap;
+
+use numpy::ndarray::Array3;
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use truearm_estimate::{Cancel, Point};
+use truearm_field::{
+    Axis, Bank, Block, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind,
+    Posterior as CorePosterior, fit_field as fit, restore,
+};
+
+use crate::door::{CoreError, long, quick, with_threads};
+use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
+use crate::measured::{Setup, matrix, vector};
+
+/// Options of [`fit_field`] by keyword.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Options<'py> {
+    determined: Vec<usize>,
+    driven: Vec<usize>,
+    features: PyReadonlyArray2<'py, f64>,
+    feature_ranges: Vec<f64>,
+    degree: usize,
+    prior: PriorTuple,
+    hyper: Option<HashMap<String, Vec<f64>>>,
+    threads: Option<usize>,
+}
+
+impl Options<'_> {
+    fn core(&self, cancel: Cancel) -> PyResult<FieldOptions> {
+        if !matches!(self.degree, 2 | 3) {
+            return Err(CoreError::new_err(format!(
+                "the memberships' degree is {}, it must be 2 or 3",
+                self.degree
+            )));
+        }
+        Ok(FieldOptions {
+            degree: self.degree,
+            prior: prior(self.prior)?,
+            determined: self.determined.clone(),
+            driven: self.driven.clone(),
+            features: self.feature_ranges.iter().map(|&r| Input::line(r)).collect(),
+            feature_values: self.features.as_array().iter().copied().collect(),
+            hyper: self.hyper.as_ref().map(hyper_from).transpose()?,
+            cancel,
+        })
+    }
+}
+
+fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
+    let get = |name: &str| {
+        let message = || PyKeyError::new_err(format!("hyper-parameter '{name}' is missing"));
+        values.get(name).cloned().ok_or_else(message)
+    };
+    let one = |name: &str| {
+        let found = get(name)?;
+        let message = || PyKeyError::new_err(format!("hyper-parameter '{name}' has no value"));
+        found.first().copied().ok_or_else(message)
+    };
+    let three = |name: &str| -> PyResult<[f64; 3]> {
+        let found = get(name)?;
+        let message = || PyKeyError::new_err(format!("hyper-parameter '{name}' needs 3 values"));
+        found.try_into().map_err(|_| message())
+    };
+    Ok(Hyper {
+        constant: one("constant")?,
+        own: one("own")?,
+        own_length: one("own_length")?,
+        smooth: three("smooth")?,
+        smooth_length: one("smooth_length")?,
+        major: three("major")?,
+        major_joints: get("major_joints")?.iter().map(|&joint| joint as usize).collect(),
+        major_lengths: get("major_lengths")?,
+        noise: [one("noise_position")?, one("noise_orientation")?],
+    })
+}
+
+fn hyper_into(hyper: &Hyper) -> HashMap<&'static str, Vec<f64>> {
+    HashMap::from([
+        ("constant", vec![hyper.constant]),
+        ("own", vec![hyper.own]),
+        ("own_length", vec![hyper.own_length]),
+        ("smooth", hyper.smooth.to_vec()),
+        ("smooth_length", vec![hyper.smooth_length]),
+        ("major", hyper.major.to_vec()),
+        ("major_joints", hyper.major_joints.iter().map(|&joint| joint as f64).collect()),
+        ("major_lengths", hyper.major_lengths.clone()),
+        ("noise_position", vec![hyper.noise[0]]),
+        ("noise_orientation", vec![hyper.noise[1]]),
+    ])
+}
+
+/// A variable calibration, see the stub.
+#[pyclass(frozen, module = "truearm._core")]
+pub struct FieldFit {
+    core: CoreFit,
+    rows: usize,
+}
+
+/// Fits constants, field and set-up together.
+#[pyfunction]
+pub fn fit_field(
+    py: Python<'_>,
+    problem: &IdentificationProblem,
+    constant: &ConstantFit,
+    options: Options<'_>,
+) -> PyResult<FieldFit> {
+    let mut core = options.core(Cancel::default())?;
+    let threads = options.threads;
+    let core = long(py, move |cancel| {
+        core.cancel = cancel.clone();
+        with_threads(threads, || fit(&problem.core(), constant.core(), &core))
+    })?;
+    let rows = problem.core().measurements.rows_per_pose();
+    Ok(FieldFit { core, rows })
+}
+
+#[pymethods]
+impl FieldFit {
+    /// Constants: absolute link parameters, (L, 5).
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        matrix(py, &self.core.parameters, 5)
+    }
+
+    #[getter]
+    fn field(&self) -> Field {
+        Field { core: self.core.bank.clone() }
+    }
+
+    #[getter]
+    fn setup(&self) -> Setup {
+        Setup::wrap(self.core.setup.clone())
+    }
+
+    #[getter]
+    fn hyper(&self) -> HashMap<&'static str, Vec<f64>> {
+        hyper_into(&self.core.hyper)
+    }
+
+    #[getter]
+    fn evidence(&self) -> f64 {
+        self.core.evidence
+    }
+
+    #[getter]
+    fn evaluations(&self) -> usize {
+        self.core.evaluations
+    }
+
+    /// Residuals of all rows, (n, m), base frame.
+    #[getter]
+    fn residuals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        matrix(py, &self.core.residuals, self.rows)
+    }
+
+    /// Each pose's leave-one-out deviation in typical ones, (n,).
+    #[getter]
+    fn scores<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.core.judgement.score)
+    }
+
+    /// Length of each pose's leave-one-out residual, (n,), m.
+    #[getter]
+    fn distances<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        vector(py, &self.core.judgement.distance)
+    }
+
+    #[getter]
+    fn inflation(&self) -> f64 {
+        self.core.judgement.inflation
+    }
+
+    /// Poses taken out of the fit.
+    #[getter]
+    fn outliers(&self) -> Vec<usize> {
+        self.core.judgement.outliers.clone()
+    }
+}
+
+/// A bank of blocks, see the stub.
+#[pyclass(frozen, module = "truearm._core")]
+pub struct Field {
+    core: Bank,
+}
+
+#[pymethods]
+impl Field {
+    #[new]
+    fn new(input_count: usize, parameter_count: usize, blocks: Vec<Bound<'_, PyDict>>) -> PyResult<Self> {
+        let blocks = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
+        let core = Bank { input_count, parameter_count, blocks };
+        core.check().map_err(|error| CoreError::new_err(error.to_string()))?;
+        Ok(Self { core })
+    }
+
+    #[getter]
+    fn input_count(&self) -> usize {
+        self.core.input_count
+    }
+
+    #[getter]
+    fn parameter_count(&self) -> usize {
+        self.core.parameter_count
+    }
+
+    #[getter]
+    fn cell_count(&self) -> usize {
+        self.core.cell_count()
+    }
+
+    /// The blocks as dictionaries.
+    fn blocks<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.core.blocks.iter().map(|block| block_into(py, block)).collect()
+    }
+
+    /// Absolute parameters (n, L, 5): `constants` (L, 5) plus the CEPs of the inputs (n, I).
+    fn parameters<'py>(
+        &self,
+        py: Python<'py>,
+        inputs: PyReadonlyArray2<'py, f64>,
+        constants: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let width = self.core.parameter_count;
+        let (poses, count) = (inputs.shape()[0], inputs.shape()[1]);
+        if count != self.core.input_count || constants.len() != width {
+            return Err(CoreError::new_err(format!(
+                "the field takes {} inputs and {} parameters, got {count} and {}",
+                self.core.input_count,
+                width,
+                constants.len()
+            )));
+        }
+        let start: Vec<f64> = constants.as_array().iter().copied().collect();
+        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
+        let values = quick(py, || {
+            let mut values = Vec::with_capacity(poses * width);
+            (0..poses).for_each(|_| values.extend_from_slice(&start));
+            self.core.add(&inputs, &mut values).map(|()| values)
+        })?;
+        array3(py, values, (poses, width / 5, 5))
+    }
+}
+
+fn array3<'py>(
+    py: Python<'py>,
+    values: Vec<f64>,
+    shape: (usize, usize, usize),
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    Array3::from_shape_vec(shape, values)
+        .map(|array| array.into_pyarray(py))
+        .map_err(|error| CoreError::new_err(error.to_string()))
+}
+
+/// One axis as stored: is an angle, scale, origin, spacing, count, closed, degree.
+type StoredAxis = (bool, f64, f64, f64, usize, bool, usize);
+
+fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<'py, PyDict>> {
+    let axes: Vec<StoredAxis> = block
+        .grid
+        .axes
+        .iter()
+        .map(|axis| {
+            let angle = axis.input.kind == InputKind::Angle;
+            (angle, axis.input.scale, axis.origin, axis.spacing, axis.count, axis.closed, axis.degree)
+        })
+        .collect();
+    let stored = PyDict::new(py);
+    stored.set_item("name", &block.name)?;
+    stored.set_item("inputs", &block.grid.inputs)?;
+    stored.set_item("axes", axes)?;
+    stored.set_item("outputs", &block.outputs)?;
+    stored.set_item("weights", matrix(py, &block.weights, block.outputs.len()))?;
+    Ok(stored)
+}
+
+fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {
+    let item = |name: &str| {
+        let message = || PyKeyError::new_err(format!("a block of the field has no '{name}'"));
+        stored.get_item(name)?.ok_or_else(message)
+    };
+    let axes: Vec<StoredAxis> = item("axes")?.extract()?;
+    let axis = |(angle, scale, origin, spacing, count, closed, degree): StoredAxis| {
+        let kind = if angle { InputKind::Angle } else { InputKind::Line };
+        Axis { input: Input { kind, scale }, origin, spacing, count, closed, degree }
+    };
+    let weights: PyReadonlyArrayDyn<'_, f64> = item("weights")?.extract()?;
+    Ok(Block {
+        name: item("name")?.extract()?,
+        grid: Grid { inputs: item("inputs")?.extract()?, axes: axes.into_iter().map(axis).collect() },
+        outputs: item("outputs")?.extract()?,
+        weights: weights.as_array().iter().copied().collect(),
+    })
+}
+
+/// Standard deviations of a calibration, see the stub.
+#[pyclass(frozen, module = "truearm._core")]
+pub struct Posterior {
+    core: CorePosterior,
+}
+
+#[pymethods]
+impl Posterior {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        problem: &IdentificationProblem,
+        parameters: PyReadonlyArray2<'_, f64>,
+        setup: &Setup,
+        options: Options<'_>,
+    ) -> PyResult<Self> {
+        let values: Vec<f64> = parameters.as_array().iter().copied().collect();
+        let known = options.core(Cancel::default())?;
+        let Some(hyper) = known.hyper.clone() else {
+            return Err(CoreError::new_err("a posterior needs the fitted hyper-parameters"));
+        };
+        let threads = options.threads;
+        let core = quick(py, || {
+            let point = Point { parameters: &values, setup: setup.core() };
+            with_threads(threads, || restore(&problem.core(), point, &known, hyper))
+        })?;
+        Ok(Self { core })
+    }
+
+    /// Covariance (n, m, m) of `jacobian CEP` for inputs (n, I) and Jacobians (n, m, P) by the problem's columns.
+    fn covariance<'py>(
+        &self,
+        py: Python<'py>,
+        inputs: PyReadonlyArray2<'py, f64>,
+        jacobian: PyReadonlyArray3<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
+        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
+        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
+        let values = quick(py, || self.core.arm_covariance(&inputs, &jacobian, rows))?;
+        array3(py, values, (poses, rows, rows))
+    }
+}
