@@ -6,15 +6,16 @@ use rayon::prelude::*;
 
 use crate::chain::Chain;
 use crate::error::KinematicsError;
-use crate::isa::{Isa, Kernel, dispatch};
-use crate::lane::{LANES, Lane};
-use crate::parameters::{LaneParameters, Parameters, SharedParameters};
+use crate::isa::dispatch;
+use crate::lane::LANES;
+use crate::parameters::{Parameters, SharedParameters};
+use crate::piece::{Piece, Source};
 use crate::quantity::{Jacobian, Pose, Position, Quantity};
-use crate::rows::load_lanes;
-use crate::writer::LineWriter;
 
-/// Numbers of a result that is no longer found in the caches when it is read: 2 MB.
-const STREAM_FROM: usize = 1 << 18;
+/// Numbers of a result too large to stay in the caches until it is read: 16 MB.
+///
+/// Smaller results gain nothing by being streamed, and whoever reads them next would wait for the memory.
+const STREAM_FROM: usize = 1 << 21;
 
 /// A chain with a bound on the threads to use.
 #[derive(Debug, Clone, Copy)]
@@ -195,14 +196,19 @@ impl Batch<'_> {
         out: &mut [f64],
     ) -> Result<(), KinematicsError> {
         let poses = self.check(quantity.width(), joints, parameters, out)?;
+        let prepared;
         let source = match parameters {
-            Parameters::One(values) => Source::Shared(SharedParameters::new(values)),
+            Parameters::One(values) => {
+                prepared = SharedParameters::new(values);
+                Source::Shared(&prepared)
+            }
+            Parameters::Prepared(shared) => Source::Shared(shared),
             Parameters::Each(values) => Source::Each(values),
         };
         let width = quantity.width();
         let stream = out.len() >= STREAM_FROM;
         let work = |first: usize, out: &mut [f64]| {
-            dispatch(Piece { chain: self.chain, quantity, joints, source: &source, first, out, stream });
+            dispatch(Piece { chain: self.chain, quantity, joints, source, first, out, stream });
         };
         if poses < quantity.parallel_from() || self.threads == 1 {
             work(0, out);
@@ -232,7 +238,8 @@ impl Batch<'_> {
             ));
         }
         let (got, wanted, rule) = match parameters {
-            Parameters::One(values) => (values.len(), all, format!("it must be {all}, five for each link")),
+            Parameters::One(values) => (values.len(), all, five_a_link(all)),
+            Parameters::Prepared(shared) => (shared.len(), all, five_a_link(all)),
             Parameters::Each(values) => (
                 values.len(),
                 poses * all,
@@ -249,91 +256,10 @@ impl Batch<'_> {
     }
 }
 
+fn five_a_link(all: usize) -> String {
+    format!("it must be {all}, five for each link")
+}
+
 fn length(name: &'static str, got: usize, rule: String) -> KinematicsError {
     KinematicsError::Length { name, got, rule }
-}
-
-enum Source<'a> {
-    Shared(SharedParameters),
-    Each(&'a [f64]),
-}
-
-/// A run of poses from `first` on, as many as `out` has rows for.
-struct Piece<'a, Q> {
-    chain: &'a Chain,
-    quantity: Q,
-    joints: &'a [f64],
-    source: &'a Source<'a>,
-    first: usize,
-    out: &'a mut [f64],
-    /// Write past the caches.
-    stream: bool,
-}
-
-impl<Q: Quantity> Kernel for Piece<'_, Q> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        let group = LANES * self.quantity.width();
-        let mut reader = Reader::new(self.chain, self.joints, self.source, self.first);
-        let mut scratch = self.quantity.scratch();
-        if !self.stream {
-            for rows in self.out.chunks_mut(group) {
-                let (joints, parameters) = reader.next::<I>();
-                self.quantity.group::<I>(self.chain, joints, parameters, &mut scratch, rows);
-            }
-            return;
-        }
-        let mut left = self.out.len();
-        let mut writer = LineWriter::new(self.out, group);
-        while left > 0 {
-            let count = left.min(group);
-            let (joints, parameters) = reader.next::<I>();
-            self.quantity.group::<I>(self.chain, joints, parameters, &mut scratch, writer.room(count));
-            writer.commit::<I>(count);
-            left -= count;
-        }
-        writer.finish::<I>();
-    }
-}
-
-/// Takes group after group of poses from the arrays of a batch.
-struct Reader<'a> {
-    joints: &'a [f64],
-    source: &'a Source<'a>,
-    first: usize,
-    joint_lanes: Vec<Lane>,
-    parameter_lanes: Vec<Lane>,
-}
-
-impl<'a> Reader<'a> {
-    fn new(chain: &Chain, joints: &'a [f64], source: &'a Source<'a>, first: usize) -> Self {
-        let parameters = match source {
-            Source::Shared(_) => 0,
-            Source::Each(_) => chain.parameter_count(),
-        };
-        Self {
-            joints,
-            source,
-            first,
-            joint_lanes: vec![Lane::ZERO; chain.joint_count()],
-            parameter_lanes: vec![Lane::ZERO; parameters],
-        }
-    }
-
-    #[inline(always)]
-    fn next<I: Isa>(&mut self) -> (&[Lane], LaneParameters<'_>) {
-        let first = self.first;
-        self.first += LANES;
-        load_lanes::<I>(self.joints, self.joint_lanes.len(), first, &mut self.joint_lanes);
-        let parameters = match self.source {
-            Source::Shared(shared) => LaneParameters::Shared(shared),
-            Source::Each(values) => {
-                load_lanes::<I>(values, self.parameter_lanes.len(), first, &mut self.parameter_lanes);
-                LaneParameters::Each(&self.parameter_lanes)
-            }
-        };
-        (&self.joint_lanes, parameters)
-    }
 }

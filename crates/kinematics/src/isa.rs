@@ -41,7 +41,8 @@ pub trait Isa {
 /// Work that is compiled once for each instruction set.
 ///
 /// `run` and everything it calls in its loops must be `#[inline(always)]`: what is not inlined is compiled
-/// for the plainest machine, and every `mul_add` in it becomes a library call.
+/// for the plainest machine, and every `mul_add` in it becomes a library call. That goes for larger closures too,
+/// such as those given to `array::map` and `array::from_fn`: write loops.
 pub trait Kernel {
     /// What the work gives back.
     type Output;

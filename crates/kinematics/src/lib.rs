@@ -5,12 +5,15 @@
 //! once: every scalar of the textbook is a [`Lane`] of eight, and [`dispatch`] compiles the same plain
 //! loops for the instruction sets of the machine it may run on.
 
+#![allow(clippy::needless_range_loop, reason = "loops over lanes go through several arrays with one index")]
+
 mod batch;
 mod chain;
 mod error;
 mod isa;
 mod lane;
 mod parameters;
+mod piece;
 mod point;
 mod quantity;
 mod rows;
@@ -26,7 +29,7 @@ pub use error::KinematicsError;
 pub use isa::{InstructionSet, Isa, Kernel, dispatch, dispatch_on};
 pub use lane::{LANES, Lane};
 pub use parameters::{LaneParameters, Parameters, SharedParameters};
-pub use rows::{load_lanes, store_lanes};
+pub use rows::{lane_room, load_lanes, store_lanes};
 pub use sweep::{LaneFrame, Screw};
 pub use transform::{Transform, rotation_exp, rotation_log};
 pub use trig::sin_cos;

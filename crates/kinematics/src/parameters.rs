@@ -9,6 +9,8 @@ use crate::trig::sin_cos;
 pub enum Parameters<'a> {
     /// One set for all poses, 5 L.
     One(&'a [f64]),
+    /// One set for all poses, prepared for many small batches.
+    Prepared(&'a SharedParameters),
     /// A set for each pose, n x 5 L, row-major.
     Each(&'a [f64]),
 }
@@ -40,6 +42,11 @@ impl SharedParameters {
             bent: p[4] != 0.0,
         });
         SharedParameters { links: links.collect() }
+    }
+
+    /// Number of parameters, 5 L.
+    pub(crate) fn len(&self) -> usize {
+        5 * self.links.len()
     }
 }
 

@@ -5,24 +5,27 @@ use crate::lane::{LANES, Lane};
 
 /// Lanes of the rows from `first` on of a row-major array, `width` numbers a row.
 ///
-/// `lanes[j].0[i]` is column j of row `first + i`; past the end of `rows` the last row is repeated. `rows`
-/// must reach `first` and `lanes` be `width` long.
+/// `lanes[j].0[i]` is column j of row `first + i`; past the end of `rows` the last row is repeated. `rows` must
+/// reach `first`; `lanes` must be as long as [`lane_room`] says, and what lies beyond `width` is of no meaning.
 #[inline(always)]
 pub fn load_lanes<I: Isa>(rows: &[f64], width: usize, first: usize, lanes: &mut [Lane]) {
-    // A block reads eight columns of eight rows, so that the last row's reach past the columns wanted must exist.
-    let reach = (first + LANES - 1) * width + width.next_multiple_of(LANES);
-    if reach > rows.len() {
+    let blocks = lanes.as_chunks_mut::<LANES>().0;
+    let start = first * width;
+    // A block reads eight columns of eight rows, so what the last row reads past its end must exist.
+    let Some(source) = rows.get(start..start + (LANES - 1) * width + LANES * blocks.len()) else {
         return load_last(rows, width, first, lanes);
-    }
-    for (block, lanes) in lanes.chunks_mut(LANES).enumerate() {
-        let start = first * width + block * LANES;
-        let mut square = [Lane::ZERO; LANES];
-        for (i, row) in square.iter_mut().enumerate() {
-            row.0.copy_from_slice(&rows[start + i * width..][..LANES]);
+    };
+    for (index, block) in blocks.iter_mut().enumerate() {
+        for i in 0..LANES {
+            block[i].0.copy_from_slice(&source[i * width + index * LANES..][..LANES]);
         }
-        I::transpose(&mut square);
-        lanes.copy_from_slice(&square[..lanes.len()]);
+        I::transpose(block);
     }
+}
+
+/// Lanes that [`load_lanes`] needs for rows of `width` numbers.
+pub const fn lane_room(width: usize) -> usize {
+    width.next_multiple_of(LANES)
 }
 
 /// The same number by number, repeating the last row.

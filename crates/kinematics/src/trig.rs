@@ -35,6 +35,7 @@ const COSINE: [f64; 7] = [
 /// The absolute error is below 2.3e-16 for angles up to a million radians; larger ones go to the standard library. NaN and
 /// infinite angles give NaN.
 #[inline(always)]
+#[allow(clippy::neg_cmp_op_on_partial_ord, reason = "NaN counts as beyond, and this is one comparison")]
 pub fn sin_cos<I: Isa>(angle: Lane) -> (Lane, Lane) {
     let (mut sine, mut cosine) = reduced::<I>(angle);
     if angle.0.iter().fold(false, |beyond, x| beyond | !(x.abs() <= LIMIT)) {

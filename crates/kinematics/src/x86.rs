@@ -11,6 +11,10 @@ use std::mem::transmute;
 
 use crate::lane::{LANES, Lane};
 
+type Eight = __m512d;
+type Fours = [__m256d; 2];
+type Twos = [__m128d; 4];
+
 /// Bytes of a cache line, and of a lane.
 const LINE: usize = 64;
 
@@ -24,7 +28,10 @@ const LINE: usize = 64;
 #[inline(always)]
 pub unsafe fn mul_add_avx512(a: Lane, b: Lane, c: Lane) -> Lane {
     // SAFETY: a lane is a vector of eight f64; the caller vouches for the instruction.
-    unsafe { transmute(_mm512_fmadd_pd(transmute(a), transmute(b), transmute(c))) }
+    unsafe {
+        let [a, b, c] = transmute::<[Lane; 3], [Eight; 3]>([a, b, c]);
+        transmute::<Eight, Lane>(_mm512_fmadd_pd(a, b, c))
+    }
 }
 
 /// a b + c with one rounding, see [`mul_add_avx512`].
@@ -35,9 +42,8 @@ pub unsafe fn mul_add_avx512(a: Lane, b: Lane, c: Lane) -> Lane {
 pub unsafe fn mul_add_avx2(a: Lane, b: Lane, c: Lane) -> Lane {
     // SAFETY: a lane is two vectors of four f64; the caller vouches for the instruction.
     unsafe {
-        let (a, b, c): ([__m256d; 2], [__m256d; 2], [__m256d; 2]) =
-            (transmute(a), transmute(b), transmute(c));
-        transmute([_mm256_fmadd_pd(a[0], b[0], c[0]), _mm256_fmadd_pd(a[1], b[1], c[1])])
+        let [a, b, c] = transmute::<[Lane; 3], [Fours; 3]>([a, b, c]);
+        transmute::<Fours, Lane>([_mm256_fmadd_pd(a[0], b[0], c[0]), _mm256_fmadd_pd(a[1], b[1], c[1])])
     }
 }
 
@@ -46,9 +52,8 @@ pub unsafe fn mul_add_avx2(a: Lane, b: Lane, c: Lane) -> Lane {
 pub fn mul_add_sse2(a: Lane, b: Lane, c: Lane) -> Lane {
     // SAFETY: a lane is four vectors of two f64, and every x86-64 machine has the instructions.
     unsafe {
-        let (a, b, c): ([__m128d; 4], [__m128d; 4], [__m128d; 4]) =
-            (transmute(a), transmute(b), transmute(c));
-        transmute([
+        let [a, b, c] = transmute::<[Lane; 3], [Twos; 3]>([a, b, c]);
+        transmute::<Twos, Lane>([
             _mm_add_pd(_mm_mul_pd(a[0], b[0]), c[0]),
             _mm_add_pd(_mm_mul_pd(a[1], b[1]), c[1]),
             _mm_add_pd(_mm_mul_pd(a[2], b[2]), c[2]),
