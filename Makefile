@@ -29,7 +29,7 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help setup demo test check bench docs rust-test py-test clean
+.PHONY: help setup demo test check bench docs figures rust-test py-test clean
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
@@ -37,6 +37,7 @@ help:
 	@echo 'make test   Rust and Python tests'
 	@echo 'make check  formatting, lint, types and layers'
 	@echo 'make bench  speed against peers, with the ratio to reach beside each (BENCH=--write keeps them in docs/)'
+	@echo 'make figures  errors on public measurements, into docs/reference/results.md'
 	@echo 'make docs   write the generated pages of docs/reference again'
 
 demo: $(STAMPS)/built
@@ -66,6 +67,11 @@ docs: $(STAMPS)/built
 	$(BIN)/python docs/make_picture.py
 
 setup: $(STAMPS)/built
+
+# Needs public measurement data, see docs/reference/results.md; takes hours for ten seeds.
+figures: $(STAMPS)/built
+	$(BIN)/python -m benches.figures build/figures $(FIGURES)
+	$(BIN)/python docs/make_results.py build/figures
 
 clean:
 	rm -rf $(VENV) target demo

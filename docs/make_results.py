@@ -1,0 +1,124 @@
+"""Write docs/reference/results.md and the table of README.md from what `python -m benches.figures OUT` left.
+
+python docs/make_results.py OUT
+"""
+
+import argparse
+import json
+import re
+import statistics
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "reference" / "results.md"
+README = ROOT / "README.md"
+MODELS = ("nominal", "constant", "variable")
+FIRST_SEED = 7
+IN_README = ("c400", "b400", "irb400", "ur5", "ac2b")
+HEAD = """# Results on real arms
+
+Position error in mm on rows that took no part in fitting or choosing, from public measurements made by
+others. `make figures FIGURES="--data DIR"` runs the command line on them and writes this page. Nominal, constant
+and variable each have their own frame and target fitted to the same rows. The first table is for seed 7, the
+second shows how much the choice of held-out rows matters.
+
+The data, q1 ... q6 in rad and x y z in m, from their authors' repositories:
+
+- UR10, three set-ups A, B and C, laser tracker with T-Mac: christianlandgraf/ipa-robot-accuracy
+- IRB 120, laser tracker: icelinker/Robot-Calibration-LaserTracker
+- UR5: 1351210328/GTPN_GTCN
+"""
+
+
+def main() -> int:
+    """Read the results and write both tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path, help="directory that benches.figures wrote")
+    found = read_cases(parser.parse_args().out)
+    if not found:
+        parser.error("there are no results; run: python -m benches.figures OUT")
+    PAGE.write_text("\n".join([HEAD, first_seed_table(found), "", seeds_table(found), ""]))
+    short = {name: case for name, case in found.items() if name in IN_README}
+    written = re.sub(
+        r"(<!-- results -->\n).*?(<!-- end of results -->)",
+        lambda marks: f"{marks[1]}{readme_table(short)}\n{marks[2]}",
+        README.read_text(),
+        flags=re.DOTALL,
+    )
+    README.write_text(written)
+    sys.stdout.write(f"written to {PAGE} and {README}\n")
+    return 0
+
+
+def read_cases(out: Path) -> dict[str, dict[str, Any]]:
+    """Each case with the errors of each seed: model to statistics."""
+    cases = {}
+    for described in sorted(out.glob("*/case.json")):
+        case = json.loads(described.read_text())
+        case["errors"] = {
+            int(folder.name.removeprefix("seed-")): read_errors(folder, bool(case["judge"]))
+            for folder in sorted(described.parent.glob("seed-*"))
+        }
+        if FIRST_SEED in case["errors"]:
+            cases[case["name"]] = case
+    return cases
+
+
+def read_errors(folder: Path, judged_elsewhere: bool) -> dict[str, dict[str, float]]:
+    """Model to statistics, from the held-out rows or from the other set-up."""
+    if judged_elsewhere:
+        content = json.loads((folder / "evaluation.json").read_text())["errors"]
+    else:
+        content = json.loads((folder / "summary.json").read_text())["holdout"]
+    return {model: content[model] for model in MODELS if model in content}
+
+
+def first_seed_table(cases: dict[str, dict[str, Any]]) -> str:
+    """Mean, RMS, 95 %, 99 % and maximum of each model for the first seed, and the mean to reach."""
+    lines = [
+        "| data | model | mean | RMS | 95 % | 99 % | max | mean to reach |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for case in cases.values():
+        for model, errors in case["errors"][FIRST_SEED].items():
+            numbers = " | ".join(f"{errors[f'{key}_mm']:.3f}" for key in ("mean", "rms", "p95", "p99", "max"))
+            to_reach = case["target_mean_mm"] if model == "variable" else None
+            target = "" if to_reach is None else f"{to_reach:.3f}"
+            lines.append(f"| {case['title']} | {model} | {numbers} | {target} |")
+    return "\n".join(lines)
+
+
+def seeds_table(cases: dict[str, dict[str, Any]]) -> str:
+    """Median and worst mean over the seeds."""
+    lines = [
+        "| data | seeds | constant: median, worst mean | variable: median, worst mean |",
+        "|---|---|---|---|",
+    ]
+    for case in cases.values():
+        cells = []
+        for model in ("constant", "variable"):
+            means = [errors[model]["mean_mm"] for errors in case["errors"].values() if model in errors]
+            cells.append(f"{statistics.median(means):.3f}, {max(means):.3f}" if means else "")
+        lines.append(f"| {case['title']} | {len(case['errors'])} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def readme_table(cases: dict[str, dict[str, Any]]) -> str:
+    """Means of the three models for the first seed."""
+    lines = [
+        "Mean position error in mm on held-out poses, seed 7; [data and more](docs/reference/results.md).",
+        "",
+        "| data | nominal | constant | variable |",
+        "|---|---|---|---|",
+    ]
+    for case in cases.values():
+        errors = case["errors"][FIRST_SEED]
+        means = [f"{errors[model]['mean_mm']:.3f}" if model in errors else "" for model in MODELS]
+        lines.append(f"| {case['title']} | {' | '.join(means)} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
