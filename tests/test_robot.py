@@ -1,11 +1,14 @@
 """The robot: what its file says is what its kinematics do."""
 
 import json
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from truearm.errors import InputError
 from truearm.library import library_names
 from truearm.robot import Payload, Robot
@@ -21,11 +24,11 @@ alpha = 90.0
 HEAD = 'name = "arm"\nconvention = "standard"\nlength_unit = "mm"\nangle_unit = "deg"\n'
 
 
-def arm(tail="", head=HEAD, links=LINK * 2):
+def arm(tail: str = "", head: str = HEAD, links: str = LINK * 2) -> Robot:
     return Robot.from_toml(head + links + tail, where="arm.toml")
 
 
-def test_units_become_si():
+def test_units_become_si() -> None:
     robot = arm()
     np.testing.assert_allclose(robot.table, [[0, 0.1, 0.05, np.pi / 2, 0]] * 2, rtol=0, atol=0)
     metres = arm(
@@ -35,13 +38,13 @@ def test_units_become_si():
     np.testing.assert_array_equal(metres.table[0, [1, 3]], [1.0, 1.5])
 
 
-def test_limits_are_degrees_for_revolute_and_lengths_for_prismatic():
+def test_limits_are_degrees_for_revolute_and_lengths_for_prismatic() -> None:
     slide = LINK.replace("revolute", "prismatic") + "limits = [0, 210]\n"
     robot = arm(links=LINK + "limits = [-90, 180]\n" + slide + LINK)
     np.testing.assert_allclose(robot.limits, [[-np.pi / 2, np.pi], [0, 0.21], [-np.inf, np.inf]])
 
 
-def test_paper_arm_has_the_forward_kinematics_of_the_fixtures(root):
+def test_paper_arm_has_the_forward_kinematics_of_the_fixtures(root: Path) -> None:
     path = root.parent / "shared" / "reference" / "rv_m2_fixtures.json"
     if not path.is_file():
         pytest.skip(f"no fixtures at {path}")
@@ -50,13 +53,14 @@ def test_paper_arm_has_the_forward_kinematics_of_the_fixtures(root):
     np.testing.assert_allclose(position_mm, fixtures["nominal_mm"], atol=1e-9)
 
 
-def test_base_given_as_a_row_is_kept_as_one():
+def test_base_given_as_a_row_is_kept_as_one() -> None:
     robot = Robot.load("RV-M2")
+    assert robot.base_row is not None
     np.testing.assert_allclose(robot.base_row, [np.pi / 2, 0.4, -0.08, np.pi, 0.0])
     assert arm().base_row is None
 
 
-def test_direction_and_coupling_make_joint_values_from_readings():
+def test_direction_and_coupling_make_joint_values_from_readings() -> None:
     """q_dh = matrix . (direction * reading)."""
     robot = arm("[coupling]\nmatrix = [[1, 0], [1, 1]]\n", links=LINK + LINK + "direction = -1\n")
     np.testing.assert_array_equal(robot.joints_from_readings([0.3, 0.1]), [0.3, 0.3 - 0.1])
@@ -67,7 +71,7 @@ def test_direction_and_coupling_make_joint_values_from_readings():
 
 
 @pytest.mark.parametrize("name", ["fanuc-lr-mate-200id", "kuka-kr-6-r900", "adept-cobra-600", "franka-panda"])
-def test_joint_jacobian_is_with_respect_to_readings(name):
+def test_joint_jacobian_is_with_respect_to_readings(name: str) -> None:
     robot, step = Robot.load(name), 1e-6
     q = np.random.default_rng(4).uniform(-1, 1, robot.joint_count)
     for joint in range(robot.joint_count):
@@ -78,7 +82,7 @@ def test_joint_jacobian_is_with_respect_to_readings(name):
         np.testing.assert_allclose(robot.joint_jacobian(q)[:, joint], slope, atol=1e-8)
 
 
-def test_parameter_jacobian_against_a_changed_table():
+def test_parameter_jacobian_against_a_changed_table() -> None:
     robot, step = Robot.load("ur10"), 1e-6
     q = np.linspace(-1, 1, 6)
     jacobian = robot.parameter_jacobian(q)
@@ -93,7 +97,7 @@ def test_parameter_jacobian_against_a_changed_table():
         np.testing.assert_allclose(jacobian[:, k], slope, atol=1e-8)
 
 
-def test_shapes_follow_the_readings():
+def test_shapes_follow_the_readings() -> None:
     robot = Robot.load("ur5")
     one, many = np.zeros(6), np.zeros((4, 6))
     assert robot.position(one).shape == (3,)
@@ -105,7 +109,7 @@ def test_shapes_follow_the_readings():
     assert robot.position(np.empty((0, 6))).shape == (0, 3)
 
 
-def test_out_is_written_to():
+def test_out_is_written_to() -> None:
     robot, q = Robot.load("ur5"), np.random.default_rng(5).uniform(-1, 1, (7, 6))
     out = np.empty((7, 3))
     assert robot.position(q, out=out) is out
@@ -126,13 +130,13 @@ def test_out_is_written_to():
         ([[0] * 6, [0] * 5], "are not numbers"),
     ],
 )
-def test_readings_are_checked_at_the_door(q, message):
+def test_readings_are_checked_at_the_door(q: Any, message: str) -> None:
     with pytest.raises(InputError, match=f"joint readings of UR5.*{message}|{message}"):
         Robot.load("ur5").position(q)
 
 
 @pytest.mark.parametrize("name", library_names())
-def test_dictionary_and_toml_bring_back_the_same_robot(name):
+def test_dictionary_and_toml_bring_back_the_same_robot(name: str) -> None:
     robot = Robot.load(name)
     assert Robot.from_dict(json.loads(json.dumps(robot.to_dict(), allow_nan=False))) == robot
     assert Robot.from_toml(robot.to_toml()) == robot
@@ -147,7 +151,7 @@ numbers = st.floats(-3.0, 3.0)
     text=st.text(min_size=1).filter(lambda t: "\r" not in t),
     lower=st.sampled_from([-np.inf, -1.0]),
 )
-def test_any_robot_comes_back_bit_for_bit(table, coupling, text, lower):
+def test_any_robot_comes_back_bit_for_bit(table: Any, coupling: Any, text: str, lower: float) -> None:
     upper = np.inf if np.isinf(lower) else 2.0
     robot = Robot(
         name=text,
@@ -167,23 +171,23 @@ def test_any_robot_comes_back_bit_for_bit(table, coupling, text, lower):
     assert Robot.from_toml(robot.to_toml()) == robot
 
 
-def test_transforms_by_quaternion():
+def test_transforms_by_quaternion() -> None:
     robot = arm("[tool]\nxyz = [0, 0, 100]\nquaternion_wxyz = [0.7071, 0, 0.7071, 0]\n")
     np.testing.assert_allclose(robot.tool[:3, 3], [0, 0, 0.1])
     np.testing.assert_allclose(robot.tool[:3, :3], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], atol=1e-15)
     np.testing.assert_allclose(robot.pose([0, 0]), robot.flange_chain.pose(np.zeros((1, 2)))[0] @ robot.tool)
 
 
-def test_arrays_cannot_be_changed():
+def test_arrays_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         Robot.load("ur5").table[0, 0] = 1.0
 
 
 @pytest.mark.parametrize("name", ["UR10", "ur 10", "Ur-10", "rv_m2", "KUKA KR 6 R900"])
-def test_library_names_forgive_case_and_separators(name):
+def test_library_names_forgive_case_and_separators(name: str) -> None:
     assert Robot.load(name).joint_count in (5, 6)
 
 
-def test_unknown_names_bring_the_nearest():
-    with pytest.raises(InputError, match='no robot "ur12" .*Did you mean .*"ur10".*truearm robots'):
+def test_unknown_names_bring_the_nearest() -> None:
+    with pytest.raises(InputError, match=r'no robot "ur12" .*Did you mean .*"ur10".*truearm robots'):
         Robot.load("ur12")

@@ -1,6 +1,9 @@
 """Robot files that are wrong: the message names the file, the key and the rule."""
 
+from pathlib import Path
+
 import pytest
+
 from truearm.errors import InputError
 from truearm.robot import Robot
 
@@ -28,43 +31,87 @@ mass_kg = 1.0
 
 BAD = {
     "not TOML": ("name =", "name = =", "not TOML: .*line 1"),
-    "unknown key in a link": ("alpha = 90.0", "alhpa = 90.0", 'unknown key "link 2, alhpa". Did you mean "alpha"'),
-    "unknown key at the top": ("convention", "convetion", 'unknown key "convetion". Did you mean "convention"'),
+    "unknown key in a link": (
+        "alpha = 90.0",
+        "alhpa = 90.0",
+        'unknown key "link 2, alhpa". Did you mean "alpha"',
+    ),
+    "unknown key at the top": (
+        "convention",
+        "convetion",
+        'unknown key "convetion". Did you mean "convention"',
+    ),
     "unknown key unlike any": ("mass_kg", "zzz", 'unknown key "payload, zzz". Known here: mass_kg, centre'),
     "missing key": ('length_unit = "mm"\n', "", 'key "length_unit" is missing. Either "m" or "mm"'),
     "missing joint": ('joint = "revolute"\nd', "d", 'key "link 1, joint" is missing. Either "revolute"'),
     "no links": ("[[link]]", "[[links]]", 'unknown key "links". Did you mean "link"'),
-    "unknown unit": ('"mm"', '"cm"', "length_unit: 'cm' is not known. Must be \"m\" or \"mm\""),
+    "unknown unit": ('"mm"', '"cm"', 'length_unit: \'cm\' is not known. Must be "m" or "mm"'),
     "unknown convention": ('"standard"', '"craig"', "convention: 'craig' is not known. Must be \"standard\""),
     "unknown joint": ('"revolute"\nalpha', '"helical"\nalpha', "link 2, joint: 'helical' is not known"),
-    "text for a number": ("alpha = 90.0", 'alpha = "90"', "link 2, alpha: '90' cannot be used. Must be a number"),
-    "true for a number": ("alpha = 90.0", "alpha = true", "link 2, alpha: True cannot be used. Must be a number"),
-    "not a number": ("alpha = 90.0", "alpha = nan", "link 2, alpha: nan cannot be used. Must be a finite number"),
+    "text for a number": (
+        "alpha = 90.0",
+        'alpha = "90"',
+        "link 2, alpha: '90' cannot be used. Must be a number",
+    ),
+    "true for a number": (
+        "alpha = 90.0",
+        "alpha = true",
+        "link 2, alpha: True cannot be used. Must be a number",
+    ),
+    "not a number": (
+        "alpha = 90.0",
+        "alpha = nan",
+        "link 2, alpha: nan cannot be used. Must be a finite number",
+    ),
     "infinite limit": ("[-90.0, 90.0]", "[-inf, 90.0]", "link 1, limits.*Must be a finite number"),
-    "limits swapped": ("[-90.0, 90.0]", "[90.0, -90.0]", "link 1, limits: 90 to -90; the lower limit comes first"),
+    "limits swapped": (
+        "[-90.0, 90.0]",
+        "[90.0, -90.0]",
+        "link 1, limits: 90 to -90; the lower limit comes first",
+    ),
     "one limit": ("[-90.0, 90.0]", "[90.0]", "link 1, limits: .*Must have 2 entries"),
     "three limits": ("[-90.0, 90.0]", "[1.0, 2.0, 3.0]", "link 1, limits: .*Must have 2 entries"),
     "limits not a list": ("[-90.0, 90.0]", "90.0", "link 1, limits: 90.0 cannot be used. Must be a list"),
     "direction": ("alpha = 90.0", "direction = 2", "link 2, direction: 2 is not known. Must be 1 or -1"),
-    "quaternion length": ("[1.0, 0.0, 0.0, 0.0]", "[1.0, 1.0, 0.0, 0.0]", "tool, quaternion_wxyz: length 1.41421, must be 1"),
+    "quaternion length": (
+        "[1.0, 0.0, 0.0, 0.0]",
+        "[1.0, 1.0, 0.0, 0.0]",
+        "tool, quaternion_wxyz: length 1.41421, must be 1",
+    ),
     "two notations": ("xyz = [0.0", "d = 1.0\nxyz = [0.0", 'tool: gives "d" beside xyz'),
     "coupling size": ("[[1, 0], [0, 1]]", "[[1, 0]]", "coupling.matrix must be 2 by 2"),
-    "singular coupling": ("[[1, 0], [0, 1]]", "[[1, 1], [1, 1]]", "coupling: the coupling matrix is singular"),
-    "negative mass": ("mass_kg = 1.0", "mass_kg = -1.0", "payload, mass_kg: -1.0 cannot be used. Must be at least 0"),
+    "singular coupling": (
+        "[[1, 0], [0, 1]]",
+        "[[1, 1], [1, 1]]",
+        "coupling: the coupling matrix is singular",
+    ),
+    "negative mass": (
+        "mass_kg = 1.0",
+        "mass_kg = -1.0",
+        "payload, mass_kg: -1.0 cannot be used. Must be at least 0",
+    ),
     "section for a value": ("[base]\ntheta = 10.0", "base = 3", "base: 3 cannot be used. Must be a section"),
     "empty name": ('"arm"', '""', "name: '' cannot be used. Must not be empty"),
     "number for the name": ('"arm"', "3", "name: 3 cannot be used. Must be text in quotes"),
-    "degrees read as radians": ('"deg"', '"rad"', "arm.toml, link 2, alpha: 90 rad. No angle is beyond one turn. Check angle_unit"),
-    "millimetres read as metres": ('"mm"', '"m"', "arm.toml, link 1, d: 100 m. No link is longer than 50 m. Check length_unit"),
-}  # fmt: skip
+    "degrees read as radians": (
+        '"deg"',
+        '"rad"',
+        "arm.toml, link 2, alpha: 90 rad. No angle is beyond one turn. Check angle_unit",
+    ),
+    "millimetres read as metres": (
+        '"mm"',
+        '"m"',
+        "arm.toml, link 1, d: 100 m. No link is longer than 50 m. Check length_unit",
+    ),
+}
 
 
-def test_the_good_file_is_good():
+def test_the_good_file_is_good() -> None:
     assert Robot.from_toml(GOOD, where="arm.toml").joint_count == 2
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_files_are_explained(case):
+def test_bad_files_are_explained(case: str) -> None:
     old, new, message = BAD[case]
     assert old in GOOD
     with pytest.raises(InputError, match=message) as caught:
@@ -82,7 +129,7 @@ def test_bad_files_are_explained(case):
         (b"", 'key "name" is missing'),
     ],
 )
-def test_files_that_are_no_text(tmp_path, content, message):
+def test_files_that_are_no_text(tmp_path: Path, content: bytes, message: str) -> None:
     path = tmp_path / "arm.toml"
     path.write_bytes(content)
     with pytest.raises(InputError, match=message) as caught:
@@ -90,7 +137,7 @@ def test_files_that_are_no_text(tmp_path, content, message):
     assert str(caught.value).startswith(str(path))
 
 
-def test_missing_file_and_directory(tmp_path):
+def test_missing_file_and_directory(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no such file"):
         Robot.load(tmp_path / "none.toml")
     with pytest.raises(InputError, match="this is a directory"):

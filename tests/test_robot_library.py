@@ -5,13 +5,17 @@ they turn at zero readings, and where its flange is, straight from the dimension
 exponentials of these screws must be the library's forward kinematics.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+
 from truearm.library import library_names
 from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
 
 X, Y, Z = np.eye(3)
 
@@ -20,13 +24,12 @@ X, Y, Z = np.eye(3)
 class Drawing:
     """Axes as (direction, point in mm) at zero readings, flange point in mm and its axes as columns."""
 
-    axes: list
-    flange_mm: tuple
-    flange_axes: tuple = (X, Y, Z)
-    prismatic: tuple = ()
-    readings: np.ndarray = field(default_factory=lambda: np.empty(0))
+    axes: list[tuple[Floats, tuple[float, float, float]]]
+    flange_mm: tuple[float, float, float]
+    flange_axes: tuple[Floats, Floats, Floats] = (X, Y, Z)
+    prismatic: tuple[int, ...] = ()
 
-    def pose(self, q):
+    def pose(self, q: Floats) -> Floats:
         pose = np.eye(4)
         for joint, ((direction, point), value) in enumerate(zip(self.axes, q, strict=True)):
             motion = np.eye(4)
@@ -42,7 +45,7 @@ class Drawing:
         return pose @ home
 
 
-def ur(d1, a2, a3, d4, d5, d6):
+def ur(d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> Drawing:
     """A UR at zero readings lies stretched out along -x, the wrist to the -y side."""
     reach = -(a2 + a3)
     return Drawing(
@@ -59,7 +62,7 @@ def ur(d1, a2, a3, d4, d5, d6):
     )
 
 
-def abb(height, upper, elbow, forearm, wrist):
+def abb(height: float, upper: float, elbow: float, forearm: float, wrist: float) -> Drawing:
     return Drawing(
         [
             (Z, (0, 0, 0)),
@@ -74,7 +77,7 @@ def abb(height, upper, elbow, forearm, wrist):
     )
 
 
-def iiwa(shoulder, elbow, wrist, flange):
+def iiwa(shoulder: float, elbow: float, wrist: float, flange: float) -> Drawing:
     elbow, wrist = shoulder + elbow, shoulder + elbow + wrist
     axes = [(Z, 0), (Y, shoulder), (Z, 0), (-Y, elbow), (Z, 0), (Y, wrist), (Z, 0)]
     return Drawing([(axis, (0, 0, height)) for axis, height in axes], (0, 0, wrist + flange))
@@ -189,12 +192,12 @@ WRIST_REACH_MM = {
 }
 
 
-def test_every_arm_of_the_library_has_a_drawing():
+def test_every_arm_of_the_library_has_a_drawing() -> None:
     assert set(library_names()) == set(DRAWINGS)
 
 
 @pytest.mark.parametrize("name", DRAWINGS)
-def test_forward_kinematics_follow_the_drawing(name):
+def test_forward_kinematics_follow_the_drawing(name: str) -> None:
     robot, drawing = Robot.load(name), DRAWINGS[name]
     low, high = np.clip(robot.limits, -np.pi, np.pi).T
     q = np.random.default_rng(1).uniform(low, high, (50, robot.joint_count))
@@ -205,14 +208,14 @@ def test_forward_kinematics_follow_the_drawing(name):
     np.testing.assert_allclose(robot.pose(q), expected, atol=1e-12)
 
 
-def test_fanuc_forearm_keeps_its_direction_when_j2_alone_moves():
+def test_fanuc_forearm_keeps_its_direction_when_j2_alone_moves() -> None:
     robot = Robot.load("fanuc-lr-mate-200id")
-    before, after = robot.pose([[0, 0, 0, 0, 0, 0], [0, 0.7, 0, 0, 0, 0]])
+    before, after = robot.pose(np.array([[0, 0.0, 0, 0, 0, 0], [0, 0.7, 0, 0, 0, 0]]))
     np.testing.assert_allclose(before[:3, :3], after[:3, :3], atol=1e-15)
 
 
 @pytest.mark.parametrize("name", library_names())
-def test_every_arm_says_where_its_numbers_come_from_and_has_limits(name):
+def test_every_arm_says_where_its_numbers_come_from_and_has_limits(name: str) -> None:
     robot = Robot.load(name)
     assert len(robot.source) > 20
     assert np.isfinite(robot.limits).all(axis=1).sum() >= robot.joint_count - 1
@@ -220,7 +223,7 @@ def test_every_arm_says_where_its_numbers_come_from_and_has_limits(name):
 
 
 @pytest.mark.parametrize(("name", "reach_mm"), WRIST_REACH_MM.items())
-def test_wrist_reaches_as_far_as_the_data_sheet_says(name, reach_mm):
+def test_wrist_reaches_as_far_as_the_data_sheet_says(name: str, reach_mm: float) -> None:
     """Published reach: from the axis of joint 1 to the centre of the wrist, arm stretched out."""
     table = 1000 * Robot.load(name).table
     stretched = table[0, 2] + table[1, 2] + np.hypot(table[2, 2], table[3, 1])

@@ -1,12 +1,15 @@
 """URDF chains: the Denavit-Hartenberg form has the very forward kinematics of the file."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+
 from truearm.errors import InputError
 from truearm.robot import Robot
 
@@ -31,18 +34,24 @@ kinds = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
 joints = st.tuples(kinds, origins, angles, axes)
 
 
-def urdf(chain):
+Joint = tuple[str, tuple[float, ...], tuple[float, ...], str]
+Chain = Sequence[Joint]
+Floats = NDArray[np.float64]
+
+
+def urdf(chain: Chain) -> str:
     parts = ['<robot name="arm"><link name="l0"/>']
     for i, (kind, xyz, rpy, axis) in enumerate(chain):
         parts.append(
-            f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}"><parent link="l{i}"/><child link="l{i + 1}"/>'
+            f'<link name="l{i + 1}"/><joint name="j{i}" type="{kind}">'
+            f'<parent link="l{i}"/><child link="l{i + 1}"/>'
             f'<origin xyz="{" ".join(map(repr, xyz))}" rpy="{" ".join(map(repr, rpy))}"/><axis xyz="{axis}"/>'
             '<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>'
         )
     return "".join(parts) + "</robot>"
 
 
-def forward(chain, q):
+def forward(chain: Chain, q: Floats) -> Floats:
     """The definition of a URDF: origin, then motion along or about the axis, joint by joint."""
     pose, values = np.eye(4), iter(q)
     for kind, xyz, rpy, axis in chain:
@@ -62,7 +71,7 @@ def forward(chain, q):
     return pose
 
 
-def load(tmp_path, chain):
+def load(tmp_path: Path, chain: Chain) -> Robot:
     path = tmp_path / "arm.urdf"
     path.write_text(urdf(chain))
     return Robot.from_urdf(path)
@@ -70,7 +79,7 @@ def load(tmp_path, chain):
 
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(chain=st.lists(joints, min_size=1, max_size=8), seed=st.integers(0, 2**32 - 1))
-def test_any_chain_keeps_its_forward_kinematics(tmp_path, chain, seed):
+def test_any_chain_keeps_its_forward_kinematics(tmp_path: Path, chain: Chain, seed: int) -> None:
     chain = [
         *chain,
         ("revolute", (0.1, 0.0, 0.2), (0.0, 0.0, 0.0), "0 0 1"),
@@ -86,13 +95,13 @@ def test_any_chain_keeps_its_forward_kinematics(tmp_path, chain, seed):
 
 @settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(chain=st.lists(joints, min_size=2, max_size=6))
-def test_no_row_is_far_away(tmp_path, chain):
+def test_no_row_is_far_away(tmp_path: Path, chain: Chain) -> None:
     """Near-parallel axes do not send a common normal a hundred metres off."""
     chain = [*chain, ("revolute", (0.1, 0.0, 0.2), (0.0, 0.0, 0.0), "0 0 1")]
     assert np.abs(load(tmp_path, chain).table[:, 1:3]).max() < 1000.0
 
 
-def test_parallel_axes_have_beta_only_where_they_are_not_exactly_parallel(tmp_path):
+def test_parallel_axes_have_beta_only_where_they_are_not_exactly_parallel(tmp_path: Path) -> None:
     z = ("revolute", (0.3, 0.0, 0.0), (0.0, 0.0, 0.0), "0 0 1")
     tilted = ("revolute", (0.3, 0.0, 0.0), (0.0, 1e-4, 0.0), "0 0 1")
     table = load(tmp_path, [z, z, tilted, z]).table
@@ -100,7 +109,7 @@ def test_parallel_axes_have_beta_only_where_they_are_not_exactly_parallel(tmp_pa
     np.testing.assert_allclose(table[:, 2], [0.3, 0.3, 0.3, 0.0], atol=1e-15)
 
 
-def test_a_ur_urdf_gives_the_makers_table(tmp_path):
+def test_a_ur_urdf_gives_the_makers_table(tmp_path: Path) -> None:
     """Axes of a UR10 as its URDF has them come out with the d, a and alpha of the library."""
     chain = [
         ("revolute", (0.0, 0.0, 0.1273), (0.0, 0.0, 0.0), "0 0 1"),
@@ -115,7 +124,7 @@ def test_a_ur_urdf_gives_the_makers_table(tmp_path):
     np.testing.assert_allclose(np.abs(table[:, 1:4]), np.abs(library[:, 1:4]), atol=1e-12)
 
 
-def test_the_parsers_own_kinematics_agree(tmp_path):
+def test_the_parsers_own_kinematics_agree(tmp_path: Path) -> None:
     import yourdfpy
 
     rng = np.random.default_rng(3)
@@ -128,7 +137,7 @@ def test_the_parsers_own_kinematics_agree(tmp_path):
     np.testing.assert_allclose(robot.pose(q), model.get_transform("l6", "l0"), atol=1e-9)
 
 
-def test_limits_and_kinds(tmp_path):
+def test_limits_and_kinds(tmp_path: Path) -> None:
     xyz, rpy = (0.0, 0.0, 0.1), (0.0, 0.0, 0.0)
     robot = load(
         tmp_path,
@@ -148,14 +157,14 @@ BRANCHED = """<robot name="arm"><link name="base"/><link name="a"/><link name="t
 <joint name="f2" type="fixed"><parent link="a"/><child link="camera"/></joint></robot>"""
 
 
-def test_the_tip_is_chosen_behind_a_hash(tmp_path):
+def test_the_tip_is_chosen_behind_a_hash(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(BRANCHED)
     assert Robot.load(f"{path}#tool0").source == "arm.urdf, base to tool0"
     assert Robot.load(f"{path}#base,camera").joint_count == 1
     with pytest.raises(InputError, match='the chain may end at "tool0" or "camera"'):
         Robot.load(path)
-    with pytest.raises(InputError, match='no link "tool1".*Did you mean "tool0"'):
+    with pytest.raises(InputError, match=r'no link "tool1".*Did you mean "tool0"'):
         Robot.load(f"{path}#tool1")
     with pytest.raises(InputError, match='no joint moves between "a" and "camera"'):
         Robot.load(f"{path}#a,camera")
@@ -183,7 +192,7 @@ def test_the_tip_is_chosen_behind_a_hash(tmp_path):
         ),
     ],
 )
-def test_bad_files_are_explained(tmp_path, content, message):
+def test_bad_files_are_explained(tmp_path: Path, content: str, message: str) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(content)
     with pytest.raises(InputError, match=message) as caught:
@@ -191,6 +200,6 @@ def test_bad_files_are_explained(tmp_path, content, message):
     assert str(caught.value).startswith(str(path))
 
 
-def test_xacro_is_told_apart():
-    with pytest.raises(InputError, match="xacro macro.*Expand it first"):
+def test_xacro_is_told_apart() -> None:
+    with pytest.raises(InputError, match=r"xacro macro.*Expand it first"):
         Robot.load(Path("arm.urdf.xacro"))
