@@ -20,9 +20,9 @@ IN_README = ("c400", "b400", "irb400", "ur5", "ac2b")
 HEAD = """# Results on real arms
 
 Position error in mm on rows that took no part in fitting or choosing, from public measurements made by
-others. `make figures FIGURES="--data DIR"` runs the command line on them and writes this page. Nominal, constant
-and variable each have their own frame and target fitted to the same rows. The first table is for seed 7, the
-second shows how much the choice of held-out rows matters.
+others. `make figures FIGURES="--data DIR"` runs the command line on them and writes this page. Nominal,
+constant and variable each have their own frame and target fitted to the same rows. The first table is for
+seed 7, the second shows how much the choice of held-out rows matters.
 
 The data, q1 ... q6 in rad and x y z in m, from their authors' repositories:
 
