@@ -8,7 +8,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use truearm_kinematics::{
-    Batch, Chain as Core, Convention, Joint, KinematicsError, Link, Parameters, Transform,
+    Batch, Chain as Core, Convention, Joint, KinematicsError, Link, Parameters, SharedParameters, Transform,
 };
 
 use crate::door::{CoreError, Failure, quick};
@@ -20,7 +20,7 @@ type Array<'py, D> = Bound<'py, PyArray<f64, D>>;
 #[pyclass(frozen, module = "truearm._core")]
 pub struct Chain {
     core: Core,
-    nominal: Vec<f64>,
+    nominal: SharedParameters,
 }
 
 impl Chain {
@@ -45,7 +45,7 @@ impl Chain {
         poses: usize,
     ) -> PyResult<Parameters<'a>> {
         let Some(array) = given else {
-            return Ok(Parameters::One(&self.nominal));
+            return Ok(Parameters::Prepared(&self.nominal));
         };
         let (links, values) = (self.core.link_count(), contiguous("parameters", array)?);
         match array.shape() {
@@ -102,7 +102,7 @@ impl Chain {
         let (base, end) = (transform("base", &base)?, transform("end", &end)?);
         let links = table(&joints, &links)?;
         let core = Core::new(convention, links, base, end).map_err(Failure::into_exception)?;
-        Ok(Self { nominal: core.nominal(), core })
+        Ok(Self { nominal: SharedParameters::new(&core.nominal()), core })
     }
 
     #[getter]
