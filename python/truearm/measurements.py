@@ -220,7 +220,8 @@ class Measurements:
             if value is not None:
                 flat = value.reshape(len(self), -1)
                 columns |= {f"{name}{k}": flat[:, k] for k in range(flat.shape[1])}
-        return pd.DataFrame(columns).join(self.features, rsuffix=" feature")
+        columns |= {f"feature {name}": self.features[name].to_numpy() for name in self.features.columns}
+        return pd.DataFrame(columns)
 
 
 def _concatenate(parts: Sequence[Measurements]) -> Measurements:

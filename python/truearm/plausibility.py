@@ -36,7 +36,7 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
     _check_kinds(measurements, robot)
     _check_degrees(measurements, robot)
     _check_alike(measurements)
-    for group in measurements.groups:
+    for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
     return [*measurements.notices, *_limit_notices(measurements, robot), *_repetitions(measurements)]
 

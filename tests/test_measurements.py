@@ -1,0 +1,228 @@
+"""Measurements: what is in the file is what is fitted, in SI."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from truearm.errors import InputError
+from truearm.measurements import Measurements
+
+HEADER = "q1,q2,x,y,z"
+ROWS = ["0.1,0.2,1,2,3", "0.3,-0.4,1.5,2.5,3.5", "0.5,0.6,2,3,4"]
+
+
+def write(
+    folder: Path, header: str = HEADER, rows: list[str] | None = None, name: str = "tracker.csv"
+) -> Path:
+    path = folder / name
+    path.write_text("\n".join([header, *(ROWS if rows is None else rows)]) + "\n")
+    return path
+
+
+def read(folder: Path, header: str = HEADER, rows: list[str] | None = None, **options: Any) -> Measurements:
+    return Measurements.read_csv(write(folder, header, rows), **options)
+
+
+def frame(count: int = 6, joints: int = 3, seed: int = 0) -> pd.DataFrame:
+    rng = np.random.default_rng(seed)
+    names = [f"q{k + 1}" for k in range(joints)] + ["x", "y", "z"]
+    return pd.DataFrame(rng.uniform(-1, 1, (count, len(names))), columns=names)
+
+
+def test_plain_file(tmp_path: Path) -> None:
+    data = read(tmp_path)
+    np.testing.assert_array_equal(data.readings, [[0.1, 0.2], [0.3, -0.4], [0.5, 0.6]])
+    np.testing.assert_array_equal(data.targets[:, 0], [[1, 2, 3], [1.5, 2.5, 3.5], [2, 3, 4]])
+    assert data.orientations is None
+    assert data.sigma_m is None
+    assert data.group.tolist() == ["tracker"] * 3
+    assert data.rows.tolist() == [1, 2, 3]
+    assert data.files == [str(tmp_path / "tracker.csv")]
+    assert (len(data), data.joint_count, data.target_count) == (3, 2, 1)
+
+
+def test_units_in_column_names(tmp_path: Path) -> None:
+    data = read(
+        tmp_path, "q1_deg,q2_mm,x_mm,y_mm,z_mm,sigma_mm", ["90,200,1.1,2,3,0.01", "45,100,4,5,6,0.02"]
+    )
+    np.testing.assert_allclose(data.readings, [[np.pi / 2, 0.2], [np.pi / 4, 0.1]], rtol=1e-15)
+    np.testing.assert_array_equal(data.targets[:, 0], [[0.0011, 0.002, 0.003], [0.004, 0.005, 0.006]])
+    assert data.sigma_m is not None
+    np.testing.assert_array_equal(data.sigma_m, [1e-5, 2e-5])
+    assert data.joint_units == ("deg", "mm")
+
+
+def test_units_by_option(tmp_path: Path) -> None:
+    data = read(
+        tmp_path,
+        "q1,q2,x,y,z",
+        ["90,200,1,2,3"],
+        length_unit="mm",
+        angle_unit="deg",
+        joints=("revolute", "prismatic"),
+    )
+    np.testing.assert_allclose(data.readings, [[np.pi / 2, 0.2]])
+    np.testing.assert_array_equal(data.targets[0, 0], [0.001, 0.002, 0.003])
+    assert data.joint_units == ("deg", "mm")
+
+
+def test_several_targets_and_missing_ones(tmp_path: Path) -> None:
+    data = read(tmp_path, "q1,x,y,z,x2,y2,z2", ["0,1,2,3,4,5,6", "1,,,,7,8,9", "2,1,1,1,,,"])
+    assert data.target_count == 2
+    np.testing.assert_array_equal(np.isnan(data.targets).all(axis=2), [[0, 0], [1, 0], [0, 1]])
+
+
+def test_quaternions_are_normalised_and_may_be_missing(tmp_path: Path) -> None:
+    data = read(tmp_path, "q1,x,y,z,qw,qx,qy,qz", ["0,1,2,3,1.0004,0,0,0", "1,1,2,3,,,,"])
+    assert data.orientations is not None
+    np.testing.assert_array_equal(data.orientations[0], [1, 0, 0, 0])
+    assert np.isnan(data.orientations[1]).all()
+
+
+def test_groups_and_features(tmp_path: Path) -> None:
+    header = "q1,x,y,z,group,temperature_C,q1_read,operator"
+    data = read(tmp_path, header, ["0,1,2,3, a ,21.5,0.01,Ann", "1,1,2,3,b,,1.01,Bo"])
+    assert data.group.tolist() == ["a", "b"]
+    assert data.groups == ["a", "b"]
+    assert list(data.features.columns) == ["temperature_C", "q1_read"]
+    np.testing.assert_array_equal(data.features["temperature_C"], [21.5, np.nan])
+    assert [notice.kind for notice in data.notices] == ["text_columns"]
+    assert '"operator"' in data.notices[0].message
+
+
+def test_names_in_other_letters_are_noticed(tmp_path: Path) -> None:
+    data = read(tmp_path, "q1,x,y,z,Sigma mm,QW", ["0,1,2,3,4,5", "1,1,2,3,4,5"])
+    assert [notice.kind for notice in data.notices] == ["column_names"]
+    assert '"Sigma mm" and "QW"' in data.notices[0].message
+
+
+def test_distances_to_anchors_and_within_pairs(tmp_path: Path) -> None:
+    header = "q1,distance_mm,anchor,pair"
+    data = read(tmp_path, header, ["0,500,bar,", "1,300,,p", "2,300,,p"])
+    assert data.target_count == 0
+    assert data.distance_m is not None
+    np.testing.assert_array_equal(data.distance_m, [0.5, 0.3, 0.3])
+    assert data.anchor is not None
+    assert data.anchor.tolist() == ["bar", "", ""]
+    assert data.pair is not None
+    assert data.pair.tolist() == ["", "p", "p"]
+
+
+def test_data_frames_read_like_files(tmp_path: Path) -> None:
+    table = frame()
+    table["group"] = [1, 1, 2, 2, 2, 2]
+    table["note"] = "text"
+    path = tmp_path / "data.csv"
+    table.to_csv(path, index=False)
+    from_frame, from_file = Measurements.from_dataframe(table), Measurements.read_csv(path)
+    assert from_frame.group.tolist() == ["1", "1", "2", "2", "2", "2"]
+    assert from_frame.hash() == from_file.hash()
+
+
+def test_row_selection() -> None:
+    table = frame(8)
+    table["temperature_C"] = np.arange(8.0)
+    data = Measurements.from_dataframe(table)
+    by_mask, by_index = data.select(np.arange(8) % 2 == 0), data.select([0, 2, 4, 6])
+    assert by_mask.hash() == by_index.hash()
+    assert by_mask.rows.tolist() == [1, 3, 5, 7]
+    assert by_mask.features.index.tolist() == [0, 1, 2, 3]
+    assert by_mask.features["temperature_C"].tolist() == [0, 2, 4, 6]
+    assert len(data.select(np.zeros(8, dtype=bool))) == 0
+
+
+def test_putting_parts_together(tmp_path: Path) -> None:
+    one = read(tmp_path, "q1,x,y,z,distance,pair", ["0,1,2,3,0.5,p", "1,1,2,3,0.5,p"])
+    header = "q1,x,y,z,x2,y2,z2,qw,qx,qy,qz,sigma_mm,temperature_C,distance,pair"
+    path = write(
+        tmp_path,
+        header,
+        ["0,1,2,3,4,5,6,1,0,0,0,0.1,20,0.6,p", "1,1,2,3,4,5,6,1,0,0,0,0.1,20,0.6,p"],
+        "other.csv",
+    )
+    both = Measurements.concatenate([one, Measurements.read_csv(path)])
+    assert both.groups == ["tracker", "other"]
+    assert both.targets.shape == (4, 2, 3)
+    assert np.isnan(both.targets[:2, 1]).all()
+    assert both.orientations is not None
+    assert np.isnan(both.orientations[:2]).all()
+    assert both.sigma_m is not None
+    np.testing.assert_array_equal(both.sigma_m, [np.nan, np.nan, 1e-4, 1e-4])
+    np.testing.assert_array_equal(both.features["temperature_C"], [np.nan, np.nan, 20, 20])
+    assert both.pair is not None
+    assert len(set(both.pair.tolist())) == 2
+    assert both.rows.tolist() == [1, 2, 1, 2]
+    assert both.row_names(np.array([True, False, True, True])) == (
+        f"row 1 of {tmp_path / 'tracker.csv'}; rows 1 and 2 of {path}"
+    )
+
+
+def test_parts_of_other_arms_do_not_go_together() -> None:
+    parts = [Measurements.from_dataframe(frame(joints=n), name=f"arm{n}") for n in (3, 4)]
+    with pytest.raises(InputError, match="4 joints in arm4, 3 in arm3"):
+        Measurements.concatenate(parts)
+    with pytest.raises(InputError, match="no measurements"):
+        Measurements.concatenate([])
+
+
+def test_identical_rows_are_counted_once() -> None:
+    table = frame(5)
+    table = pd.concat([table, table.iloc[[1, 3]]], ignore_index=True)
+    data = Measurements.from_dataframe(table)
+    assert data.identical_rows().tolist() == [False] * 5 + [True] * 2
+    assert data.deduplicated().rows.tolist() == [1, 2, 3, 4, 5]
+    table["temperature_C"] = np.arange(7.0)
+    assert not Measurements.from_dataframe(table).identical_rows().any()
+
+
+@given(rows=st.permutations(range(6)))
+def test_the_hash_is_of_the_content(rows: list[int]) -> None:
+    data = Measurements.from_dataframe(frame(), name="one")
+    same = Measurements.concatenate([data.select([0, 1]), data.select([2, 3, 4, 5])])
+    assert same.hash() == data.hash()
+    assert (data.select(rows).hash() == data.hash()) == (rows == list(range(6)))
+
+
+def test_every_part_of_the_content_counts_in_the_hash() -> None:
+    table = frame()
+    hashes = {Measurements.from_dataframe(table, name="a").hash()}
+    changes: dict[str, Any] = {"q1": 0.5, "x": 9.0, "sigma_m": 1e-5, "temperature_C": 20.0, "group": "b"}
+    for name, value in changes.items():
+        changed = Measurements.from_dataframe(table.assign(**{name: value}), name="a")
+        hashes.add(changed.hash())
+    assert len(hashes) == 6
+    assert all(len(text) == 64 for text in hashes)
+
+
+finite = st.floats(-1e6, 1e6)
+
+
+@given(values=st.lists(st.tuples(*[finite] * 5), min_size=1, max_size=5))
+def test_numbers_survive_the_file_bit_for_bit(tmp_path_factory: pytest.TempPathFactory, values: Any) -> None:
+    path = tmp_path_factory.mktemp("csv") / "data.csv"
+    path.write_text("\n".join([HEADER, *(",".join(map(repr, row)) for row in values)]))
+    data = Measurements.read_csv(path)
+    np.testing.assert_array_equal(np.hstack([data.readings, data.targets[:, 0]]), values)
+
+
+def test_arrays_cannot_be_changed() -> None:
+    data = Measurements.from_dataframe(frame())
+    with pytest.raises(ValueError, match="read-only"):
+        data.readings[0, 0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "joints", "targets"),
+    [("ur10_ipa_B", 1495, 6, 1), ("irb120_faro", 1000, 6, 3), ("ur5_gtpn", 727, 6, 1)],
+)
+def test_public_data(shared_data: Path, name: str, count: int, joints: int, targets: int) -> None:
+    data = Measurements.read_csv(shared_data / f"{name}.csv")
+    assert (len(data), data.joint_count, data.target_count) == (count, joints, targets)
+    table = np.genfromtxt(shared_data / f"{name}.csv", delimiter=",", names=True)
+    np.testing.assert_array_equal(data.readings[:, 0], table["q1"])
+    np.testing.assert_array_equal(data.targets[:, 0], np.column_stack([table[axis] for axis in "xyz"]))

@@ -1,0 +1,163 @@
+"""Measurement files that are wrong: the message says what, where, the rule and the way out."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from truearm.errors import InputError
+from truearm.measurements import Measurements
+
+TABLES = {
+    "no joint columns": (
+        "J1,J2,x,y,z",
+        ["0,0,1,2,3"],
+        r"no joint columns q1, q2, .*columns are J1, J2, x, y, z.*--map",
+    ),
+    "joint left out": ("q1,q3,x,y,z", ["0,0,1,2,3"], 'Joint column "q2" is missing before "q3"'),
+    "misspelt axis": ("q1,x,y,Z", ["0,1,2,3"], 'Column "z" is missing. Did you mean "Z"'),
+    "misspelt positions": ("q1,X,Y,Z", ["0,1,2,3"], 'No position x, y, z and no distance. Did you mean "X"'),
+    "half a second target": ("q1,x,y,z,x2,y2", ["0,1,2,3,4,5"], 'Column "z2" is missing'),
+    "third target, no second": ("q1,x,y,z,x3,y3,z3", ["0,1,2,3,4,5,6"], "Target 3 is there without"),
+    "half a quaternion": ("q1,x,y,z,qw,qx,qy", ["0,1,2,3,1,0,0"], 'Column "qz" of the quaternion is missing'),
+    "one name twice": ("q1,x,x,y,z", ["0,1,1,2,3"], 'column "x" occurs more than once'),
+    "one meaning twice": ("q1,x,x_mm,y,z", ["0,1,1,2,3"], 'columns "x" and "x_mm" mean the same'),
+    "column without name": ("q1,x,,y,z", ["0,1,1,2,3"], "column 3 has no name"),
+    "no header": ("0,0,1,2,3", ["0,0,1,2,3"], "first line holds numbers only.*q1,q2"),
+    "mixed angles": ("q1_deg,q2,x,y,z", ["0,0,1,2,3"], 'mixed units: column "q1_deg" is in deg, "q2" in SI'),
+    "mixed lengths": ("q1,x_mm,y,z_mm", ["0,1,2,3"], 'mixed units: column "x_mm" is in mm, "y" in SI'),
+    "mixed lengths of targets": ("q1,x,y,z,x2_mm,y2_mm,z2_mm", ["0,1,2,3,4,5,6"], "mixed units"),
+    "NaN": (
+        "q1,x,y,z",
+        ["0,1,2,3", "0,nan,2,3", "1,2,3,NaN"],
+        r'column "x" holds NaN or infinite values in row 2',
+    ),
+    "infinite": (
+        "q1,x,y,z",
+        ["0,1,2,3", "-inf,1,2,3", "1e999,1,2,3"],
+        r'"q1" holds NaN or infinite.* in rows 2 and 3',
+    ),
+    "text": ("q1,x,y,z", ["0,1,2,3", "0,1,n/a,3"], 'column "y" holds "n/a" in row 2. It must hold numbers'),
+    "empty joint": (
+        "q1,x,y,z",
+        ["0,1,2,3", ",1,2,3"],
+        'column "q1" is empty in row 2. Every row needs all joints',
+    ),
+    "half a point": ("q1,x,y,z", ["0,1,2,3", "0,1,,3"], 'only some of "x", "y" and "z" are given in row 2'),
+    "nothing measured": ("q1,x,y,z", ["0,1,2,3", "0,,,"], "nothing was measured in row 2"),
+    "half an orientation": ("q1,x,y,z,qw,qx,qy,qz", ["0,1,2,3,1,,0,0"], 'only some of "qw" to "qz" .* row 1'),
+    "long quaternion": (
+        "q1,x,y,z,qw,qx,qy,qz",
+        ["0,1,2,3,1,0,0,0", "0,1,2,3,1,0,0,0.1", "0,1,2,3,2,0,0,0"],
+        r"not length 1 \(up to 2\) in rows 2 and 3. Orientations are unit quaternions, w first",
+    ),
+    "sigma zero": (
+        "q1,x,y,z,sigma_mm",
+        ["0,1,2,3,0.1", "0,1,2,3,0"],
+        '"sigma_mm" is empty, zero or negative in row 2',
+    ),
+    "sigma empty": ("q1,x,y,z,sigma_mm", ["0,1,2,3,"], "empty, zero or negative in row 1"),
+    "group empty": ("q1,x,y,z,group", ["0,1,2,3,a", "0,1,2,3,"], '"group" is empty in row 2'),
+    "distance to nowhere": ("q1,distance", ["0,1"], "the distance leads nowhere in row 1.*anchor.*pair"),
+    "distance to both": ("q1,distance,anchor,pair", ["0,1,a,p"], "leads to an anchor and a pair in row 1"),
+    "distance negative": ("q1,distance,anchor", ["0,-1,a"], '"distance" is not positive in row 1'),
+    "pair of one": ("q1,distance,pair", ["0,1,p"], 'not exactly two rows share the name in "pair" in row 1'),
+    "pair of three": ("q1,distance,pair", ["0,1,p"] * 3, "rows 1, 2 and 3"),
+    "two distances of a pair": (
+        "q1,distance,pair",
+        ["0,1,p", "1,2,p"],
+        'pair "p" has two distances, 1 m and 2 m',
+    ),
+    "pair without distance": (
+        "q1,x,y,z,distance,pair",
+        ["0,1,2,3,,p", "1,1,2,3,1,p"],
+        "distance of a pair is empty in row 1",
+    ),
+    "no rows": ("q1,x,y,z", [], "no data rows below the header"),
+    "short line": (
+        "q1,x,y,z",
+        ["0,1,2,3", "0,1,2"],
+        "row 2 has another number of fields than the header's 4; row 2 has 3",
+    ),
+    "long lines": ("q1,x,y,z", ["0,1,2,3,4", "0,1,2,3,4"], "rows 1 and 2 have another number"),
+}
+CONTENTS = {
+    "empty": (b"", "the file is empty"),
+    "blank": (b"\n \n", "the file is empty"),
+    "workbook": (b"PK\x03\x04....", "this is a ZIP archive, such as an Excel workbook"),
+    "calibration": (b"\x10\x00\x00\x00\x00\x00\x00\x00{}", "binary data"),
+    "web page": (b"<!DOCTYPE html><html>", "an HTML page, not CSV"),
+    "URDF": (b"<?xml version='1.0'?><robot/>", "XML, not CSV"),
+    "JSON": (b'{"q1": 0}', "JSON, not CSV"),
+    "UTF-16": ("q1,x".encode("utf-16"), "UTF-16 text. Save it as UTF-8"),
+    "Latin-1": (b"q1,x,y,z,\xb0C\n1,2,3,4,5", "line 1 holds bytes that are not UTF-8"),
+    "semicolons": (b"q1;x;y;z\n0;1,5;2;3\n", 'by semicolons.*truearm import data.csv -o .* --delimiter ";"'),
+    "tabs": (b"q1\tx\ty\tz\n0\t1\t2\t3\n", "separated by tabs.*--delimiter tab"),
+    "open quote": (b'q1,x,y,z\n0,1,2,"3\n', "not CSV"),
+}
+
+
+@pytest.mark.parametrize("case", TABLES)
+def test_bad_tables_are_explained(tmp_path: Path, case: str) -> None:
+    header, rows, message = TABLES[case]
+    path = tmp_path / "data.csv"
+    path.write_text("\n".join([header, *rows]))
+    with pytest.raises(InputError, match=message) as caught:
+        Measurements.read_csv(path)
+    assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize("case", CONTENTS)
+def test_files_that_are_not_csv(tmp_path: Path, case: str) -> None:
+    content, message = CONTENTS[case]
+    path = tmp_path / "data.csv"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=message) as caught:
+        Measurements.read_csv(path)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_missing_file_and_directory(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        Measurements.read_csv(tmp_path / "none.csv")
+    with pytest.raises(InputError, match="a directory"):
+        Measurements.read_csv(tmp_path)
+
+
+def test_at_most_ten_rows_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "data.csv"
+    path.write_text("q1,x,y,z\n" + "0,nan,2,3\n" * 25)
+    with pytest.raises(InputError, match=r"in rows 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 and 15 more\. "):
+        Measurements.read_csv(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "message"),
+    [
+        ("q1,x_mm,y_mm,z_mm", {"length_unit": "m"}, 'column "x_mm" says mm, the options say m'),
+        ("q1_deg,x,y,z", {"angle_unit": "rad"}, 'column "q1_deg" says deg, the options say rad'),
+        ("q1,x,y,z", {"length_unit": "cm"}, '"cm" is no unit here. Known are "m" and "mm"'),
+        ("q1,x,y,z", {"angle_unit": "grad"}, '"grad" is no unit here'),
+        ("q1,x,y,z", {"joint_count": 6}, "there are 1 joint columns. The robot has 6 joints"),
+        ("q1,x,y,z", {"joints": ("revolute",) * 6}, "The robot has 6 joints"),
+    ],
+)
+def test_options_that_contradict_the_file(tmp_path: Path, header: str, options: Any, message: str) -> None:
+    path = tmp_path / "data.csv"
+    path.write_text(f"{header}\n0,1,2,3\n")
+    with pytest.raises(InputError, match=message):
+        Measurements.read_csv(path, **options)
+
+
+def test_bad_data_frames() -> None:
+    good = pd.DataFrame({"q1": [0.0, 1.0], "x": [1.0, 2.0], "y": [1.0, 2.0], "z": [1.0, 2.0]})
+    with pytest.raises(InputError, match="there are no data rows"):
+        Measurements.from_dataframe(good.iloc[:0])
+    with pytest.raises(InputError, match='"x" holds NaN or infinite values in row 2'):
+        Measurements.from_dataframe(good.assign(x=[1.0, np.inf]))
+    with pytest.raises(InputError, match='"q1" is empty in row 1'):
+        Measurements.from_dataframe(good.assign(q1=[np.nan, 1.0]))
+    with pytest.raises(InputError, match="two columns have the same name"):
+        Measurements.from_dataframe(pd.concat([good, good[["x"]]], axis=1))

@@ -1,0 +1,212 @@
+"""Measurements against the robot they are said to be of."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.library import library_names
+from truearm.measurements import Measurements
+from truearm.plausibility import check_against
+from truearm.robot import Robot
+from truearm.rotations import quaternion_from_matrix
+
+Floats = NDArray[np.float64]
+WORLD = np.array([3.0, -2.0, 0.5])
+
+
+def readings(robot: Robot, count: int = 40, seed: int = 0, share: float = 0.9) -> Floats:
+    low, high = np.clip(robot.limits, -np.pi, np.pi).T
+    middle, half = (low + high) / 2, share * (high - low) / 2
+    return np.random.default_rng(seed).uniform(middle - half, middle + half, (count, robot.joint_count))
+
+
+def table(robot: Robot, q: Floats, scale: float = 1.0) -> pd.DataFrame:
+    """What a device somewhere in the cell would see of the tool."""
+    columns = dict(zip([f"q{k + 1}" for k in range(robot.joint_count)], q.T, strict=True))
+    points = scale * (robot.position(q) + WORLD)
+    return pd.DataFrame({**columns, **dict(zip("xyz", points.T, strict=True))})
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_right_data_passes_in_every_unit(name: str) -> None:
+    robot = Robot.load(name)
+    q = readings(robot)
+    assert check_against(Measurements.from_dataframe(table(robot, q)), robot) == []
+    in_mm = Measurements.from_dataframe(table(robot, q, 1000.0), length_unit="mm")
+    assert check_against(in_mm, robot) == []
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_millimetres_read_as_metres(name: str) -> None:
+    robot = Robot.load(name)
+    data = Measurements.from_dataframe(table(robot, readings(robot), 1000.0), name="mm.csv")
+    with pytest.raises(
+        InputError, match=r"mm.csv, group mm.csv: half of .* millimetres, give --length-unit mm"
+    ):
+        check_against(data, robot)
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_metres_read_as_millimetres(name: str) -> None:
+    robot = Robot.load(name)
+    data = Measurements.from_dataframe(table(robot, readings(robot)), length_unit="mm")
+    with pytest.raises(
+        InputError, match="far too close together.*If they are in metres, give --length-unit m"
+    ):
+        check_against(data, robot)
+
+
+@pytest.mark.parametrize("name", [name for name in library_names() if name != "adept-cobra-600"])
+def test_degrees_read_as_radians(name: str) -> None:
+    robot = Robot.load(name)
+    q = readings(robot)
+    data = Measurements.from_dataframe(
+        table(robot, q).assign(**{f"q{k + 1}": np.degrees(q[:, k]) for k in range(q.shape[1])})
+    )
+    with pytest.raises(InputError, match="beyond what .* can reach.*give --angle-unit deg"):
+        check_against(data, robot)
+
+
+@pytest.mark.parametrize("name", ["ur10", "abb-irb-120", "kuka-iiwa-7", "rv-m2"])
+def test_degrees_of_small_motions_read_as_radians(name: str) -> None:
+    robot = Robot.load(name)
+    q = readings(robot, share=0.9)
+    q = q * np.radians(11.0) / np.abs(q).max()
+    q = np.clip(q, *robot.limits.T)
+    data = Measurements.from_dataframe(
+        table(robot, q).assign(**{f"q{k + 1}": np.degrees(q[:, k]) for k in range(q.shape[1])})
+    )
+    with pytest.raises(InputError, match="give --angle-unit deg"):
+        check_against(data, robot)
+
+
+def test_radians_read_as_degrees() -> None:
+    robot = Robot.load("ur10")
+    data = Measurements.from_dataframe(table(robot, readings(robot)), angle_unit="deg")
+    with pytest.raises(InputError, match="stated in degrees, look like radians.*--angle-unit rad"):
+        check_against(data, robot)
+
+
+def test_stated_radians_are_believed() -> None:
+    """An endless wrist may have turned many times: what is stated is not doubted, but said."""
+    robot = Robot.load("ur10")
+    q = readings(robot)
+    q[7, 5] += 8 * np.pi
+    points = table(robot, q)
+    with pytest.raises(InputError, match="row 8.*beyond what UR10 can reach"):
+        check_against(Measurements.from_dataframe(points), robot)
+    (notice,) = check_against(Measurements.from_dataframe(points, angle_unit="rad"), robot)
+    assert (notice.kind, notice.rows) == ("limits", (8,))
+
+
+def test_limits_are_warned_of_with_rows() -> None:
+    robot = Robot.load("rv-m2")
+    q = readings(robot)
+    q[[4, 9], 1] = np.radians([101.0, 105.0])
+    q[11, 2] = np.radians(3.0)
+    notices = check_against(Measurements.from_dataframe(table(robot, q)), robot)
+    assert [(notice.kind, notice.rows) for notice in notices] == [("limits", (5, 10)), ("limits", (12,))]
+    assert (
+        notices[0].message
+        == "Joint 2 is outside its limits (-30 to 100 deg) in rows 5 and 10, up to 105 deg."
+    )
+
+
+def test_identical_rows_are_warned_of_with_rows() -> None:
+    robot = Robot.load("rv-m2")
+    points = table(robot, readings(robot, 10))
+    data = Measurements.from_dataframe(pd.concat([points, points.iloc[[2, 5]]]))
+    (notice,) = check_against(data, robot)
+    assert (notice.kind, notice.rows) == ("identical_rows", (11, 12))
+    assert notice.message == "Identical to an earlier row in everything, counted once: rows 11 and 12."
+
+
+def test_all_poses_alike() -> None:
+    robot = Robot.load("ur5")
+    points = table(robot, np.tile(readings(robot, 1), (8, 1)))
+    with pytest.raises(InputError, match="all 8 poses are alike.*Measure poses all over the workspace"):
+        check_against(Measurements.from_dataframe(points), robot)
+    points = table(robot, readings(robot, 8)).assign(x=1.0, y=2.0, z=3.0)
+    with pytest.raises(InputError, match="all 8 measured positions are equal though the joints vary"):
+        check_against(Measurements.from_dataframe(points), robot)
+
+
+def test_another_arm() -> None:
+    points = table(Robot.load("rv-m2"), readings(Robot.load("rv-m2")))
+    with pytest.raises(InputError, match="there are 5 joint columns. The robot has 6 joints"):
+        check_against(Measurements.from_dataframe(points), Robot.load("ur5"))
+
+
+def test_kinds_of_joints() -> None:
+    scara = Robot.load("adept-cobra-600")
+    points = table(scara, readings(scara))
+    in_mm = points.rename(columns={"q3": "q3_mm"}).assign(q3_mm=1000 * points["q3"])
+    assert check_against(Measurements.from_dataframe(in_mm), scara) == []
+    wrong = points.rename(columns={"q2": "q2_mm"})
+    with pytest.raises(InputError, match="joint 2 is given in mm. Joint 2 of Adept Cobra 600 is revolute"):
+        check_against(Measurements.from_dataframe(wrong), scara)
+
+
+@given(seed=st.integers(0, 1000), reach=st.floats(0.0, 1.5), share=st.floats(0.02, 0.9))
+def test_no_honest_tool_or_region_is_refused(seed: int, reach: float, share: float) -> None:
+    """Long tools and small regions are no wrong units."""
+    robot = Robot.load("abb-irb-120")
+    q = readings(robot, 30, seed, share)
+    points = robot.pose(q) @ np.array([reach, 0.0, 0.0, 1.0])
+    data = table(robot, q).assign(x=points[:, 0], y=points[:, 1], z=points[:, 2])
+    assert check_against(Measurements.from_dataframe(data), robot) == []
+
+
+def test_one_gross_outlier_is_no_wrong_unit() -> None:
+    robot = Robot.load("abb-irb-120")
+    points = table(robot, readings(robot))
+    points.loc[3, "x"] = 1e4
+    assert check_against(Measurements.from_dataframe(points), robot) == []
+
+
+def test_wrong_units_of_one_group_are_found() -> None:
+    robot = Robot.load("ur5")
+    good = Measurements.from_dataframe(table(robot, readings(robot)), name="good")
+    bad = Measurements.from_dataframe(table(robot, readings(robot, seed=1), 1000.0), name="bad")
+    with pytest.raises(InputError, match="bad, group bad: .*--length-unit mm"):
+        check_against(Measurements.concatenate([good, bad]), robot)
+
+
+def test_distances_alone_are_looked_at_for_joints_only() -> None:
+    robot = Robot.load("ur5")
+    q = readings(robot)
+    data = table(robot, q).drop(columns=["x", "y", "z"]).assign(distance=1.0, anchor="bar")
+    assert check_against(Measurements.from_dataframe(data), robot) == []
+
+
+def test_poses_pass() -> None:
+    robot = Robot.load("ur5")
+    q = readings(robot)
+    quaternions = quaternion_from_matrix(robot.pose(q)[:, :3, :3])
+    data = table(robot, q).assign(**{f"q{axis}": quaternions[:, k] for k, axis in enumerate("wxyz")})
+    assert check_against(Measurements.from_dataframe(data), robot) == []
+
+
+@pytest.mark.parametrize(
+    ("file", "robot"),
+    [
+        ("ur10_ipa_A", "ur10"),
+        ("ur10_ipa_B", "ur10"),
+        ("ur10_ipa_C", "ur10"),
+        ("irb120_faro", "abb-irb-120"),
+        ("ur5_gtpn", "ur5"),
+    ],
+)
+def test_public_data_is_plausible_and_is_not_in_other_units(shared_data: Path, file: str, robot: str) -> None:
+    arm, path = Robot.load(robot), shared_data / f"{file}.csv"
+    assert check_against(Measurements.read_csv(path), arm) == []
+    with pytest.raises(InputError, match="too close together"):
+        check_against(Measurements.read_csv(path, length_unit="mm"), arm)
+    with pytest.raises(InputError, match="look like radians"):
+        check_against(Measurements.read_csv(path, angle_unit="deg"), arm)
