@@ -1,0 +1,234 @@
+"""Other people's tables come in as they are said to be, and only then."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from truearm.cli import main
+from truearm.errors import InputError, UsageError
+from truearm.importing import ImportPlan, import_table, unused_columns
+from truearm.measurements import Measurements
+from truearm.rotation_columns import RotationColumns
+
+IPA_OPTIONS = [
+    *("--delimiter", ";", "--decimal", ",", "--joint-unit", "rad", "--length-unit", "mm"),
+    *("--map", "q1=shoulder_pan_joint", "--map", "q2=shoulder_lift_joint", "--map", "q3=elbow_joint"),
+    *("--map", "q4=wrist_1_joint", "--map", "q5=wrist_2_joint", "--map", "q6=wrist_3_joint"),
+    *("--map", "x=measurement_x", "--map", "y=measurement_y", "--map", "z=measurement_z"),
+    *("--rotation", "euler:XYZ:deg=measurement_rx,measurement_ry,measurement_rz"),
+    *("--keep", "temperature_C=measurement_temperature"),
+    *("--keep", "goal_x=Goal x", "--keep", "goal_y=Goal y", "--keep", "goal_z=Goal z"),
+    *("--keep", "std_x_m=measurement_std_x:mm", "--keep", "std_y_m=measurement_std_y:mm"),
+    *("--keep", "std_z_m=measurement_std_z:mm"),
+]
+PLAIN = "J1,J2,px,py,pz\n90,45,1000,2000,3000\n-90,0,1500,2500,3500\n"
+COLUMNS = {"q1": "J1", "q2": "J2", "x": "px", "y": "py", "z": "pz"}
+
+
+def write(folder: Path, text: str, encoding: str = "utf-8") -> Path:
+    path = folder / "raw.txt"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def plan(**changes: Any) -> ImportPlan:
+    return ImportPlan(**{"columns": COLUMNS, "joint_unit": "deg", "length_unit": "mm", **changes})
+
+
+def test_the_public_series_equals_its_conversion(shared_data: Path, tmp_path: Path) -> None:
+    raw = shared_data / "raw" / "ipa_series_B_measurements_joint_configurations.csv"
+    output = tmp_path / "measurements.csv"
+    assert main(["import", str(raw), "-o", str(output), *IPA_OPTIONS]) == 0
+    ours, theirs = pd.read_csv(output), pd.read_csv(shared_data / "ur10_ipa_B.csv")
+    assert list(ours.columns) == list(theirs.columns)
+    for column in theirs:
+        digits = 1e-10 if str(column).startswith("q") and not str(column)[1].isdigit() else 1e-12
+        np.testing.assert_allclose(ours[column], theirs[column], rtol=0.0, atol=digits)
+
+
+def test_units_and_columns(tmp_path: Path) -> None:
+    table = import_table(write(tmp_path, PLAIN), plan())
+    assert list(table.columns) == ["q1", "q2", "x", "y", "z"]
+    np.testing.assert_allclose(table["q1"], [np.pi / 2, -np.pi / 2])
+    np.testing.assert_array_equal(table["y"], [2.0, 2.5])
+
+
+def test_units_behind_columns_come_first(tmp_path: Path) -> None:
+    path = write(tmp_path, PLAIN)
+    table = import_table(path, plan(columns={**COLUMNS, "q2": "J2:mm"}))
+    np.testing.assert_array_equal(table["q2"], [0.045, 0.0])
+
+
+def test_columns_with_our_names_need_no_mapping(tmp_path: Path) -> None:
+    path = write(tmp_path, "q1_deg,x_mm,y_mm,z_mm,group,qw,qx,qy,qz\n90,1,2,3,a,1,0,0,0\n")
+    table = import_table(path, ImportPlan())
+    assert list(table.columns) == ["q1", "x", "y", "z", "qw", "qx", "qy", "qz", "group"]
+    np.testing.assert_allclose(table.loc[0, ["q1", "x"]].to_numpy(dtype=float), [np.pi / 2, 0.001])
+
+
+@pytest.mark.parametrize(
+    ("text", "changes"),
+    [
+        (PLAIN.replace(",", ";"), {"delimiter": ";"}),
+        (PLAIN.replace(",", "\t"), {"delimiter": "\t"}),
+        (PLAIN.replace(",", ";").replace("1000", "1000,0"), {"delimiter": ";", "decimal": ","}),
+        ("Station 1\nsome words, and more\n" + PLAIN, {"skip_lines": 2}),
+        (PLAIN.replace("\n", "\r\n"), {}),
+        ("\ufeff" + PLAIN, {}),
+    ],
+)
+def test_marks_and_preambles(tmp_path: Path, text: str, changes: Any) -> None:
+    table = import_table(write(tmp_path, text), plan(**changes))
+    np.testing.assert_array_equal(table["x"], [1.0, 1.5])
+
+
+def test_other_encodings(tmp_path: Path) -> None:
+    path = write(tmp_path, PLAIN.replace("J1", "J1 [°]"), "latin-1")
+    columns = {**COLUMNS, "q1": "J1 [°]"}
+    assert len(import_table(path, plan(columns=columns, encoding="latin-1"))) == 2
+    with pytest.raises(InputError, match="not UTF-8"):
+        import_table(path, plan(columns=columns))
+    with pytest.raises(UsageError, match='"klingon" is no known encoding'):
+        import_table(path, plan(columns=columns, encoding="klingon"))
+
+
+angles = st.floats(-3.0, 3.0)
+rotations = st.tuples(angles, st.floats(-1.5, 1.5), angles)
+
+
+@given(
+    triple=rotations,
+    sequence=st.sampled_from(["XYZ", "ZYX", "ZYZ", "xyz", "zyx"]),
+    unit=st.sampled_from(["deg", "rad"]),
+)
+def test_euler_angles_are_turns_one_after_the_other(
+    triple: tuple[float, float, float], sequence: str, unit: str
+) -> None:
+    """Capitals: each turn about the axes as turned so far. Small letters: about the fixed axes."""
+    turns = [
+        Rotation.from_rotvec(a * np.eye(3)["xyz".index(c)])
+        for a, c in zip(triple, sequence.lower(), strict=True)
+    ]
+    expected = turns[0] * turns[1] * turns[2] if sequence.isupper() else turns[2] * turns[1] * turns[0]
+    given_angles = np.degrees(triple) if unit == "deg" else np.array(triple)
+    columns = RotationColumns.parse(f"euler:{sequence}:{unit}=a,b,c")
+    ((w, x, y, z),) = columns.quaternions(given_angles[None])
+    difference = Rotation.from_quat([x, y, z, w]).inv() * expected
+    assert difference.magnitude() < 1e-12
+    assert w >= 0.0
+
+
+@given(triple=rotations)
+def test_rotation_vectors_and_quaternions(triple: tuple[float, float, float]) -> None:
+    expected = Rotation.from_rotvec(triple)
+    ((w, x, y, z),) = RotationColumns.parse("vector:deg=a,b,c").quaternions(np.degrees(triple)[None])
+    assert (Rotation.from_quat([x, y, z, w]).inv() * expected).magnitude() < 1e-12
+    last = RotationColumns.parse("quaternion:xyzw=a,b,c,d").quaternions(np.array([[x, y, z, w]]))
+    np.testing.assert_array_equal(last, [[w, x, y, z]])
+
+
+def test_missing_orientations_stay_missing(tmp_path: Path) -> None:
+    text = "q1,x,y,z,rx,ry,rz\n0,1,2,3,10,20,30\n1,1,2,3,,,\n"
+    rotation = RotationColumns.parse("euler:ZYX:deg=rx,ry,rz")
+    table = import_table(
+        write(tmp_path, text), ImportPlan(rotation=rotation, joint_unit="rad", length_unit="m")
+    )
+    assert table["qw"].isna().tolist() == [False, True]
+    assert len(Measurements.from_dataframe(table)) == 2
+
+
+def test_what_is_left_out_is_told(tmp_path: Path) -> None:
+    path = write(
+        tmp_path, PLAIN.replace("J1", "note,J1").replace("\n90", "\na,90").replace("\n-90", "\nb,-90")
+    )
+    assert unused_columns(path, plan()) == ["note"]
+    assert import_table(path, plan(keep={"remark": "note"}))["remark"].tolist() == ["a", "b"]
+
+
+BAD: dict[str, tuple[str, dict[str, Any], str]] = {
+    "semicolons": (PLAIN.replace(",", ";"), {}, 'separated by semicolons. If so, give --delimiter ";"'),
+    "tabs": (PLAIN.replace(",", "\t"), {}, "separated by tabs. If so, give --delimiter tab"),
+    "one field": (PLAIN.replace(",", " "), {}, 'the header is one field: "J1 J2 px py pz".*--delimiter'),
+    "decimal comma": (
+        PLAIN.replace(",", ";").replace("90;", "90,5;"),
+        {"delimiter": ";"},
+        '"90,5".*give --decimal ","',
+    ),
+    "both marks": (PLAIN, {"delimiter": ",", "decimal": ","}, '"," is both delimiter and decimal mark'),
+    "thousands": (
+        PLAIN.replace(",", ";").replace("1000", "1.000"),
+        {"delimiter": ";", "decimal": ","},
+        '"px" holds "1.000" in row 1',
+    ),
+    "text": (
+        PLAIN.replace("1500", "n/a"),
+        {"decimal": "."},
+        'column "px" holds "n/a" in row 2. It must hold numbers',
+    ),
+    "no joint unit": (
+        PLAIN,
+        {"joint_unit": None},
+        'unit of column "q1" is not stated. Give --joint-unit rad or deg',
+    ),
+    "no length unit": (
+        PLAIN,
+        {"length_unit": None},
+        'unit of column "x" is not stated. Give --length-unit m or mm',
+    ),
+    "misspelt column": (
+        PLAIN,
+        {"columns": {**COLUMNS, "q1": "j1"}},
+        'no column "j1". Did you mean "J1".*columns are J1, J2',
+    ),
+    "unknown column of ours": (
+        PLAIN,
+        {"columns": {**COLUMNS, "temperature": "J1"}},
+        '"temperature" is no measurement column.*--keep',
+    ),
+    "unit in our name": (
+        PLAIN,
+        {"columns": {"q1_deg": "J1"}},
+        '"q1_deg" is no measurement column. Units stand behind .* --map q1=COLUMN:deg',
+    ),
+    "keeping a joint": (PLAIN, {"keep": {"q3": "J1"}}, '"q3" is a measurement column. Give it with --map'),
+    "skipping all": (PLAIN, {"skip_lines": 3}, "3 lines to skip, the file has 3"),
+    "page": ("<html></html>", {}, "an HTML page"),
+    "empty": ("", {}, "the file is empty"),
+    "NaN": (PLAIN.replace("1500", "nan"), {}, '"px" holds NaN or infinite values in row 2'),
+    "no position": (PLAIN, {"columns": {"q1": "J1"}}, "No position x, y, z"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_wrong_plans_are_explained(tmp_path: Path, case: str) -> None:
+    text, changes, message = BAD[case]
+    with pytest.raises(InputError, match=message):
+        import_table(write(tmp_path, text), plan(**changes))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "euler:XYZ=a,b,c",
+        "euler:XYZ:grad=a,b,c",
+        "euler:XYZ:deg=a,b",
+        "vector=a,b,c",
+        "quaternion:abcd=a,b,c,d",
+        "",
+    ],
+)
+def test_rotation_options_are_explained(text: str) -> None:
+    with pytest.raises(UsageError, match="is no rotation. Write euler:XYZ:deg=RX,RY,RZ"):
+        RotationColumns.parse(text)
+
+
+@pytest.mark.parametrize("sequence", ["XyZ", "XXY", "XY", "ABC", "XYZX"])
+def test_orders_of_euler_angles_are_explained(sequence: str) -> None:
+    with pytest.raises(InputError, match=f'"{sequence}" is no order of Euler angles. Three axes'):
+        RotationColumns.parse(f"euler:{sequence}:deg=a,b,c")
