@@ -14,7 +14,8 @@ use truearm_kinematics::{Isa, Kernel, dispatch};
 
 use crate::FieldError;
 use crate::hyper::{
-    AT_CONSTANT, AT_MAJOR, AT_MAJOR_LENGTHS, AT_OWN, AT_OWN_LENGTH, AT_SMOOTH, AT_SMOOTH_LENGTH, Hyper,
+    AT_CONSTANT, AT_OWN, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SMOOTH, AT_SMOOTH_LENGTH, Hyper,
+    Product,
 };
 use crate::kernel::{Value, matern, squared_exponential};
 use crate::pairs::{ByColumn, ClassSums, PairKernels, PairTable, add_products, covariance};
@@ -60,30 +61,28 @@ struct PoseKernels {
     /// (count, I) each.
     own: Vec<Value>,
     smooth: Vec<Value>,
-    /// (count,).
-    major: Vec<f64>,
+    /// For each product, (count,).
+    products: Vec<Vec<f64>>,
 }
 
 impl PoseKernels {
     fn new(distances: &[f64], inputs: usize, hyper: &Hyper) -> Self {
-        let major = |distances: &[f64]| {
-            if hyper.major_joints.is_empty() {
-                0.0
-            } else {
-                (-exponents(hyper, distances).sum::<f64>()).exp()
-            }
+        let product = |product: &Product| {
+            let pairs = distances.chunks_exact(inputs);
+            pairs.map(|distances| (-exponents(product, distances).sum::<f64>()).exp()).collect()
         };
         Self {
             own: distances.iter().map(|&d| matern(d, hyper.own_length)).collect(),
             smooth: distances.iter().map(|&d| squared_exponential(d, hyper.smooth_length)).collect(),
-            major: distances.chunks_exact(inputs).map(major).collect(),
+            products: hyper.products.iter().map(product).collect(),
         }
     }
 }
 
-/// Exponents of the `major` kernel's factors for one pair of poses.
-fn exponents<'a>(hyper: &'a Hyper, distances: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-    hyper.major_joints.iter().zip(&hyper.major_lengths).map(|(&k, length)| distances[k] / (length * length))
+/// Exponents of the factors of a product's kernel for one pair of poses.
+fn exponents<'a>(product: &'a Product, distances: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    let joints = product.joints.iter().zip(&product.lengths);
+    joints.map(|(&k, length)| distances[k] / (length * length))
 }
 
 /// The continuous kernels of all poses.
@@ -95,13 +94,17 @@ struct Continuous {
 impl PairKernels for Continuous {
     fn fill(&self, j: usize, table: &mut PairTable) {
         let kernels = &self.poses[j];
-        table.clear(self.inputs, kernels.major.len());
-        for (i, (own, smooth)) in
-            kernels.own.chunks_exact(self.inputs).zip(kernels.smooth.chunks_exact(self.inputs)).enumerate()
-        {
+        let count = kernels.own.len() / self.inputs;
+        table.clear(self.inputs, kernels.products.len(), count);
+        for (i, own) in kernels.own.chunks_exact(self.inputs).enumerate() {
             table.own.iter_mut().zip(own).for_each(|(column, value)| column[i] = value.kernel);
-            table.smooth[i] = smooth.iter().map(|value| value.kernel).sum();
-            table.major[i] = kernels.major[i];
+        }
+        let smooth = kernels.smooth.chunks_exact(self.inputs);
+        for (sum, values) in table.smooth.iter_mut().zip(smooth) {
+            *sum = values.iter().map(|value| value.kernel).sum();
+        }
+        for (column, values) in table.products.iter_mut().zip(&kernels.products) {
+            column.copy_from_slice(values);
         }
     }
 }
@@ -291,10 +294,25 @@ impl PoseGradient<'_> {
     fn contract(&self, shares: &Shares) -> Vec<f64> {
         let hyper = self.hyper;
         let mut gradient = vec![0.0; hyper.to_logs().len()];
-        let lengths = hyper.major_joints.len();
-        let inputs = self.evidence.training.inputs.len();
-        let distances = &self.evidence.distances.0[self.pose];
+        let noise = gradient.len() - 2;
         gradient[AT_CONSTANT] = hyper.constant.powi(2) * shares.constant.iter().sum::<f64>();
+        let anew: f64 = shares.own.iter().map(|share| share[0]).sum();
+        gradient[AT_REPEATABILITY] = hyper.repeatability.powi(2) * anew;
+        gradient[noise] = shares.noise[0];
+        gradient[noise + 1] = shares.noise[1];
+        self.contract_single(shares, &mut gradient);
+        let mut first = AT_PRODUCTS;
+        for (product, kernels) in hyper.products.iter().zip(&self.kernels.products) {
+            self.contract_product(product, kernels, shares, &mut gradient[first..first + product.len()]);
+            first += product.len();
+        }
+        gradient
+    }
+
+    /// `own` and `smooth`.
+    fn contract_single(&self, shares: &Shares, gradient: &mut [f64]) {
+        let hyper = self.hyper;
+        let inputs = self.evidence.training.inputs.len();
         for i in 0..shares.constant.len() {
             let range = i * inputs..(i + 1) * inputs;
             for (own, share) in self.kernels.own[range.clone()].iter().zip(&shares.own) {
@@ -302,24 +320,32 @@ impl PoseGradient<'_> {
                 gradient[AT_OWN] += share * own.kernel;
                 gradient[AT_OWN_LENGTH] += 0.5 * share * own.by_log_length;
             }
-            let smooth: f64 = self.kernels.smooth[range.clone()].iter().map(|value| value.kernel).sum();
-            let slope: f64 = self.kernels.smooth[range.clone()].iter().map(|value| value.by_log_length).sum();
-            let mut major = 0.0;
+            let smooth = &self.kernels.smooth[range];
+            let kernel: f64 = smooth.iter().map(|value| value.kernel).sum();
+            let slope: f64 = smooth.iter().map(|value| value.by_log_length).sum();
             for class in 0..3 {
-                let smooth_share = hyper.smooth[class].powi(2) * shares.classes[class][i];
-                let major_share =
-                    hyper.major[class].powi(2) * shares.classes[class][i] * self.kernels.major[i];
-                gradient[AT_SMOOTH + class] += smooth_share * smooth;
-                gradient[AT_SMOOTH_LENGTH] += 0.5 * smooth_share * slope;
-                gradient[AT_MAJOR + class] += major_share;
-                major += major_share;
-            }
-            for (k, exponent) in exponents(hyper, &distances[range]).enumerate() {
-                gradient[AT_MAJOR_LENGTHS + k] += major * exponent;
+                let share = hyper.smooth[class].powi(2) * shares.classes[class][i];
+                gradient[AT_SMOOTH + class] += share * kernel;
+                gradient[AT_SMOOTH_LENGTH] += 0.5 * share * slope;
             }
         }
-        gradient[AT_MAJOR_LENGTHS + lengths] = shares.noise[0];
-        gradient[AT_MAJOR_LENGTHS + lengths + 1] = shares.noise[1];
-        gradient
+    }
+
+    /// One product: its amplitudes, then its lengths.
+    fn contract_product(&self, product: &Product, kernels: &[f64], shares: &Shares, gradient: &mut [f64]) {
+        let inputs = self.evidence.training.inputs.len();
+        let distances = self.evidence.distances.0[self.pose].chunks_exact(inputs);
+        for (i, (kernel, distances)) in kernels.iter().zip(distances).enumerate().take(shares.constant.len())
+        {
+            let mut total = 0.0;
+            for class in 0..3 {
+                let share = product.amplitudes[class].powi(2) * shares.classes[class][i] * kernel;
+                gradient[class] += share;
+                total += share;
+            }
+            for (k, exponent) in exponents(product, distances).enumerate() {
+                gradient[3 + k] += total * exponent;
+            }
+        }
     }
 }

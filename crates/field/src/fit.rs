@@ -12,7 +12,7 @@ use crate::kernel::Input;
 use crate::optimise::Limits;
 use crate::outliers::{self, Judgement};
 use crate::posterior::{Posterior, Solution};
-use crate::select::{refine, select_major};
+use crate::select::{Found, prune_major, refine, select_major};
 use crate::training::{Column, Training};
 
 /// How the field is fitted.
@@ -142,31 +142,33 @@ impl Search<'_> {
         let joints = self.problem.measurements.joint_count;
         let small = training.select(&spread_poses(training, ROWS_FOR_SELECTION));
         let chosen = select_major(&small, joints, noise, &self.options.cancel)?;
-        let mut hyper = Hyper::start(&chosen.major_joints, noise);
         let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER));
-        let warm = chosen;
-        hyper = hyper.with_logs(&warm.to_logs());
-        self.refine(&middle, &mut hyper, SEARCH)?;
+        let evidence = Evidence::new(&middle, &self.options.cancel);
+        let mut found = refine(&evidence, chosen.hyper, SEARCH)?;
+        found.evaluations += chosen.evaluations;
+        let mut found = prune_major(&evidence, found)?;
+        found = refine_more(&evidence, found, POLISH)?;
+        self.note(&found);
         if training.row_count() > middle.row_count() {
-            let large = training.select(&spread_poses(training, ROWS_FOR_POLISH));
-            self.refine(&large, &mut hyper, POLISH)?;
+            return self.again(training, found.hyper);
         }
-        Ok(hyper)
+        Ok(found.hyper)
     }
 
-    fn again(&mut self, training: &Training, mut hyper: Hyper) -> Result<Hyper, FieldError> {
-        if self.options.hyper.is_none() {
-            let large = training.select(&spread_poses(training, ROWS_FOR_POLISH));
-            self.refine(&large, &mut hyper, POLISH)?;
+    /// Hyper-parameters from present ones, on as many rows as can be afforded.
+    fn again(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
+        if self.options.hyper.is_some() {
+            return Ok(hyper);
         }
-        Ok(hyper)
+        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH));
+        let found = refine(&Evidence::new(&large, &self.options.cancel), hyper, POLISH)?;
+        self.note(&found);
+        Ok(found.hyper)
     }
 
-    fn refine(&mut self, training: &Training, hyper: &mut Hyper, limits: Limits) -> Result<(), FieldError> {
-        let optimum = refine(&Evidence::new(training, &self.options.cancel), hyper, limits)?;
-        self.evidence = optimum.value;
-        self.evaluations += optimum.evaluations;
-        Ok(())
+    fn note(&mut self, found: &Found) {
+        self.evidence = found.value;
+        self.evaluations += found.evaluations;
     }
 
     fn judge(&self, training: &Training, hyper: &Hyper) -> Result<Judged, FieldError> {
@@ -177,6 +179,11 @@ impl Search<'_> {
         let judgement = outliers::judge(&posterior, &solution)?;
         Ok(Judged { posterior, solution, judgement })
     }
+}
+
+fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Found, FieldError> {
+    let better = refine(evidence, found.hyper, limits)?;
+    Ok(Found { evaluations: found.evaluations + better.evaluations, ..better })
 }
 
 /// Poses spread evenly over the training set (and so over its groups) with at most `rows` rows.

@@ -3,7 +3,18 @@
 //! Amplitudes and lengths are shared by the joints: one more per joint costs at thirty poses and gains nothing
 //! measurable at four hundred (docs/decisions/0003). Each has a wide log-normal prior centred on its start.
 
-use crate::training::Class;
+/// A block that varies with several joints together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Product {
+    /// `major` or `wrist`.
+    pub name: String,
+    /// Amplitudes by class (theta, other angles, lengths), rad or m.
+    pub amplitudes: [f64; 3],
+    /// Its joints.
+    pub joints: Vec<usize>,
+    /// Their length scales, rad (scaled input units).
+    pub lengths: Vec<f64>,
+}
 
 /// Hyper-parameters; amplitudes in rad or m, lengths in scaled input units (rad).
 #[derive(Debug, Clone, PartialEq)]
@@ -18,12 +29,10 @@ pub struct Hyper {
     pub smooth: [f64; 3],
     /// Length scale of `smooth` blocks.
     pub smooth_length: f64,
-    /// Amplitudes of the `major` block by class.
-    pub major: [f64; 3],
-    /// Joints of the `major` block.
-    pub major_joints: Vec<usize>,
-    /// Their length scales.
-    pub major_lengths: Vec<f64>,
+    /// What every joint misses anew at every pose, rad (prismatic: times [`OWN_LEVER`] m).
+    pub repeatability: f64,
+    /// Blocks over several joints together.
+    pub products: Vec<Product>,
     /// Noise of positions (m) and of orientations (rad).
     pub noise: [f64; 2],
 }
@@ -32,7 +41,7 @@ pub struct Hyper {
 pub const OWN_LEVER: f64 = 0.3;
 
 /// One hyper-parameter as the optimiser sees it, in its own unit.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     pub start: f64,
     pub low: f64,
@@ -47,75 +56,138 @@ const fn range(start: f64, low: f64, high: f64, spread: f64) -> Range {
     Range { start, low, high, spread }
 }
 
+const fn amplitude(start: f64) -> Range {
+    range(start * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0)
+}
+
 const CONSTANT: Range = range(1.0, 0.1, 10.0, 0.5);
 const OWN: Range = range(0.1 * MILLI, 0.003 * MILLI, 3.0 * MILLI, 1.0);
 const OWN_LENGTH: Range = range(0.1, 0.02, 3.0, 0.7);
+const SMOOTH: [Range; 3] = [amplitude(0.05), amplitude(0.05), amplitude(0.025)];
 const SMOOTH_LENGTH: Range = range(1.5, 0.5, 10.0, 0.7);
-const SMOOTH: [Range; 3] = [
-    range(0.05 * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0),
-    range(0.05 * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0),
-    range(0.025 * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0),
-];
-const MAJOR_LENGTH: Range = range(2.0, 0.6, 20.0, 0.7);
-const MAJOR: [Range; 3] = [
-    range(0.1 * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0),
-    range(0.1 * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0),
-    range(0.05 * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0),
-];
-const NOISE_LOW: f64 = 0.003 * MILLI;
+const REPEATABILITY: Range = range(0.03 * MILLI, 0.002 * MILLI, MILLI, 1.0);
+const MAJOR: [Range; 3] = [amplitude(0.1), amplitude(0.1), amplitude(0.05)];
+const WRIST: [Range; 3] = [amplitude(0.05), amplitude(0.05), amplitude(0.025)];
+const PRODUCT_LENGTH: Range = range(2.0, 0.6, 20.0, 0.7);
+const NOISE_LOW: f64 = 0.001 * MILLI;
 const NOISE_HIGH: f64 = 10.0 * MILLI;
 
-/// Positions of the hyper-parameters in the vector of logarithms; major lengths follow, then noise.
+/// Positions of the hyper-parameters in the vector of logarithms; products follow, then noise.
 pub const AT_CONSTANT: usize = 0;
 pub const AT_OWN: usize = 1;
 pub const AT_OWN_LENGTH: usize = 2;
 pub const AT_SMOOTH: usize = 3;
 pub const AT_SMOOTH_LENGTH: usize = 6;
-pub const AT_MAJOR: usize = 7;
-pub const AT_MAJOR_LENGTHS: usize = 10;
+pub const AT_REPEATABILITY: usize = 7;
+pub const AT_PRODUCTS: usize = 8;
+
+/// Name of the block whose joints the evidence chooses.
+pub const MAJOR_NAME: &str = "major";
+/// Name of the block over the last three joints.
+pub const WRIST_NAME: &str = "wrist";
+
+impl Product {
+    /// A block at the centre of its priors.
+    pub fn start(name: &str, joints: Vec<usize>) -> Self {
+        let amplitudes = Self::amplitude_ranges(name).map(|r| r.start);
+        let lengths = vec![PRODUCT_LENGTH.start; joints.len()];
+        Self { name: name.to_owned(), amplitudes, joints, lengths }
+    }
+
+    fn amplitude_ranges(name: &str) -> [Range; 3] {
+        if name == WRIST_NAME { WRIST } else { MAJOR }
+    }
+
+    /// Hyper-parameters of the block: three amplitudes, then the lengths.
+    pub fn len(&self) -> usize {
+        3 + self.lengths.len()
+    }
+
+    /// Whether the block has no joints.
+    pub fn is_empty(&self) -> bool {
+        self.joints.is_empty()
+    }
+}
 
 impl Hyper {
-    /// Starts for the given joints of the `major` block and noise.
-    pub fn start(major_joints: &[usize], noise: [f64; 2]) -> Self {
+    /// The priors' centres, with a `major` block over the given joints and a `wrist` block over the last three of an arm
+    /// that has more.
+    pub fn start(major_joints: &[usize], joint_count: usize, noise: [f64; 2]) -> Self {
+        let mut products = vec![Product::start(MAJOR_NAME, major_joints.to_vec())];
+        if joint_count > 3 {
+            let last_three = (joint_count - 3..joint_count).collect();
+            products.push(Product::start(WRIST_NAME, last_three));
+        }
         Self {
             constant: CONSTANT.start,
             own: OWN.start,
             own_length: OWN_LENGTH.start,
             smooth: SMOOTH.map(|r| r.start),
             smooth_length: SMOOTH_LENGTH.start,
-            major: MAJOR.map(|r| r.start),
-            major_joints: major_joints.to_vec(),
-            major_lengths: vec![MAJOR_LENGTH.start; major_joints.len()],
+            repeatability: REPEATABILITY.start,
+            products,
             noise,
         }
+    }
+
+    /// Several starts: the evidence has more than one maximum.
+    ///
+    /// Beside the priors' centres, errors that sit in fine curves of the joints and errors that sit in slow variations
+    /// of all joints together.
+    pub fn starts(major_joints: &[usize], joint_count: usize, noise: [f64; 2]) -> Vec<Self> {
+        let plain = Self::start(major_joints, joint_count, noise);
+        let fine = Self {
+            constant: 0.3 * plain.constant,
+            own: 4.0 * plain.own,
+            own_length: 0.6 * plain.own_length,
+            ..plain.clone()
+        };
+        let mut slow = Self {
+            constant: 0.3 * plain.constant,
+            own: 0.2 * plain.own,
+            own_length: 2.0 * plain.own_length,
+            ..plain.clone()
+        };
+        for product in &mut slow.products {
+            product.amplitudes = product.amplitudes.map(|amplitude| 3.0 * amplitude);
+        }
+        vec![plain, fine, slow]
     }
 
     /// Logarithms of all hyper-parameters.
     pub fn to_logs(&self) -> Vec<f64> {
         let mut values = vec![self.constant, self.own, self.own_length];
         values.extend(self.smooth);
-        values.push(self.smooth_length);
-        values.extend(self.major);
-        values.extend(&self.major_lengths);
+        values.extend([self.smooth_length, self.repeatability]);
+        for product in &self.products {
+            values.extend(product.amplitudes);
+            values.extend(&product.lengths);
+        }
         values.extend(self.noise);
         values.into_iter().map(f64::ln).collect()
     }
 
-    /// The inverse of [`Hyper::to_logs`], for the same joints of the `major` block.
+    /// The inverse of [`Hyper::to_logs`], for the same blocks.
     pub fn with_logs(&self, logs: &[f64]) -> Self {
         let at = |index: usize| logs[index].exp();
         let three = |first: usize| std::array::from_fn(|k| at(first + k));
-        let lengths = self.major_joints.len();
+        let mut first = AT_PRODUCTS;
+        let mut products = self.products.clone();
+        for product in &mut products {
+            product.amplitudes = three(first);
+            let lengths = product.lengths.iter_mut().enumerate();
+            lengths.for_each(|(k, length)| *length = at(first + 3 + k));
+            first += product.len();
+        }
         Self {
             constant: at(AT_CONSTANT),
             own: at(AT_OWN),
             own_length: at(AT_OWN_LENGTH),
             smooth: three(AT_SMOOTH),
             smooth_length: at(AT_SMOOTH_LENGTH),
-            major: three(AT_MAJOR),
-            major_joints: self.major_joints.clone(),
-            major_lengths: (0..lengths).map(|k| at(AT_MAJOR_LENGTHS + k)).collect(),
-            noise: [at(AT_MAJOR_LENGTHS + lengths), at(AT_MAJOR_LENGTHS + lengths + 1)],
+            repeatability: at(AT_REPEATABILITY),
+            products,
+            noise: [at(first), at(first + 1)],
         }
     }
 
@@ -123,24 +195,26 @@ impl Hyper {
     pub fn ranges(&self) -> Vec<Range> {
         let mut ranges = vec![CONSTANT, OWN, OWN_LENGTH];
         ranges.extend(SMOOTH);
-        ranges.push(SMOOTH_LENGTH);
-        ranges.extend(MAJOR);
-        ranges.extend(vec![MAJOR_LENGTH; self.major_joints.len()]);
+        ranges.extend([SMOOTH_LENGTH, REPEATABILITY]);
+        for product in &self.products {
+            ranges.extend(Product::amplitude_ranges(&product.name));
+            ranges.extend(vec![PRODUCT_LENGTH; product.lengths.len()]);
+        }
         ranges.extend(self.noise.map(|start| range(start, NOISE_LOW, NOISE_HIGH, f64::INFINITY)));
         ranges
     }
 
-    /// The same hyper-parameters without one of the `major` joints.
-    pub fn without(&self, position: usize) -> Self {
-        let mut fewer = self.clone();
-        fewer.major_joints.remove(position);
-        fewer.major_lengths.remove(position);
-        fewer
+    /// Joints of the `major` block.
+    pub fn major_joints(&self) -> &[usize] {
+        self.products.first().map_or(&[], |product| &product.joints)
     }
 
-    /// Amplitude of `smooth` or `major` of a class.
-    pub fn amplitude(amplitudes: &[f64; 3], class: Class) -> f64 {
-        amplitudes[class.index()]
+    /// The same hyper-parameters without one of the `major` joints.
+    pub fn without_major(&self, position: usize) -> Self {
+        let mut fewer = self.clone();
+        fewer.products[0].joints.remove(position);
+        fewer.products[0].lengths.remove(position);
+        fewer
     }
 }
 
@@ -150,20 +224,23 @@ mod tests {
 
     #[test]
     fn logs_and_back() {
-        let hyper = Hyper::start(&[1, 2, 3], [1e-4, 3e-4]);
+        let hyper = Hyper::start(&[1, 2], 6, [1e-4, 3e-4]);
         let logs = hyper.to_logs();
         assert_eq!(logs.len(), hyper.ranges().len());
         let back = hyper.with_logs(&logs);
         for (a, b) in back.to_logs().iter().zip(&logs) {
             assert!((a - b).abs() < 1e-12);
         }
-        assert_eq!(back.major_joints, hyper.major_joints);
+        assert_eq!(back.major_joints(), [1, 2]);
+        assert_eq!(back.products[1].joints, [3, 4, 5]);
     }
 
     #[test]
     fn starts_lie_within_bounds() {
-        for range in Hyper::start(&[0, 1], [1e-4, 1e-4]).ranges() {
-            assert!(range.low < range.start && range.start < range.high);
+        for hyper in Hyper::starts(&[0, 1], 7, [1e-4, 1e-4]) {
+            for (range, log) in hyper.ranges().iter().zip(hyper.to_logs()) {
+                assert!(range.low < log.exp() && log.exp() < range.high);
+            }
         }
     }
 }

@@ -6,7 +6,8 @@
 //! (a kernel on its cells), so that fit, evidence and standard deviation are those of exact Gaussian inference.
 //!
 //! Blocks: `constant` (the constants, kernel one), `own` (theta of a revolute joint, d of a prismatic one, over that
-//! joint), `smooth` (all CEPs over each input separately), `major` (all CEPs over at most three joints together).
+//! joint), `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
+//! together: those that the evidence chooses, and the last three).
 
 mod bank;
 mod cells;
@@ -26,7 +27,7 @@ pub use bank::{Bank, Block};
 pub use cells::{Axis, Grid};
 pub use error::FieldError;
 pub use fit::{FieldFit, FieldOptions, fit_field, restore};
-pub use hyper::Hyper;
+pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME};
 pub use kernel::{Input, InputKind};
 pub use outliers::Judgement;
 pub use posterior::Posterior;

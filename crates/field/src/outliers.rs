@@ -2,7 +2,7 @@
 //!
 //! A loss that forgives large residuals before the field is fitted throws away genuine local error. Here a pose is
 //! judged by its leave-one-out residual under constants and field, standardised by everything that the model knows of
-//! its own uncertainty.
+//! its own uncertainty, at full weight even where an earlier judgement took its weight away.
 
 use crate::FieldError;
 use crate::posterior::{Posterior, Solution};
@@ -11,7 +11,7 @@ use crate::training::Training;
 /// Judgement of every pose by the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
-    /// Root mean square of each pose's standardised leave-one-out residual, (n,), relative to the typical one.
+    /// Each pose's squared standardised leave-one-out residual over the squared limit, (n,): above one is an outlier.
     pub score: Vec<f64>,
     /// Length of each pose's leave-one-out residual of the first target, (n,), m.
     pub distance: Vec<f64>,
@@ -21,12 +21,18 @@ pub struct Judgement {
     pub outliers: Vec<usize>,
 }
 
-/// A pose this many typical deviations off is taken out: a normal error of this size has odds of 1e-9 a row.
-const OVERWHELMING: f64 = 6.0;
-/// Weight of an outlier's rows: their noise is a thousand times larger.
-const NEGLIGIBLE: f64 = 1e-6;
+/// Standard normal quantile of odds of one in a million: overwhelming evidence against a pose.
+const OVERWHELMING: f64 = 4.753_424_308_8;
+/// Weight of an outlier's rows: their noise is thirty times larger, and they no longer count.
+const NEGLIGIBLE: f64 = 1e-3;
 /// 95 % of a standard normal variable lies within this.
 const QUANTILE_95: f64 = 1.959_963_984_540_054;
+
+/// Quantile of the chi-squared distribution at a standard normal quantile (Wilson and Hilferty 1931).
+fn chi_squared(freedom: f64, normal_quantile: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    freedom * (1.0 - spread + normal_quantile * spread.sqrt()).powi(3)
+}
 
 /// Judges every pose of a posterior's training set.
 ///
@@ -35,31 +41,37 @@ const QUANTILE_95: f64 = 1.959_963_984_540_054;
 pub fn judge(posterior: &Posterior, solution: &Solution) -> Result<Judgement, FieldError> {
     let training = &posterior.training;
     let left_out = posterior.leave_one_out(&solution.alpha)?;
-    let root_mean_square =
-        |values: &[f64]| (values.iter().map(|z| z * z).sum::<f64>() / values.len().max(1) as f64).sqrt();
-    let raw: Vec<f64> = (0..training.pose_count())
-        .map(|pose| root_mean_square(&left_out.standardised[training.rows(pose)]))
+    let poses = 0..training.pose_count();
+    let squares: Vec<f64> = poses
+        .clone()
+        .map(|pose| left_out.standardised[training.rows(pose)].iter().map(|z| z * z).sum())
         .collect();
-    let judged: Vec<usize> = (0..training.pose_count()).filter(|&pose| is_judged(training, pose)).collect();
-    let typical = quantile(judged.iter().map(|&pose| raw[pose]), 0.5).max(f64::MIN_POSITIVE);
-    let components =
-        judged.iter().flat_map(|&pose| &left_out.standardised[training.rows(pose)]).map(|z| z.abs());
-    let inflation = (quantile(components, 0.95) / QUANTILE_95).max(1.0);
+    let trusted: Vec<usize> = poses.clone().filter(|&pose| is_trusted(training, pose)).collect();
+    let shares =
+        trusted.iter().map(|&pose| squares[pose] / chi_squared(training.rows(pose).len() as f64, 0.0));
+    let typical = quantile(shares, 0.5).max(1.0);
+    let score = |pose: usize| match training.rows(pose).len() {
+        0 => 0.0,
+        rows => squares[pose] / (typical * chi_squared(rows as f64, OVERWHELMING)),
+    };
+    let components = trusted.iter().flat_map(|&pose| &left_out.standardised[training.rows(pose)]);
+    let inflation = (quantile(components.map(|z| z.abs()), 0.95) / QUANTILE_95).max(1.0);
     let distance = |pose: usize| {
         let rows = training.rows(pose);
         let first = rows.start..(rows.start + 3).min(rows.end);
         left_out.residual[first].iter().map(|x| x * x).sum::<f64>().sqrt()
     };
-    let score: Vec<f64> = raw.iter().map(|z| z / typical.max(1.0)).collect();
-    let outliers = (0..training.pose_count())
-        .filter(|&pose| !training.rows(pose).is_empty())
-        .filter(|&pose| score[pose] > OVERWHELMING || !is_judged(training, pose))
-        .collect();
-    Ok(Judgement { distance: (0..training.pose_count()).map(distance).collect(), score, inflation, outliers })
+    let score: Vec<f64> = poses.clone().map(score).collect();
+    Ok(Judgement {
+        distance: poses.clone().map(distance).collect(),
+        outliers: poses.filter(|&pose| score[pose] > 1.0).collect(),
+        score,
+        inflation,
+    })
 }
 
 /// Whether a pose takes part with its full weight.
-fn is_judged(training: &Training, pose: usize) -> bool {
+fn is_trusted(training: &Training, pose: usize) -> bool {
     training.rows(pose).next().is_some_and(|row| training.weight[row] > NEGLIGIBLE)
 }
 
@@ -73,15 +85,28 @@ fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 }
 
 impl Judgement {
-    /// Takes the outliers' weight away; says whether that changed anything.
+    /// Takes the weight of the outliers away and gives it back to poses judged innocent; says whether anything changed.
     pub fn reweigh(&self, training: &mut Training) -> bool {
         let mut changed = false;
-        for &pose in &self.outliers {
+        for pose in 0..training.pose_count() {
+            let weight = if self.score[pose] > 1.0 { NEGLIGIBLE } else { 1.0 };
             for row in training.rows(pose) {
-                changed |= training.weight[row] > NEGLIGIBLE;
-                training.weight[row] = training.weight[row].min(NEGLIGIBLE);
+                changed |= training.weight[row] != weight;
+                training.weight[row] = weight;
             }
         }
         changed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chi_squared_quantiles_match_tables() {
+        // 99.9999 % of chi-squared with 3 degrees of freedom lie below 30.665, half of them below 2.366.
+        assert!((chi_squared(3.0, OVERWHELMING) - 30.665).abs() < 0.5);
+        assert!((chi_squared(3.0, 0.0) - 2.366).abs() < 0.02);
     }
 }

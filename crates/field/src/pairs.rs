@@ -1,7 +1,8 @@
 //! Covariance of measured rows, column by column, from kernels between poses.
 //!
 //! For rows r of pose i and c of pose j,
-//! `K[r, c] = sum_p J[r, p] J[c, p] (constant_p^2 + own^2 k_own + (smooth^2 k_smooth + major^2 k_major) of p's class)`.
+//! `K[r, c] = sum_p J[r, p] J[c, p] (constant_p^2 + own^2 k_own + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
+//! and within one pose what its joints do not repeat.
 //! The sums over the parameters of a class are formed first, for all rows at once, so that the inner loops run over
 //! contiguous rows; nothing of the size of the matrix is kept but the matrix.
 
@@ -17,13 +18,16 @@ use crate::training::{Class, Training};
 pub struct PairTable {
     pub own: Vec<Vec<f64>>,
     pub smooth: Vec<f64>,
-    pub major: Vec<f64>,
+    /// One for each product.
+    pub products: Vec<Vec<f64>>,
 }
 
 impl PairTable {
-    pub fn clear(&mut self, joints: usize, count: usize) {
+    pub fn clear(&mut self, joints: usize, products: usize, count: usize) {
         self.own.resize(joints, Vec::new());
-        for column in self.own.iter_mut().chain([&mut self.smooth, &mut self.major]) {
+        self.products.resize(products, Vec::new());
+        let columns = self.own.iter_mut().chain(&mut self.products);
+        for column in columns.chain([&mut self.smooth]) {
             column.clear();
             column.resize(count, 0.0);
         }
@@ -148,17 +152,23 @@ impl RowFactors {
     ) {
         let poses = &by_column.pose[first..];
         for (class, factors) in self.classes.iter_mut().enumerate() {
-            let (smooth, major) = (hyper.smooth[class].powi(2), hyper.major[class].powi(2));
+            let smooth = hyper.smooth[class].powi(2);
             factors.clear();
-            factors.extend(
-                poses.iter().map(|i| smooth * table.smooth[i - pose] + major * table.major[i - pose]),
-            );
+            factors.extend(poses.iter().map(|i| smooth * table.smooth[i - pose]));
+            for (product, kernels) in hyper.products.iter().zip(&table.products) {
+                let variance = product.amplitudes[class].powi(2);
+                let terms = poses.iter().map(|i| variance * kernels[i - pose]);
+                factors.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            }
         }
         self.own.resize(by_column.own.len(), Vec::new());
         for ((factors, kernels), own) in self.own.iter_mut().zip(&table.own).zip(&by_column.own) {
-            let variance = own.map_or(0.0, |(_, lever)| (hyper.own * lever).powi(2));
+            let lever = own.map_or(0.0, |(_, lever)| lever);
+            let (variance, anew) = ((hyper.own * lever).powi(2), (hyper.repeatability * lever).powi(2));
             factors.clear();
-            factors.extend(poses.iter().map(|i| variance * kernels[i - pose]));
+            factors.extend(
+                poses.iter().map(|i| variance * kernels[i - pose] + if *i == pose { anew } else { 0.0 }),
+            );
         }
     }
 }

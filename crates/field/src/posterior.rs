@@ -10,7 +10,7 @@ use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
 use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::cells::{Active, Axis, CellKernel, Grid};
-use crate::hyper::Hyper;
+use crate::hyper::{Hyper, Product};
 use crate::kernel::{matern, squared_exponential};
 use crate::pairs::{ByColumn, PairKernels, PairTable, covariance};
 use crate::training::Training;
@@ -26,8 +26,8 @@ pub struct Cells {
     pub own: Vec<Option<CellKernel>>,
     /// One per input.
     pub smooth: Vec<CellKernel>,
-    /// Input and cells of the `major` block.
-    pub major: Vec<(usize, CellKernel)>,
+    /// Inputs and cells of each product.
+    pub products: Vec<Vec<(usize, CellKernel)>>,
 }
 
 impl Cells {
@@ -44,11 +44,14 @@ impl Cells {
         let smooth = |k: usize, length: f64| {
             CellKernel::new(axis(k, length, CELLS), |d| squared_exponential(d, length))
         };
-        let joints = hyper.major_joints.iter().zip(&hyper.major_lengths);
+        let product = |product: &Product| {
+            let joints = product.joints.iter().zip(&product.lengths);
+            joints.map(|(&k, &length)| (k, smooth(k, length))).collect()
+        };
         Self {
             own: (0..training.inputs.len()).map(own).collect(),
             smooth: (0..training.inputs.len()).map(|k| smooth(k, hyper.smooth_length)).collect(),
-            major: joints.map(|(&k, &length)| (k, smooth(k, length))).collect(),
+            products: hyper.products.iter().map(product).collect(),
         }
     }
 
@@ -62,23 +65,37 @@ impl Cells {
                 .map(|(cells, &v)| cells.as_ref().map(|c| c.axis.active(v)))
                 .collect(),
             smooth: self.smooth.iter().zip(values).map(|(cells, &v)| cells.axis.active(v)).collect(),
-            major: self.major.iter().map(|(k, cells)| cells.axis.active(values[*k])).collect(),
+            products: self
+                .products
+                .iter()
+                .map(|axes| axes.iter().map(|(k, cells)| cells.axis.active(values[*k])).collect())
+                .collect(),
         }
     }
 
-    /// Kernels between two configurations: `own` of each input into `own`, then `smooth` and `major`.
-    fn kernels(&self, a: &Excited, b: &Excited, mut own: impl FnMut(usize, f64)) -> (f64, f64) {
-        for (k, cells) in self.own.iter().enumerate() {
-            if let (Some(cells), Some(a), Some(b)) = (cells, &a.own[k], &b.own[k]) {
-                own(k, cells.implied(a, b));
-            }
+    /// Prior correlations of two configurations.
+    fn kernels(&self, a: &Excited, b: &Excited) -> Correlations {
+        let own = self.own.iter().zip(a.own.iter().zip(&b.own)).map(|(cells, pair)| match (cells, pair) {
+            (Some(cells), (Some(a), Some(b))) => cells.implied(a, b),
+            _ => 0.0,
+        });
+        let smooth = self.smooth.iter().zip(a.smooth.iter().zip(&b.smooth));
+        let product = |(axes, (a, b)): (&Vec<(usize, CellKernel)>, (&Vec<Active>, &Vec<Active>))| {
+            axes.iter().zip(a.iter().zip(b)).map(|((_, cells), (a, b))| cells.implied(a, b)).product()
+        };
+        Correlations {
+            own: own.collect(),
+            smooth: smooth.map(|(cells, (a, b))| cells.implied(a, b)).sum(),
+            products: self.products.iter().zip(a.products.iter().zip(&b.products)).map(product).collect(),
         }
-        let smooth =
-            self.smooth.iter().enumerate().map(|(k, cells)| cells.implied(&a.smooth[k], &b.smooth[k])).sum();
-        let product =
-            self.major.iter().enumerate().map(|(k, (_, cells))| cells.implied(&a.major[k], &b.major[k]));
-        (smooth, if self.major.is_empty() { 0.0 } else { product.product() })
     }
+}
+
+/// Prior correlations of two configurations, by block.
+struct Correlations {
+    own: Vec<f64>,
+    smooth: f64,
+    products: Vec<f64>,
 }
 
 /// Excited cells of one configuration.
@@ -86,7 +103,7 @@ impl Cells {
 pub struct Excited {
     own: Vec<Option<Active>>,
     smooth: Vec<Active>,
-    major: Vec<Active>,
+    products: Vec<Vec<Active>>,
 }
 
 struct Implied<'a> {
@@ -96,12 +113,12 @@ struct Implied<'a> {
 
 impl PairKernels for Implied<'_> {
     fn fill(&self, j: usize, table: &mut PairTable) {
-        table.clear(self.cells.own.len(), self.excited.len() - j);
+        table.clear(self.cells.own.len(), self.cells.products.len(), self.excited.len() - j);
         for (i, other) in self.excited[j..].iter().enumerate() {
-            let own = &mut table.own;
-            let (smooth, major) = self.cells.kernels(&self.excited[j], other, |k, value| own[k][i] = value);
-            table.smooth[i] = smooth;
-            table.major[i] = major;
+            let kernels = self.cells.kernels(&self.excited[j], other);
+            table.own.iter_mut().zip(kernels.own).for_each(|(column, value)| column[i] = value);
+            table.smooth[i] = kernels.smooth;
+            table.products.iter_mut().zip(kernels.products).for_each(|(column, value)| column[i] = value);
         }
     }
 }
@@ -205,9 +222,9 @@ impl Posterior {
         for (k, cells) in self.cells.smooth.iter().enumerate() {
             bank.blocks.push(self.block("smooth", &[(k, cells)], &self.driven(&self.hyper.smooth), pull));
         }
-        if !self.cells.major.is_empty() {
-            let axes: Vec<_> = self.cells.major.iter().map(|(k, cells)| (*k, cells)).collect();
-            bank.blocks.push(self.block("major", &axes, &self.driven(&self.hyper.major), pull));
+        for (axes, product) in self.cells.products.iter().zip(&self.hyper.products) {
+            let axes: Vec<_> = axes.iter().map(|(k, cells)| (*k, cells)).collect();
+            bank.blocks.push(self.block(&product.name, &axes, &self.driven(&product.amplitudes), pull));
         }
         bank
     }
@@ -271,15 +288,27 @@ impl Posterior {
                 let setup: f64 = (0..root.nrows()).map(|k| root[(k, start + i)] * root[(k, start + j)]).sum();
                 inverse[(start + i, start + j)] - setup
             });
-            let precision = Cholesky::new(block, faer::Par::Seq)
-                .ok_or(FieldError::NotPositiveDefinite { rows: count })?;
+            let error = || FieldError::NotPositiveDefinite { rows: count };
+            let precision = Cholesky::new(block, faer::Par::Seq).ok_or_else(error)?;
             let local: Vec<f64> = range.map(|row| alpha[row]).collect();
-            out.residual[start..start + count].copy_from_slice(&precision.solve_vector(&local));
-            let mut standardised = column(&local);
-            precision.solve_lower(standardised.as_mut());
+            let left_out = precision.solve_vector(&local);
+            let mut standardised = column(&left_out);
+            let spread = self.at_full_weight(precision.inverse(), start);
+            Cholesky::new(spread, faer::Par::Seq).ok_or_else(error)?.solve_lower(standardised.as_mut());
+            out.residual[start..start + count].copy_from_slice(&left_out);
             out.standardised[start..start + count].copy_from_slice(&to_vec(standardised.as_ref()));
         }
         Ok(out)
+    }
+
+    /// Covariance of a pose's left-out residual as it would be if its rows had their full weight.
+    fn at_full_weight(&self, mut covariance: Mat<f64>, start: usize) -> Mat<f64> {
+        for i in 0..covariance.nrows() {
+            let row = start + i;
+            let noise = self.training.noise_variance(row, self.hyper.noise);
+            covariance[(i, i)] -= noise * (1.0 - self.training.weight[row]);
+        }
+        covariance
     }
 
     /// Covariance of `J* CEP(q*)` of new poses: rows (m, P) of each, inputs (n, I); returns (n, m, m).
@@ -348,8 +377,7 @@ impl Posterior {
 
     /// Prior covariance of each column's CEP at two configurations, (P,).
     fn variances(&self, a: &Excited, b: &Excited) -> Vec<f64> {
-        let mut own = vec![0.0; self.training.inputs.len()];
-        let (smooth, major) = self.cells.kernels(a, b, |k, value| own[k] = value);
+        let kernels = self.cells.kernels(a, b);
         let mut variances: Vec<f64> = self
             .training
             .columns
@@ -357,12 +385,14 @@ impl Posterior {
             .map(|column| (self.hyper.constant * column.constant).powi(2))
             .collect();
         for (class, columns) in self.by_column.driven.iter().enumerate() {
-            let value = self.hyper.smooth[class].powi(2) * smooth + self.hyper.major[class].powi(2) * major;
+            let products = self.hyper.products.iter().zip(&kernels.products);
+            let products: f64 = products.map(|(product, k)| product.amplitudes[class].powi(2) * k).sum();
+            let value = self.hyper.smooth[class].powi(2) * kernels.smooth + products;
             columns.iter().for_each(|&p| variances[p] += value);
         }
         for (k, entry) in self.by_column.own.iter().enumerate() {
             if let Some((p, lever)) = entry {
-                variances[*p] += (self.hyper.own * lever).powi(2) * own[k];
+                variances[*p] += (self.hyper.own * lever).powi(2) * kernels.own[k];
             }
         }
         variances

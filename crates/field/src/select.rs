@@ -9,17 +9,25 @@ use truearm_estimate::Cancel;
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
-use crate::optimise::{Limits, Optimum, maximise};
+use crate::optimise::{Limits, maximise};
 use crate::training::Training;
 
 /// A joint must bring this many nats to stay.
-const WORTH: f64 = -1e9;
+const WORTH: f64 = 3.0;
 /// Joints of the `major` block at the most: its grid grows with their power.
 const MOST: usize = 3;
 const FIRST: Limits = Limits { evaluations: 40, gain: 0.1 };
 const REFIT: Limits = Limits { evaluations: 8, gain: 0.3 };
 
-/// Hyper-parameters with the chosen joints, fitted to the (small) training set.
+/// Hyper-parameters, the logarithm of their evidence and prior, and what it cost to find them.
+#[derive(Debug, Clone)]
+pub struct Found {
+    pub hyper: Hyper,
+    pub value: f64,
+    pub evaluations: usize,
+}
+
+/// Hyper-parameters of three joints at the most, fitted to a small training set from several starts.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
@@ -28,42 +36,66 @@ pub fn select_major(
     joints: usize,
     noise: [f64; 2],
     cancel: &Cancel,
-) -> Result<Hyper, FieldError> {
+) -> Result<Found, FieldError> {
     let evidence = Evidence::new(training, cancel);
     let all: Vec<usize> = (0..joints).collect();
-    let start = Hyper::start(&all, noise);
-    let mut best = start.clone();
-    let mut value = refine(&evidence, &mut best, FIRST)?.value;
-    while best.major_joints.len() > 1 {
-        let (candidate, reached) = cheapest_removal(&evidence, &best)?;
-        if best.major_joints.len() <= MOST && value - reached >= WORTH {
+    let mut evaluations = 0;
+    let mut best: Option<Found> = None;
+    for start in Hyper::starts(&all, joints, noise) {
+        let found = refine(&evidence, start, FIRST)?;
+        evaluations += found.evaluations;
+        if best.as_ref().is_none_or(|best| found.value > best.value) {
+            best = Some(found);
+        }
+    }
+    let Some(mut best) = best else {
+        return Err(FieldError::Length { what: "starts", found: 0, expected: 1 });
+    };
+    while best.hyper.major_joints().len() > MOST {
+        best = cheapest_removal(&evidence, &best.hyper, &mut evaluations)?;
+    }
+    Ok(Found { evaluations, ..best })
+}
+
+/// Takes out joints that bring less than [`WORTH`], one by one; one stays.
+///
+/// # Errors
+/// [`FieldError`] of the evidence.
+pub fn prune_major(evidence: &Evidence, mut best: Found) -> Result<Found, FieldError> {
+    while best.hyper.major_joints().len() > 1 {
+        let mut evaluations = best.evaluations;
+        let candidate = cheapest_removal(evidence, &best.hyper, &mut evaluations)?;
+        if best.value - candidate.value >= WORTH {
+            best.evaluations = evaluations;
             break;
         }
-        (best, value) = (candidate, reached);
+        best = Found { evaluations, ..candidate };
     }
     Ok(best)
 }
 
-fn cheapest_removal(evidence: &Evidence, from: &Hyper) -> Result<(Hyper, f64), FieldError> {
-    let mut best: Option<(Hyper, f64)> = None;
-    for position in 0..from.major_joints.len() {
-        let mut candidate = from.without(position);
-        let value = refine(evidence, &mut candidate, REFIT)?.value;
-        if best.as_ref().is_none_or(|(_, reached)| value > *reached) {
-            best = Some((candidate, value));
+fn cheapest_removal(evidence: &Evidence, from: &Hyper, evaluations: &mut usize) -> Result<Found, FieldError> {
+    let mut best: Option<Found> = None;
+    for position in 0..from.major_joints().len() {
+        let found = refine(evidence, from.without_major(position), REFIT)?;
+        *evaluations += found.evaluations;
+        if best.as_ref().is_none_or(|best| found.value > best.value) {
+            best = Some(found);
         }
     }
     best.ok_or(FieldError::Length { what: "joints of the major block", found: 0, expected: 1 })
 }
 
-/// Maximises the evidence from given hyper-parameters, which become the best found.
+/// Maximises the evidence from given hyper-parameters.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
-pub fn refine(evidence: &Evidence, hyper: &mut Hyper, limits: Limits) -> Result<Optimum, FieldError> {
-    let shape = hyper.clone();
-    let optimum =
-        maximise(|logs| evidence.score(&shape.with_logs(logs)), &hyper.to_logs(), &hyper.ranges(), limits)?;
-    *hyper = shape.with_logs(&optimum.point);
-    Ok(optimum)
+pub fn refine(evidence: &Evidence, start: Hyper, limits: Limits) -> Result<Found, FieldError> {
+    let score = |logs: &[f64]| evidence.score(&start.with_logs(logs));
+    let optimum = maximise(score, &start.to_logs(), &start.ranges(), limits)?;
+    Ok(Found {
+        hyper: start.with_logs(&optimum.point),
+        value: optimum.value,
+        evaluations: optimum.evaluations,
+    })
 }

@@ -12,8 +12,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
-    Axis, Bank, Block, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind,
-    Posterior as CorePosterior, fit_field as fit, restore,
+    Axis, Bank, Block, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind, MAJOR_NAME,
+    Posterior as CorePosterior, Product, WRIST_NAME, fit_field as fit, restore,
 };
 
 use crate::door::{CoreError, long, quick, with_threads};
@@ -70,32 +70,47 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         let message = || PyKeyError::new_err(format!("hyper-parameter '{name}' needs 3 values"));
         found.try_into().map_err(|_| message())
     };
+    let product = |name: &str| -> PyResult<Product> {
+        Ok(Product {
+            name: name.to_owned(),
+            amplitudes: three(&format!("{name}_amplitudes"))?,
+            joints: get(&format!("{name}_joints"))?.iter().map(|&joint| joint as usize).collect(),
+            lengths: get(&format!("{name}_lengths"))?,
+        })
+    };
+    let names = [MAJOR_NAME, WRIST_NAME];
+    let present = names.iter().filter(|name| values.contains_key(&format!("{name}_joints")));
     Ok(Hyper {
         constant: one("constant")?,
         own: one("own")?,
         own_length: one("own_length")?,
         smooth: three("smooth")?,
         smooth_length: one("smooth_length")?,
-        major: three("major")?,
-        major_joints: get("major_joints")?.iter().map(|&joint| joint as usize).collect(),
-        major_lengths: get("major_lengths")?,
+        repeatability: one("repeatability")?,
+        products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
         noise: [one("noise_position")?, one("noise_orientation")?],
     })
 }
 
-fn hyper_into(hyper: &Hyper) -> HashMap<&'static str, Vec<f64>> {
-    HashMap::from([
-        ("constant", vec![hyper.constant]),
-        ("own", vec![hyper.own]),
-        ("own_length", vec![hyper.own_length]),
-        ("smooth", hyper.smooth.to_vec()),
-        ("smooth_length", vec![hyper.smooth_length]),
-        ("major", hyper.major.to_vec()),
-        ("major_joints", hyper.major_joints.iter().map(|&joint| joint as f64).collect()),
-        ("major_lengths", hyper.major_lengths.clone()),
-        ("noise_position", vec![hyper.noise[0]]),
-        ("noise_orientation", vec![hyper.noise[1]]),
-    ])
+fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
+    let mut values = HashMap::from([
+        ("constant".to_owned(), vec![hyper.constant]),
+        ("own".to_owned(), vec![hyper.own]),
+        ("own_length".to_owned(), vec![hyper.own_length]),
+        ("smooth".to_owned(), hyper.smooth.to_vec()),
+        ("smooth_length".to_owned(), vec![hyper.smooth_length]),
+        ("repeatability".to_owned(), vec![hyper.repeatability]),
+        ("noise_position".to_owned(), vec![hyper.noise[0]]),
+        ("noise_orientation".to_owned(), vec![hyper.noise[1]]),
+    ]);
+    for product in &hyper.products {
+        let name = &product.name;
+        let joints = product.joints.iter().map(|&joint| joint as f64).collect();
+        values.insert(format!("{name}_amplitudes"), product.amplitudes.to_vec());
+        values.insert(format!("{name}_joints"), joints);
+        values.insert(format!("{name}_lengths"), product.lengths.clone());
+    }
+    values
 }
 
 /// A variable calibration, see the stub.
@@ -142,7 +157,7 @@ impl FieldFit {
     }
 
     #[getter]
-    fn hyper(&self) -> HashMap<&'static str, Vec<f64>> {
+    fn hyper(&self) -> HashMap<String, Vec<f64>> {
         hyper_into(&self.core.hyper)
     }
 
