@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
-from truearm.errors import InputError, did_you_mean, list_names
+from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS
 
 JOINT: Final = re.compile(r"q([1-9]\d*)(?:_(rad|deg|m|mm))?")
@@ -63,7 +63,7 @@ class StatedUnits:
     def __post_init__(self) -> None:
         for value, known in ((self.length, LENGTH_UNITS), (self.angle, ANGLE_UNITS)):
             if value is not None and value not in known:
-                raise InputError(f'"{value}" is no unit here', rule=f"Known are {list_names(known)}")
+                raise UsageError(f'"{value}" is no unit here', rule=f"Known are {list_names(known)}")
 
 
 def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str) -> Layout:
@@ -187,7 +187,7 @@ class _Finder:
 
     def _stated(self, column: Column, unit: str | None) -> Column:
         if unit and column.unit and column.unit != unit:
-            raise InputError(
+            raise UsageError(
                 f'column "{column.name}" says {column.unit}, the options say {unit}',
                 where=self.where,
                 way_out="Leave out the option, or rename the column",

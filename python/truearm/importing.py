@@ -134,14 +134,7 @@ def _plain_delimiter(text: str, where: str) -> str:
 def _all_columns(table: Table, plan: ImportPlan) -> dict[str, str]:
     """Their column of each of ours: those of the plan, and those that have our names already."""
     for ours in plan.columns:
-        if not _is_ours(ours):
-            known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "distance", *WORDS]
-            raise UsageError(
-                f'"{ours}" is no measurement column',
-                where="--map",
-                rule=did_you_mean(ours, known) or f"Known are {list_names(known)} and their like",
-                way_out="Further columns are kept with --keep",
-            )
+        _check_is_ours(ours)
     taken = {_split_unit(table, theirs)[0] for theirs in plan.columns.values()}
     taken |= {_split_unit(table, theirs)[0] for theirs in plan.keep.values()}
     named = dict(plan.columns)
@@ -239,6 +232,18 @@ def _existing(table: Table, name: str) -> str:
             way_out=f"Its columns are {', '.join(table.names)}",
         )
     return name
+
+
+def _check_is_ours(ours: str) -> None:
+    if _is_ours(ours):
+        return
+    bare, _, unit = ours.rpartition("_")
+    known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "distance", *WORDS]
+    rule = did_you_mean(ours, known) or f"Known are {list_names(known)} and their like"
+    way_out = "Further columns are kept with --keep"
+    if unit in UNITS and _is_ours(bare):
+        rule, way_out = "Units stand behind their column", f"Write --map {bare}=COLUMN:{unit}"
+    raise UsageError(f'"{ours}" is no measurement column', where="--map", rule=rule, way_out=way_out)
 
 
 def _is_ours(name: str) -> bool:

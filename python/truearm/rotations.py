@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from truearm.errors import InputError
+from truearm.errors import UsageError
 
 UNIT_TOLERANCE: Final = 1e-3
 
@@ -36,18 +36,18 @@ def quaternion_from_euler(angles: ArrayLike, sequence: str) -> NDArray[np.float6
             about the fixed ones ("xyz", extrinsic).
 
     Raises:
-        InputError: If the sequence is not three axes in one case, or repeats an axis next to itself.
+        UsageError: If the sequence is not three axes in one case, or repeats an axis next to itself.
     """
     check_euler_sequence(sequence)
     return _wxyz(Rotation.from_euler(sequence, np.asarray(angles, dtype=np.float64)))
 
 
 def check_euler_sequence(sequence: str) -> None:
-    """Raise InputError unless `sequence` names three axes as quaternion_from_euler expects them."""
+    """Raise UsageError unless `sequence` names three axes as quaternion_from_euler expects them."""
     one_case = sequence in (sequence.upper(), sequence.lower())
     known = len(sequence) == 3 and set(sequence.lower()) <= set("xyz")
     if not (one_case and known and sequence[0] != sequence[1] != sequence[2]):
-        raise InputError(
+        raise UsageError(
             f'"{sequence}" is no order of Euler angles',
             rule="Three axes, no axis twice in a row: capitals for moving axes (XYZ, intrinsic), "
             "small letters for fixed axes (xyz, extrinsic)",
