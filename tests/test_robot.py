@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from truearm.errors import InputError
 from truearm.library import library_names
-from truearm.robot import Payload, Robot
+from truearm.robot import Robot
+from truearm.robot_data import Payload
 
 LINK = """
 [[link]]

@@ -1,94 +1,33 @@
-"""The robot: nominal Denavit-Hartenberg table, fixed transforms, coupling and limits."""
+"""The robot: its files, and the kinematics of its nominal table."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Literal, cast
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from truearm import robot_dict, robot_toml
 from truearm._core import Chain
-from truearm.arrays import as_rows, frozen
+from truearm.arrays import as_rows
 from truearm.errors import InputError
 from truearm.files import read_text
 from truearm.library import library_text
 from truearm.robot_checks import check_sizes
+from truearm.robot_data import Floats, RobotData
 from truearm.robot_file import parse_robot_file
 from truearm.urdf import read_urdf
 
-Convention = Literal["standard", "modified"]
-Joint = Literal["revolute", "prismatic"]
-Floats = NDArray[np.float64]
-
 URDF_ENDINGS: Final = (".urdf", ".xml")
-MIN_COUPLING_DETERMINANT: Final = 1e-9
 
 
-@dataclass(frozen=True)
-class Payload:
-    """What the arm carried: mass, and centre of gravity in the flange frame."""
+class Robot(RobotData):
+    """A serial arm as its maker means it to be: the fields of RobotData, and their kinematics.
 
-    mass_kg: float
-    centre_of_gravity_mm: tuple[float, float, float] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Robot:
-    """A serial arm as its maker means it to be. SI units; all arrays are read-only.
-
-    Parameters are in the order links, base to flange, and within a link theta, d, a, alpha, beta.
-    A joint reading becomes a Denavit-Hartenberg joint value by q_dh = coupling . reading; it is added
-    to theta of a revolute joint's row, to d of a prismatic joint's row.
-
-    base_from_tool = base . A1 ... AN . flange . tool, where A is
-    Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) in the standard convention and
-    Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d) in the modified one.
-
-    Attributes:
-        name: What people call it.
-        source: Where its numbers come from.
-        convention: "standard" or "modified".
-        joints: "revolute" or "prismatic" for each of the N joints.
-        table: Nominal parameters (N, 5).
-        base: Fixed transform (4, 4) before the first link.
-        flange: Fixed transform (4, 4) after the last link.
-        tool: Fixed transform (4, 4) from flange to tool.
-        base_row: Denavit-Hartenberg row (5,) that `base` was given as, or None.
-        coupling: Joint values from readings (N, N), directions included.
-        limits: Lowest and highest reading (N, 2); infinite where there is none.
-        payload: What the arm carried, if stated.
+    Parameters are in the order links, base to flange, and within a link theta, d, a, alpha, beta. `q` is
+    always joint readings, what the controller shows, in rad and m.
     """
-
-    name: str
-    source: str
-    convention: Convention
-    joints: tuple[Joint, ...]
-    table: Floats
-    base: Floats
-    flange: Floats
-    tool: Floats
-    base_row: Floats | None
-    coupling: Floats
-    limits: Floats
-    payload: Payload | None = None
-
-    def __post_init__(self) -> None:
-        n = len(self.joints)
-        shapes = {"table": (n, 5), "base": (4, 4), "flange": (4, 4), "tool": (4, 4)}
-        shapes |= {"coupling": (n, n), "limits": (n, 2)}
-        for field, shape in shapes.items():
-            object.__setattr__(self, field, _checked(field, getattr(self, field), shape))
-        if self.base_row is not None:
-            object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
-        if abs(np.linalg.det(self.coupling)) < MIN_COUPLING_DETERMINANT:
-            raise InputError(
-                "the coupling matrix is singular",
-                where="coupling",
-                rule="Every joint value must come from one set of readings only",
-            )
 
     @classmethod
     def load(cls, name_or_path: str | Path) -> "Robot":
@@ -124,13 +63,8 @@ class Robot:
             InputError: If the text is no robot file; names the key and the rule.
         """
         file = parse_robot_file(text, where=where)
-        fields = robot_toml.fields_of(file)
-        payload = None
-        if file.payload is not None:
-            centre = file.payload.centre_of_gravity_mm
-            payload = Payload(file.payload.mass_kg, cast("Any", tuple(centre)) if centre else None)
         try:
-            robot = cls(**fields, payload=payload)
+            robot = cls(**robot_toml.fields_of(file))
             check_sizes(robot)
         except InputError as error:
             raise error.at(where) from None
@@ -170,11 +104,6 @@ class Robot:
 
     def __hash__(self) -> int:
         return hash((self.name, self.convention, self.joints, self.table.tobytes()))
-
-    @property
-    def joint_count(self) -> int:
-        """Number of joints, N."""
-        return len(self.joints)
 
     @cached_property
     def chain(self) -> Chain:
@@ -243,9 +172,7 @@ class Robot:
         Raises:
             InputError: If a key is missing or a value has another shape.
         """
-        fields = robot_dict.fields_of(content)
-        payload = fields.pop("payload")
-        return cls(**fields, payload=None if payload is None else Payload(**payload))
+        return cls(**robot_dict.fields_of(content))
 
     def to_toml(self) -> str:
         """The text of a robot file in m and rad that from_toml reads back to this robot."""
@@ -267,12 +194,3 @@ class Robot:
 
 def _batched(out: Floats | None, *, single: bool) -> Floats | None:
     return out[None] if single and out is not None else out
-
-
-def _checked(field: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape != shape:
-        raise InputError(f"shape {array.shape}", where=field, rule=f"The shape must be {shape}")
-    if field != "limits" and not np.isfinite(array).all():
-        raise InputError("NaN or infinite value", where=field, rule="All values must be finite")
-    return frozen(array, *shape)

@@ -1,14 +1,12 @@
 """Whether a robot's numbers can be those of an arm: mostly, whether their units can be right."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from truearm.errors import InputError, Notice, list_rows
+from truearm.robot_data import RobotData
 from truearm.units import RADIANS_PER_DEGREE
-
-if TYPE_CHECKING:
-    from truearm.robot import Robot
 
 MAX_LENGTH_M: Final = 50.0
 MAX_ANGLE_RAD: Final = 2.0 * np.pi + 1e-6
@@ -18,7 +16,7 @@ ANGLES: Final = {0: "theta", 3: "alpha", 4: "beta"}
 LENGTHS: Final = {1: "d", 2: "a"}
 
 
-def check_sizes(robot: "Robot") -> None:
+def check_sizes(robot: RobotData) -> None:
     """Raise InputError if an angle or a length can only come from a wrong unit."""
     for column, name in ANGLES.items():
         _refuse_large(robot, column, name, MAX_ANGLE_RAD, ("rad", "angle_unit"))
@@ -35,7 +33,7 @@ def check_sizes(robot: "Robot") -> None:
             )
 
 
-def robot_notices(robot: "Robot") -> list[Notice]:
+def robot_notices(robot: RobotData) -> list[Notice]:
     """What is allowed and still strange: no limits at all, radians written where degrees were stated."""
     notices = []
     if np.isinf(robot.limits).all():
@@ -52,7 +50,7 @@ def robot_notices(robot: "Robot") -> list[Notice]:
     return notices
 
 
-def _refuse_large(robot: "Robot", column: int, name: str, bound: float, unit: tuple[str, str]) -> None:
+def _refuse_large(robot: RobotData, column: int, name: str, bound: float, unit: tuple[str, str]) -> None:
     values = np.abs(robot.table[:, column])
     if values.max() > bound:
         link = int(values.argmax())

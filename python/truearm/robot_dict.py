@@ -1,21 +1,19 @@
 """A Robot as JSON values, and back, bit for bit."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
-
-if TYPE_CHECKING:
-    from truearm.robot import Robot
+from truearm.robot_data import Payload, RobotData
 
 TEXTS: Final = ("name", "source", "convention")
 ARRAYS: Final = ("table", "base", "flange", "tool", "coupling")
 
 
-def to_dict(robot: "Robot") -> dict[str, Any]:
+def to_dict(robot: RobotData) -> dict[str, Any]:
     """All fields as JSON values; an absent limit is null."""
     content: dict[str, Any] = {key: getattr(robot, key) for key in TEXTS}
     content["joints"] = list(robot.joints)
@@ -34,7 +32,7 @@ def to_dict(robot: "Robot") -> dict[str, Any]:
 
 
 def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of Robot from what to_dict gave; the payload is a dictionary of its own.
+    """Fields of a Robot from what to_dict gave.
 
     Raises:
         InputError: If a key is missing.
@@ -52,7 +50,7 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
     payload = content["payload"]
     if payload is not None:
         centre = payload["centre_of_gravity_mm"]
-        payload = {**payload, "centre_of_gravity_mm": None if centre is None else tuple(centre)}
+        payload = Payload(payload["mass_kg"], None if centre is None else tuple(centre))
     fields["payload"] = payload
     return fields
 

@@ -2,24 +2,22 @@
 
 import json
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.dh_row import row_transform
-from truearm.robot_file import Link, Placement, RobotFile, Row
+from truearm.robot_data import Payload, RobotData
+from truearm.robot_file import Link, PayloadSection, Placement, RobotFile, Row
 from truearm.rotations import quaternion_from_matrix, transform_from_parts
 from truearm.units import to_si
-
-if TYPE_CHECKING:
-    from truearm.robot import Payload, Robot
 
 Floats = NDArray[np.float64]
 
 
 def fields_of(file: RobotFile) -> dict[str, Any]:
-    """Fields of a Robot but for the payload: lengths in m, angles in rad."""
+    """Fields of a Robot: lengths in m, angles in rad."""
     count = len(file.link)
     matrix = np.eye(count) if file.coupling is None else np.array(file.coupling.matrix)
     has_base_row = file.base.is_row and bool(file.base.model_fields_set)
@@ -35,10 +33,11 @@ def fields_of(file: RobotFile) -> dict[str, Any]:
         "base_row": _row(file.base, file) if has_base_row else None,
         "coupling": matrix * np.array([link.direction for link in file.link], dtype=np.float64),
         "limits": np.array([_limits(link, file) for link in file.link]),
+        "payload": None if file.payload is None else _payload_of(file.payload),
     }
 
 
-def write(robot: "Robot") -> str:
+def write(robot: RobotData) -> str:
     """Text of a robot file in m and rad that describes `robot`."""
     diagonal = np.diag(robot.coupling)
     directed = np.array_equal(robot.coupling, np.diag(diagonal)) and set(diagonal) <= {-1.0, 1.0}
@@ -59,6 +58,13 @@ def write(robot: "Robot") -> str:
     if robot.payload is not None:
         lines += _payload(robot.payload)
     return "\n".join(lines) + "\n"
+
+
+def _payload_of(section: PayloadSection) -> Payload:
+    if section.centre_of_gravity_mm is None:
+        return Payload(section.mass_kg)
+    x, y, z = section.centre_of_gravity_mm
+    return Payload(section.mass_kg, (x, y, z))
 
 
 def _row(row: Row, file: RobotFile) -> Floats:
@@ -89,7 +95,7 @@ def _limits(link: Link, file: RobotFile) -> Floats:
     return to_si(np.array(link.limits), unit)
 
 
-def _link(robot: "Robot", index: int, direction: int) -> list[str]:
+def _link(robot: RobotData, index: int, direction: int) -> list[str]:
     theta, d, a, alpha, beta = robot.table[index].tolist()
     lines = ["", "[[link]]", f'joint = "{robot.joints[index]}"']
     lines += [f"theta = {theta!r}", f"d = {d!r}", f"a = {a!r}", f"alpha = {alpha!r}"]
@@ -112,7 +118,7 @@ def _placement(name: str, transform: Floats, row: Floats | None = None) -> list[
     return ["", f"[{name}]", *values]
 
 
-def _payload(payload: "Payload") -> list[str]:
+def _payload(payload: Payload) -> list[str]:
     lines = ["", "[payload]", f"mass_kg = {payload.mass_kg!r}"]
     if payload.centre_of_gravity_mm is not None:
         lines.append(f"centre_of_gravity_mm = {_list(payload.centre_of_gravity_mm)}")

@@ -1,0 +1,94 @@
+"""The fields of a robot: nominal table, fixed transforms, coupling and limits, checked on the way in."""
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.arrays import frozen
+from truearm.errors import InputError
+
+Convention = Literal["standard", "modified"]
+Joint = Literal["revolute", "prismatic"]
+Floats = NDArray[np.float64]
+
+MIN_COUPLING_DETERMINANT: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What the arm carried: mass, and centre of gravity in the flange frame."""
+
+    mass_kg: float
+    centre_of_gravity_mm: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RobotData:
+    """A serial arm as its maker means it to be. SI units; all arrays are read-only.
+
+    Parameters are in the order links, base to flange, and within a link theta, d, a, alpha, beta.
+    A joint reading becomes a Denavit-Hartenberg joint value by q_dh = coupling . reading; it is added
+    to theta of a revolute joint's row, to d of a prismatic joint's row.
+
+    base_from_tool = base . A1 ... AN . flange . tool, where A is
+    Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) in the standard convention and
+    Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d) in the modified one.
+
+    Attributes:
+        name: What people call it.
+        source: Where its numbers come from.
+        convention: "standard" or "modified".
+        joints: "revolute" or "prismatic" for each of the N joints.
+        table: Nominal parameters (N, 5).
+        base: Fixed transform (4, 4) before the first link.
+        flange: Fixed transform (4, 4) after the last link.
+        tool: Fixed transform (4, 4) from flange to tool.
+        base_row: Denavit-Hartenberg row (5,) that `base` was given as, or None.
+        coupling: Joint values from readings (N, N), directions included.
+        limits: Lowest and highest reading (N, 2); infinite where there is none.
+        payload: What the arm carried, if stated.
+    """
+
+    name: str
+    source: str
+    convention: Convention
+    joints: tuple[Joint, ...]
+    table: Floats
+    base: Floats
+    flange: Floats
+    tool: Floats
+    base_row: Floats | None
+    coupling: Floats
+    limits: Floats
+    payload: Payload | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.joints)
+        shapes = {"table": (n, 5), "base": (4, 4), "flange": (4, 4), "tool": (4, 4)}
+        shapes |= {"coupling": (n, n), "limits": (n, 2)}
+        for field, shape in shapes.items():
+            object.__setattr__(self, field, _checked(field, getattr(self, field), shape))
+        if self.base_row is not None:
+            object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
+        if abs(np.linalg.det(self.coupling)) < MIN_COUPLING_DETERMINANT:
+            raise InputError(
+                "the coupling matrix is singular",
+                where="coupling",
+                rule="Every joint value must come from one set of readings only",
+            )
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints, N."""
+        return len(self.joints)
+
+
+def _checked(field: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != shape:
+        raise InputError(f"shape {array.shape}", where=field, rule=f"The shape must be {shape}")
+    if field != "limits" and not np.isfinite(array).all():
+        raise InputError("NaN or infinite value", where=field, rule="All values must be finite")
+    return frozen(array, *shape)
