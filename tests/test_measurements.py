@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 from truearm.measurements import Measurements
 
 HEADER = "q1,q2,x,y,z"
@@ -160,6 +160,24 @@ def test_putting_parts_together(tmp_path: Path) -> None:
     assert both.row_names(np.array([True, False, True, True])) == (
         f"row 1 of {tmp_path / 'tracker.csv'}; rows 1 and 2 of {path}"
     )
+
+
+def test_files_of_one_name_are_groups_of_their_own(tmp_path: Path) -> None:
+    for folder in ("monday", "tuesday"):
+        (tmp_path / folder).mkdir()
+        write(tmp_path / folder)
+    other = write(tmp_path, name="other.csv")
+    same = [tmp_path / folder / "tracker.csv" for folder in ("monday", "tuesday")]
+    data = Measurements.read_files([*same, other])
+    assert data.groups == [str(same[0]), str(same[1]), "other"]
+    assert len(data) == 9
+    with pytest.raises(UsageError, match=r"other\.csv: the file is named twice"):
+        Measurements.read_files([other, other])
+
+
+def test_files_that_name_the_same_group_share_it(tmp_path: Path) -> None:
+    paths = [write(tmp_path, "q1,x,y,z,group", ["0,1,2,3,a"], name) for name in ("one.csv", "two.csv")]
+    assert Measurements.read_files(paths).groups == ["a"]
 
 
 def test_parts_of_other_arms_do_not_go_together() -> None:

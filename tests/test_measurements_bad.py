@@ -40,6 +40,7 @@ TABLES = {
         r'"q1" holds NaN or infinite.* in rows 2 and 3',
     ),
     "text": ("q1,x,y,z", ["0,1,2,3", "0,1,n/a,3"], 'column "y" holds "n/a" in row 2. It must hold numbers'),
+    "number for programmers": ("q1,x,y,z", ["0,1,2,3", "0,1_000,2,3"], 'column "x" holds "1_000" in row 2'),
     "empty joint": (
         "q1,x,y,z",
         ["0,1,2,3", ",1,2,3"],

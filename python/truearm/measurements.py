@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.columns import StatedUnits
-from truearm.errors import InputError, Notice, list_rows
+from truearm.errors import InputError, Notice, UsageError, list_rows
 from truearm.measured_fields import read_fields
 from truearm.reading import read_csv_table, table_from_frame
 
@@ -124,10 +124,49 @@ class Measurements:
             InputError: If the file is no such CSV, columns are missing, or values break a rule.
         """
         stated = StatedUnits(length_unit, angle_unit, joints)
-        table = read_csv_table(Path(path))
-        read = cls(**read_fields(table, stated, default_group=Path(path).stem))
+        read = cls._read(Path(path), stated, group=Path(path).stem)
         read.require_joint_count(joint_count if joints is None else len(joints))
         return read
+
+    @classmethod
+    def read_files(
+        cls,
+        paths: Sequence[str | Path],
+        *,
+        length_unit: str | None = None,
+        angle_unit: str | None = None,
+        joints: Sequence[str] | None = None,
+    ) -> "Measurements":
+        """Read several CSV files and put them together; each without a `group` column is a group of its own.
+
+        Groups are named after their files, with the folders where two files have the same name.
+
+        Args:
+            paths: The files.
+            length_unit: As for read_csv.
+            angle_unit: As for read_csv.
+            joints: As for read_csv.
+
+        Raises:
+            InputError: As for read_csv, and if a file is named twice.
+        """
+        files = [Path(path) for path in paths]
+        for path in files:
+            if files.count(path) > 1:
+                raise UsageError("the file is named twice", where=str(path))
+        stems = [path.stem for path in files]
+        names = [
+            stem if stems.count(stem) == 1 else str(path) for path, stem in zip(files, stems, strict=True)
+        ]
+        stated = StatedUnits(length_unit, angle_unit, joints)
+        parts = [cls._read(path, stated, group=name) for path, name in zip(files, names, strict=True)]
+        for part in parts:
+            part.require_joint_count(None if joints is None else len(joints))
+        return cls.concatenate(parts)
+
+    @classmethod
+    def _read(cls, path: Path, stated: StatedUnits, *, group: str) -> "Measurements":
+        return cls(**read_fields(read_csv_table(path), stated, default_group=group))
 
     @classmethod
     def from_dataframe(

@@ -75,10 +75,10 @@ class Table:
         for row, cell in enumerate(cells):
             if not cell or infinite[row]:
                 continue
-            try:
-                values[row] = float(cell)
-            except ValueError:
-                raise self._no_number(name, row, cell) from None
+            number = _as_number(cell)
+            if number is None:
+                raise self._no_number(name, row, cell)
+            values[row] = number
         return self._checked(name, values, infinite | np.isinf(values))
 
     def _checked(self, name: str, values: Floats, bad: NDArray[np.bool_]) -> Floats:
@@ -188,7 +188,7 @@ def quoted_delimiter(mark: str) -> str:
 
 
 def _check_header(header: Sequence[str], where: str) -> None:
-    if all(_is_number(name) for name in header):
+    if all(_as_number(name) is not None for name in header):
         raise InputError(
             "the first line holds numbers only",
             where=where,
@@ -209,9 +209,9 @@ def _in_words(number: float) -> str:
     return str(int(number)) if number == int(number) else repr(number)
 
 
-def _is_number(text: str) -> bool:
+def _as_number(text: str) -> float | None:
+    """The number that a cell holds; Python's 1_000 is none in a table."""
     try:
-        float(text)
+        return None if "_" in text else float(text)
     except ValueError:
-        return False
-    return True
+        return None
