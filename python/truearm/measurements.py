@@ -71,6 +71,8 @@ class Measurements:
     notices: tuple[Notice, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.joint_units:
+            object.__setattr__(self, "joint_units", ("",) * self.joint_count)
         for name in PER_ROW:
             value = getattr(self, name)
             if value is not None:
