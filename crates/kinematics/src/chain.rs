@@ -58,6 +58,7 @@ pub struct Chain {
     base: Transform,
     end: Transform,
     joint_columns: Vec<usize>,
+    end_turns: bool,
 }
 
 impl Chain {
@@ -83,7 +84,8 @@ impl Chain {
         if joint_columns.is_empty() {
             return Err(KinematicsError::NoJoints { links: links.len() });
         }
-        Ok(Chain { convention, links, base, end, joint_columns })
+        let end_turns = turns(&end);
+        Ok(Chain { convention, links, base, end, joint_columns, end_turns })
     }
 
     /// Number of joints, J.
@@ -131,13 +133,18 @@ impl Chain {
         &self.end
     }
 
+    /// Whether the end is turned with respect to the last link, or only shifted.
+    pub(crate) fn end_turns(&self) -> bool {
+        self.end_turns
+    }
+
     /// The same chain with another end.
     ///
     /// # Errors
     /// [`KinematicsError::NotRigid`] if the transform is not rigid.
     pub fn with_end(&self, end: Transform) -> Result<Chain, KinematicsError> {
         end.check("end")?;
-        Ok(Chain { end, ..self.clone() })
+        Ok(Chain { end, end_turns: turns(&end), ..self.clone() })
     }
 
     /// The same chain with another base.
@@ -148,6 +155,10 @@ impl Chain {
         base.check("base")?;
         Ok(Chain { base, ..self.clone() })
     }
+}
+
+fn turns(transform: &Transform) -> bool {
+    transform.rotation != Transform::IDENTITY.rotation
 }
 
 fn check_finite(index: usize, link: &Link) -> Result<(), KinematicsError> {

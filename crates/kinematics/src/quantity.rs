@@ -1,11 +1,12 @@
 //! What a batch can compute of a group of eight poses.
 
 use crate::chain::Chain;
+use crate::frame::LaneFrame;
 use crate::isa::Isa;
 use crate::lane::{LANES, Lane};
 use crate::parameters::LaneParameters;
 use crate::rows::store_lanes;
-use crate::sweep::{LaneFrame, Screw};
+use crate::sweep::Screw;
 use crate::transform::Transform;
 
 /// A row of numbers for every pose.
@@ -102,8 +103,7 @@ impl Quantity for Pose {
         rows: &mut [f64],
     ) {
         const ORDER: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-        let mut frame = LaneFrame::splat(&Transform::IDENTITY);
-        chain.sweep::<I>(joints, parameters, &[], &mut frame, &mut []);
+        let frame = chain.end_frame::<I>(joints, parameters);
         let (r, p) = (&frame.rotation, &frame.position);
         let (zero, one) = (Lane::ZERO, Lane::splat(1.0));
         let matrix =

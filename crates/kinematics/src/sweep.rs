@@ -1,10 +1,10 @@
 //! One pass along the chain: the end's frame and its motion by any of the parameters.
 
 use crate::chain::{Chain, Convention, Joint};
+use crate::frame::LaneFrame;
 use crate::isa::Isa;
 use crate::lane::Lane;
 use crate::parameters::{LaneParameters, LinkSource, LinkValues};
-use crate::transform::Transform;
 use crate::trig::sin_cos;
 
 /// Motion of the end for a unit change of one parameter, in the base frame.
@@ -31,86 +31,6 @@ impl Screw {
     }
 }
 
-/// A frame of eight poses: base_from_frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LaneFrame {
-    /// Rotation matrix, row-major.
-    pub rotation: [Lane; 9],
-    /// Origin, metres.
-    pub position: [Lane; 3],
-}
-
-impl LaneFrame {
-    /// The same transform for all poses.
-    #[inline(always)]
-    pub fn splat(transform: &Transform) -> LaneFrame {
-        let mut frame = LaneFrame { rotation: [Lane::ZERO; 9], position: [Lane::ZERO; 3] };
-        for (lane, value) in frame.rotation.iter_mut().zip(&transform.rotation) {
-            *lane = Lane::splat(*value);
-        }
-        for (lane, value) in frame.position.iter_mut().zip(&transform.translation) {
-            *lane = Lane::splat(*value);
-        }
-        frame
-    }
-
-    #[inline(always)]
-    fn axis(&self, k: usize) -> [Lane; 3] {
-        [self.rotation[k], self.rotation[3 + k], self.rotation[6 + k]]
-    }
-
-    /// Turn about axis `2`, `0` or `1`: `first` and `second` are the other two axes in cyclic order.
-    #[inline(always)]
-    fn turn<I: Isa>(&mut self, first: usize, second: usize, (sine, cosine): (Lane, Lane)) {
-        for row in 0..3 {
-            let (u, v) = (self.rotation[3 * row + first], self.rotation[3 * row + second]);
-            self.rotation[3 * row + first] = I::mul_add(u, cosine, v * sine);
-            self.rotation[3 * row + second] = I::mul_add(v, cosine, -(u * sine));
-        }
-    }
-
-    #[inline(always)]
-    fn shift<I: Isa>(&mut self, axis: usize, by: Lane) {
-        for row in 0..3 {
-            self.position[row] = I::mul_add(self.rotation[3 * row + axis], by, self.position[row]);
-        }
-    }
-
-    /// The frame after a fixed transform from here.
-    #[inline(always)]
-    fn then<I: Isa>(&self, transform: &Transform) -> LaneFrame {
-        let mut out = *self;
-        for axis in 0..3 {
-            out.shift::<I>(axis, Lane::splat(transform.translation[axis]));
-        }
-        if transform.rotation == Transform::IDENTITY.rotation {
-            return out;
-        }
-        for (index, value) in out.rotation.iter_mut().enumerate() {
-            let (row, column) = (index / 3, index % 3);
-            let mut sum = self.rotation[3 * row] * transform.rotation[column];
-            for k in 1..3 {
-                sum = I::mul_add(
-                    self.rotation[3 * row + k],
-                    Lane::splat(transform.rotation[3 * k + column]),
-                    sum,
-                );
-            }
-            *value = sum;
-        }
-        out
-    }
-}
-
-/// The axes that the parameters of a link turn about or shift along, and the points the turning axes pass through.
-struct Axes {
-    theta: [Lane; 3],
-    a: [Lane; 3],
-    beta: [Lane; 3],
-    theta_point: [Lane; 3],
-    beta_point: [Lane; 3],
-}
-
 impl Chain {
     /// The end's frame and the screws of the wanted parameters, for a group of eight poses.
     ///
@@ -125,35 +45,55 @@ impl Chain {
         frame: &mut LaneFrame,
         screws: &mut [Screw],
     ) {
-        match parameters {
-            LaneParameters::Shared(shared) => {
-                self.sweep_links::<I, _>(joints, shared, columns, frame, screws)
-            }
-            LaneParameters::Each(lanes) => self.sweep_links::<I, _>(joints, lanes, columns, frame, screws),
-        }
+        let mut axes = Wanted { columns, next: 0, slots: [NOT_WANTED; 5], screws };
+        *frame = self.walk::<I, _>(joints, parameters, &mut axes);
         for (screw, column) in screws.iter_mut().zip(columns) {
             if !matches!(column % 5, 1 | 2) {
-                let point = screw.linear;
-                let end = &frame.position;
+                let (end, point) = (&frame.position, &screw.linear);
                 let arm = [end[0] - point[0], end[1] - point[1], end[2] - point[2]];
                 screw.linear = cross::<I>(&screw.angular, &arm);
             }
         }
     }
 
-    /// The end's frame, and in `screws` each wanted axis with a point on it in place of the linear motion.
+    /// The end's frame alone; arguments as for [`Chain::sweep`].
     #[inline(always)]
-    fn sweep_links<I: Isa, S: LinkSource>(
+    pub fn end_frame<I: Isa>(&self, joints: &[Lane], parameters: LaneParameters<'_>) -> LaneFrame {
+        self.walk::<I, _>(joints, parameters, &mut NoAxes)
+    }
+
+    /// The end's frame; shows `axes` every frame on the way.
+    #[inline(always)]
+    fn walk<I: Isa, A: Axes>(
+        &self,
+        joints: &[Lane],
+        parameters: LaneParameters<'_>,
+        axes: &mut A,
+    ) -> LaneFrame {
+        let mut frame = LaneFrame::splat(self.base());
+        match parameters {
+            LaneParameters::Shared(shared) => self.walk_links::<I, _, _>(joints, shared, &mut frame, axes),
+            LaneParameters::Each(lanes) => self.walk_links::<I, _, _>(joints, lanes, &mut frame, axes),
+        }
+        let [x, y, z] = self.end().translation;
+        frame.shift::<I>(0, Lane::splat(x));
+        frame.shift::<I>(1, Lane::splat(y));
+        frame.shift::<I>(2, Lane::splat(z));
+        if self.end_turns() {
+            frame.rotate::<I>(&self.end().rotation);
+        }
+        frame
+    }
+
+    #[inline(always)]
+    fn walk_links<I: Isa, S: LinkSource, A: Axes>(
         &self,
         joints: &[Lane],
         source: S,
-        columns: &[usize],
         frame: &mut LaneFrame,
-        screws: &mut [Screw],
+        axes: &mut A,
     ) {
-        let mut current = LaneFrame::splat(self.base());
         let mut joint = 0;
-        let mut column = 0;
         for (index, link) in self.links().iter().enumerate() {
             let mut values = source.link::<I>(index);
             match link.joint {
@@ -162,62 +102,113 @@ impl Chain {
                 Joint::Fixed => {}
             }
             joint += usize::from(link.joint != Joint::Fixed);
-            let axes = match self.convention() {
-                Convention::Standard => standard::<I>(&mut current, &values),
-                Convention::Modified => modified::<I>(&mut current, &values),
-            };
-            while column < columns.len() && columns[column] < 5 * (index + 1) {
-                screws[column] = axes.screw(columns[column] - 5 * index);
-                column += 1;
+            axes.enter(index);
+            match self.convention() {
+                Convention::Standard => standard::<I, A>(frame, &values, axes),
+                Convention::Modified => modified::<I, A>(frame, &values, axes),
             }
         }
-        *frame = current.then::<I>(self.end());
     }
 }
 
-impl Axes {
+/// Sees the frames on the way along the chain in which the parameters of the links move what comes after.
+trait Axes {
+    /// Here begins a link.
+    fn enter(&mut self, link: usize);
+
+    /// Parameter k of the link turns about an axis of the frame through its origin.
+    fn turns(&mut self, k: usize, frame: &LaneFrame, axis: usize);
+
+    /// Parameter k of the link shifts along an axis of the frame.
+    fn shifts(&mut self, k: usize, frame: &LaneFrame, axis: usize);
+}
+
+/// Only the end is wanted.
+struct NoAxes;
+
+impl Axes for NoAxes {
     #[inline(always)]
-    fn screw(&self, k: usize) -> Screw {
-        match k {
-            0 => Screw { angular: self.theta, linear: self.theta_point },
-            1 => Screw { angular: [Lane::ZERO; 3], linear: self.theta },
-            2 => Screw { angular: [Lane::ZERO; 3], linear: self.a },
-            3 => Screw { angular: self.a, linear: self.beta_point },
-            _ => Screw { angular: self.beta, linear: self.beta_point },
+    fn enter(&mut self, _link: usize) {}
+
+    #[inline(always)]
+    fn turns(&mut self, _k: usize, _frame: &LaneFrame, _axis: usize) {}
+
+    #[inline(always)]
+    fn shifts(&mut self, _k: usize, _frame: &LaneFrame, _axis: usize) {}
+}
+
+/// Slot of a parameter that is not wanted: beyond all screws.
+const NOT_WANTED: usize = usize::MAX;
+
+/// Gathers the axes of some parameters: those that turn with a point on them in place of the linear motion.
+struct Wanted<'a> {
+    columns: &'a [usize],
+    next: usize,
+    slots: [usize; 5],
+    screws: &'a mut [Screw],
+}
+
+impl Axes for Wanted<'_> {
+    #[inline(always)]
+    fn enter(&mut self, link: usize) {
+        self.slots = [NOT_WANTED; 5];
+        while let Some(column) = self.columns.get(self.next)
+            && *column < 5 * (link + 1)
+        {
+            self.slots[*column - 5 * link] = self.next;
+            self.next += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn turns(&mut self, k: usize, frame: &LaneFrame, axis: usize) {
+        if let Some(screw) = self.screws.get_mut(self.slots[k]) {
+            screw.angular = frame.axis(axis);
+            screw.linear = frame.position;
+        }
+    }
+
+    #[inline(always)]
+    fn shifts(&mut self, k: usize, frame: &LaneFrame, axis: usize) {
+        if let Some(screw) = self.screws.get_mut(self.slots[k]) {
+            screw.angular = [Lane::ZERO; 3];
+            screw.linear = frame.axis(axis);
         }
     }
 }
 
 /// Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta).
 #[inline(always)]
-fn standard<I: Isa>(frame: &mut LaneFrame, link: &LinkValues<Lane>) -> Axes {
-    let (theta, theta_point) = (frame.axis(2), frame.position);
+fn standard<I: Isa, A: Axes>(frame: &mut LaneFrame, link: &LinkValues<Lane>, axes: &mut A) {
+    axes.turns(0, frame, 2);
+    axes.shifts(1, frame, 2);
     frame.turn::<I>(0, 1, sin_cos::<I>(link.theta));
     frame.shift::<I>(2, link.d);
+    axes.shifts(2, frame, 0);
     frame.shift::<I>(0, link.a);
-    let a = frame.axis(0);
+    axes.turns(3, frame, 0);
     frame.turn::<I>(1, 2, link.alpha);
-    let beta = frame.axis(1);
+    axes.turns(4, frame, 1);
     if link.bent {
         frame.turn::<I>(2, 0, link.beta);
     }
-    Axes { theta, a, beta, theta_point, beta_point: frame.position }
 }
 
 /// Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d).
 #[inline(always)]
-fn modified<I: Isa>(frame: &mut LaneFrame, link: &LinkValues<Lane>) -> Axes {
-    let a = frame.axis(0);
+fn modified<I: Isa, A: Axes>(frame: &mut LaneFrame, link: &LinkValues<Lane>, axes: &mut A) {
+    axes.turns(3, frame, 0);
     frame.turn::<I>(1, 2, link.alpha);
+    axes.shifts(2, frame, 0);
     frame.shift::<I>(0, link.a);
-    let beta = frame.axis(1);
+    axes.turns(4, frame, 1);
     if link.bent {
         frame.turn::<I>(2, 0, link.beta);
     }
-    let (theta, point) = (frame.axis(2), frame.position);
+    axes.turns(0, frame, 2);
+    axes.shifts(1, frame, 2);
     frame.turn::<I>(0, 1, sin_cos::<I>(link.theta));
     frame.shift::<I>(2, link.d);
-    Axes { theta, a, beta, theta_point: point, beta_point: point }
 }
 
 #[inline(always)]
