@@ -16,6 +16,7 @@ from truearm._core import Chain
 from truearm.arrays import as_rows
 from truearm.errors import InputError, did_you_mean
 from truearm.measurements import Measurements
+from truearm.parameters import KINDS
 from truearm.robot import Robot
 from truearm.rotations import (
     matrix_from_quaternion,
@@ -27,7 +28,7 @@ from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 
-PARAMETER_KINDS: Final = ("theta", "d", "a", "alpha", "beta")
+
 LENGTHS: Final = ("d", "a")
 # The fifteen parameters of the RV-M2 that positions determine, section 6 of the paper; row 0 is BASE.
 # fmt: off
@@ -209,7 +210,7 @@ class VirtualArm:
 
 
 def _default_parameters(robot: Robot) -> list[str]:
-    return [f"{kind}{row}" for row in range(1, robot.joint_count + 1) for kind in PARAMETER_KINDS[:4]]
+    return [f"{kind}{row}" for row in range(1, robot.joint_count + 1) for kind in KINDS[:4]]
 
 
 def _nominal_rows(robot: Robot) -> Floats:
@@ -245,9 +246,7 @@ def _places(robot: Robot) -> dict[str, tuple[int, int]]:
     """Row and column of each parameter by name; rows are counted from 0 where the base is one of them."""
     first = 1 if robot.base_row is None else 0
     rows = range(robot.joint_count + 1 - first)
-    return {
-        f"{kind}{row + first}": (row, column) for row in rows for column, kind in enumerate(PARAMETER_KINDS)
-    }
+    return {f"{kind}{row + first}": (row, column) for row in rows for column, kind in enumerate(KINDS)}
 
 
 def _ranges(robot: Robot) -> tuple[Floats, Floats]:
