@@ -55,6 +55,10 @@ CASES = [
     _case("aall", "UR10, set-up A, whole positions held out, all training rows", "ur10", A, 0.078, *GOALS),
     _case("ctail", "UR10, set-up C, upper 30 % of joint 2 held out", "ur10", C, None,
           "--holdout-range", "q2:high:0.3"),
+    _case("irb1to2", "IRB 120, fitted to target 1, judged at target 2, 400 poses", "abb-irb-120", IRB, 0.25,
+          "--train-size", "400", "--judge-target", "2"),
+    _case("irb12to3", "IRB 120, fitted to targets 1 and 2, judged at target 3, 400 poses", "abb-irb-120", IRB,
+          0.10, "--train-size", "400", "--use", "targets", "--judge-target", "3"),
     Case("a2b", "UR10, from set-up A, 900 poses, to B", "ur10", [A], ["--train-size", "900", "--no-refit"], B,
          [], 0.27),
     Case("ac2b", "UR10, from set-ups A and C, 600 poses each, to B", "ur10", [A, C],
@@ -93,7 +97,8 @@ def run(case: Case, out: Path, data: Path, chosen: list[int]) -> None:
         folder = out / f"seed-{seed}"
         if not (folder / "summary.json").exists():
             files = [str(data / name) for name in case.files]
-            options = ["--use", "position", "--seed", str(seed), *case.options]
+            use = [] if "--use" in case.options else ["--use", "position"]
+            options = [*use, "--seed", str(seed), *case.options]
             truearm("calibrate", case.robot, *files, "-o", str(folder), *options)
         if case.judge and not (folder / "evaluation.json").exists():
             judged = [str(folder / "calibration.calib"), str(data / case.judge)]
