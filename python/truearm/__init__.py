@@ -1,1 +1,69 @@
-"""Robot arm calibration with Denavit-Hartenberg parameters that vary over the workspace."""
+"""truearm: robot arm calibration with Denavit-Hartenberg parameters that vary over the workspace.
+
+    import truearm as ta
+
+    robot = ta.Robot.load("ur10")
+    data = ta.Measurements.read_csv("ur10.csv")
+    calibration = ta.calibrate(robot, data)
+
+What is public is imported when it is first asked for.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from truearm.calibrating import calibrate
+    from truearm.calibration import Calibration
+    from truearm.errors import InputError, Notice, TruearmError, UsageError, WorkError
+    from truearm.evaluation import Evaluation, EvaluationOptions, evaluate
+    from truearm.measurements import Measurements
+    from truearm.options import Options
+    from truearm.robot import Robot
+    from truearm.splitting import HoldoutRange, SplitRule
+
+__all__ = [
+    "Calibration",
+    "Evaluation",
+    "EvaluationOptions",
+    "HoldoutRange",
+    "InputError",
+    "Measurements",
+    "Notice",
+    "Options",
+    "Robot",
+    "SplitRule",
+    "TruearmError",
+    "UsageError",
+    "WorkError",
+    "calibrate",
+    "evaluate",
+]
+
+_HOME: Final = {
+    "calibrate": "calibrating",
+    "Calibration": "calibration",
+    "InputError": "errors",
+    "Notice": "errors",
+    "TruearmError": "errors",
+    "UsageError": "errors",
+    "WorkError": "errors",
+    "Evaluation": "evaluation",
+    "EvaluationOptions": "evaluation",
+    "evaluate": "evaluation",
+    "Measurements": "measurements",
+    "Options": "options",
+    "Robot": "robot",
+    "HoldoutRange": "splitting",
+    "SplitRule": "splitting",
+}
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401
+    if name not in _HOME:
+        raise AttributeError(f"module 'truearm' has no attribute '{name}'")
+    return getattr(import_module(f"truearm.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -1,7 +1,7 @@
 """The compiled core. Private: the package's modules wrap it."""
 
-from collections.abc import Sequence
-from typing import final
+from collections.abc import Mapping, Sequence
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,8 @@ class Chain:
     Parameters are ordered by link, within a link theta, d, a, alpha, beta (rad and m); joint values are
     Denavit-Hartenberg ones, added to theta (revolute) or d (prismatic) of their links. Arrays are float64 and
     C-contiguous. `parameters` are absolute: the links' own (None), (L, 5) for all poses, or (n, L, 5).
-    Results go to `out` if it is given, which costs far less than a large new array. `threads` bounds the threads used
-    (None: all); the result does not depend on it.
+    Results go to `out` if it is given, which costs far less than a large new array. `threads` bounds the threads
+    used (None: all); the result does not depend on it.
 
     Raises:
         CoreError: A shape does not fit, an array is not contiguous, a transform is not rigid.
@@ -92,3 +92,251 @@ class Chain:
         threads: int | None = None,
     ) -> NDArray[np.float64]:
         """Derivative with respect to the joint values, (n, 3, J), or (n, 6, J) with `pose`; rows as above."""
+
+@final
+class MeasurementSet:
+    """Measurements of n poses, as the estimators read them. SI units; NaN where nothing was measured.
+
+    Raises:
+        CoreError: Lengths do not fit, a joint value or a sigma is not finite, an index is out of range.
+    """
+
+    def __init__(self, arrays: Mapping[str, Any]) -> None:
+        """Make a set.
+
+        Args:
+            arrays: joints (n, J) Denavit-Hartenberg joint values; group (n,) int64 from 0; targets
+                (n, T, 3) in world; rotations (n, 3, 3) world_from_target, or None; sigma (n,) of a position's
+                components; weight (n,); distances: (pose, whether to an anchor, anchor or other pose, m),
+                in place of targets.
+        """
+
+    @property
+    def rows_per_pose(self) -> int:
+        """m: three rows of residuals a target, then three of the orientation if it was measured."""
+
+@final
+class Setup:
+    """Unknowns of G set-ups: world_from_base, targets in the flange frame, flange_from_target; A anchors."""
+
+    def __init__(
+        self,
+        frames: NDArray[np.float64],
+        targets: NDArray[np.float64],
+        rotations: NDArray[np.float64],
+        anchors: NDArray[np.float64],
+    ) -> None:
+        """Set-ups from (G, 4, 4), (G, T, 3), (G, 3, 3) and (A, 3)."""
+
+    @property
+    def frames(self) -> NDArray[np.float64]:
+        """world_from_base of each group, (G, 4, 4)."""
+
+    @property
+    def targets(self) -> NDArray[np.float64]:
+        """Target points in the flange frame, (G, T, 3), m."""
+
+    @property
+    def rotations(self) -> NDArray[np.float64]:
+        """flange_from_target, (G, 3, 3)."""
+
+    @property
+    def anchors(self) -> NDArray[np.float64]:
+        """Fixed points in the base frame, (A, 3), m."""
+
+@final
+class Problem:
+    """What is to be identified from what; columns are indices 5 * link + (theta, d, a, alpha, beta)."""
+
+    def __init__(
+        self,
+        chain: Chain,
+        measurements: MeasurementSet,
+        columns: Sequence[int],
+        world_is_known: bool = False,
+    ) -> None:
+        """Make a problem.
+
+        Args:
+            chain: It ends at the flange.
+            measurements: What was measured.
+            columns: Parameters that are unknowns, ascending.
+            world_is_known: Whether there is no world_from_base.
+        """
+
+@final
+class ConstantFit:
+    """Constants and set-up, with what is needed to judge them."""
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """Absolute parameters, (L, 5)."""
+
+    @property
+    def setup(self) -> Setup:
+        """Frames, targets and anchors."""
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of all unknowns, (u, u): the problem's columns, then the set-up's."""
+
+    @property
+    def noise(self) -> tuple[float, float]:
+        """Of positions or distances (m) and of orientations (rad), beside the rows' own sigma."""
+
+    @property
+    def prior_scale(self) -> float:
+        """Factor on the prior's standard deviations."""
+
+    @property
+    def residuals(self) -> NDArray[np.float64]:
+        """Of all rows, (n m,), or of distances (d,); base frame."""
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """Weights (n,) that a robust loss gave."""
+
+    @property
+    def iterations(self) -> int:
+        """Steps of the last minimisation."""
+
+    @property
+    def reason(self) -> str:
+        """Why it ended."""
+
+@final
+class FieldFit:
+    """Constants, field and set-up, fitted together."""
+
+    @property
+    def parameters(self) -> NDArray[np.float64]:
+        """Constants: absolute parameters, (L, 5)."""
+
+    @property
+    def field(self) -> Field:
+        """What is added to the constants."""
+
+    @property
+    def setup(self) -> Setup:
+        """Frames and targets."""
+
+    @property
+    def hyper(self) -> dict[str, list[float]]:
+        """Hyper-parameters by name."""
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the evidence and the hyper-parameters' priors at the maximum."""
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the evidence."""
+
+    @property
+    def residuals(self) -> NDArray[np.float64]:
+        """Of all rows, (n, m), base frame."""
+
+    @property
+    def scores(self) -> NDArray[np.float64]:
+        """Squared standardised leave-one-out residuals over the limit, (n,); above one is an outlier."""
+
+    @property
+    def distances(self) -> NDArray[np.float64]:
+        """Length of each pose's leave-one-out residual at the first target, (n,), m."""
+
+    @property
+    def inflation(self) -> float:
+        """Factor on standard deviations that makes them agree with leave-one-out residuals."""
+
+    @property
+    def outliers(self) -> list[int]:
+        """Poses taken out of the fit."""
+
+@final
+class Field:
+    """A bank of blocks: inputs in, corrections of the parameters out."""
+
+    def __init__(self, input_count: int, parameter_count: int, blocks: Sequence[dict[str, Any]]) -> None:
+        """A bank from blocks as `blocks` gives them."""
+
+    @property
+    def input_count(self) -> int:
+        """I: joints, then features."""
+
+    @property
+    def parameter_count(self) -> int:
+        """5 L."""
+
+    @property
+    def cell_count(self) -> int:
+        """Association cells of all blocks."""
+
+    def blocks(self) -> list[dict[str, Any]]:
+        """The blocks, each with name, inputs, axes, outputs and weights (cells, outputs).
+
+        An axis is (is an angle, scale, origin, spacing, count, closed, degree).
+        """
+
+    def parameters(self, inputs: NDArray[np.float64], constants: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Absolute parameters (n, L, 5) at inputs (n, I): constants (L, 5) and what is added to them."""
+
+@final
+class Posterior:
+    """What the rows leave uncertain about constants and field, for known hyper-parameters."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        parameters: NDArray[np.float64],
+        setup: Setup,
+        options: Mapping[str, Any],
+    ) -> None:
+        """The posterior, linearised at parameters (L, 5) and set-up; options as for fit_field with `hyper`."""
+
+    def covariance(self, inputs: NDArray[np.float64], jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Covariance (n, m, m) of jacobian (n, m, P), by the problem's columns, times parameters."""
+
+def fit_constant(problem: Problem, options: Mapping[str, Any]) -> ConstantFit:
+    """Fit constants and set-up.
+
+    Args:
+        problem: With no columns, frames and targets are fitted alone.
+        options: prior (standard deviation of lengths in m, of angles in rad, whether the evidence scales them),
+            or None; noise (m, rad), or None to estimate it; robust "huber", "cauchy" or None; start, a set-up,
+            or None; parameters, a fixed arm (L, 5) or (n, L, 5), or None; threads, or None for all.
+
+    Raises:
+        CoreError: Measurements are too few or too alike.
+    """
+
+def fit_field(problem: Problem, constant: ConstantFit, options: Mapping[str, Any]) -> FieldFit:
+    """Fit constants, field and set-up together. Honours Ctrl-C.
+
+    Args:
+        problem: Over all candidates.
+        constant: The constants' fit, over those that are determined.
+        options: determined and driven, indices into the problem's columns; features (n, F); feature_ranges;
+            degree 2 or 3; prior as for fit_constant; hyper, or None to find them; threads, or None for all.
+
+    Raises:
+        CoreError: Values are far outside the model.
+    """
+
+def identifiability(
+    problem: Problem, parameters: NDArray[np.float64], setup: Setup
+) -> tuple[list[int], list[tuple[int, list[tuple[int, float]], bool]], int, float]:
+    """Which columns the poses determine.
+
+    Returns:
+        Determined indices into the problem's columns; for each of the others its index, the (index, part) it
+        is confounded with and whether the set-up takes part; rank of arm and set-up; their condition number.
+    """
+
+def residuals(problem: Problem, parameters: NDArray[np.float64], setup: Setup) -> NDArray[np.float64]:
+    """Measured minus predicted (n, m), base frame, zero where not measured; of distances (d, 1).
+
+    Args:
+        problem: Its columns do not matter.
+        parameters: (L, 5), or (n, L, 5) where they vary.
+        setup: Frames, targets and anchors.
+    """

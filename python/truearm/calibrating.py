@@ -1,0 +1,137 @@
+"""From measurements to a calibration: split, fit, validate, and fit to all rows."""
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from truearm.calibration import Calibration
+from truearm.core_set import select
+from truearm.details import ConstantDetails, VariableDetails
+from truearm.errors import InputError, UsageError
+from truearm.fitted_rows import FittedRows, sides
+from truearm.fitting import (
+    ENOUGH_FOR_HYPER,
+    Fits,
+    Stages,
+    Task,
+    feature_ranges,
+    feature_values,
+    fit_rows,
+    no_stages,
+)
+from truearm.identified import IdentifiedArm
+from truearm.judging import judge
+from truearm.measurements import Measurements
+from truearm.options import Options
+from truearm.plausibility import check_against
+from truearm.robot import Robot
+from truearm.splitting import Split, split_rows
+from truearm.validation import Validation
+
+
+def calibrate(
+    robot: Robot,
+    data: Measurements | Sequence[Measurements],
+    options: Options | None = None,
+    *,
+    threads: int | None = None,
+    stages: Stages = no_stages,
+    **more: Any,
+) -> Calibration:
+    """Calibrate an arm: fit to training rows, judge on held-out rows, then fit to all rows.
+
+    Args:
+        robot: The nominal arm.
+        data: What was measured.
+        options: How to calibrate; the command line's defaults without them.
+        threads: Threads at the most; the result does not depend on it.
+        stages: Called with the name of each stage; gives a context manager that surrounds it.
+        **more: The same options as keywords, such as model="constant", train_size=400 or seed=1.
+
+    Raises:
+        UsageError: If options contradict each other or the data.
+        InputError: If the data cannot be of this arm, or cannot be split as asked for.
+        WorkError: If the rows determine too little.
+    """
+    chosen = _options(options, more)
+    given = data if isinstance(data, Measurements) else Measurements.concatenate(data)
+    notices = check_against(given, robot)
+    given = given.deduplicated()
+    task = _task(robot, given, chosen, threads, stages)
+    split = split_rows(given, chosen.split)
+    trained = fit_rows(task, given.select(split.train))
+    validation = _validate(task, trained, given, split)
+    final, order = trained, split.train
+    if chosen.refit:
+        order = np.random.default_rng(chosen.split.seed).permutation(len(given))
+        final = fit_rows(task, given.select(order), _kept_hyper(trained))
+    return Calibration(
+        robot=robot,
+        options=chosen,
+        groups=tuple(task.groups),
+        selection=task.selection,
+        models=final.models(task.arm),
+        identifiability=final.identifiability,
+        constant=ConstantDetails.of(final.identifiability.determined, final.constant),
+        variable=_variable_details(final, chosen),
+        validation=validation,
+        rows=FittedRows.of(final, sides(len(given), split)[order], task.selection),
+        data_hash=given.hash(),
+        version=version("truearm"),
+        notices=tuple(notices),
+        seconds=trained.seconds,
+    )
+
+
+def _options(options: Options | None, more: Mapping[str, Any]) -> Options:
+    if options is not None and more:
+        raise UsageError("options were given both ways", rule="Give an Options object or keywords")
+    return options if options is not None else Options.of(**more)
+
+
+def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:
+    selection = select(data, options.use, options.judge_target)
+    where = ", ".join(data.files)
+    if selection.distances and options.model == "variable":
+        raise UsageError(
+            "distances alone cannot tell what varies over the workspace",
+            where=where,
+            rule="From distances only the constant model is fitted",
+            way_out="Give --model constant (model='constant')",
+        )
+    if options.frame == "world" and len(data.groups) > 1:
+        raise InputError(
+            f"there are {len(data.groups)} set-ups",
+            where=where,
+            rule="With the world as frame the base is part of the arm, so there can be one set-up only",
+            way_out="Calibrate from one of them, or leave --frame out",
+        )
+    arm = IdentifiedArm(robot, options.frame, options.parallel_within_deg)
+    return Task(arm, selection, data.groups, options, threads, stages)
+
+
+def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> Validation:
+    models = trained.models(task.arm)
+    held = data.select(split.holdout)
+    return Validation(
+        n_train=len(trained.data),
+        n_holdout=len(held),
+        holdout=judge(task, models, held, trained.data),
+        train=judge(task, models, trained.data, trained.data),
+    )
+
+
+def _kept_hyper(trained: Fits) -> dict[str, list[float]] | None:
+    """Hyper-parameters for the fit to all rows; None to find them again where few rows trained."""
+    if trained.variable is None or len(trained.data) < ENOUGH_FOR_HYPER:
+        return None
+    return trained.variable.hyper
+
+
+def _variable_details(fits: Fits, options: Options) -> VariableDetails | None:
+    if fits.variable is None:
+        return None
+    ranges = feature_ranges(feature_values(fits.data, options.features))
+    return VariableDetails.of(fits.variable, ranges)

@@ -1,0 +1,241 @@
+"""A calibration: an arm's identified parameters, what they predict, and how good that is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm import calibration_content
+from truearm._core import Chain
+from truearm.arrays import as_rows
+from truearm.calibration_file import read_calibration_file, write_calibration_file
+from truearm.core_set import Selection
+from truearm.details import ConstantDetails, VariableDetails
+from truearm.endpoints import Endpoint, at_target, at_tool
+from truearm.errors import Notice, WorkError
+from truearm.fitted_rows import FittedRows
+from truearm.identifiability import Identifiability
+from truearm.identified import IdentifiedArm
+from truearm.inputs import feature_columns
+from truearm.models import CONSTANT, VARIABLE, ArmModel
+from truearm.options import Options
+from truearm.robot import Robot
+from truearm.summary import summarise
+from truearm.uncertainty import ConstantSpread, Spread, VariableSpread
+from truearm.validation import Validation
+
+Floats = NDArray[np.float64]
+Features = Mapping[str, ArrayLike]
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Identified parameters of an arm. SI units; parameters in the order links, theta, d, a, alpha, beta.
+
+    Joint readings `q` are (n, N), or (N,) for one, and results have the same leading dimension. Where the
+    calibration was fitted with features, predictions need `features`: a number, or one for each pose, by
+    name. Without `group`, positions and poses are those of the robot file's tool, or of `tool`, in the
+    robot's base frame. With `group` they are those of the measured `target`, or of `tool`, in that set-up's world.
+
+    Attributes:
+        robot: The nominal arm.
+        options: How it was calibrated.
+        groups: Names of the set-ups.
+        selection: What of the measurements was used.
+        models: The fitted models by name: "nominal", "constant" and, if fitted, "variable".
+        identifiability: Which parameters the measurements determined.
+        constant: More about the constant model.
+        variable: More about the variable model; None where there is none.
+        validation: Errors on rows that took no part in fitting.
+        rows: The rows it was fitted to; None where they were left out of the file.
+        data_hash: SHA-256 of all measurements that were given.
+        version: Version of truearm that made it.
+        notices: What the user should know.
+        seconds: Time of the fits that were validated; empty for a calibration that was read.
+    """
+
+    robot: Robot
+    options: Options
+    groups: tuple[str, ...]
+    selection: Selection
+    models: Mapping[str, ArmModel]
+    identifiability: Identifiability
+    constant: ConstantDetails
+    variable: VariableDetails | None
+    validation: Validation
+    rows: FittedRows | None
+    data_hash: str
+    version: str
+    notices: tuple[Notice, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Calibration":
+        """Read a calibration file.
+
+        Raises:
+            InputError: If there is no such file, it is none of ours, is cut short or altered, or has a
+                layout that this version does not know.
+        """
+        arrays, content = read_calibration_file(Path(path))
+        return cls(**calibration_content.unpack(arrays, content, where=str(path)))
+
+    def save(self, path: str | Path, *, with_rows: bool = True) -> None:
+        """Write a calibration file, completely or not at all.
+
+        Args:
+            path: Where to.
+            with_rows: Whether to keep the measurements; without them a variable model has no standard
+                deviations.
+        """
+        arrays, content = calibration_content.pack(self, with_rows=with_rows)
+        write_calibration_file(Path(path), arrays, content)
+
+    @cached_property
+    def arm(self) -> IdentifiedArm:
+        """The arm with what of it was identified."""
+        return IdentifiedArm(self.robot, self.options.frame, self.options.parallel_within_deg)
+
+    @property
+    def model(self) -> ArmModel:
+        """The model that predicts: the variable one if there is one."""
+        return self.models[VARIABLE if VARIABLE in self.models else CONSTANT]
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What `truearm calibrate` writes to summary.json."""
+        return summarise(self)
+
+    def parameters(self, q: ArrayLike, *, features: Features | None = None) -> Floats:
+        """Absolute parameters of the links, (n, N, 5), or (N, 5) for one reading."""
+        rows, single = self._readings(q)
+        found = self.model.parameters(self._inputs(rows, features))[:, self.arm.links]
+        return found[0] if single else found
+
+    def position(
+        self,
+        q: ArrayLike,
+        *,
+        tool: ArrayLike | None = None,
+        group: str | None = None,
+        target: int | None = None,
+        features: Features | None = None,
+    ) -> Floats:
+        """Predicted points, (n, 3), m.
+
+        Args:
+            q: Readings.
+            tool: Transform (4, 4) from flange to tool, or a point (3,) in the flange frame.
+            group: Name of the set-up whose world is meant.
+            target: Measured target, from 1.
+            features: Features by name.
+        """
+        end = self._endpoint(tool, group, target)
+        rows, single = self._readings(q)
+        points = self._chain(end.flange_from_end).position(*self._at(rows, features))
+        if end.world_from_base is not None:
+            points = points @ end.world_from_base[:3, :3].T + end.world_from_base[:3, 3]
+        return points[0] if single else points
+
+    def pose(
+        self,
+        q: ArrayLike,
+        *,
+        tool: ArrayLike | None = None,
+        group: str | None = None,
+        target: int | None = None,
+        features: Features | None = None,
+    ) -> Floats:
+        """Predicted poses, (n, 4, 4); arguments as for position.
+
+        Raises:
+            WorkError: If the orientation of the target was not measured.
+        """
+        end = self._endpoint(tool, group, target)
+        if not end.has_orientation:
+            raise WorkError(
+                "the orientation of the target on the tool is not known",
+                rule="It was not measured",
+                way_out="Ask for its position, or give a tool",
+            )
+        rows, single = self._readings(q)
+        poses = self._chain(end.flange_from_end).pose(*self._at(rows, features))
+        if end.world_from_base is not None:
+            poses = end.world_from_base @ poses
+        return poses[0] if single else poses
+
+    def parameter_jacobian(
+        self,
+        q: ArrayLike,
+        pose: bool = False,
+        *,
+        tool: ArrayLike | None = None,
+        features: Features | None = None,
+    ) -> Floats:
+        """Derivatives at the calibrated parameters with respect to those of the links, link by link.
+
+        Returns:
+            (n, 3, 5 N), or (n, 6, 5 N) with `pose`: translation, then the rotation vector in the base frame.
+        """
+        rows, single = self._readings(q)
+        first = 5 * (self.arm.links.start or 0)
+        found = self._jacobian(rows, features, tool, pose=pose)[:, :, first:]
+        return found[0] if single else found
+
+    def position_std(
+        self, q: ArrayLike, *, tool: ArrayLike | None = None, features: Features | None = None
+    ) -> Floats:
+        """Standard deviation of each coordinate in the base frame, (n, 3), m.
+
+        This is the arm's part alone: no noise of a measurement, no uncertainty of where a device stands.
+        """
+        return self._std(q, tool, features, pose=False)
+
+    def pose_std(
+        self, q: ArrayLike, *, tool: ArrayLike | None = None, features: Features | None = None
+    ) -> Floats:
+        """The same of position and rotation vector in the base frame, (n, 6), m and rad."""
+        return self._std(q, tool, features, pose=True)
+
+    def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
+        rows, single = self._readings(q)
+        jacobian = self._jacobian(rows, features, tool, pose=pose)
+        covariance = self._spread.covariance(self._inputs(rows, features), jacobian)
+        found: Floats = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
+        return found[0] if single else found
+
+    def _jacobian(
+        self, rows: Floats, features: Features | None, tool: ArrayLike | None, *, pose: bool
+    ) -> Floats:
+        chain = self._chain(at_tool(self.robot, tool))
+        return chain.parameter_jacobian(*self._at(rows, features), pose=pose)
+
+    @cached_property
+    def _spread(self) -> Spread:
+        if self.variable is None:
+            return ConstantSpread.of(self)
+        return VariableSpread.of(self)
+
+    def _readings(self, q: ArrayLike) -> tuple[Floats, bool]:
+        return as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
+
+    def _inputs(self, rows: Floats, features: Features | None) -> Floats:
+        columns = feature_columns(features, self.options.features, len(rows))
+        return np.hstack([self.robot.joints_from_readings(rows), columns])
+
+    def _at(self, rows: Floats, features: Features | None) -> tuple[Floats, Floats]:
+        """Joint values (n, N) and parameters (n, L, 5) of readings."""
+        inputs = self._inputs(rows, features)
+        return np.ascontiguousarray(inputs[:, : self.robot.joint_count]), self.model.parameters(inputs)
+
+    def _endpoint(self, tool: ArrayLike | None, group: str | None, target: int | None) -> Endpoint:
+        if group is None and target is None:
+            return Endpoint(at_tool(self.robot, tool))
+        return at_target(self, tool, group, target)
+
+    def _chain(self, flange_from_end: Floats) -> Chain:
+        return self.arm.chain(self.robot.flange @ flange_from_end)

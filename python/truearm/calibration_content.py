@@ -1,0 +1,150 @@
+"""A calibration as arrays and JSON values, and back, bit for bit."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm import rows_content
+from truearm._core import Field, Setup
+from truearm.core_set import Selection
+from truearm.details import ConstantDetails, VariableDetails
+from truearm.errors import InputError
+from truearm.identifiability import Identifiability
+from truearm.identified import IdentifiedArm
+from truearm.models import ArmModel
+from truearm.options import Options
+from truearm.robot import Robot
+from truearm.validation import Validation
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
+
+Arrays = dict[str, NDArray[Any]]
+
+SETUP_PARTS: Final = ("frames", "targets", "rotations", "anchors")
+CONSTANT_KEYS: Final = ("noise_m", "noise_rad", "prior_scale", "iterations", "reason")
+VARIABLE_KEYS: Final = ("evidence", "evaluations", "inflation")
+
+
+def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and JSON values of a calibration."""
+    arrays: Arrays = {"constant.covariance": calibration.constant.covariance}
+    content: dict[str, Any] = {
+        "version": calibration.version,
+        "robot": calibration.robot.to_dict(),
+        "controller_model": None,
+        "options": calibration.options.to_dict(),
+        "groups": list(calibration.groups),
+        "selection": {**asdict(calibration.selection), "targets": list(calibration.selection.targets)},
+        "identifiability": calibration.identifiability.to_dict(),
+        "constant": _constant(calibration.constant),
+        "variable": _variable(calibration.variable),
+        "models": {name: _model(name, model, arrays) for name, model in calibration.models.items()},
+        "validation": calibration.validation.to_dict(),
+        "data_sha256": calibration.data_hash,
+        "rows": None,
+    }
+    if with_rows and calibration.rows is not None:
+        content["rows"] = rows_content.pack(calibration.rows, calibration.options.features, arrays)
+    return arrays, content
+
+
+def unpack(arrays: Arrays, content: Mapping[str, Any], *, where: str) -> dict[str, Any]:
+    """Arguments of Calibration.
+
+    Raises:
+        InputError: If a key or an array is missing.
+    """
+    try:
+        return _fields(arrays, content)
+    except KeyError as error:
+        raise InputError(f"the calibration has no {error}", where=where) from None
+
+
+def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
+    options = Options.of(**content["options"])
+    robot = Robot.from_dict(content["robot"])
+    arm = IdentifiedArm(robot, options.frame)
+    selection = content["selection"]
+    constant, rows = content["constant"], content["rows"]
+    inputs = robot.joint_count + len(options.features)
+    models = {
+        name: _read_model(name, stored, arrays, (inputs, arm.table.size))
+        for name, stored in content["models"].items()
+    }
+    return {
+        "robot": robot,
+        "options": options,
+        "groups": tuple(content["groups"]),
+        "selection": Selection(**{**selection, "targets": tuple(selection["targets"])}),
+        "models": models,
+        "identifiability": Identifiability.from_dict(content["identifiability"]),
+        "constant": ConstantDetails(
+            names=tuple(constant["names"]),
+            covariance=arrays["constant.covariance"],
+            **{key: constant[key] for key in CONSTANT_KEYS},
+        ),
+        "variable": _read_variable(content["variable"]),
+        "validation": Validation.from_dict(content["validation"]),
+        "rows": None if rows is None else rows_content.unpack(rows, arrays),
+        "data_hash": content["data_sha256"],
+        "version": content["version"],
+    }
+
+
+def _constant(details: ConstantDetails) -> dict[str, Any]:
+    return {"names": list(details.names), **{key: getattr(details, key) for key in CONSTANT_KEYS}}
+
+
+def _variable(details: VariableDetails | None) -> dict[str, Any] | None:
+    if details is None:
+        return None
+    return {
+        "hyper": {name: details.hyper[name] for name in sorted(details.hyper)},
+        "feature_ranges": list(details.feature_ranges),
+        **{key: getattr(details, key) for key in VARIABLE_KEYS},
+    }
+
+
+def _read_variable(content: Mapping[str, Any] | None) -> VariableDetails | None:
+    if content is None:
+        return None
+    return VariableDetails(
+        hyper=content["hyper"],
+        feature_ranges=tuple(content["feature_ranges"]),
+        **{key: content[key] for key in VARIABLE_KEYS},
+    )
+
+
+def _model(name: str, model: ArmModel, arrays: Arrays) -> dict[str, Any]:
+    """JSON values of a model; its arrays are added to `arrays`."""
+    arrays[f"{name}.constants"] = model.constants
+    for part in SETUP_PARTS:
+        arrays[f"{name}.{part}"] = getattr(model.setup, part)
+    if model.field is None:
+        return {"blocks": None}
+    blocks = []
+    for number, block in enumerate(model.field.blocks()):
+        arrays[f"{name}.block{number}.weights"] = block.pop("weights")
+        blocks.append({**block, "axes": [list(axis) for axis in block["axes"]]})
+    return {"blocks": blocks}
+
+
+def _read_model(name: str, content: Mapping[str, Any], arrays: Arrays, sizes: tuple[int, int]) -> ArmModel:
+    """A model; `sizes` are the numbers of inputs and of parameters."""
+    setup = Setup(*(arrays[f"{name}.{part}"] for part in SETUP_PARTS))
+    field = None
+    if content["blocks"] is not None:
+        blocks = [
+            {
+                **block,
+                "axes": [tuple(axis) for axis in block["axes"]],
+                "weights": arrays[f"{name}.block{number}.weights"],
+            }
+            for number, block in enumerate(content["blocks"])
+        ]
+        field = Field(*sizes, blocks)
+    return ArmModel(np.ascontiguousarray(arrays[f"{name}.constants"]), setup, field)

@@ -1,0 +1,171 @@
+"""`truearm calibrate`: learn an arm's parameters from measurements and judge them on held-out ones."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from truearm.calibrating import calibrate
+from truearm.calibration import Calibration
+from truearm.cli.console import print_json, say, say_wrapped, warn
+from truearm.cli.error_tables import print_errors
+from truearm.cli.progress import told_stages
+from truearm.errors import InputError, list_rows
+from truearm.files import write_whole
+from truearm.measurements import Measurements
+from truearm.options import Options
+from truearm.robot import Robot
+
+CALIBRATION_NAME = "calibration.calib"
+SUMMARY_NAME = "summary.json"
+OUTLIERS_NAMED = 3
+
+
+def command(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A library name, a TOML file or a URDF (FILE.urdf#TIP).")
+    ],
+    measurements: Annotated[
+        list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")],
+    holdout: Annotated[float, typer.Option(help="Share of the rows that is held out.")] = 0.3,
+    seed: Annotated[int, typer.Option(help="Seed of the split.")] = 7,
+    train_size: Annotated[
+        int | None, typer.Option(metavar="N", help="Training rows of each file.  [default: all others]")
+    ] = None,
+    split_by: Annotated[
+        str | None, typer.Option(metavar="COL,COL", help="Hold out whole groups equal in these columns.")
+    ] = None,
+    holdout_range: Annotated[
+        str | None,
+        typer.Option(
+            metavar="qJ:low|high:SHARE", help="Hold out the rows with the lowest or highest readings."
+        ),
+    ] = None,
+    use: Annotated[
+        str | None,
+        typer.Option(metavar="position|pose|targets", help="What to use.  [default: all that was measured]"),
+    ] = None,
+    judge_target: Annotated[
+        int, typer.Option(metavar="K", help="Judge at this target; another than 1 takes no part in the fit.")
+    ] = 1,
+    model: Annotated[
+        str, typer.Option(metavar="variable|constant", help="The constant model alone, or both.")
+    ] = "variable",
+    robust: Annotated[
+        str, typer.Option(metavar="none|huber|cauchy", help="Loss of the constant fit.")
+    ] = "none",
+    features: Annotated[
+        str | None, typer.Option(metavar="COL,COL", help="Columns that parameters may vary with.")
+    ] = None,
+    frame: Annotated[
+        str, typer.Option(metavar="free|world", help="world: the base is corrected, not fitted.")
+    ] = "free",
+    no_refit: Annotated[bool, typer.Option("--no-refit", help="Keep the fit to the training rows.")] = False,
+    length_unit: Annotated[
+        str | None, typer.Option(metavar="mm|m", help="Unit of columns that name none.")
+    ] = None,
+    angle_unit: Annotated[
+        str | None, typer.Option(metavar="deg|rad", help="Unit of joint columns that name none.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    degree: Annotated[int, typer.Option(hidden=True)] = 2,
+    threads: Annotated[int | None, typer.Option(hidden=True, min=1)] = None,
+) -> None:
+    """Calibrate an arm and judge the calibration on poses that took no part in it.
+
+    Writes DIR/calibration.calib, fitted to all rows after the errors were judged, and DIR/summary.json.
+    """
+    options = Options.of(
+        holdout=holdout,
+        seed=seed,
+        train_size=train_size,
+        split_by=split_by or (),
+        holdout_range=holdout_range,
+        use=use,
+        judge_target=judge_target,
+        model=model,
+        robust=robust,
+        features=features or (),
+        frame=frame,
+        refit=not no_refit,
+        degree=degree,
+    )
+    arm = Robot.load(robot)
+    data = Measurements.read_files(
+        measurements, length_unit=length_unit, angle_unit=angle_unit, joints=arm.joints
+    )
+    check_directory(output)
+    calibration = calibrate(arm, data, options, threads=threads, stages=told_stages())
+    warn(calibration.notices)
+    summary = write_results(calibration, output)
+    if as_json:
+        print_json(summary)
+        return
+    print_results(calibration)
+    print_places(output)
+    say(f"Judge it on other measurements: truearm evaluate {output / CALIBRATION_NAME} OTHER.csv")
+
+
+def check_directory(output: Path) -> None:
+    """Raise InputError, before any work, if `output` is there and is no directory."""
+    if output.exists() and not output.is_dir():
+        raise InputError("this is a file", where=str(output), rule="-o names a directory")
+
+
+def write_results(calibration: Calibration, output: Path) -> dict[str, Any]:
+    """Write both files to a directory, which is made if needed; the content of summary.json."""
+    summary = calibration.summary
+    output.mkdir(parents=True, exist_ok=True)
+    calibration.save(output / CALIBRATION_NAME)
+    write_whole(output / SUMMARY_NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+    return summary
+
+
+def print_places(output: Path) -> None:
+    """Say where the files are."""
+    say(f"Calibration: {output / CALIBRATION_NAME}")
+    say(f"Summary:     {output / SUMMARY_NAME}")
+
+
+def print_results(calibration: Calibration) -> None:
+    """Print what was determined, the errors, and what stands out."""
+    validation, summary = calibration.validation, calibration.summary
+    trained = f"fitted to {validation.n_train} rows, judged on {validation.n_holdout} others"
+    say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
+    print_determined(calibration)
+    print_errors(validation.holdout, f"{validation.n_holdout} held-out rows")
+    say(f"Noise that no model explains: {summary['noise_mm']:.3f} mm in each coordinate.")
+    _print_outliers(summary["outliers"])
+    if calibration.options.refit and calibration.rows is not None:
+        say(f"After that fitted to all {len(calibration.rows.data)} rows.")
+
+
+def print_determined(calibration: Calibration) -> None:
+    """Say which parameters the measurements determine, and what the others cannot be told from."""
+    found = calibration.identifiability
+    say(f"The poses determine {found.rank} of {found.parameters} parameters of the arm.")
+    for words, names in _by_reason(found.undetermined, found.words).items():
+        say_wrapped(f"  {', '.join(names)} {words}")
+
+
+def _by_reason(names: tuple[str, ...], sentences: tuple[str, ...]) -> dict[str, list[str]]:
+    """Undetermined names by what is said of them."""
+    grouped: dict[str, list[str]] = {}
+    for name, sentence in zip(names, sentences, strict=True):
+        grouped.setdefault(sentence.removeprefix(name).strip(), []).append(name)
+    return grouped
+
+
+def _print_outliers(outliers: list[dict[str, Any]]) -> None:
+    if not outliers:
+        return
+    worst = outliers[:OUTLIERS_NAMED]
+    rows = list_rows([outlier["row"] for outlier in worst])
+    more = f" and {len(outliers) - len(worst)} more" if len(outliers) > len(worst) else ""
+    say_wrapped(
+        f"Outliers: {rows}{more} ({worst[0]['distance_mm']:.2f} mm at the worst, in {worst[0]['file']}); "
+        "taken out of the variable fit, not out of the errors above."
+    )

@@ -1,0 +1,70 @@
+"""`truearm evaluate`: errors of a calibration on other measurements."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truearm.calibration import Calibration
+from truearm.cli.console import print_json, say, warn
+from truearm.cli.error_tables import print_errors
+from truearm.cli.progress import told_stages
+from truearm.evaluation import EvaluationOptions, evaluate
+from truearm.measurements import Measurements
+
+
+def command(
+    calibration: Annotated[
+        Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
+    ],
+    measurements: Annotated[
+        list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
+    ],
+    seed: Annotated[int, typer.Option(help="Seed of the draw of frame rows.")] = 7,
+    use: Annotated[
+        str | None,
+        typer.Option(metavar="position|pose|targets", help="What to use.  [default: all that was measured]"),
+    ] = None,
+    judge_target: Annotated[int, typer.Option(metavar="K", help="Judge at this target.")] = 1,
+    frame_rows: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Rows that find the frame and tool.  [default: a third, 400 at most]"),
+    ] = None,
+    keep_tool: Annotated[
+        bool, typer.Option("--keep-tool", help="Keep the tool; only the frame is found.")
+    ] = False,
+    keep_frames: Annotated[
+        bool, typer.Option("--keep-frames", help="Keep frame and tool, and judge all rows.")
+    ] = False,
+    length_unit: Annotated[
+        str | None, typer.Option(metavar="mm|m", help="Unit of columns that name none.")
+    ] = None,
+    angle_unit: Annotated[
+        str | None, typer.Option(metavar="deg|rad", help="Unit of joint columns that name none.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Judge a calibration on measurements of another day or another set-up.
+
+    Some rows find where the device and the tool are now, for each model alone; the others are judged.
+    """
+    options = EvaluationOptions(
+        seed=seed,
+        use=use,  # type: ignore[arg-type]
+        frame_rows=frame_rows,
+        keep_tool=keep_tool,
+        keep_frames=keep_frames,
+        judge_target=judge_target,
+    )
+    known = Calibration.load(calibration)
+    data = Measurements.read_files(
+        measurements, length_unit=length_unit, angle_unit=angle_unit, joints=known.robot.joints
+    )
+    found = evaluate(known, data, options, stages=told_stages())
+    warn(found.notices)
+    if as_json:
+        print_json(found.to_dict())
+        return
+    how = "frame and tool kept" if keep_frames else f"{found.n_frame} rows found the frame"
+    say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
+    print_errors(found.errors, f"{found.n_judged} rows")

@@ -1,0 +1,176 @@
+"""What of the measurements is used, and its arrays as the core reads them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import MeasurementSet
+from truearm.errors import InputError, UsageError
+from truearm.measurements import Measurements
+from truearm.robot import Robot
+from truearm.rotations import matrix_from_quaternion
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Use = Literal["position", "pose", "targets"]
+
+USES: Final = ("position", "pose", "targets")
+FIRST_TARGET: Final = 1
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What takes part in a fit, and where errors are judged.
+
+    Attributes:
+        targets: Measured points that are fitted, indices from 0; none with distances.
+        orientation: Whether the measured orientation is fitted.
+        distances: Whether distances stand in place of points.
+        judge: Measured point at which errors are judged, index from 0.
+    """
+
+    targets: tuple[int, ...]
+    orientation: bool = False
+    distances: bool = False
+    judge: int = 0
+
+    @property
+    def judges_another(self) -> bool:
+        """Whether errors are judged at a point that takes no part in the fit."""
+        return not self.distances and self.judge not in self.targets
+
+
+def select(data: Measurements, use: Use | None, judge_target: int = FIRST_TARGET) -> Selection:
+    """What to use of `data`: with None targets, else pose, else position, as far as was measured.
+
+    A target other than the first that errors are judged at takes no part in the fit.
+
+    Raises:
+        UsageError: If what is asked for was not measured.
+        InputError: If only some rows hold distances.
+    """
+    if _holds_distances(data):
+        if use is not None or judge_target != FIRST_TARGET:
+            raise UsageError("distances were measured, not points", where=", ".join(data.files))
+        return Selection((), distances=True)
+    _check_asked(data, use, judge_target)
+    judge = judge_target - 1
+    if use is None:
+        several = data.target_count - (judge > 0) > 1
+        use = "targets" if several else "position" if data.orientations is None else "pose"
+    points = range(data.target_count) if use == "targets" else (0,)
+    targets = tuple(point for point in points if point != judge or judge == 0)
+    return Selection(targets, orientation=use == "pose", judge=judge)
+
+
+def core_set(
+    robot: Robot,
+    data: Measurements,
+    selection: Selection,
+    groups: Sequence[str],
+    weight: Floats | None = None,
+) -> MeasurementSet:
+    """The rows of `data` as the core reads them.
+
+    Args:
+        robot: Turns readings into joint values.
+        data: The rows, n of them; empty rows of points and orientations count as not measured.
+        selection: What of them is used.
+        groups: Names of the set-ups, in the order of their numbers.
+        weight: Weights (n,); one each by default.
+    """
+    count = len(data)
+    number = {name: k for k, name in enumerate(groups)}
+    sigma = np.zeros(count) if data.sigma_m is None else np.nan_to_num(data.sigma_m, nan=0.0)
+    return MeasurementSet(
+        {
+            "joints": robot.joints_from_readings(data.readings),
+            "group": np.array([number[name] for name in data.group], dtype=np.int64),
+            "targets": np.ascontiguousarray(data.targets[:, list(selection.targets)]),
+            "rotations": rotations(data) if selection.orientation else None,
+            "sigma": sigma,
+            "weight": np.ones(count) if weight is None else weight,
+            "distances": _distances(data) if selection.distances else [],
+        }
+    )
+
+
+def rotations(data: Measurements) -> Floats:
+    """world_from_target rotations (n, 3, 3); NaN where not measured."""
+    found = np.full((len(data), 3, 3), np.nan)
+    if data.orientations is not None:
+        measured = np.isfinite(data.orientations).all(axis=1)
+        found[measured] = matrix_from_quaternion(data.orientations[measured])
+    return found
+
+
+def anchor_names(data: Measurements) -> list[str]:
+    """Names of the fixed points that distances lead to, in the order of their numbers."""
+    return sorted(set(data.anchor.tolist()) - {""}) if data.anchor is not None else []
+
+
+def distance_count(data: Measurements) -> int:
+    """How many distances were measured; that of a pair counts once."""
+    return len(_distances(data))
+
+
+def _distances(data: Measurements) -> list[tuple[int, bool, int, float]]:
+    """(row, whether to an anchor, anchor or other row, distance in m); each pair once."""
+    number = {name: k for k, name in enumerate(anchor_names(data))}
+    anchors, pairs = _words(data.anchor, len(data)), _words(data.pair, len(data))
+    entries, waiting = [], dict[str, int]()
+    for row, value in enumerate(_numbers(data.distance_m, len(data))):
+        if np.isnan(value):
+            continue
+        if anchors[row]:
+            entries.append((row, True, number[anchors[row]], value))
+        elif pairs[row] in waiting:
+            entries.append((waiting.pop(pairs[row]), False, row, value))
+        else:
+            waiting[pairs[row]] = row
+    return entries
+
+
+def _words(given: NDArray[np.str_] | None, count: int) -> list[str]:
+    return [""] * count if given is None else [str(word) for word in given]
+
+
+def _numbers(given: Floats | None, count: int) -> list[float]:
+    return [np.nan] * count if given is None else [float(number) for number in given]
+
+
+def _holds_distances(data: Measurements) -> bool:
+    if data.distance_m is None:
+        return False
+    has_point = np.asarray(np.any(np.all(np.isfinite(data.targets), axis=2), axis=1))
+    if has_point.any() and not has_point.all():
+        raise InputError(
+            f"only distances were measured in {data.row_names(~has_point)}, points in others",
+            where=", ".join(data.files),
+            rule="Either all rows hold points, or all hold distances",
+            way_out="Keep them in two files and calibrate from one",
+        )
+    return not bool(has_point.any())
+
+
+def _check_asked(data: Measurements, use: Use | None, judge_target: int) -> None:
+    where = ", ".join(data.files)
+    if use is not None and use not in USES:
+        raise UsageError(f'"{use}" is not known', where="use", rule="Either position, pose or targets")
+    if use == "pose" and data.orientations is None:
+        raise UsageError(
+            "no orientation was measured", where=where, rule="A pose needs the columns qw qx qy qz"
+        )
+    if use == "targets" and data.target_count < 2:
+        raise UsageError(
+            "one point was measured", where=where, rule="Further targets are columns x2 y2 z2, x3 y3 z3, ..."
+        )
+    if not 1 <= judge_target <= data.target_count:
+        raise UsageError(
+            f"there is no target {judge_target} to judge at",
+            where=where,
+            rule=f"{data.target_count} targets were measured",
+        )

@@ -1,0 +1,65 @@
+"""What a fit found beside the parameters themselves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import ConstantFit, FieldFit
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantDetails:
+    """About the constant model.
+
+    Attributes:
+        names: Names of the constants that were fitted, in the order of the covariance.
+        covariance: Of these constants, then of the set-up's unknowns, (u, u), SI.
+        noise_m: Noise of positions (or distances) beside the rows' own sigma, what is not modelled included.
+        noise_rad: The same of orientations.
+        prior_scale: Factor on the priors' standard deviations that the evidence chose.
+        iterations: Steps of the last minimisation.
+        reason: Why it ended.
+    """
+
+    names: tuple[str, ...]
+    covariance: Floats
+    noise_m: float
+    noise_rad: float
+    prior_scale: float
+    iterations: int
+    reason: str
+
+    @classmethod
+    def of(cls, names: tuple[str, ...], fit: ConstantFit) -> "ConstantDetails":
+        """Those of a fit."""
+        noise_m, noise_rad = fit.noise
+        return cls(
+            names, fit.covariance, noise_m, noise_rad, fit.prior_scale, fit.iterations, str(fit.reason)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class VariableDetails:
+    """About the variable model.
+
+    Attributes:
+        hyper: Hyper-parameters by name; amplitudes in rad and m, length scales in rad or parts of the range.
+        evidence: Logarithm of the evidence at its maximum.
+        evaluations: How often it was evaluated.
+        inflation: Factor on standard deviations that makes them agree with left-out residuals.
+        feature_ranges: How far the values of each feature reached.
+    """
+
+    hyper: dict[str, list[float]]
+    evidence: float
+    evaluations: int
+    inflation: float
+    feature_ranges: tuple[float, ...]
+
+    @classmethod
+    def of(cls, fit: FieldFit, feature_ranges: list[float]) -> "VariableDetails":
+        """Those of a fit."""
+        return cls(fit.hyper, fit.evidence, fit.evaluations, fit.inflation, tuple(feature_ranges))

@@ -1,0 +1,96 @@
+"""The point or frame that a prediction is of: the robot's tool, another tool, or a measured target."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.arrays import check_finite
+from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.robot import Robot
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Endpoint:
+    """What is predicted, and in which frame.
+
+    Attributes:
+        flange_from_end: Transform (4, 4).
+        world_from_base: Transform (4, 4), or None for the base frame.
+        has_orientation: Whether the rotation of `flange_from_end` means anything.
+    """
+
+    flange_from_end: Floats
+    world_from_base: Floats | None = None
+    has_orientation: bool = True
+
+
+def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
+    """flange_from_tool (4, 4) of the robot's own tool, or of `tool`: a transform (4, 4) or a point (3,).
+
+    Raises:
+        InputError: If it is neither.
+    """
+    if tool is None:
+        return robot.tool
+    given = np.asarray(tool, dtype=np.float64)
+    check_finite(given.reshape(1, -1), what="the tool's numbers")
+    if given.shape == (3,):
+        transform = np.eye(4)
+        transform[:3, 3] = given
+        return transform
+    if given.shape != (4, 4):
+        raise InputError(
+            f"the tool has shape {given.shape}",
+            rule="A transform (4, 4) from flange to tool, or a point (3,) in the flange frame, m",
+        )
+    return given
+
+
+def at_target(
+    calibration: "Calibration", tool: ArrayLike | None, group: str | None, target: int | None
+) -> Endpoint:
+    """A measured target, or a tool, in the world of a set-up.
+
+    Args:
+        calibration: Knows the set-ups.
+        tool: A tool instead of a target.
+        group: Name of the set-up; may be None where there is one.
+        target: Measured target from 1; the first by default.
+
+    Raises:
+        UsageError: If there is no such set-up or target.
+    """
+    number = _group_number(calibration, group)
+    setup, selection = calibration.model.setup, calibration.selection
+    world_from_base = None if selection.distances else setup.frames[number]
+    if tool is not None:
+        if target is not None:
+            raise UsageError("a tool and a target were given", rule="A prediction is of one of them")
+        return Endpoint(at_tool(calibration.robot, tool), world_from_base)
+    known = [k + 1 for k in selection.targets] or [1]
+    wanted = known[0] if target is None else target
+    if wanted not in known:
+        raise UsageError(f"there is no target {wanted}", rule=f"Targets {known} were fitted")
+    transform = np.eye(4)
+    transform[:3, 3] = setup.targets[number, known.index(wanted)]
+    if selection.orientation:
+        transform[:3, :3] = setup.rotations[number]
+    return Endpoint(transform, world_from_base, selection.orientation)
+
+
+def _group_number(calibration: "Calibration", group: str | None) -> int:
+    groups = calibration.groups
+    if group is None and len(groups) == 1:
+        return 0
+    if group not in groups:
+        what = "no group is named" if group is None else f'there is no group "{group}"'
+        near = "" if group is None else did_you_mean(group, groups)
+        raise UsageError(what, rule=f"The calibration knows {list_names(groups)}", way_out=near)
+    return groups.index(group)

@@ -1,0 +1,219 @@
+"""Errors of a calibration on measurements that it has not seen, mostly in a new set-up."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Setup, fit_constant
+from truearm.calibration import Calibration
+from truearm.core_set import Use, core_set, rotations, select
+from truearm.errors import InputError, Notice, UsageError, list_names
+from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
+from truearm.judging import judge, model_inputs
+from truearm.measurements import Measurements
+from truearm.models import ArmModel
+from truearm.plausibility import check_against
+from truearm.registration import register
+from truearm.splitting import DEFAULT_SEED
+from truearm.validation import Errors
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+MOST_FRAME_ROWS: Final = 400
+FEWEST_FRAME_ROWS: Final = 3
+
+
+@dataclass(frozen=True)
+class EvaluationOptions:
+    """How to judge a calibration on other measurements.
+
+    Attributes:
+        seed: Seed of the draw of frame rows.
+        use: What of the measurements to use, as in calibrate.
+        frame_rows: Rows of each set-up that find its frame and tool; a third by default, 400 at most.
+        keep_tool: Whether the tool stays as it was calibrated, so that the rows find the frame alone.
+        keep_frames: Whether the set-ups are those of the calibration, so that all rows are judged.
+        judge_target: Measured target, from 1, at which errors are judged.
+    """
+
+    seed: int = DEFAULT_SEED
+    use: Use | None = None
+    frame_rows: int | None = None
+    keep_tool: bool = False
+    keep_frames: bool = False
+    judge_target: int = 1
+
+    def __post_init__(self) -> None:
+        if self.keep_frames and self.frame_rows is not None:
+            raise UsageError("frame rows find frames", rule="With --keep-frames there are none to find")
+        if self.frame_rows is not None and self.frame_rows < FEWEST_FRAME_ROWS:
+            raise UsageError(f"{self.frame_rows} frame rows", rule=f"At least {FEWEST_FRAME_ROWS} are needed")
+        if self.seed < 0:
+            raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Errors on other measurements.
+
+    Attributes:
+        n_frame: Rows that found frame and tool.
+        n_judged: Rows that were judged.
+        errors: Errors of "nominal", "constant" and, if there is one, "variable".
+        notices: What the user should know.
+    """
+
+    n_frame: int
+    n_judged: int
+    errors: Mapping[str, Errors]
+    notices: tuple[Notice, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values, without the notices."""
+        errors = {name: found.to_dict() for name, found in self.errors.items()}
+        return {"n_frame": self.n_frame, "n_judged": self.n_judged, "errors": errors}
+
+
+def evaluate(
+    calibration: Calibration,
+    data: Measurements,
+    options: EvaluationOptions | None = None,
+    *,
+    stages: Stages = no_stages,
+    **more: Any,
+) -> Evaluation:
+    """Errors of a calibration's models on `data`.
+
+    Each model finds its own frames and tools on the same rows; nothing else of it moves.
+
+    Args:
+        calibration: What is judged.
+        data: Measurements of the same arm.
+        options: How to judge; defaults without them.
+        stages: Called with the name of each stage; gives a context manager that surrounds it.
+        **more: The same options as keywords, such as frame_rows=10.
+
+    Raises:
+        UsageError: If options contradict each other or the data.
+        InputError: If the data cannot be of this arm, or has too few rows.
+        WorkError: If the frame rows determine too little.
+    """
+    chosen = options if options is not None else EvaluationOptions(**more)
+    notices = check_against(data, calibration.robot)
+    data = data.deduplicated()
+    selection = select(data, chosen.use, chosen.judge_target)
+    if selection.distances:
+        raise InputError(
+            "distances were measured, not points",
+            where=", ".join(data.files),
+            rule="A calibration is judged at measured points",
+        )
+    task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
+    frame, judged = _divide(data, chosen)
+    with stages("finding frame and tool"):
+        models = {
+            name: ArmModel(
+                model.constants, _setup(task, calibration, name, data.select(frame), chosen), model.field
+            )
+            for name, model in calibration.models.items()
+        }
+    with stages("judging"):
+        errors = judge(task, models, data.select(judged), data.select(frame if len(frame) else judged))
+    return Evaluation(len(frame), len(judged), errors, tuple(notices))
+
+
+def _divide(data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]:
+    """Rows that find the frames, and rows that are judged; each set-up for itself."""
+    if options.keep_frames:
+        return np.empty(0, dtype=np.int64), np.arange(len(data))
+    frame, judged = [], []
+    for group in data.groups:
+        rows = np.flatnonzero(data.group == group)
+        count = options.frame_rows or min(len(rows) // 3, MOST_FRAME_ROWS)
+        if not FEWEST_FRAME_ROWS <= count < len(rows):
+            raise InputError(
+                f"{len(rows)} rows of set-up {list_names([group])}, of which {count} would find its frame",
+                where=", ".join(data.files),
+                rule=f"At least {FEWEST_FRAME_ROWS} rows find the frame, and some must be left to judge",
+                way_out="Measure more poses or give another --frame-rows",
+            )
+        order = rows[np.random.default_rng(options.seed).permutation(len(rows))]
+        frame.append(order[:count])
+        judged.append(order[count:])
+    return np.concatenate(frame), np.concatenate(judged)
+
+
+def _setup(
+    task: Task, calibration: Calibration, name: str, data: Measurements, options: EvaluationOptions
+) -> Setup:
+    """Frames and tools of a model in the set-ups of `task`, found from rows or kept."""
+    model = calibration.models[name]
+    if options.keep_frames:
+        return _stored(task, calibration, model.setup)
+    parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
+    if options.keep_tool:
+        return _registered(task, calibration, data, parameters, _stored(task, calibration, model.setup))
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
+    with core_errors(data):
+        return fit_constant(task.problem(measured, []), fit_options(task, parameters=parameters)).setup
+
+
+def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:
+    """The calibration's own set-up for each of the task's groups: by name, or its only one."""
+    known = calibration.groups
+    numbers = [
+        0 if len(known) == 1 else known.index(group)
+        for group in task.groups
+        if group in known or len(known) == 1
+    ]
+    if len(numbers) < len(task.groups):
+        missing = [group for group in task.groups if group not in known]
+        raise UsageError(
+            f"the calibration has no set-up {list_names(missing)}",
+            rule=f"It knows {list_names(known)}",
+            way_out='Name the set-up that is meant in a column "group"',
+        )
+    fitted, wanted = calibration.selection.targets, task.selection.targets
+    lacking = [target + 1 for target in wanted if target not in fitted]
+    if lacking or (task.selection.orientation and not calibration.selection.orientation):
+        what = f"target {lacking[0]}" if lacking else "the orientation of the tool"
+        raise UsageError(
+            f"{what} took no part in the calibration",
+            rule="Only what was fitted can be kept",
+            way_out="Give --use position, or let the set-up be found",
+        )
+    chosen = [fitted.index(target) for target in wanted]
+    return Setup(
+        np.ascontiguousarray(setup.frames[numbers]),
+        np.ascontiguousarray(setup.targets[numbers][:, chosen]),
+        np.ascontiguousarray(setup.rotations[numbers]),
+        setup.anchors,
+    )
+
+
+def _registered(
+    task: Task, calibration: Calibration, data: Measurements, parameters: Floats, known: Setup
+) -> Setup:
+    """Frames from the rows, with the tools of `known`."""
+    if task.arm.world_is_known:
+        return known
+    joints = task.arm.robot.joints_from_readings(data.readings)
+    flange = task.arm.flange_chain.pose(joints, parameters)
+    measured, turned = data.targets[:, list(task.selection.targets)], rotations(data)
+    frames = []
+    details = calibration.constant
+    lever = details.noise_m / details.noise_rad if task.selection.orientation else 0.0
+    for number, group in enumerate(task.groups):
+        rows = data.group == group
+        points = flange[rows, None, :3, 3] + np.einsum(
+            "nij,tj->nti", flange[rows, :3, :3], known.targets[number]
+        )
+        seen = np.isfinite(measured[rows]).all(axis=2)
+        with_turn = np.isfinite(turned[rows]).all(axis=(1, 2)) & task.selection.orientation
+        predicted = flange[rows][with_turn, :3, :3] @ known.rotations[number]
+        frames.append(register(points[seen], measured[rows][seen], predicted, turned[rows][with_turn], lever))
+    return Setup(np.stack(frames), known.targets, known.rotations, known.anchors)

@@ -1,0 +1,94 @@
+"""The rows that a calibration was fitted to, and what became of each."""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from truearm.core_set import Selection
+from truearm.fitting import Fits
+from truearm.measurements import Measurements
+from truearm.splitting import Split
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+UNUSED: Final = 0
+TRAINED: Final = 1
+HELD_OUT: Final = 2
+OUTLIER_WEIGHT: Final = 1e-3
+"""Weight of a row that was taken out of the fit."""
+OVERWHELMING: Final = 1e-6
+"""A row is an outlier where the model makes errors as large as its own less likely than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRows:
+    """n rows in the order they were fitted in.
+
+    Attributes:
+        data: What was measured.
+        side: For each row (n,) whether it was UNUSED, TRAINED or HELD_OUT when the errors were judged.
+        weight: Weights in the final fit (n,).
+        residual: Measured minus predicted (n, m), base frame: three a target in m, then three of the
+            orientation in rad; zero where not measured. For distances (d, 1).
+        score: Squared standardised residuals over the limit (n,); above one is an outlier.
+        distance_m: Lengths of the residuals that were judged (n,).
+    """
+
+    data: Measurements
+    side: NDArray[np.int64]
+    weight: Floats
+    residual: Floats
+    score: Floats
+    distance_m: Floats
+
+    @classmethod
+    def of(cls, fits: Fits, side: NDArray[np.int64], selection: Selection) -> "FittedRows":
+        """The rows of a fit; `side` (n,) in their order."""
+        if fits.variable is None:
+            width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
+            residual = fits.constant.residuals.reshape(-1, width)
+            score, distance = _judge_constant(fits, residual, selection)
+            return cls(fits.data, side, fits.constant.weights, residual, score, distance)
+        weight = np.ones(len(fits.data))
+        weight[fits.variable.outliers] = OUTLIER_WEIGHT
+        variable = fits.variable
+        return cls(fits.data, side, weight, variable.residuals, variable.scores, variable.distances)
+
+    def outliers(self) -> list[dict[str, Any]]:
+        """File, row, score and distance_mm of each outlier, the worst first."""
+        found = np.flatnonzero(self.score > 1.0)
+        return [
+            {
+                "file": str(self.data.sources[k]),
+                "row": int(self.data.rows[k]),
+                "score": float(self.score[k]),
+                "distance_mm": float(self.distance_m[k] * MM_PER_METRE),
+            }
+            for k in found[np.argsort(-self.score[found], kind="stable")]
+        ]
+
+
+def sides(count: int, split: Split) -> NDArray[np.int64]:
+    """For each of `count` rows on which side of the split it stands."""
+    side = np.full(count, UNUSED, dtype=np.int64)
+    side[split.train] = TRAINED
+    side[split.holdout] = HELD_OUT
+    return side
+
+
+def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> tuple[Floats, Floats]:
+    """Score and distance (n,) of each row against the constant model; rows of distances are not judged."""
+    if selection.distances:
+        return np.zeros(len(fits.data)), np.zeros(len(fits.data))
+    position, orientation = fits.constant.noise
+    own = np.zeros(len(fits.data)) if fits.data.sigma_m is None else np.nan_to_num(fits.data.sigma_m)
+    variance = np.repeat((position**2 + own**2)[:, None], residual.shape[1], axis=1)
+    if selection.orientation:
+        variance[:, -3:] = orientation**2
+    squares = (residual**2 / variance).sum(axis=1)
+    freedom = np.maximum((residual != 0.0).sum(axis=1), 1)
+    return squares / chi2.isf(OVERWHELMING, freedom), np.linalg.norm(residual[:, :3], axis=1)

@@ -1,0 +1,260 @@
+"""The three fits of one set of rows: frame and tool alone, constants, and what varies."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import (
+    ConstantFit,
+    CoreError,
+    FieldFit,
+    MeasurementSet,
+    Problem,
+    fit_constant,
+    fit_field,
+)
+from truearm.core_set import Selection, core_set, distance_count
+from truearm.errors import InputError, WorkError, list_names
+from truearm.identifiability import Identifiability, identify
+from truearm.identified import IdentifiedArm
+from truearm.measurements import Measurements
+from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
+from truearm.options import Options
+
+Floats = NDArray[np.float64]
+Hyper = dict[str, list[float]]
+Stages = Callable[[str], AbstractContextManager[Any]]
+
+ENOUGH_FOR_HYPER: Final = 400
+"""The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
+
+
+def no_stages(_: str) -> AbstractContextManager[None]:
+    """Says nothing about the stages of the work."""
+    return nullcontext()
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is the same for every set of rows that is fitted.
+
+    Attributes:
+        arm: The arm and its candidates.
+        selection: What of the measurements is used.
+        groups: Names of the set-ups, in the order of their numbers.
+        options: How to fit.
+        threads: Threads at the most; the result does not depend on it.
+        stages: Told what is being done.
+    """
+
+    arm: IdentifiedArm
+    selection: Selection
+    groups: Sequence[str]
+    options: Options
+    threads: int | None = None
+    stages: Stages = no_stages
+
+    def problem(self, measured: MeasurementSet, columns: Sequence[int]) -> Problem:
+        """The core's problem of rows and parameters asked for."""
+        return Problem(self.arm.flange_chain, measured, list(columns), self.arm.world_is_known)
+
+    def columns(self, names: Sequence[str]) -> list[int]:
+        """Columns of the candidates of these names, ascending."""
+        named = zip(self.arm.candidates.columns, self.arm.candidates.names, strict=True)
+        return [column for column, name in named if name in names]
+
+
+@dataclass(frozen=True, eq=False)
+class Fits:
+    """What one set of rows says.
+
+    Attributes:
+        data: The rows, n of them.
+        nominal: Frame and tool alone.
+        identifiability: What the rows determine.
+        constant: Constants with frame and tool.
+        variable: Constants, field, frame and tool together; None where only constants were asked for.
+        seconds: Time of the constant and the variable fit.
+    """
+
+    data: Measurements
+    nominal: ConstantFit
+    identifiability: Identifiability
+    constant: ConstantFit
+    variable: FieldFit | None
+    seconds: dict[str, float]
+
+    def models(self, arm: IdentifiedArm) -> dict[str, ArmModel]:
+        """The fitted models by name."""
+        models = {
+            NOMINAL: ArmModel(arm.table, self.nominal.setup),
+            CONSTANT: ArmModel(self.constant.parameters, self.constant.setup),
+        }
+        if self.variable is not None:
+            models[VARIABLE] = ArmModel(self.variable.parameters, self.variable.setup, self.variable.field)
+        return models
+
+
+def fit_rows(task: Task, data: Measurements, hyper: Hyper | None = None) -> Fits:
+    """Fit all models to all rows of `data`.
+
+    Args:
+        task: What to fit.
+        data: The rows.
+        hyper: Hyper-parameters of the field to keep; found from the rows by default.
+
+    Raises:
+        WorkError: If the rows are too few or too alike.
+    """
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
+    began = time.perf_counter()
+    with task.stages("finding frame and tool"), core_errors(data):
+        nominal = fit_constant(task.problem(measured, []), fit_options(task))
+    with task.stages("asking what the poses determine"):
+        found = identify(task.arm, measured, nominal.setup)
+        _check_enough(task, data, found)
+    with task.stages("fitting the constants"), core_errors(data):
+        chosen = task.problem(measured, task.columns(found.determined))
+        constant = fit_constant(
+            chosen, fit_options(task, prior=task.options.prior, robust=task.options.robust)
+        )
+    seconds = {CONSTANT: time.perf_counter() - began}
+    variable = None
+    if task.options.model == VARIABLE:
+        began = time.perf_counter()
+        with task.stages("fitting what varies"), core_errors(data):
+            variable = _fit_field(task, measured, constant, found, data, hyper)
+        seconds[VARIABLE] = time.perf_counter() - began
+    return Fits(data, nominal, found, constant, variable, seconds)
+
+
+def fit_options(
+    task: Task,
+    prior: tuple[float, float, bool] | None = None,
+    robust: str | None = None,
+    parameters: Floats | None = None,
+) -> dict[str, Any]:
+    """The core's options of a constant fit; `parameters` (n, L, 5) are the arm where it is not fitted."""
+    return {
+        "prior": prior,
+        "noise": None,
+        "robust": robust,
+        "start": None,
+        "parameters": parameters,
+        "threads": task.threads,
+    }
+
+
+def field_options(
+    task: Task, names: Sequence[str], features: Floats, ranges: Sequence[float], hyper: Hyper | None
+) -> dict[str, Any]:
+    """The core's options of a field.
+
+    Args:
+        task: What to fit.
+        names: Names of the candidates whose constants the data determines.
+        features: Values of the features (n, F).
+        ranges: How far the values of each feature reach.
+        hyper: Known hyper-parameters, or None to find them.
+    """
+    candidates = task.arm.candidates
+    return {
+        "determined": [k for k, name in enumerate(candidates.names) if name in names],
+        "driven": list(candidates.driven),
+        "features": np.ascontiguousarray(features),
+        "feature_ranges": list(ranges),
+        "degree": task.options.degree,
+        "prior": task.options.prior,
+        "hyper": hyper,
+        "threads": task.threads,
+    }
+
+
+def _fit_field(
+    task: Task,
+    measured: MeasurementSet,
+    constant: ConstantFit,
+    found: Identifiability,
+    data: Measurements,
+    hyper: Hyper | None,
+) -> FieldFit:
+    values = feature_values(data, task.options.features)
+    options = field_options(task, found.determined, values, feature_ranges(values), hyper)
+    return fit_field(task.problem(measured, task.arm.candidates.columns), constant, options)
+
+
+def feature_values(data: Measurements, names: Sequence[str]) -> Floats:
+    """Values (n, F) of the named columns.
+
+    Raises:
+        InputError: If a column is missing, or empty in some rows.
+    """
+    values = np.empty((len(data), len(names)))
+    for k, name in enumerate(names):
+        where = ", ".join(data.files)
+        if name not in data.features.columns:
+            raise InputError(
+                f'there is no column "{name}" to use as a feature',
+                where=where,
+                rule=f"There are {list_names(map(str, data.features.columns)) or 'no further columns'}",
+            )
+        values[:, k] = data.features[name].to_numpy(np.float64)
+        bad = ~np.isfinite(values[:, k])
+        if bad.any():
+            raise InputError(
+                f'the feature "{name}" is empty in {data.row_names(bad)}',
+                where=where,
+                rule="The field needs its features at every pose",
+                way_out="Fill the cells or leave out the rows",
+            )
+    return values
+
+
+def feature_ranges(values: Floats) -> list[float]:
+    """How far each column of `values` (n, F) reaches."""
+    return [float(reach) for reach in np.ptp(values, axis=0)] if values.shape[1] else []
+
+
+def _check_enough(task: Task, data: Measurements, found: Identifiability) -> None:
+    """Refuse rows that leave nothing to tell the unknowns from the noise with."""
+    values = _measured_values(task, data)
+    if values > found.total_rank:
+        return
+    unknowns = found.parameters + _setup_unknowns(task)
+    per_row = max(values // len(data), 1)
+    raise WorkError(
+        f"{values} measured values in {len(data)} rows cannot determine up to {unknowns} unknowns",
+        where=", ".join(data.files),
+        rule="There must be more measured values than unknowns",
+        way_out=f"Measure at least {unknowns // per_row + 1} poses to train on, or use a larger --train-size",
+    )
+
+
+def _measured_values(task: Task, data: Measurements) -> int:
+    if task.selection.distances:
+        return distance_count(data)
+    points = np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2).sum()
+    turned = 0
+    if task.selection.orientation and data.orientations is not None:
+        turned = np.isfinite(data.orientations).all(axis=1).sum()
+    return 3 * int(points + turned)
+
+
+def _setup_unknowns(task: Task) -> int:
+    frame = 0 if task.arm.world_is_known or task.selection.distances else 6
+    points = 1 if task.selection.distances else len(task.selection.targets)
+    return len(task.groups) * (frame + 3 * points + (3 if task.selection.orientation else 0))
+
+
+@contextmanager
+def core_errors(data: Measurements) -> Iterator[None]:
+    """Errors of the core as WorkError that names the files."""
+    try:
+        yield
+    except CoreError as error:
+        raise WorkError(str(error), where=", ".join(data.files)) from error

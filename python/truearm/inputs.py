@@ -1,0 +1,42 @@
+"""Inputs of a field: joint values, and features given by name."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.arrays import check_finite
+from truearm.errors import InputError, UsageError, list_names
+
+Floats = NDArray[np.float64]
+
+
+def feature_columns(given: Mapping[str, ArrayLike] | None, names: Sequence[str], count: int) -> Floats:
+    """Values (count, F) of the named features.
+
+    Args:
+        given: A number, or (count,) numbers, by name.
+        names: Names of the F features that are needed.
+        count: Number of poses.
+
+    Raises:
+        UsageError: If a feature is missing, or one is given that is not needed.
+        InputError: If a value is no number, is not finite, or there are too many or too few.
+    """
+    known = given or {}
+    if set(known) != set(names):
+        what = list_names(sorted(map(str, known))) or "no features"
+        needed = list_names(names) or "none"
+        raise UsageError(f"{what} given", where="features", rule=f"The calibration needs {needed}")
+    columns = np.empty((count, len(names)))
+    for k, name in enumerate(names):
+        try:
+            columns[:, k] = np.asarray(known[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(
+                f'the feature "{name}" has shape {np.shape(known[name])}',
+                rule=f"One number, or {count}: one for each pose",
+            ) from None
+    if columns.size:
+        check_finite(columns, what="features")
+    return columns

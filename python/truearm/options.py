@@ -1,0 +1,116 @@
+"""What a calibration may be told: the options of the command line, with the same defaults."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Final, Literal
+
+from truearm.core_set import FIRST_TARGET, USES, Use
+from truearm.errors import UsageError, did_you_mean, list_names
+from truearm.identified import Frame
+from truearm.parameters import PARALLEL_WITHIN_DEG
+from truearm.splitting import HoldoutRange, SplitRule
+
+ModelName = Literal["variable", "constant"]
+Robust = Literal["none", "huber", "cauchy"]
+
+CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
+    "use": (None, *USES),
+    "model": ("variable", "constant"),
+    "robust": ("none", "huber", "cauchy"),
+    "frame": ("free", "world"),
+    "degree": (2, 3),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to calibrate.
+
+    Attributes:
+        split: Which rows train and which are held out.
+        use: What of the measurements to use; None for all: targets, else pose, else position.
+        model: "variable", or "constant" for that alone.
+        robust: Loss of the constant fit.
+        refit: Whether the calibration is fitted to all rows after validation.
+        features: Columns that the field depends on beside the joints.
+        frame: "free" for an unknown world_from_base of each set-up; "world" for none and a base that is
+            corrected like a link.
+        judge_target: Measured target, from 1, at which errors are judged; one other than the first takes
+            no part in the fit.
+        degree: Degree of the memberships, 2 or 3.
+        prior_mm: Standard deviation of the prior of lengths, before the evidence scales it.
+        prior_mrad: The same of angles.
+        parallel_within_deg: Angle between axes up to which beta is asked for in place of d.
+    """
+
+    split: SplitRule = field(default_factory=SplitRule)
+    use: Use | None = None
+    model: ModelName = "variable"
+    robust: Robust = "none"
+    refit: bool = True
+    features: tuple[str, ...] = ()
+    frame: Frame = "free"
+    judge_target: int = FIRST_TARGET
+    degree: int = 2
+    prior_mm: float = 2.0
+    prior_mrad: float = 2.0
+    parallel_within_deg: float = PARALLEL_WITHIN_DEG
+
+    def __post_init__(self) -> None:
+        for name, known in CHOICES.items():
+            value = getattr(self, name)
+            if value not in known:
+                words = " or ".join(str(choice) for choice in known if choice is not None)
+                raise UsageError(f'"{value}" is not known', where=name, rule=f"Either {words}")
+        for name in ("prior_mm", "prior_mrad", "parallel_within_deg"):
+            if not getattr(self, name) > 0.0:
+                raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
+
+        if self.features and self.model == "constant":
+            raise UsageError(
+                "features belong to what varies",
+                where="features",
+                way_out="Leave them out, or --model constant",
+            )
+
+    @property
+    def prior(self) -> tuple[float, float, bool]:
+        """Standard deviations of lengths (m) and angles (rad), and that the evidence scales them."""
+        return self.prior_mm / 1e3, self.prior_mrad / 1e3, True
+
+    @classmethod
+    def of(cls, **given: Any) -> "Options":
+        """Options from keywords: those of this class and those of SplitRule, side by side.
+
+        Raises:
+            UsageError: If there is no such option or a value breaks a rule.
+        """
+        known = (*cls.__dataclass_fields__, *SplitRule.__dataclass_fields__)
+        for name in given:
+            if name not in known:
+                raise UsageError(
+                    f'there is no option "{name}"',
+                    rule=f"There are {list_names(sorted(set(known) - {'split'}))}",
+                    way_out=did_you_mean(name, known),
+                )
+        splitting = {name: given.pop(name) for name in SplitRule.__dataclass_fields__ if name in given}
+        if isinstance(splitting.get("holdout_range"), str):
+            splitting["holdout_range"] = HoldoutRange.parse(splitting["holdout_range"])
+        for part, names in ((splitting, ("split_by",)), (given, ("features",))):
+            part |= {name: _words(part[name]) for name in names if name in part}
+        if splitting:
+            given["split"] = SplitRule(**splitting)
+        return cls(**given)
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values, flat."""
+        content = asdict(self)
+        split: dict[str, Any] = content.pop("split")
+        split["split_by"] = list(self.split.split_by)
+        split["holdout_range"] = None if self.split.holdout_range is None else str(self.split.holdout_range)
+        return split | content | {"features": list(self.features)}
+
+
+def _words(value: Any) -> tuple[str, ...]:  # noqa: ANN401
+    """Names given as one text with commas, or one by one."""
+    return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else tuple(value)

@@ -1,0 +1,60 @@
+"""The rows of a calibration as arrays and JSON values, and back, bit for bit."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from truearm.fitted_rows import FittedRows
+from truearm.measurements import Measurements
+
+Arrays = dict[str, NDArray[Any]]
+
+NUMBERS: Final = ("readings", "targets", "orientations", "sigma_m", "distance_m", "rows")
+WORDS: Final = ("group", "sources", "anchor", "pair")
+OUTCOMES: Final = ("side", "weight", "residual", "score", "distance_m")
+
+
+def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str, Any]:
+    """JSON values of rows; their arrays are added to `arrays`."""
+    words: dict[str, list[str]] = {}
+    for name in NUMBERS:
+        value = getattr(rows.data, name)
+        if value is not None:
+            arrays[f"rows.{name}"] = value
+    for name in WORDS:
+        value = getattr(rows.data, name)
+        if value is not None:
+            known, index = np.unique(value, return_inverse=True)
+            words[name] = known.tolist()
+            arrays[f"rows.{name}"] = index.astype(np.int64)
+    for name in features:
+        arrays[f"rows.feature.{name}"] = rows.data.features[name].to_numpy(np.float64)
+    for name in OUTCOMES:
+        arrays[f"outcome.{name}"] = getattr(rows, name)
+    return {"words": words, "features": list(features), "joint_units": list(rows.data.joint_units)}
+
+
+def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
+    """The rows that `pack` described.
+
+    Raises:
+        KeyError: If an array is missing.
+    """
+    index = pd.RangeIndex(len(arrays["rows.readings"]))
+    words: dict[str, Any] = {
+        name: np.array(known, dtype=np.str_)[arrays[f"rows.{name}"]]
+        for name, known in content["words"].items()
+    }
+    fields: dict[str, Any] = dict.fromkeys(NUMBERS)
+    fields |= {name: np.array(arrays[f"rows.{name}"]) for name in NUMBERS if f"rows.{name}" in arrays}
+    columns = {name: arrays[f"rows.feature.{name}"] for name in content["features"]}
+    data = Measurements(
+        **fields,
+        **words,
+        features=pd.DataFrame(columns, index=index),
+        joint_units=tuple(content["joint_units"]),
+    )
+    return FittedRows(data, **{name: np.array(arrays[f"outcome.{name}"]) for name in OUTCOMES})

@@ -1,0 +1,253 @@
+"""Which rows train and which are held out."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.measurements import Measurements
+
+Rows = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+DEFAULT_HOLDOUT: Final = 0.3
+DEFAULT_SEED: Final = 7
+RANGE_FORM: Final = re.compile(r"q([1-9]\d*):(low|high):(.+)")
+
+
+@dataclass(frozen=True)
+class HoldoutRange:
+    """The tail of one joint's readings: the `share` of the rows with the lowest or highest ones.
+
+    Attributes:
+        joint: Joint, counted from 1.
+        high: Whether the highest readings are held out, not the lowest.
+        share: Part of the rows, between 0 and 1.
+    """
+
+    joint: int
+    high: bool
+    share: float
+
+    @classmethod
+    def parse(cls, text: str) -> "HoldoutRange":
+        """The range that "q2:high:0.3" stands for.
+
+        Raises:
+            UsageError: If it stands for none.
+        """
+        found = RANGE_FORM.fullmatch(text)
+        share = _number(found[3]) if found else None
+        if found is None or share is None:
+            raise UsageError(
+                f'"{text}" is no range to hold out',
+                rule="Write qJ:low:SHARE or qJ:high:SHARE, such as q2:high:0.3",
+            )
+        _check_share(share, f'the share in "{text}"')
+        return cls(int(found[1]), found[2] == "high", share)
+
+    def __str__(self) -> str:
+        return f"q{self.joint}:{'high' if self.high else 'low'}:{self.share:g}"
+
+
+@dataclass(frozen=True)
+class SplitRule:
+    """How rows are divided; for each file alone, with numpy.random.default_rng(seed).
+
+    Plain: permutation(n); from int((1 - holdout) n) on they are held out, of the others the first
+    `train_size` train. With `split_by` the sorted different values of those columns are permuted, the last
+    share of them is held out with all their rows, and the training rows are a permutation of the other
+    rows. With `holdout_range` the tail is held out instead, and the training rows follow in the same way.
+
+    Rows with the same joint vector, and the two rows of a pair, stay together, on the side of the first.
+
+    Attributes:
+        holdout: Part of the rows that is held out, between 0 and 1.
+        seed: Seed of the permutations.
+        train_size: Training rows of each file; all that are not held out by default.
+        split_by: Columns.
+        holdout_range: Tail of one joint.
+    """
+
+    holdout: float = DEFAULT_HOLDOUT
+    seed: int = DEFAULT_SEED
+    train_size: int | None = None
+    split_by: tuple[str, ...] = ()
+    holdout_range: HoldoutRange | None = None
+
+    def __post_init__(self) -> None:
+        _check_share(self.holdout, "the share to hold out")
+        if self.seed < 0:
+            raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
+        if self.train_size is not None and self.train_size < 1:
+            raise UsageError(f"the train size is {self.train_size}", rule="It must be positive")
+        if self.split_by and self.holdout_range is not None:
+            raise UsageError(
+                "rows can be held out by columns or by a joint's range, not both",
+                way_out="Give --split-by or --holdout-range",
+            )
+
+
+@dataclass(frozen=True)
+class Split:
+    """Row indices, counted from 0.
+
+    Attributes:
+        train: Training rows (t,), in the permutations' order.
+        holdout: Held-out rows (h,), in the permutations' order.
+    """
+
+    train: Rows
+    holdout: Rows
+
+
+def split_rows(data: Measurements, rule: SplitRule) -> Split:
+    """Divide the rows of `data`.
+
+    Raises:
+        UsageError: If a column or joint is not there, or the train size reaches into the held-out rows.
+        InputError: If no rows would train or be held out, or a held-out set-up has no training rows.
+    """
+    first_of = _first_of_kin(data)
+    parts = [_split_file(data, np.flatnonzero(data.sources == file), first_of, rule) for file in data.files]
+    split = Split(
+        train=np.concatenate([part.train for part in parts]),
+        holdout=np.concatenate([part.holdout for part in parts]),
+    )
+    _check_groups(data, split)
+    return split
+
+
+def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule) -> Split:
+    """Split the rows (r,) of one file; `first_of` (n,) names each row's first kin."""
+    rng = np.random.default_rng(rule.seed)
+    if rule.holdout_range is not None:
+        held = _tail(data, rows, rule.holdout_range)
+    elif rule.split_by:
+        held = _drawn_keys(data, rows, rule, rng)
+    else:
+        order = rng.permutation(len(rows))
+        held = np.zeros(len(rows), dtype=np.bool_)
+        held[order[int((1.0 - rule.holdout) * len(rows)) :]] = True
+    held = _together(held, rows, first_of)
+    if rule.split_by or rule.holdout_range is not None:
+        order = np.concatenate([rng.permutation(np.flatnonzero(~held)), np.flatnonzero(held)])
+    train, holdout = order[~held[order]], order[held[order]]
+    where = str(data.sources[rows[0]])
+    _check_sizes(len(train), len(holdout), rule, where)
+    return Split(train=rows[train[: rule.train_size]], holdout=rows[holdout])
+
+
+def _tail(data: Measurements, rows: Rows, tail: HoldoutRange) -> Mask:
+    """Held-out mask (r,): readings from the boundary on, so that equal ones stay together."""
+    if tail.joint > data.joint_count:
+        raise UsageError(
+            f'"{tail}" names joint {tail.joint}', rule=f"The measurements have {data.joint_count} joints"
+        )
+    readings = data.readings[rows, tail.joint - 1] * (1.0 if tail.high else -1.0)
+    boundary = np.sort(readings)[int((1.0 - tail.share) * len(rows))]
+    return np.asarray(readings >= boundary)
+
+
+def _drawn_keys(data: Measurements, rows: Rows, rule: SplitRule, rng: np.random.Generator) -> Mask:
+    """Held-out mask (r,): the rows of the last share of the permuted keys."""
+    _, index = np.unique(_key_columns(data, rule.split_by)[rows], axis=0, return_inverse=True)
+    count = int(index.max()) + 1
+    drawn = rng.permutation(count)[int((1.0 - rule.holdout) * count) :]
+    return np.isin(index.reshape(-1), drawn)
+
+
+def _key_columns(data: Measurements, names: Sequence[str]) -> NDArray[np.float64]:
+    """Columns (n, k) to split by: features, or what was read as group, joints or positions."""
+    known = {f"q{j + 1}": data.readings[:, j] for j in range(data.joint_count)}
+    known["group"] = np.unique(data.group, return_inverse=True)[1].astype(np.float64)
+    known |= {str(name): data.features[name].to_numpy(np.float64) for name in data.features.columns}
+    for name in names:
+        if name not in known:
+            raise UsageError(
+                f'there is no column "{name}" to split by',
+                where=", ".join(data.files),
+                rule=f"There are {list_names(known)}",
+                way_out=did_you_mean(name, list(known)),
+            )
+    return np.column_stack([known[name] for name in names])
+
+
+def _first_of_kin(data: Measurements) -> Rows:
+    """For each row (n,) the first row that must stay on the same side."""
+    count = len(data)
+    _, alike = np.unique(data.readings, axis=0, return_inverse=True)
+    links = [alike.reshape(-1)]
+    if data.pair is not None:
+        _, pair = np.unique(data.pair, return_inverse=True)
+        alone = data.pair == ""
+        links.append(np.where(alone, len(pair) + np.arange(count), pair))
+    kin = links[0]
+    for other in links[1:]:
+        kin = _components(kin, other)
+    _, first, index = np.unique(kin, return_index=True, return_inverse=True)
+    return np.asarray(first[index.reshape(-1)], dtype=np.int64)
+
+
+def _components(a: Rows, b: Rows) -> Rows:
+    """Labels (n,) of rows connected by equal labels in `a` (n,) or in `b` (n,)."""
+    _, b = np.unique(b, return_inverse=True)
+    nodes = int(a.max()) + 1 + int(b.max()) + 1
+    edges = coo_array((np.ones(len(a)), (a, b + int(a.max()) + 1)), shape=(nodes, nodes))
+    _, labels = connected_components(edges, directed=False)
+    return np.asarray(labels[a], dtype=np.int64)
+
+
+def _together(held: Mask, rows: Rows, first_of: Rows) -> Mask:
+    """The mask (r,) with every row on the side of its first kin within the file."""
+    _, index = np.unique(first_of[rows], return_inverse=True)
+    _, first = np.unique(index.reshape(-1), return_index=True)
+    return np.asarray(held[first[index.reshape(-1)]])
+
+
+def _check_sizes(train: int, holdout: int, rule: SplitRule, where: str) -> None:
+    if holdout == 0 or train == 0:
+        side = "held out" if holdout == 0 else "left to train on"
+        raise InputError(
+            f"no row would be {side}: {train + holdout} rows, of which {holdout} held out",
+            where=where,
+            way_out="Measure more poses, or hold out another share",
+        )
+    if rule.train_size is not None and rule.train_size > train:
+        raise UsageError(
+            f"a train size of {rule.train_size} reaches into the held-out rows",
+            where=where,
+            rule=f"Of {train + holdout} rows {holdout} are held out, so at most {train} can train",
+            way_out="Give a smaller --train-size or a smaller --holdout",
+        )
+
+
+def _check_groups(data: Measurements, split: Split) -> None:
+    trained = set(data.group[split.train].tolist())
+    missing = [group for group in data.groups if group not in trained]
+    if missing:
+        raise InputError(
+            f"no row of the set-up {list_names(missing)} trains",
+            where=", ".join(data.files),
+            rule="The frame and tool of every set-up are found from its training rows",
+            way_out="Give a larger --train-size or another --seed; "
+            "to judge a whole set-up, use: truearm evaluate",
+        )
+
+
+def _check_share(share: float, what: str) -> None:
+    if not 0.0 < share < 1.0:
+        raise UsageError(f"{what} is {share:g}", rule="It must be between 0 and 1")
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

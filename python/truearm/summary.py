@@ -1,0 +1,77 @@
+"""A calibration in numbers, for programs: the content of summary.json."""
+
+from typing import TYPE_CHECKING, Any, Final
+
+from truearm.units import MM_PER_METRE
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
+
+MRAD_PER_RAD: Final = 1e3
+AMPLITUDES: Final = (
+    ("theta_mrad", MRAD_PER_RAD),
+    ("other_angles_mrad", MRAD_PER_RAD),
+    ("lengths_mm", MM_PER_METRE),
+)
+
+
+def summarise(calibration: "Calibration") -> dict[str, Any]:
+    """The content of summary.json."""
+    return {
+        "robot": calibration.robot.name,
+        **calibration.validation.to_dict(),
+        "identifiability": calibration.identifiability.to_dict(),
+        "noise_mm": noise_mm(calibration),
+        "outliers": [] if calibration.rows is None else calibration.rows.outliers(),
+        "blocks": describe_blocks(calibration),
+        "refit": calibration.options.refit,
+        "n_fitted": None if calibration.rows is None else len(calibration.rows.data),
+        "options": calibration.options.to_dict(),
+        "data_sha256": calibration.data_hash,
+        "version": calibration.version,
+        "seconds": dict(calibration.seconds),
+        "notices": [str(notice) for notice in calibration.notices],
+    }
+
+
+def noise_mm(calibration: "Calibration") -> float:
+    """Standard deviation of a coordinate that the best model leaves unexplained."""
+    if calibration.variable is not None:
+        return calibration.variable.hyper["noise_position"][0] * MM_PER_METRE
+    return calibration.constant.noise_m * MM_PER_METRE
+
+
+def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:
+    """Name, joints (from 1), features, length scales, amplitudes and number of cells of each block.
+
+    Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units.
+    """
+    field, details = calibration.model.field, calibration.variable
+    if field is None or details is None:
+        return []
+    return [_describe(block, calibration, details.hyper) for block in field.blocks()]
+
+
+def _describe(
+    block: dict[str, Any], calibration: "Calibration", hyper: dict[str, list[float]]
+) -> dict[str, Any]:
+    joints, name = calibration.robot.joint_count, block["name"]
+    lengths = hyper.get(f"{name}_lengths") or hyper[f"{name}_length"] * len(block["inputs"])
+    scales = [axis[1] for axis in block["axes"]]
+    cells = 1
+    for axis in block["axes"]:
+        cells *= axis[4]
+    return {
+        "name": name,
+        "joints": [k + 1 for k in block["inputs"] if k < joints],
+        "features": [calibration.options.features[k - joints] for k in block["inputs"] if k >= joints],
+        "lengths": [length / scale for length, scale in zip(lengths, scales, strict=True)],
+        "amplitudes": _amplitudes(name, hyper),
+        "cells": cells,
+        "parameters": len(block["outputs"]),
+    }
+
+
+def _amplitudes(name: str, hyper: dict[str, list[float]]) -> dict[str, float]:
+    values = hyper.get(f"{name}_amplitudes") or hyper[name]
+    return {key: value * unit for (key, unit), value in zip(AMPLITUDES, values, strict=False)}

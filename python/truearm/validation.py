@@ -1,0 +1,132 @@
+"""Errors of a model on measured rows, and their statistics."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Problem, Setup, residuals
+from truearm.core_set import Selection, core_set
+from truearm.identified import IdentifiedArm
+from truearm.measurements import Measurements
+
+Floats = NDArray[np.float64]
+
+MILLI = 1e-3
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Of errors in mm or mrad: mean, root mean square, 95 % and 99 % quantile, largest."""
+
+    mean: float
+    rms: float
+    p95: float
+    p99: float
+    max: float
+
+    @classmethod
+    def of(cls, errors: Floats) -> "Statistics":
+        """Statistics of errors (n,) in m or rad; of none they are NaN."""
+        if len(errors) == 0:
+            return cls(*[float("nan")] * 5)
+        scaled = errors / MILLI
+        p95, p99 = np.quantile(scaled, [0.95, 0.99])
+        rms = np.sqrt(np.square(scaled).mean())
+        return cls(*map(float, (scaled.mean(), rms, p95, p99, scaled.max())))
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of one model.
+
+    Attributes:
+        position: Of the judged target (or of the distances), mm.
+        orientation: Of the tool, mrad; None where it was not measured.
+    """
+
+    position: Statistics
+    orientation: Statistics | None = None
+
+    def to_dict(self) -> dict[str, float]:
+        """mean_mm, rms_mm, p95_mm, p99_mm, max_mm, and the same in mrad if orientation was measured."""
+        content = {f"{key}_mm": value for key, value in asdict(self.position).items()}
+        if self.orientation is not None:
+            content |= {f"{key}_mrad": value for key, value in asdict(self.orientation).items()}
+        return content
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, float]) -> "Errors":
+        """The errors that `to_dict` described."""
+
+        def unit(name: str) -> Statistics:
+            return Statistics(*(content[f"{key}_{name}"] for key in ("mean", "rms", "p95", "p99", "max")))
+
+        return cls(unit("mm"), unit("mrad") if "mean_mrad" in content else None)
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Errors on rows that took no part in any fit, and on those that trained.
+
+    Attributes:
+        n_train: Rows that trained.
+        n_holdout: Rows that were held out.
+        holdout: Errors of "nominal", "constant" and, if fitted, "variable" on held-out rows.
+        train: The same on training rows.
+    """
+
+    n_train: int
+    n_holdout: int
+    holdout: Mapping[str, Errors]
+    train: Mapping[str, Errors]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "n_train": self.n_train,
+            "n_holdout": self.n_holdout,
+            "holdout": {name: errors.to_dict() for name, errors in self.holdout.items()},
+            "train": {name: errors.to_dict() for name, errors in self.train.items()},
+        }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Validation":
+        """The validation that `to_dict` described."""
+        sides = {
+            side: {name: Errors.from_dict(errors) for name, errors in content[side].items()}
+            for side in ("holdout", "train")
+        }
+        return cls(content["n_train"], content["n_holdout"], **sides)
+
+
+def measure_errors(
+    arm: IdentifiedArm,
+    data: Measurements,
+    selection: Selection,
+    groups: Sequence[str],
+    parameters: Floats,
+    setup: Setup,
+) -> Errors:
+    """Errors of a model at the first target of the set-up and, if selected, of the orientation.
+
+    Args:
+        arm: The arm.
+        data: Rows to judge, n of them.
+        selection: What was fitted; its first target is judged.
+        groups: Names of the set-ups, in the order of `setup`.
+        parameters: Parameters (L, 5), or (n, L, 5) of each row.
+        setup: Frames and targets of the groups.
+    """
+    problem = Problem(arm.flange_chain, core_set(arm.robot, data, selection, groups), [], arm.world_is_known)
+    left = residuals(problem, np.ascontiguousarray(parameters), setup)
+    if selection.distances:
+        return Errors(Statistics.of(np.abs(left[:, 0])))
+    seen = np.isfinite(data.targets[:, selection.targets[0]]).all(axis=1)
+    position = Statistics.of(np.linalg.norm(left[seen, :3], axis=1))
+    if not selection.orientation or data.orientations is None:
+        return Errors(position)
+    turned = np.isfinite(data.orientations).all(axis=1)
+    return Errors(position, Statistics.of(np.linalg.norm(left[turned, -3:], axis=1)))
