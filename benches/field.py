@@ -3,7 +3,7 @@
 import json
 import sys
 import warnings
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +81,7 @@ def run():
     process, peer_fit = fitted_process(*training_residuals())
     q = readings(EVALUATED)
     peer = seconds_of(lambda: process.predict(q), repeats=3)
-    fit, name = double["fit"][str(TRAINING)], f"variable fit, {TRAINING} poses, two threads"
+    fit, name = double["fit"], f"variable fit, {TRAINING} poses, two threads"
     comparisons = [
         Comparison(
             f"field at {EVALUATED} poses",
@@ -95,11 +95,11 @@ def run():
     ]
     series = [
         Series(
-            f"variable fit, {threads} threads",
-            [f"{n} poses" for n in found["fit"]],
-            list(found["fit"].values()),
+            f"variable fit, {words}",
+            [f"{n} poses" for n in GROWTH],
+            [found["growth"][str(n)] for n in GROWTH],
         )
-        for threads, found in ((1, single), (2, double))
+        for words, found in (("one thread", single), ("two threads", double))
     ]
     remarks = [
         f"Fitted to {measurements()[1]}, {TRAINING} training rows; the growth with poses to a virtual UR10. "
@@ -113,12 +113,12 @@ def own_timings():
     """Our side, in as many threads as this process has."""
     data, _ = measurements()
     found = []
-    fit = {TRAINING: seconds_once(lambda: found.append(calibrate(data, TRAINING)))}
+    fit = seconds_once(lambda: found.append(calibrate(data, TRAINING)))
     q = readings(EVALUATED)
     field = seconds_of(lambda: found[0].parameters(q))
     grown = virtual(int(max(GROWTH) / 0.7) + 1)
-    fit |= {n: seconds_once(lambda n=n: calibrate(grown, n)) for n in GROWTH}
-    return {"field": field, "fit": dict(sorted(fit.items()))}
+    growth = {poses: seconds_once(partial(calibrate, grown, poses)) for poses in GROWTH}
+    return {"field": field, "fit": fit, "growth": growth}
 
 
 if __name__ == "__main__":
