@@ -38,6 +38,12 @@ impl Cholesky {
         self.len() == 0
     }
 
+    /// L, zero above the diagonal, (n, n).
+    pub fn lower(&self) -> Mat<f64> {
+        let n = self.len();
+        Mat::from_fn(n, n, |i, j| if i >= j { self.lower[(i, j)] } else { 0.0 })
+    }
+
     /// log det A.
     pub fn log_determinant(&self) -> f64 {
         2.0 * (0..self.len()).map(|i| self.lower[(i, i)].ln()).sum::<f64>()

@@ -13,13 +13,13 @@ use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
 use truearm_kinematics::{Isa, Kernel, dispatch};
 
 use crate::FieldError;
+use crate::data_space::setup_precision;
 use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SMOOTH, AT_SMOOTH_LENGTH, Hyper,
     Product,
 };
 use crate::kernel::{Value, matern, squared_exponential};
 use crate::pairs::{ByColumn, ClassSums, PairKernels, PairTable, add_products, covariance};
-use crate::posterior::setup_precision;
 use crate::training::Training;
 
 /// The evidence of one training set under any hyper-parameters.

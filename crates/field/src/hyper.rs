@@ -209,6 +209,13 @@ impl Hyper {
         self.products.first().map_or(&[], |product| &product.joints)
     }
 
+    /// The same hyper-parameters with a fresh `major` block over other joints.
+    pub fn with_major(&self, joints: Vec<usize>) -> Self {
+        let mut other = self.clone();
+        other.products[0] = Product::start(MAJOR_NAME, joints);
+        other
+    }
+
     /// The same hyper-parameters without one of the `major` joints.
     pub fn without_major(&self, position: usize) -> Self {
         let mut fewer = self.clone();

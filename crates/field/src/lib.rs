@@ -11,17 +11,22 @@
 
 mod bank;
 mod cells;
+mod data_space;
 mod error;
 mod evidence;
 mod fit;
 mod hyper;
 mod kernel;
+mod linear;
+mod model;
 mod optimise;
 mod outliers;
 mod pairs;
 mod posterior;
+mod refine;
 mod select;
 mod training;
+mod weight_space;
 
 pub use bank::{Bank, Block};
 pub use cells::{Axis, Grid};

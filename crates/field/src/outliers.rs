@@ -5,7 +5,7 @@
 //! its own uncertainty, at full weight even where an earlier judgement took its weight away.
 
 use crate::FieldError;
-use crate::posterior::{Posterior, Solution};
+use crate::posterior::Posterior;
 use crate::training::Training;
 
 /// Judgement of every pose by the others.
@@ -38,15 +38,17 @@ fn chi_squared(freedom: f64, normal_quantile: f64) -> f64 {
 ///
 /// # Errors
 /// [`FieldError::NotPositiveDefinite`].
-pub fn judge(posterior: &Posterior, solution: &Solution) -> Result<Judgement, FieldError> {
-    let training = &posterior.training;
-    let left_out = posterior.leave_one_out(&solution.alpha)?;
+pub fn judge(posterior: &Posterior) -> Result<Judgement, FieldError> {
+    let training = posterior.training();
+    let left_out = posterior.leave_one_out(&training.residual)?;
     let poses = 0..training.pose_count();
     let squares: Vec<f64> = poses
         .clone()
         .map(|pose| left_out.standardised[training.rows(pose)].iter().map(|z| z * z).sum())
         .collect();
-    let trusted: Vec<usize> = poses.clone().filter(|&pose| is_trusted(training, pose)).collect();
+    let sampled = |pose: usize| training.rows(pose).next().is_some_and(|row| left_out.sampled[row]);
+    let trusted: Vec<usize> =
+        poses.clone().filter(|&pose| is_trusted(training, pose) && sampled(pose)).collect();
     let shares =
         trusted.iter().map(|&pose| squares[pose] / chi_squared(training.rows(pose).len() as f64, 0.0));
     let typical = quantile(shares, 0.5).max(1.0);

@@ -1,8 +1,10 @@
 //! Which joints the `major` block varies with, chosen by the evidence.
 //!
-//! Backward elimination from all joints: the joint whose absence costs least after refitting goes, until three are
-//! left, and further while one costs less than [`WORTH`]. Length scales alone do not tell: a long one may still carry
-//! a first harmonic.
+//! Backward elimination from all joints on a small training set: the joint whose absence costs least after refitting
+//! goes, until three are left; length scales alone do not tell, since a long one may still carry a first harmonic.
+//! Elimination is greedy and its set small, so its choice then stands against the usual ones (the arm's first three
+//! joints, and the two or three after the first, about which gravity does not turn) on a larger set. A joint must
+//! bring [`WORTH`] nats to stay; two stay always.
 
 use truearm_estimate::Cancel;
 
@@ -16,7 +18,10 @@ use crate::training::Training;
 const WORTH: f64 = 3.0;
 /// Joints of the `major` block at the most: its grid grows with their power.
 const MOST: usize = 3;
+/// One joint alone is what `smooth` blocks hold already.
+const FEWEST: usize = 2;
 const FIRST: Limits = Limits { evaluations: 40, gain: 0.1 };
+const RIVAL: Limits = Limits { evaluations: 16, gain: 0.2 };
 const REFIT: Limits = Limits { evaluations: 8, gain: 0.3 };
 
 /// Hyper-parameters, the logarithm of their evidence and prior, and what it cost to find them.
@@ -57,12 +62,35 @@ pub fn select_major(
     Ok(Found { evaluations, ..best })
 }
 
-/// Takes out joints that bring less than [`WORTH`], one by one; one stays.
+/// The best of what elimination found and of the usual joints, a nat for a nat but [`WORTH`] a joint.
+///
+/// # Errors
+/// [`FieldError`] of the evidence.
+pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result<Found, FieldError> {
+    let net = |found: &Found| found.value - WORTH * found.hyper.major_joints().len() as f64;
+    let mut evaluations = found.evaluations;
+    let present = found.hyper.clone();
+    let mut best = found;
+    for usual in [0..3, 1..3, 1..4] {
+        let rival: Vec<usize> = usual.filter(|&joint| joint < joints).collect();
+        if rival == present.major_joints() || rival.is_empty() {
+            continue;
+        }
+        let candidate = refine(evidence, present.with_major(rival), RIVAL)?;
+        evaluations += candidate.evaluations;
+        if net(&candidate) > net(&best) {
+            best = candidate;
+        }
+    }
+    Ok(Found { evaluations, ..best })
+}
+
+/// Takes out joints that bring less than [`WORTH`], one by one, while more than [`FEWEST`] are left.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
 pub fn prune_major(evidence: &Evidence, mut best: Found) -> Result<Found, FieldError> {
-    while best.hyper.major_joints().len() > 1 {
+    while best.hyper.major_joints().len() > FEWEST {
         let mut evaluations = best.evaluations;
         let candidate = cheapest_removal(evidence, &best.hyper, &mut evaluations)?;
         if best.value - candidate.value >= WORTH {

@@ -134,6 +134,25 @@ impl Training {
         }
     }
 
+    /// At most `count` poses that fill the space of inputs: each the farthest from those before it.
+    pub fn fill_space(&self, count: usize) -> Vec<usize> {
+        let distance = |a: usize, b: usize| -> f64 {
+            let pairs = self.values_of(a).iter().zip(self.values_of(b));
+            self.inputs.iter().zip(pairs).map(|(input, (x, y))| input.distance(*x, *y)).sum()
+        };
+        let mut nearest: Vec<f64> = (0..self.pose_count()).map(|pose| distance(pose, 0)).collect();
+        let mut kept = vec![0];
+        while kept.len() < count.min(self.pose_count()) {
+            let farthest = (0..nearest.len())
+                .fold(0, |best, pose| if nearest[pose] > nearest[best] { pose } else { best });
+            kept.push(farthest);
+            nearest.iter_mut().enumerate().for_each(|(pose, d)| *d = d.min(distance(pose, farthest)));
+            nearest[farthest] = -1.0;
+        }
+        kept.sort_unstable();
+        kept
+    }
+
     /// Checks lengths once.
     ///
     /// # Errors

@@ -345,17 +345,20 @@ impl Posterior {
         Ok(Self { core })
     }
 
-    /// Covariance (n, m, m) of `jacobian CEP` for inputs (n, I) and Jacobians (n, m, P) by the problem's columns.
+    /// Covariance (n, m, m) of `jacobian CEP` (+ `setup s` where set-up columns (n, m, s) are given) for inputs (n, I) and Jacobians (n, m, P) by the problem's columns.
+    #[pyo3(signature = (inputs, jacobian, setup=None))]
     fn covariance<'py>(
         &self,
         py: Python<'py>,
         inputs: PyReadonlyArray2<'py, f64>,
         jacobian: PyReadonlyArray3<'py, f64>,
+        setup: Option<PyReadonlyArray3<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
         let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
         let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
-        let values = quick(py, || self.core.arm_covariance(&inputs, &jacobian, rows))?;
+        let setup_columns: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
+        let values = quick(py, || self.core.covariance(&inputs, &jacobian, setup_columns.as_deref(), rows))?;
         array3(py, values, (poses, rows, rows))
     }
 }

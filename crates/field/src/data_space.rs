@@ -1,0 +1,199 @@
+//! The posterior in data space: the covariance of all rows is factored.
+//!
+//! With K the covariance of the rows that cells and noise imply, and flat set-up columns S,
+//! `s = (S^T K^-1 S)^-1 S^T K^-1 r`, `alpha = K^-1 (r - S s)`, and the weights are prior covariance times
+//! excitations times Jacobian times alpha (universal kriging; Rasmussen and Williams 2006, section 2.7).
+
+use faer::{Mat, MatMut, MatRef};
+use truearm_estimate::Cancel;
+use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
+
+use crate::FieldError;
+use crate::bank::{Bank, Block};
+use crate::model::{BlockPlan, Excited, Implied, Model};
+use crate::pairs::covariance;
+use crate::posterior::{LeaveOneOut, Query, Solution};
+
+/// Poses whose covariances are found together.
+const BATCH: usize = 64;
+
+/// Factors of the rows' covariance.
+pub struct DataSpace {
+    pub model: Model,
+    excited: Vec<Excited>,
+    factor: Cholesky,
+    /// K^-1 S.
+    spread: Mat<f64>,
+    /// Factor of S^T K^-1 S.
+    inner: Cholesky,
+}
+
+impl DataSpace {
+    pub fn new(model: Model, cancel: &Cancel) -> Result<Self, FieldError> {
+        let training = &model.training;
+        let excited: Vec<Excited> =
+            (0..training.pose_count()).map(|pose| model.cells.excite(training.values_of(pose))).collect();
+        let rows = training.row_count();
+        let error = || FieldError::NotPositiveDefinite { rows };
+        let kernels = Implied { cells: &model.cells, excited: &excited };
+        let matrix = covariance(training, &model.by_column, &model.hyper, &kernels);
+        let dense = MatRef::from_column_major_slice(&matrix, rows, rows).to_owned();
+        drop(matrix);
+        cancel.check()?;
+        let factor = Cholesky::new(dense, parallelism()).ok_or_else(error)?;
+        let setup = MatRef::from_row_major_slice(&training.setup, rows, training.setup_width);
+        let mut spread = setup.to_owned();
+        factor.solve(spread.as_mut());
+        let inner = Cholesky::new(setup_precision(setup, &spread), faer::Par::Seq).ok_or_else(error)?;
+        Ok(Self { model, excited, factor, spread, inner })
+    }
+
+    pub fn solve(&self, residual: &[f64]) -> Solution {
+        let training = &self.model.training;
+        let step = self.setup_step(residual);
+        let alpha = self.alpha(residual, &step);
+        let pull = self.pull(&alpha);
+        let columns = training.columns.len();
+        let constant = |p: usize| {
+            let total: f64 = (0..training.pose_count()).map(|pose| pull[pose * columns + p]).sum();
+            self.model.constant_deviation(p).powi(2) * total
+        };
+        let mut bank = Bank::empty(training.inputs.len(), training.parameter_count);
+        bank.blocks = self.model.plans().iter().map(|plan| self.block(plan, &pull)).collect();
+        Solution { constant: (0..columns).map(constant).collect(), bank, setup: step }
+    }
+
+    fn setup_step(&self, residual: &[f64]) -> Vec<f64> {
+        let right = to_vec((self.spread.transpose() * column(residual)).as_ref());
+        if right.is_empty() { Vec::new() } else { self.inner.solve_vector(&right) }
+    }
+
+    fn alpha(&self, residual: &[f64], step: &[f64]) -> Vec<f64> {
+        let training = &self.model.training;
+        let setup = MatRef::from_row_major_slice(&training.setup, training.row_count(), training.setup_width);
+        let rest = column(residual) - setup * column(step);
+        self.factor.solve_vector(&to_vec(rest.as_ref()))
+    }
+
+    /// J_i^T alpha_i of every pose, (n, P).
+    fn pull(&self, alpha: &[f64]) -> Vec<f64> {
+        let width = self.model.training.columns.len();
+        let mut pull = vec![0.0; self.model.training.pose_count() * width];
+        for (pose, out) in pull.chunks_exact_mut(width).enumerate() {
+            for row in self.model.training.rows(pose) {
+                let entries = self.model.training.jacobian_row(row);
+                out.iter_mut().zip(entries).for_each(|(x, entry)| *x += entry * alpha[row]);
+            }
+        }
+        pull
+    }
+
+    /// Weights of one block: excitations times pull, spread by the prior along each axis.
+    fn block(&self, plan: &BlockPlan, pull: &[f64]) -> Block {
+        let grid = plan.grid();
+        let training = &self.model.training;
+        let (width, columns) = (plan.driven.len(), training.columns.len());
+        let mut weights = vec![0.0; grid.cell_count() * width];
+        for pose in 0..training.pose_count() {
+            let source = &pull[pose * columns..(pose + 1) * columns];
+            grid.visit(training.values_of(pose), |cell, grade| {
+                let target = &mut weights[cell * width..(cell + 1) * width];
+                for (weight, &(p, variance)) in target.iter_mut().zip(&plan.driven) {
+                    *weight += grade * variance * source[p];
+                }
+            });
+        }
+        let mut inner = width;
+        for (_, cells) in plan.axes.iter().rev() {
+            weights = cells.spread(&weights, inner);
+            inner *= cells.axis.count;
+        }
+        let outputs = plan.driven.iter().map(|&(p, _)| training.columns[p].parameter).collect();
+        Block { name: plan.name.to_owned(), grid, outputs, weights }
+    }
+
+    pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
+        let training = &self.model.training;
+        let alpha = self.alpha(residual, &self.setup_step(residual));
+        let inverse = self.factor.inverse();
+        let mut root = self.spread.transpose().to_owned();
+        self.inner.solve_lower(root.as_mut());
+        let mut out = LeaveOneOut::zeros(training.row_count());
+        for pose in 0..training.pose_count() {
+            let range = training.rows(pose);
+            let (start, count) = (range.start, range.len());
+            let block = Mat::from_fn(count, count, |i, j| {
+                let setup: f64 = (0..root.nrows()).map(|k| root[(k, start + i)] * root[(k, start + j)]).sum();
+                inverse[(start + i, start + j)] - setup
+            });
+            let error = FieldError::NotPositiveDefinite { rows: count };
+            let precision = Cholesky::new(block, faer::Par::Seq).ok_or(error)?;
+            let left_out = precision.solve_vector(&alpha[range]);
+            out.set(&self.model, pose, &left_out, precision.inverse())?;
+        }
+        Ok(out)
+    }
+
+    pub fn covariance(&self, query: &Query) -> Vec<f64> {
+        let mut out = vec![0.0; query.poses() * query.rows * query.rows];
+        for first in (0..query.poses()).step_by(BATCH) {
+            self.batch_covariance(query, first..(first + BATCH).min(query.poses()), &mut out);
+        }
+        out
+    }
+
+    fn batch_covariance(&self, query: &Query, poses: std::ops::Range<usize>, out: &mut [f64]) {
+        let training = &self.model.training;
+        let (rows, width) = (query.rows, training.setup_width);
+        let mut cross = Mat::zeros(training.row_count(), poses.len() * rows);
+        let mut priors = Vec::new();
+        for (index, pose) in poses.clone().enumerate() {
+            let excited = self.model.cells.excite(query.values_of(pose));
+            self.cross(&excited, query.jacobian_of(pose), cross.as_mut().subcols_mut(index * rows, rows));
+            priors.push(self.model.variances(&excited, &excited));
+        }
+        let mut lost = self.spread.transpose() * &cross * faer::Scale(-1.0);
+        if let Some(setup) = query.setup {
+            for (index, pose) in poses.clone().enumerate() {
+                for (i, line) in
+                    setup[pose * rows * width..(pose + 1) * rows * width].chunks_exact(width).enumerate()
+                {
+                    (0..width).for_each(|k| lost[(k, index * rows + i)] += line[k]);
+                }
+            }
+        }
+        self.factor.solve_lower(cross.as_mut());
+        self.inner.solve_lower(lost.as_mut());
+        for (index, pose) in poses.enumerate() {
+            for i in 0..rows {
+                for j in 0..rows {
+                    let (a, b) = (index * rows + i, index * rows + j);
+                    let prior = query.prior(pose, (i, j), &priors[index]);
+                    let learned = cross.col(a).transpose() * cross.col(b);
+                    let setup = lost.col(a).transpose() * lost.col(b);
+                    out[(pose * rows + i) * rows + j] = prior - learned + setup;
+                }
+            }
+        }
+    }
+
+    /// Covariance of all training rows with the rows (m, P) of one configuration: (R, m).
+    fn cross(&self, excited: &Excited, rows: &[f64], mut out: MatMut<f64>) {
+        let training = &self.model.training;
+        let columns = training.columns.len();
+        for pose in 0..training.pose_count() {
+            let variances = self.model.variances(excited, &self.excited[pose]);
+            for row in training.rows(pose) {
+                let entries = training.jacobian_row(row);
+                for (k, own) in rows.chunks_exact(columns).enumerate() {
+                    out[(row, k)] = (0..columns).map(|p| entries[p] * variances[p] * own[p]).sum();
+                }
+            }
+        }
+    }
+}
+
+/// S^T K^-1 S, with the precision of a set-up that is known to a metre and a radian: flat, but never singular.
+pub fn setup_precision(setup: MatRef<f64>, spread: &Mat<f64>) -> Mat<f64> {
+    setup.transpose() * spread + Mat::<f64>::identity(setup.ncols(), setup.ncols())
+}

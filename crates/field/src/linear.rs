@@ -1,0 +1,134 @@
+//! From measurements to rows that a field is inferred from.
+
+use truearm_estimate::{Layout, Linearised, Point, Problem, linearise};
+use truearm_kinematics::Joint;
+
+use crate::FieldError;
+use crate::fit::FieldOptions;
+use crate::kernel::Input;
+use crate::training::{Column, Training};
+
+/// Rows of a problem linearised at a point, the constants' prior centred on the nominal arm.
+pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Training, FieldError> {
+    let set = problem.measurements;
+    let layout = Layout::new(problem);
+    let nominal = problem.chain.nominal();
+    let linear = linearise(problem, point);
+    let columns = columns(problem, options);
+    let inputs: Vec<Input> =
+        joint_inputs(problem).into_iter().chain(options.features.iter().copied()).collect();
+    let own = layout.len() - layout.arm;
+    let mut training = Training {
+        columns,
+        parameter_count: problem.chain.parameter_count(),
+        inputs,
+        values: input_values(problem, options),
+        offsets: vec![0],
+        jacobian: Vec::new(),
+        setup: Vec::new(),
+        setup_width: own,
+        residual: Vec::new(),
+        variance: Vec::new(),
+        weight: Vec::new(),
+        is_orientation: Vec::new(),
+    };
+    for pose in 0..set.pose_count() {
+        for row in 0..linear.rows {
+            let target = row / 3;
+            let orientation = target >= set.target_count;
+            let measured = if orientation { set.has_rotation(pose) } else { set.has_target(pose, target) };
+            if measured && set.weight[pose] > 0.0 {
+                push_row(&mut training, problem, &linear, (pose, row, orientation), &nominal, point);
+            }
+        }
+        training.offsets.push(training.residual.len());
+    }
+    training.check()?;
+    Ok(training)
+}
+
+fn push_row(
+    training: &mut Training,
+    problem: &Problem,
+    linear: &Linearised,
+    (pose, row, orientation): (usize, usize, bool),
+    nominal: &[f64],
+    point: Point,
+) {
+    let set = problem.measurements;
+    let layout = Layout::new(problem);
+    let at = pose * linear.rows + row;
+    let jacobian = &linear.arm[at * layout.arm..(at + 1) * layout.arm];
+    let known: f64 = jacobian
+        .iter()
+        .zip(&training.columns)
+        .filter(|(_, column)| column.constant > 0.0)
+        .map(|(entry, column)| entry * (point.parameters[column.parameter] - nominal[column.parameter]))
+        .sum();
+    training.jacobian.extend(jacobian);
+    let width = layout.group_width();
+    let mut setup = vec![0.0; training.setup_width];
+    let start = layout.group(set.group[pose]).start - layout.arm;
+    setup[start..start + width].copy_from_slice(&linear.setup[at * width..(at + 1) * width]);
+    training.setup.extend(setup);
+    training.residual.push(linear.residual[at] + known);
+    training.variance.push(if orientation { 0.0 } else { set.sigma[pose].powi(2) });
+    training.weight.push(set.weight[pose]);
+    training.is_orientation.push(orientation);
+}
+
+fn columns(problem: &Problem, options: &FieldOptions) -> Vec<Column> {
+    let mut joint_of_link = vec![None; problem.chain.link_count()];
+    let mut joint = 0;
+    for (link, slot) in problem.chain.links().iter().zip(&mut joint_of_link) {
+        if link.joint != Joint::Fixed {
+            *slot = Some((joint, link.joint));
+            joint += 1;
+        }
+    }
+    let own = |parameter: usize| match joint_of_link[parameter / 5] {
+        Some((joint, Joint::Revolute)) if parameter % 5 == 0 => Some(joint),
+        Some((joint, Joint::Prismatic)) if parameter % 5 == 1 => Some(joint),
+        _ => None,
+    };
+    let column = |(k, &parameter): (usize, &usize)| {
+        let driven = options.driven.contains(&k);
+        Column {
+            parameter,
+            constant: if options.determined.contains(&k) { options.prior.of(parameter) } else { 0.0 },
+            driven,
+            own: if driven { own(parameter) } else { None },
+        }
+    };
+    problem.columns.iter().enumerate().map(column).collect()
+}
+
+fn joint_inputs(problem: &Problem) -> Vec<Input> {
+    let set = problem.measurements;
+    let kinds = problem.chain.links().iter().map(|link| link.joint);
+    let moving = kinds.filter(|&joint| joint != Joint::Fixed);
+    moving
+        .enumerate()
+        .map(|(k, joint)| match joint {
+            Joint::Prismatic => {
+                let values = set.joints.iter().skip(k).step_by(set.joint_count);
+                let (low, high) = values
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
+                Input::line(high - low)
+            }
+            _ => Input::ANGLE,
+        })
+        .collect()
+}
+
+/// Joint values, then features, of every pose.
+fn input_values(problem: &Problem, options: &FieldOptions) -> Vec<f64> {
+    let set = problem.measurements;
+    let features = options.features.len();
+    (0..set.pose_count())
+        .flat_map(|pose| {
+            let joints = &set.joints[pose * set.joint_count..(pose + 1) * set.joint_count];
+            joints.iter().chain(&options.feature_values[pose * features..(pose + 1) * features]).copied()
+        })
+        .collect()
+}

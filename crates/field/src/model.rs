@@ -1,0 +1,210 @@
+//! The prior model of one training set: cells, what they drive, and how alike configurations are under it.
+
+use crate::cells::{Active, Axis, CellKernel, Grid};
+use crate::hyper::{Hyper, Product};
+use crate::kernel::{matern, squared_exponential};
+use crate::pairs::{ByColumn, PairKernels, PairTable};
+use crate::training::Training;
+
+/// Cells per length scale: `own` curves have a rougher kernel and cost little.
+const OWN_CELLS: f64 = 3.0;
+const CELLS: f64 = 2.0;
+
+/// Cell priors of all blocks under given hyper-parameters.
+#[derive(Debug, Clone)]
+pub struct Cells {
+    /// One per input; `None` where no parameter is driven.
+    pub own: Vec<Option<CellKernel>>,
+    /// One per input.
+    pub smooth: Vec<CellKernel>,
+    /// Inputs and cells of each product.
+    pub products: Vec<Vec<(usize, CellKernel)>>,
+}
+
+impl Cells {
+    /// Cells that cover the values of a training set.
+    pub fn new(training: &Training, by_column: &ByColumn, hyper: &Hyper, degree: usize) -> Self {
+        let axis = |k: usize, length: f64, per_length: f64| {
+            let values = (0..training.pose_count()).map(|pose| training.values_of(pose)[k]);
+            Axis::covering(training.inputs[k], values, length, per_length, degree)
+        };
+        let own = |k: usize| {
+            let axis = axis(k, hyper.own_length, OWN_CELLS);
+            by_column.own[k].map(|_| CellKernel::new(axis, |d| matern(d, hyper.own_length)))
+        };
+        let smooth = |k: usize, length: f64| {
+            CellKernel::new(axis(k, length, CELLS), |d| squared_exponential(d, length))
+        };
+        let product = |product: &Product| {
+            let joints = product.joints.iter().zip(&product.lengths);
+            joints.map(|(&k, &length)| (k, smooth(k, length))).collect()
+        };
+        Self {
+            own: (0..training.inputs.len()).map(own).collect(),
+            smooth: (0..training.inputs.len()).map(|k| smooth(k, hyper.smooth_length)).collect(),
+            products: hyper.products.iter().map(product).collect(),
+        }
+    }
+
+    /// The cells that one configuration excites.
+    pub fn excite(&self, values: &[f64]) -> Excited {
+        Excited {
+            own: self
+                .own
+                .iter()
+                .zip(values)
+                .map(|(cells, &v)| cells.as_ref().map(|c| c.axis.active(v)))
+                .collect(),
+            smooth: self.smooth.iter().zip(values).map(|(cells, &v)| cells.axis.active(v)).collect(),
+            products: self
+                .products
+                .iter()
+                .map(|axes| axes.iter().map(|(k, cells)| cells.axis.active(values[*k])).collect())
+                .collect(),
+        }
+    }
+
+    /// Prior correlations of two configurations.
+    fn kernels(&self, a: &Excited, b: &Excited) -> Correlations {
+        let own = self.own.iter().zip(a.own.iter().zip(&b.own)).map(|(cells, pair)| match (cells, pair) {
+            (Some(cells), (Some(a), Some(b))) => cells.implied(a, b),
+            _ => 0.0,
+        });
+        let smooth = self.smooth.iter().zip(a.smooth.iter().zip(&b.smooth));
+        let product = |(axes, (a, b)): (&Vec<(usize, CellKernel)>, (&Vec<Active>, &Vec<Active>))| {
+            axes.iter().zip(a.iter().zip(b)).map(|((_, cells), (a, b))| cells.implied(a, b)).product()
+        };
+        Correlations {
+            own: own.collect(),
+            smooth: smooth.map(|(cells, (a, b))| cells.implied(a, b)).sum(),
+            products: self.products.iter().zip(a.products.iter().zip(&b.products)).map(product).collect(),
+        }
+    }
+}
+
+/// Prior correlations of two configurations, by block.
+struct Correlations {
+    own: Vec<f64>,
+    smooth: f64,
+    products: Vec<f64>,
+}
+
+/// Excited cells of one configuration.
+#[derive(Debug, Clone)]
+pub struct Excited {
+    own: Vec<Option<Active>>,
+    smooth: Vec<Active>,
+    products: Vec<Vec<Active>>,
+}
+
+/// Kernels between the training poses that the cells imply.
+pub struct Implied<'a> {
+    pub cells: &'a Cells,
+    pub excited: &'a [Excited],
+}
+
+impl PairKernels for Implied<'_> {
+    fn fill(&self, j: usize, table: &mut PairTable) {
+        table.clear(self.cells.own.len(), self.cells.products.len(), self.excited.len() - j);
+        for (i, other) in self.excited[j..].iter().enumerate() {
+            let kernels = self.cells.kernels(&self.excited[j], other);
+            table.own.iter_mut().zip(kernels.own).for_each(|(column, value)| column[i] = value);
+            table.smooth[i] = kernels.smooth;
+            table.products.iter_mut().zip(kernels.products).for_each(|(column, value)| column[i] = value);
+        }
+    }
+}
+
+/// One block of the bank before its weights are known.
+pub struct BlockPlan<'a> {
+    pub name: &'a str,
+    /// Input and cells of each axis.
+    pub axes: Vec<(usize, &'a CellKernel)>,
+    /// Driven columns with the prior variance of their weights.
+    pub driven: Vec<(usize, f64)>,
+}
+
+impl BlockPlan<'_> {
+    pub fn grid(&self) -> Grid {
+        Grid {
+            inputs: self.axes.iter().map(|axis| axis.0).collect(),
+            axes: self.axes.iter().map(|axis| axis.1.axis.clone()).collect(),
+        }
+    }
+}
+
+/// A training set under given hyper-parameters.
+pub struct Model {
+    pub training: Training,
+    pub hyper: Hyper,
+    pub cells: Cells,
+    pub by_column: ByColumn,
+}
+
+impl Model {
+    pub fn new(training: Training, hyper: Hyper, degree: usize) -> Self {
+        let by_column = ByColumn::new(&training);
+        let cells = Cells::new(&training, &by_column, &hyper, degree);
+        Self { training, hyper, cells, by_column }
+    }
+
+    /// Prior standard deviation of a column's constant.
+    pub fn constant_deviation(&self, p: usize) -> f64 {
+        self.hyper.constant * self.training.columns[p].constant
+    }
+
+    /// All blocks, `own` of each input first, then `smooth`, then the products.
+    pub fn plans(&self) -> Vec<BlockPlan<'_>> {
+        let mut plans = Vec::new();
+        for (k, own) in self.by_column.own.iter().enumerate() {
+            if let (Some((p, lever)), Some(cells)) = (own, &self.cells.own[k]) {
+                let driven = vec![(*p, (self.hyper.own * lever).powi(2))];
+                plans.push(BlockPlan { name: "own", axes: vec![(k, cells)], driven });
+            }
+        }
+        for (k, cells) in self.cells.smooth.iter().enumerate() {
+            plans.push(BlockPlan {
+                name: "smooth",
+                axes: vec![(k, cells)],
+                driven: self.driven(&self.hyper.smooth),
+            });
+        }
+        for (axes, product) in self.cells.products.iter().zip(&self.hyper.products) {
+            let axes = axes.iter().map(|(k, cells)| (*k, cells)).collect();
+            plans.push(BlockPlan { name: &product.name, axes, driven: self.driven(&product.amplitudes) });
+        }
+        plans
+    }
+
+    /// Driven columns with their prior variances.
+    fn driven(&self, amplitudes: &[f64; 3]) -> Vec<(usize, f64)> {
+        let classes = self.by_column.driven.iter().zip(amplitudes);
+        let mut driven: Vec<_> =
+            classes.flat_map(|(columns, a)| columns.iter().map(move |&p| (p, a * a))).collect();
+        driven.sort_by_key(|entry| entry.0);
+        driven
+    }
+
+    /// Prior covariance of each column's CEP at two configurations, (P,).
+    pub fn variances(&self, a: &Excited, b: &Excited) -> Vec<f64> {
+        let kernels = self.cells.kernels(a, b);
+        let mut variances: Vec<f64> = self
+            .training
+            .columns
+            .iter()
+            .map(|column| (self.hyper.constant * column.constant).powi(2))
+            .collect();
+        for (class, columns) in self.by_column.driven.iter().enumerate() {
+            let products = self.hyper.products.iter().zip(&kernels.products);
+            let products: f64 = products.map(|(product, k)| product.amplitudes[class].powi(2) * k).sum();
+            let value = self.hyper.smooth[class].powi(2) * kernels.smooth + products;
+            columns.iter().for_each(|&p| variances[p] += value);
+        }
+        for (k, entry) in self.by_column.own.iter().enumerate() {
+            if let Some((p, lever)) = entry {
+                variances[*p] += (self.hyper.own * lever).powi(2) * kernels.own[k];
+            }
+        }
+        variances
+    }
+}

@@ -1,0 +1,103 @@
+//! From the linear solution to the exact model's.
+
+use truearm_estimate::{Layout, Point, Problem, Setup, residuals};
+
+use crate::FieldError;
+use crate::bank::Bank;
+use crate::posterior::{Posterior, Solution};
+
+/// Gauss-Newton steps on the exact model after the linear solution.
+const RELINEARISATIONS: usize = 2;
+
+/// Constants, field and set-up with the exact residuals that they leave.
+pub struct Refined {
+    pub parameters: Vec<f64>,
+    pub bank: Bank,
+    pub setup: Setup,
+    /// (n, m), base frame.
+    pub residuals: Vec<f64>,
+}
+
+/// Gauss-Newton on the exact model with the factor of the linear one: the remainder is of second order in the CEPs.
+pub fn relinearised(
+    problem: &Problem,
+    point: Point,
+    posterior: &Posterior,
+    mut solution: Solution,
+) -> Result<Refined, FieldError> {
+    let mut refined = apply(problem, point, posterior, &solution)?;
+    for _ in 0..RELINEARISATIONS {
+        let explained = explained(posterior, &solution)?;
+        let rows = problem.measurements.rows_per_pose();
+        let exact = present_rows(problem, &refined.residuals, rows);
+        let linear: Vec<f64> = exact.iter().zip(&explained).map(|(a, b)| a + b).collect();
+        solution = posterior.solve(&linear)?;
+        refined = apply(problem, point, posterior, &solution)?;
+    }
+    Ok(refined)
+}
+
+/// Residuals of the rows that the training holds, out of (n, m).
+fn present_rows(problem: &Problem, residuals: &[f64], rows: usize) -> Vec<f64> {
+    let set = problem.measurements;
+    let mut out = Vec::new();
+    for pose in (0..set.pose_count()).filter(|&pose| set.weight[pose] > 0.0) {
+        for row in 0..rows {
+            let target = row / 3;
+            let measured = if target >= set.target_count {
+                set.has_rotation(pose)
+            } else {
+                set.has_target(pose, target)
+            };
+            if measured {
+                out.push(residuals[pose * rows + row]);
+            }
+        }
+    }
+    out
+}
+
+/// What constants, field and set-up of a solution explain of the training's residual, (R,).
+fn explained(posterior: &Posterior, solution: &Solution) -> Result<Vec<f64>, FieldError> {
+    let training = posterior.training();
+    let mut ceps = vec![0.0; training.pose_count() * training.parameter_count];
+    solution.bank.add(&training.values, &mut ceps)?;
+    let mut out = Vec::with_capacity(training.row_count());
+    for pose in 0..training.pose_count() {
+        let ceps = &ceps[pose * training.parameter_count..(pose + 1) * training.parameter_count];
+        for row in training.rows(pose) {
+            let arm: f64 = training
+                .jacobian_row(row)
+                .iter()
+                .zip(training.columns.iter().zip(&solution.constant))
+                .map(|(entry, (column, constant))| entry * (constant + ceps[column.parameter]))
+                .sum();
+            let setup = &training.setup[row * training.setup_width..(row + 1) * training.setup_width];
+            out.push(arm + setup.iter().zip(&solution.setup).map(|(a, b)| a * b).sum::<f64>());
+        }
+    }
+    Ok(out)
+}
+
+/// Constants, field and set-up of a solution, with the exact residuals they leave.
+fn apply(
+    problem: &Problem,
+    point: Point,
+    posterior: &Posterior,
+    solution: &Solution,
+) -> Result<Refined, FieldError> {
+    let training = posterior.training();
+    let mut parameters = problem.chain.nominal();
+    for (column, constant) in training.columns.iter().zip(&solution.constant) {
+        parameters[column.parameter] += constant;
+    }
+    let layout = Layout::new(problem);
+    let mut step = vec![0.0; layout.arm];
+    step.extend(&solution.setup);
+    let setup = layout.step_setup(point.setup, &step);
+    let poses = problem.measurements.pose_count();
+    let mut varying: Vec<f64> = std::iter::repeat_n(&parameters, poses).flatten().copied().collect();
+    solution.bank.add(&training.values, &mut varying)?;
+    let residuals = residuals(problem, Point { parameters: &varying, setup: &setup })?;
+    Ok(Refined { parameters, bank: solution.bank.clone(), setup, residuals })
+}
