@@ -18,8 +18,8 @@ class Chain:
     Parameters are ordered by link, within a link theta, d, a, alpha, beta (rad and m); joint values are
     Denavit-Hartenberg ones, added to theta (revolute) or d (prismatic) of their links. Arrays are float64 and
     C-contiguous. `parameters` are absolute: the links' own (None), (L, 5) for all poses, or (n, L, 5).
-    Results go to `out` if it is given, which costs far less than a large new array. `threads` bounds the threads
-    used (None: all); the result does not depend on it.
+    Results go to `out` if it is given, which costs far less than a large new array. `threads` bounds the
+    threads used (None: all); the result does not depend on it.
 
     Raises:
         CoreError: A shape does not fit, an array is not contiguous, a transform is not rigid.
@@ -291,7 +291,7 @@ class Posterior:
         setup: Setup,
         options: Mapping[str, Any],
     ) -> None:
-        """The posterior, linearised at parameters (L, 5) and set-up; options as for fit_field with `hyper`."""
+        """The posterior, linearised at parameters (L, 5) and set-up; options as for fit_field."""
 
     def covariance(self, inputs: NDArray[np.float64], jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
         """Covariance (n, m, m) of jacobian (n, m, P), by the problem's columns, times parameters."""
@@ -301,9 +301,9 @@ def fit_constant(problem: Problem, options: Mapping[str, Any]) -> ConstantFit:
 
     Args:
         problem: With no columns, frames and targets are fitted alone.
-        options: prior (standard deviation of lengths in m, of angles in rad, whether the evidence scales them),
-            or None; noise (m, rad), or None to estimate it; robust "huber", "cauchy" or None; start, a set-up,
-            or None; parameters, a fixed arm (L, 5) or (n, L, 5), or None; threads, or None for all.
+        options: prior (standard deviation of lengths in m, of angles in rad, whether the evidence scales
+            them), or None; noise (m, rad), or None to estimate it; robust "huber", "cauchy" or None; start, a
+            set-up, or None; parameters, a fixed arm (L, 5) or (n, L, 5), or None; threads, or None for all.
 
     Raises:
         CoreError: Measurements are too few or too alike.

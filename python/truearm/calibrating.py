@@ -28,6 +28,7 @@ from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
 from truearm.splitting import Split, split_rows
+from truearm.unexplained import unexplained
 from truearm.validation import Validation
 
 
@@ -63,10 +64,11 @@ def calibrate(
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))
     validation = _validate(task, trained, given, split)
-    final, order = trained, split.train
+    final, order, hyper = trained, split.train, None
     if chosen.refit:
         order = np.random.default_rng(chosen.split.seed).permutation(len(given))
-        final = fit_rows(task, given.select(order), _kept_hyper(trained))
+        hyper = _kept_hyper(trained)
+        final = fit_rows(task, given.select(order), hyper)
     return Calibration(
         robot=robot,
         options=chosen,
@@ -75,7 +77,7 @@ def calibrate(
         models=final.models(task.arm),
         identifiability=final.identifiability,
         constant=ConstantDetails.of(final.identifiability.determined, final.constant),
-        variable=_variable_details(final, chosen),
+        variable=_variable_details(task, final, final if hyper is None else trained),
         validation=validation,
         rows=FittedRows.of(final, sides(len(given), split)[order], task.selection),
         data_hash=given.hash(),
@@ -130,8 +132,15 @@ def _kept_hyper(trained: Fits) -> dict[str, list[float]] | None:
     return trained.variable.hyper
 
 
-def _variable_details(fits: Fits, options: Options) -> VariableDetails | None:
-    if fits.variable is None:
+def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:
+    if final.variable is None or searched.variable is None:
         return None
-    ranges = feature_ranges(feature_values(fits.data, options.features))
-    return VariableDetails.of(fits.variable, ranges)
+    ranges = feature_ranges(feature_values(final.data, task.options.features))
+    return VariableDetails(
+        hyper=final.variable.hyper,
+        evidence=searched.variable.evidence,
+        evaluations=searched.variable.evaluations,
+        inflation=final.variable.inflation,
+        unexplained_m=unexplained(task, final.variable, final.data),
+        feature_ranges=tuple(ranges),
+    )

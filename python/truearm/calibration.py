@@ -39,7 +39,8 @@ class Calibration:
     Joint readings `q` are (n, N), or (N,) for one, and results have the same leading dimension. Where the
     calibration was fitted with features, predictions need `features`: a number, or one for each pose, by
     name. Without `group`, positions and poses are those of the robot file's tool, or of `tool`, in the
-    robot's base frame. With `group` they are those of the measured `target`, or of `tool`, in that set-up's world.
+    robot's base frame. With `group` they are those of the measured `target`, or of `tool`, in that set-up's
+    world.
 
     Attributes:
         robot: The nominal arm.

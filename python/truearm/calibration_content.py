@@ -26,7 +26,7 @@ Arrays = dict[str, NDArray[Any]]
 
 SETUP_PARTS: Final = ("frames", "targets", "rotations", "anchors")
 CONSTANT_KEYS: Final = ("noise_m", "noise_rad", "prior_scale", "iterations", "reason")
-VARIABLE_KEYS: Final = ("evidence", "evaluations", "inflation")
+VARIABLE_KEYS: Final = ("evidence", "evaluations", "inflation", "unexplained_m")
 
 
 def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[str, Any]]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import ConstantFit, FieldFit
+from truearm._core import ConstantFit
 
 Floats = NDArray[np.float64]
 
@@ -47,9 +47,11 @@ class VariableDetails:
 
     Attributes:
         hyper: Hyper-parameters by name; amplitudes in rad and m, length scales in rad or parts of the range.
-        evidence: Logarithm of the evidence at its maximum.
-        evaluations: How often it was evaluated.
+        evidence: Logarithm of the evidence at its maximum, on the rows that found it.
+        evaluations: How often it was evaluated there.
         inflation: Factor on standard deviations that makes them agree with left-out residuals.
+        unexplained_m: Standard deviation of a position's coordinate that is left: noise, and what the joints
+            miss anew at every pose, where they were measured.
         feature_ranges: How far the values of each feature reached.
     """
 
@@ -57,9 +59,5 @@ class VariableDetails:
     evidence: float
     evaluations: int
     inflation: float
+    unexplained_m: float
     feature_ranges: tuple[float, ...]
-
-    @classmethod
-    def of(cls, fit: FieldFit, feature_ranges: list[float]) -> "VariableDetails":
-        """Those of a fit."""
-        return cls(fit.hyper, fit.evidence, fit.evaluations, fit.inflation, tuple(feature_ranges))

@@ -36,9 +36,8 @@ def summarise(calibration: "Calibration") -> dict[str, Any]:
 
 def noise_mm(calibration: "Calibration") -> float:
     """Standard deviation of a coordinate that the best model leaves unexplained."""
-    if calibration.variable is not None:
-        return calibration.variable.hyper["noise_position"][0] * MM_PER_METRE
-    return calibration.constant.noise_m * MM_PER_METRE
+    details = calibration.variable
+    return MM_PER_METRE * (calibration.constant.noise_m if details is None else details.unexplained_m)
 
 
 def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:

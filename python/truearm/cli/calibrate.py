@@ -10,8 +10,9 @@ from truearm.calibrating import calibrate
 from truearm.calibration import Calibration
 from truearm.cli.console import print_json, say, say_wrapped, warn
 from truearm.cli.error_tables import print_errors
+from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import InputError, list_rows
+from truearm.errors import InputError
 from truearm.files import write_whole
 from truearm.measurements import Measurements
 from truearm.options import Options
@@ -19,7 +20,7 @@ from truearm.robot import Robot
 
 CALIBRATION_NAME = "calibration.calib"
 SUMMARY_NAME = "summary.json"
-OUTLIERS_NAMED = 3
+OUTLIERS_NAMED = 5
 
 
 def command(
@@ -98,7 +99,8 @@ def command(
         measurements, length_unit=length_unit, angle_unit=angle_unit, joints=arm.joints
     )
     check_directory(output)
-    calibration = calibrate(arm, data, options, threads=threads, stages=told_stages())
+    with ends_promptly():
+        calibration = calibrate(arm, data, options, threads=threads, stages=told_stages())
     warn(calibration.notices)
     summary = write_results(calibration, output)
     if as_json:
@@ -138,7 +140,7 @@ def print_results(calibration: Calibration) -> None:
     print_determined(calibration)
     print_errors(validation.holdout, f"{validation.n_holdout} held-out rows")
     say(f"Noise that no model explains: {summary['noise_mm']:.3f} mm in each coordinate.")
-    _print_outliers(summary["outliers"])
+    _print_outliers(summary["outliers"], calibration)
     if calibration.options.refit and calibration.rows is not None:
         say(f"After that fitted to all {len(calibration.rows.data)} rows.")
 
@@ -159,13 +161,15 @@ def _by_reason(names: tuple[str, ...], sentences: tuple[str, ...]) -> dict[str, 
     return grouped
 
 
-def _print_outliers(outliers: list[dict[str, Any]]) -> None:
+def _print_outliers(outliers: list[dict[str, Any]], calibration: Calibration) -> None:
     if not outliers:
         return
-    worst = outliers[:OUTLIERS_NAMED]
-    rows = list_rows([outlier["row"] for outlier in worst])
-    more = f" and {len(outliers) - len(worst)} more" if len(outliers) > len(worst) else ""
-    say_wrapped(
-        f"Outliers: {rows}{more} ({worst[0]['distance_mm']:.2f} mm at the worst, in {worst[0]['file']}); "
-        "taken out of the variable fit, not out of the errors above."
-    )
+    several = calibration.rows is not None and len(calibration.rows.data.files) > 1
+    named = [
+        f"row {outlier['row']}{' of ' + Path(outlier['file']).name if several else ''}"
+        f" ({outlier['distance_mm']:.2f} mm)"
+        for outlier in outliers[:OUTLIERS_NAMED]
+    ]
+    more = f" and {len(outliers) - len(named)} more" if len(outliers) > len(named) else ""
+    fate = "taken out of the variable fit" if calibration.variable is not None else "not taken out of the fit"
+    say_wrapped(f"Outliers, {fate}: {', '.join(named)}{more}; summary.json has them all.")

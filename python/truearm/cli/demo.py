@@ -14,6 +14,7 @@ from truearm.cli.calibrate import (
     write_results,
 )
 from truearm.cli.console import say, say_wrapped, warn
+from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.files import write_whole
 from truearm.measurements import Measurements
@@ -48,7 +49,8 @@ def command(
     write_whole(measured, table.to_csv(index=False, lineterminator="\n"))
     later = arm.measure_table(arm.poses(OTHER_POSES, seed=1), seed=1)
     write_whole(other, later.to_csv(index=False, lineterminator="\n"))
-    calibration = calibrate(Robot.load("rv-m2"), Measurements.read_csv(measured), stages=told_stages())
+    with ends_promptly():
+        calibration = calibrate(Robot.load("rv-m2"), Measurements.read_csv(measured), stages=told_stages())
     warn(calibration.notices)
     write_results(calibration, output)
     print_results(calibration)

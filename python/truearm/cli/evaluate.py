@@ -8,6 +8,7 @@ import typer
 from truearm.calibration import Calibration
 from truearm.cli.console import print_json, say, warn
 from truearm.cli.error_tables import print_errors
+from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.evaluation import EvaluationOptions, evaluate
 from truearm.measurements import Measurements
@@ -60,7 +61,8 @@ def command(
     data = Measurements.read_files(
         measurements, length_unit=length_unit, angle_unit=angle_unit, joints=known.robot.joints
     )
-    found = evaluate(known, data, options, stages=told_stages())
+    with ends_promptly():
+        found = evaluate(known, data, options, stages=told_stages())
     warn(found.notices)
     if as_json:
         print_json(found.to_dict())

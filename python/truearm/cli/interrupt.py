@@ -1,0 +1,42 @@
+"""Ctrl-C that ends a command within a second, even in the middle of a long factorisation."""
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Final
+
+from truearm.cli.console import INTERRUPTED, tell
+
+GRACE_S: Final = 0.6
+
+
+@contextmanager
+def ends_promptly() -> Iterator[None]:
+    """Around long work: Ctrl-C raises KeyboardInterrupt, and ends the process if that takes too long.
+
+    Files are written whole or not at all, so that ending at any moment leaves no half-written one.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    ended = threading.Event()
+
+    def interrupted(_number: int, _frame: FrameType | None) -> None:
+        threading.Thread(target=_end_unless, args=(ended,), daemon=True).start()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupted)
+    try:
+        yield
+    finally:
+        ended.set()
+        signal.signal(signal.SIGINT, before)
+
+
+def _end_unless(ended: threading.Event) -> None:
+    if not ended.wait(GRACE_S):
+        tell("Interrupted.")
+        os._exit(INTERRUPTED)

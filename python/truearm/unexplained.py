@@ -1,0 +1,30 @@
+"""What is left when the model has said all it knows: noise of the instrument and of the joints."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import FieldFit
+from truearm.fitting import Task
+from truearm.measurements import Measurements
+
+Floats = NDArray[np.float64]
+
+PRISMATIC_LEVER_M: Final = 0.3
+"""What a prismatic joint misses in m for each rad of the hyper-parameter."""
+
+
+def unexplained(task: Task, fit: FieldFit, data: Measurements) -> float:
+    """Standard deviation of a coordinate of the first fitted target, m, over the rows of `data`.
+
+    It adds up the noise of positions and what the joints, each for itself, miss anew at every pose.
+    """
+    end = np.eye(4)
+    end[:3, 3] = fit.setup.targets[0, 0]
+    chain = task.arm.chain(task.arm.robot.flange @ end)
+    jacobian = chain.joint_jacobian(task.arm.robot.joints_from_readings(data.readings))
+    levers = np.where(np.array(task.arm.robot.joints) == "prismatic", PRISMATIC_LEVER_M, 1.0)
+    missed = fit.hyper["repeatability"][0] * jacobian * levers
+    variance = np.square(missed).sum(axis=(1, 2)).mean() / 3.0
+    return float(np.sqrt(fit.hyper["noise_position"][0] ** 2 + variance))
