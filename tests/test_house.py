@@ -77,8 +77,8 @@ def test_files_are_short(path):
 def test_python_functions_are_short(path):
     tree = ast.parse(path.read_text())
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
-    long = {node.name: (node.end_lineno or node.lineno) - node.lineno + 1 for node in functions}
-    assert {name: lines for name, lines in long.items() if lines > LONGEST_FUNCTION} == {}
+    bodies = {node.name: (node.end_lineno or 0) - node.body[0].lineno + 1 for node in functions}
+    assert {name: lines for name, lines in bodies.items() if lines > LONGEST_FUNCTION} == {}
 
 
 def test_kernels_are_inlined_into_their_instruction_set():
