@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+import truearm as ta
 from truearm.cli import COMMANDS
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
@@ -119,6 +120,22 @@ def test_every_command_is_in_the_reference():
     page = (ROOT / "docs" / "reference" / "cli.md").read_text()
     for entry in COMMANDS:
         assert f"## truearm {entry.name}\n" in page
+
+
+def test_every_key_of_a_summary_is_explained(tables):
+    page = (ROOT / "docs" / "reference" / "calibration-file.md").read_text()
+    first_column = " ".join(re.findall(r"^\|([^|]+)\|", page, re.MULTILINE))
+    data = [ta.Measurements.from_dataframe(table) for table in tables.values()]
+    calibration = ta.calibrate(ta.Robot.load("ur10"), data[0], model="constant")
+    evaluation = ta.evaluate(calibration, data[1])
+    for key in [*calibration.summary, *evaluation.to_dict()]:
+        assert f"`{key}`" in first_column, key
+
+
+def test_every_public_name_is_in_the_python_reference():
+    page = (ROOT / "docs" / "reference" / "python-api.md").read_text()
+    for name in ta.__all__:
+        assert re.search(rf"\b{name}\b", page), name
 
 
 def load_script(name):
