@@ -182,13 +182,15 @@ impl Fit<'_> {
         residuals(self.problem, Point { parameters: &state.parameters, setup: &state.setup })
     }
 
-    /// Inverse of the normal equations with the prior, rescaled to the balance's noise.
+    /// Inverse of the normal equations with the prior, rescaled to the balance's noise. A set-up counts as known to a
+    /// metre and a radian: flat, but never singular where frame and targets cannot be told apart, as on a SCARA.
     fn covariance(&self, minimum: &Minimum, balance: &Balance) -> Result<Mat<f64>, EstimateError> {
         let mut matrix = minimum.normal.matrix.clone();
         for (k, precision) in self.precision(balance.scale).into_iter().enumerate() {
             matrix[(k, k)] += precision;
         }
         let n = matrix.nrows();
+        (self.problem.columns.len()..n).for_each(|k| matrix[(k, k)] += 1.0);
         let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
         let scaled = Mat::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
         let factor = Cholesky::new(scaled, Par::Seq).ok_or_else(|| EstimateError::Singular {
