@@ -16,6 +16,8 @@ use crate::setup::Setup;
 
 /// A column counts as spanned when less than this share of it stands out of the others' span.
 const INDEPENDENT_SHARE: f64 = 1e-6;
+/// A column shorter than this share of the longest one holds nothing but rounding.
+const ROUNDING: f64 = 1e-10;
 /// Poses that the question is answered on; more do not change the answer.
 const POSES: usize = 1000;
 /// Parts of a combination below this are left out.
@@ -118,6 +120,8 @@ fn in_order(columns: MatRef<f64>, own: usize, arm: usize) -> Identifiability {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut accepted: Vec<usize> = Vec::new();
     let mut rejected: Vec<usize> = Vec::new();
+    let norms = (0..own + arm).map(|column| columns.col(column).norm_l2());
+    let negligible = ROUNDING * norms.fold(0.0, f64::max);
     for column in 0..own + arm {
         let original: Vec<f64> = (0..columns.nrows()).map(|row| columns[(row, column)]).collect();
         let norm = length(&original);
@@ -129,7 +133,7 @@ fn in_order(columns: MatRef<f64>, own: usize, arm: usize) -> Identifiability {
             }
         }
         let left = length(&rest);
-        if norm > 0.0 && left > INDEPENDENT_SHARE * norm {
+        if norm > negligible && left > INDEPENDENT_SHARE * norm {
             basis.push(rest.into_iter().map(|x| x / left).collect());
             accepted.push(column);
         } else {
