@@ -8,6 +8,7 @@ import json
 import re
 import statistics
 import sys
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ HEAD = """# Results on real arms
 Position error in mm on rows that took no part in fitting or choosing, from public measurements made by
 others. `make figures FIGURES="--data DIR"` runs the command line on them and writes this page. Nominal,
 constant and variable each have their own frame and target fitted to the same rows. The first table is for
-seed 7, the second shows how much the choice of held-out rows matters.
+seed 7, the second shows how much the choice of held-out rows matters, and which share of the held-out
+coordinates lies within the 95 % intervals that were given for them.
 
 The data, q1 ... q6 in rad and x y z in m, from their authors' repositories:
 
@@ -53,14 +55,18 @@ def main() -> int:
 
 
 def read_cases(out: Path) -> dict[str, dict[str, Any]]:
-    """Each case with the errors of each seed: model to statistics."""
+    """Each case with the errors of each seed, model to statistics, and the coverage of its intervals."""
+    described = [json.loads(path.read_text()) for path in out.glob("*/case.json")]
     cases = {}
-    for described in sorted(out.glob("*/case.json")):
-        case = json.loads(described.read_text())
+    for case in sorted(described, key=itemgetter("order")):
+        folders = sorted((out / case["name"]).glob("seed-*"))
         case["errors"] = {
             int(folder.name.removeprefix("seed-")): read_errors(folder, bool(case["judge"]))
-            for folder in sorted(described.parent.glob("seed-*"))
+            for folder in folders
         }
+        case["coverage"] = [
+            json.loads(path.read_text()) for folder in folders for path in folder.glob("coverage.json")
+        ]
         if FIRST_SEED in case["errors"]:
             cases[case["name"]] = case
     return cases
@@ -91,16 +97,21 @@ def first_seed_table(cases: dict[str, dict[str, Any]]) -> str:
 
 
 def seeds_table(cases: dict[str, dict[str, Any]]) -> str:
-    """Median and worst mean over the seeds."""
+    """Median and worst mean over the seeds, and the coverage of the intervals."""
     lines = [
-        "| data | seeds | constant: median, worst mean | variable: median, worst mean |",
-        "|---|---|---|---|",
+        "| data | seeds | constant: median, worst mean | variable: median, worst mean "
+        "| covered: least, median, most |",
+        "|---|---|---|---|---|",
     ]
     for case in cases.values():
         cells = []
         for model in ("constant", "variable"):
             means = [errors[model]["mean_mm"] for errors in case["errors"].values() if model in errors]
             cells.append(f"{statistics.median(means):.3f}, {max(means):.3f}" if means else "")
+        shares = case["coverage"]
+        cells.append(
+            f"{min(shares):.1%}, {statistics.median(shares):.1%}, {max(shares):.1%}" if shares else ""
+        )
         lines.append(f"| {case['title']} | {len(case['errors'])} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
