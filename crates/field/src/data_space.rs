@@ -134,6 +134,48 @@ impl DataSpace {
         Ok(out)
     }
 
+    /// Residuals of whole blocks of poses that would have taken no part, with their variances.
+    pub fn leave_blocks_out(
+        &self,
+        residual: &[f64],
+        blocks: &[Vec<usize>],
+    ) -> Result<Vec<LeftOut>, FieldError> {
+        let model = &self.model;
+        let training = &model.training;
+        let alpha = self.alpha(residual, &self.setup_step(residual));
+        let inverse = self.factor.inverse();
+        let mut root = self.spread.transpose().to_owned();
+        self.inner.solve_lower(root.as_mut());
+        let mut out = Vec::new();
+        for block in blocks {
+            let rows: Vec<usize> = block.iter().flat_map(|&pose| training.rows(pose)).collect();
+            let precision = Mat::from_fn(rows.len(), rows.len(), |i, j| {
+                let setup = root.col(rows[i]).transpose() * root.col(rows[j]);
+                inverse[(rows[i], rows[j])] - setup
+            });
+            let error = FieldError::NotPositiveDefinite { rows: rows.len() };
+            let factor = Cholesky::new(precision, parallelism()).ok_or(error)?;
+            let local: Vec<f64> = rows.iter().map(|&row| alpha[row]).collect();
+            let left_out = factor.solve_vector(&local);
+            let covariance = factor.inverse();
+            let mut at = 0;
+            for &pose in block {
+                let range = training.rows(pose);
+                let anew = model.noise_covariance(&training.jacobian, range.clone());
+                let noise =
+                    |i: usize| training.noise_variance(range.start + i, model.hyper.noise) + anew[(i, i)];
+                let known = |i: usize| (covariance[(at + i, at + i)] - noise(i)).max(0.0);
+                out.extend((0..range.len()).map(|i| LeftOut {
+                    residual: left_out[at + i],
+                    noise: noise(i),
+                    known: known(i),
+                }));
+                at += range.len();
+            }
+        }
+        Ok(out)
+    }
+
     pub fn covariance(&self, query: &Query) -> Vec<f64> {
         let mut out = vec![0.0; query.poses() * query.rows * query.rows];
         for first in (0..query.poses()).step_by(BATCH) {
@@ -191,6 +233,17 @@ impl DataSpace {
             }
         }
     }
+}
+
+/// A row that was predicted without its block.
+#[derive(Debug, Clone, Copy)]
+pub struct LeftOut {
+    /// Measured - predicted.
+    pub residual: f64,
+    /// Variance of the measurement.
+    pub noise: f64,
+    /// Variance of the prediction.
+    pub known: f64,
 }
 
 /// S^T K^-1 S, with the precision of a set-up that is known to a metre and a radian: flat, but never singular.

@@ -5,6 +5,7 @@ use truearm_estimate::{Cancel, ConstantFit, Point, Prior, Problem, Setup};
 use crate::FieldError;
 use crate::bank::Bank;
 use crate::evidence::Evidence;
+use crate::extrapolation::extrapolation_factor;
 use crate::hyper::Hyper;
 use crate::kernel::Input;
 use crate::linear::training;
@@ -62,6 +63,7 @@ pub struct FieldFit {
 const ROWS_FOR_SELECTION: usize = 540;
 const ROWS_FOR_HYPER: usize = 900;
 const ROWS_FOR_POLISH: usize = 3000;
+const ROWS_FOR_EXTRAPOLATION: usize = 1200;
 const SEARCH: Limits = Limits { evaluations: 60, gain: 0.02 };
 const POLISH: Limits = Limits { evaluations: 12, gain: 0.05 };
 /// Reweightings of outliers at the most.
@@ -140,6 +142,16 @@ struct Search<'a> {
 
 impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
+        let mut hyper = self.searched(training, noise)?;
+        if self.options.hyper.is_none() {
+            let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION));
+            hyper.extrapolation =
+                extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
+        }
+        Ok(hyper)
+    }
+
+    fn searched(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         if let Some(hyper) = &self.options.hyper {
             return Ok(hyper.clone());
         }

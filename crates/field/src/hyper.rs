@@ -35,6 +35,9 @@ pub struct Hyper {
     pub products: Vec<Product>,
     /// Noise of positions (m) and of orientations (rad).
     pub noise: [f64; 2],
+    /// Factor on the standard deviation of the arm's part, at least one; found by leaving out whole parts of the space, not
+    /// by the evidence.
+    pub extrapolation: f64,
 }
 
 /// An `own` amplitude of a revolute joint moves a tool at this distance as much as that of a prismatic one, m.
@@ -127,6 +130,7 @@ impl Hyper {
             repeatability: REPEATABILITY.start,
             products,
             noise,
+            extrapolation: 1.0,
         }
     }
 
@@ -188,6 +192,7 @@ impl Hyper {
             repeatability: at(AT_REPEATABILITY),
             products,
             noise: [at(first), at(first + 1)],
+            extrapolation: self.extrapolation,
         }
     }
 

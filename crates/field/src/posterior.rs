@@ -175,10 +175,13 @@ impl Posterior {
         if let Some(setup) = setup {
             length("setup", setup.len(), query.poses() * rows * training.setup_width)?;
         }
-        Ok(match self {
+        let mut covariance = match self {
             Self::Data(space) => space.covariance(&query),
             Self::Weight(space) => space.covariance(&query),
-        })
+        };
+        let scale = self.model().hyper.extrapolation.powi(2);
+        covariance.iter_mut().for_each(|value| *value *= scale);
+        Ok(covariance)
     }
 
     /// Covariance (n, m, m) of what joints do not repeat, carried to rows of a Jacobian (n, m, P).

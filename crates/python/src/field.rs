@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
     Axis, Bank, Block, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind, MAJOR_NAME,
-    Posterior as CorePosterior, Product, WRIST_NAME, fit_field as fit, restore,
+    Posterior as CorePosterior, Product, WRIST_NAME, fit_field as fit, measurement_covariance, restore,
 };
 
 use crate::door::{CoreError, long, quick, with_threads};
@@ -89,6 +89,7 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         repeatability: one("repeatability")?,
         products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
         noise: [one("noise_position")?, one("noise_orientation")?],
+        extrapolation: one("extrapolation")?,
     })
 }
 
@@ -102,6 +103,7 @@ fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         ("repeatability".to_owned(), vec![hyper.repeatability]),
         ("noise_position".to_owned(), vec![hyper.noise[0]]),
         ("noise_orientation".to_owned(), vec![hyper.noise[1]]),
+        ("extrapolation".to_owned(), vec![hyper.extrapolation]),
     ]);
     for product in &hyper.products {
         let name = &product.name;
@@ -343,6 +345,24 @@ impl Posterior {
             with_threads(threads, || restore(&problem.core(), point, &known, hyper))
         })?;
         Ok(Self { core })
+    }
+
+    /// Covariance (n, m, m) of the residuals of new measurements, base frame, see the stub.
+    fn measurement_covariance<'py>(
+        &self,
+        py: Python<'py>,
+        problem: &IdentificationProblem,
+        parameters: PyReadonlyArrayDyn<'py, f64>,
+        setup: &Setup,
+        inputs: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let core = problem.core();
+        let parameters: Vec<f64> = parameters.as_array().iter().copied().collect();
+        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
+        let point = Point { parameters: &parameters, setup: setup.core() };
+        let values = quick(py, || measurement_covariance(&self.core, &core, point, &inputs))?;
+        let rows = core.measurements.rows_per_pose();
+        array3(py, values, (core.measurements.pose_count(), rows, rows))
     }
 
     /// Covariance (n, m, m) of `jacobian CEP` (+ `setup s` where set-up columns (n, m, s) are given) for inputs (n, I) and Jacobians (n, m, P) by the problem's columns.

@@ -1,0 +1,70 @@
+//! How far to trust the field where nothing was measured.
+//!
+//! Leave-one-out residuals say nothing of whole parts of the space without data, where stationary kernels learned elsewhere
+//! are too sure of themselves. The tails of every input are left out in turn and predicted from the rest; the arm's
+//! standard deviation is scaled until 95 % of those predictions hold. Where data is dense noise outweighs it.
+
+use truearm_estimate::Cancel;
+
+use crate::FieldError;
+use crate::data_space::{DataSpace, LeftOut};
+use crate::hyper::Hyper;
+use crate::model::Model;
+use crate::training::Training;
+
+/// Share of the poses that make a tail.
+const TAIL: f64 = 0.2;
+/// Fewer poses do not tell.
+const FEWEST_POSES: usize = 50;
+/// Largest factor: beyond, the field knows nothing.
+const LARGEST: f64 = 6.0;
+/// 95 % of a standard normal variable lies within this.
+const QUANTILE_95: f64 = 1.959_963_984_540_054;
+
+/// Factor on the standard deviation of the arm's part, at least one.
+///
+/// # Errors
+/// [`FieldError`].
+pub fn extrapolation_factor(
+    training: &Training,
+    hyper: &Hyper,
+    degree: usize,
+    cancel: &Cancel,
+) -> Result<f64, FieldError> {
+    if training.pose_count() < FEWEST_POSES {
+        return Ok(1.0);
+    }
+    let space = DataSpace::new(Model::new(training.clone(), hyper.clone(), degree), cancel)?;
+    let rows = space.leave_blocks_out(&training.residual, &tails(training))?;
+    let holds = |factor: f64| {
+        let within = rows.iter().filter(|row| is_within(row, factor)).count();
+        within as f64 >= 0.95 * rows.len() as f64
+    };
+    let (mut low, mut high) = (1.0, LARGEST);
+    if holds(low) {
+        return Ok(low);
+    }
+    while high - low > 0.01 {
+        let middle = 0.5 * (low + high);
+        if holds(middle) { high = middle } else { low = middle }
+    }
+    Ok(high)
+}
+
+fn is_within(row: &LeftOut, factor: f64) -> bool {
+    let variance = row.noise + row.known * factor * factor;
+    row.residual.abs() <= QUANTILE_95 * variance.sqrt()
+}
+
+/// Poses with the largest and the smallest values of each input.
+fn tails(training: &Training) -> Vec<Vec<usize>> {
+    let count = ((training.pose_count() as f64 * TAIL) as usize).max(1);
+    let mut tails = Vec::new();
+    for k in 0..training.inputs.len() {
+        let mut order: Vec<usize> = (0..training.pose_count()).collect();
+        order.sort_by(|&a, &b| training.values_of(a)[k].total_cmp(&training.values_of(b)[k]));
+        tails.push(order[..count].to_vec());
+        tails.push(order[order.len() - count..].to_vec());
+    }
+    tails
+}
