@@ -9,7 +9,7 @@ import numpy as np
 from truearm.calibration import Calibration
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.errors import InputError, UsageError
+from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
     ENOUGH_FOR_HYPER,
@@ -20,7 +20,9 @@ from truearm.fitting import (
     feature_values,
     fit_rows,
     no_stages,
+    setup_unknowns,
 )
+from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.judging import judge
 from truearm.measurements import Measurements
@@ -82,7 +84,7 @@ def calibrate(
         rows=FittedRows.of(final, sides(len(given), split)[order], task.selection),
         data_hash=given.hash(),
         version=version("truearm"),
-        notices=tuple(notices),
+        notices=(*notices, *_open_setup(task, final.identifiability)),
         seconds=trained.seconds,
     )
 
@@ -123,6 +125,18 @@ def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> Va
         holdout=judge(task, models, held, trained.data),
         train=judge(task, models, trained.data, trained.data),
     )
+
+
+def _open_setup(task: Task, found: Identifiability) -> list[Notice]:
+    """A notice where frames and targets cannot all be told apart, as on a SCARA or from poses too alike."""
+    unknowns, rank = setup_unknowns(task), found.total_rank - found.rank
+    if task.selection.distances or rank >= unknowns:
+        return []
+    text = (
+        f"The poses determine {rank} of {unknowns} unknowns of frame and target: predictions of the measured "
+        "target are not harmed, but where the base stands in the world is not known."
+    )
+    return [Notice("open_setup", text)]
 
 
 def _kept_hyper(trained: Fits) -> dict[str, list[float]] | None:

@@ -225,7 +225,7 @@ def _check_enough(task: Task, data: Measurements, found: Identifiability) -> Non
     values = _measured_values(task, data)
     if values > found.total_rank:
         return
-    unknowns = found.parameters + _setup_unknowns(task)
+    unknowns = found.parameters + setup_unknowns(task)
     per_row = max(values // len(data), 1)
     raise WorkError(
         f"{values} measured values in {len(data)} rows cannot determine up to {unknowns} unknowns",
@@ -245,7 +245,8 @@ def _measured_values(task: Task, data: Measurements) -> int:
     return 3 * int(points + turned)
 
 
-def _setup_unknowns(task: Task) -> int:
+def setup_unknowns(task: Task) -> int:
+    """Unknowns of all set-ups: frames, targets, orientations of targets; without anchors."""
     frame = 0 if task.arm.world_is_known or task.selection.distances else 6
     points = 1 if task.selection.distances else len(task.selection.targets)
     return len(task.groups) * (frame + 3 * points + (3 if task.selection.orientation else 0))

@@ -176,6 +176,13 @@ def _key_columns(data: Measurements, names: Sequence[str]) -> NDArray[np.float64
                 rule=f"There are {list_names(known)}",
                 way_out=did_you_mean(name, list(known)),
             )
+        empty = np.isnan(known[name])
+        if empty.any():
+            raise InputError(
+                f'column "{name}" is empty in {data.row_names(empty)}',
+                where=", ".join(data.files),
+                rule="Rows are divided by the values of this column",
+            )
     return np.column_stack([known[name] for name in names])
 
 

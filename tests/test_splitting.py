@@ -1,0 +1,180 @@
+"""Splits: exactly the rows that the rule names, and no pose on both sides."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from truearm.errors import InputError, UsageError
+from truearm.measurements import Measurements
+from truearm.splitting import HoldoutRange, SplitRule, split_rows
+
+
+def table(count, *, seed=0, **columns):
+    rng = np.random.default_rng(seed)
+    readings = {f"q{j}": rng.uniform(-1.0, 1.0, count) for j in (1, 2, 3)}
+    return pd.DataFrame({**readings, "x": rng.normal(size=count), "y": 0.0, "z": 1.0, **columns})
+
+
+def measured(count, name="data", **more):
+    return Measurements.from_dataframe(table(count, **more), name=name)
+
+
+@pytest.mark.parametrize(
+    ("count", "holdout", "seed"), [(10, 0.3, 7), (101, 0.3, 7), (101, 0.25, 0), (33, 0.9, 5)]
+)
+def test_plain_split_is_one_permutation(count, holdout, seed):
+    order = np.random.default_rng(seed).permutation(count)
+    held = int((1 - holdout) * count)
+    split = split_rows(measured(count), SplitRule(holdout=holdout, seed=seed))
+    np.testing.assert_array_equal(split.train, order[:held])
+    np.testing.assert_array_equal(split.holdout, order[held:])
+
+
+def test_train_size_takes_the_first_of_the_permutation():
+    order = np.random.default_rng(7).permutation(100)
+    split = split_rows(measured(100), SplitRule(train_size=20))
+    np.testing.assert_array_equal(split.train, order[:20])
+    np.testing.assert_array_equal(split.holdout, order[70:])
+
+
+def test_each_file_is_split_for_itself():
+    data = Measurements.concatenate([measured(50, "a"), measured(40, "b", seed=1)])
+    split = split_rows(data, SplitRule(train_size=10))
+    first, second = (np.random.default_rng(7).permutation(count) for count in (50, 40))
+    np.testing.assert_array_equal(split.train, [*first[:10], *(50 + second[:10])])
+    np.testing.assert_array_equal(split.holdout, [*first[35:], *(50 + second[28:])])
+
+
+def test_a_train_size_up_to_the_held_out_rows_is_taken_and_one_more_is_refused():
+    assert len(split_rows(measured(100), SplitRule(train_size=70)).train) == 70
+    with pytest.raises(UsageError, match=r"71 reaches into the held-out rows.*30 are held out.*at most 70"):
+        split_rows(measured(100), SplitRule(train_size=71))
+
+
+def test_split_by_holds_out_whole_groups():
+    place = np.arange(120) % 12
+    data = measured(120, place=place * 1.0, layer=place % 2 * 1.0)
+    split = split_rows(data, SplitRule(split_by=("layer", "place")))
+    rng = np.random.default_rng(7)
+    keys = np.unique(np.column_stack([place % 2, place]), axis=0)
+    drawn = {tuple(key) for key in keys[rng.permutation(12)[int(0.7 * 12) :]]}
+    held = np.array([(p % 2, p) in drawn for p in place])
+    np.testing.assert_array_equal(split.train, rng.permutation(np.flatnonzero(~held)))
+    assert set(split.holdout) == set(np.flatnonzero(held))
+    assert not set(place[split.train]) & set(place[split.holdout])
+
+
+def test_split_by_with_a_train_size_keeps_the_held_out_groups():
+    data = measured(120, place=np.arange(120) % 12 * 1.0)
+    whole = split_rows(data, SplitRule(split_by=("place",)))
+    few = split_rows(data, SplitRule(split_by=("place",), train_size=15))
+    np.testing.assert_array_equal(few.train, whole.train[:15])
+    np.testing.assert_array_equal(few.holdout, whole.holdout)
+
+
+def test_split_by_a_joint_or_the_group():
+    data = measured(60, group=[f"g{k % 6}" for k in range(60)])
+    with pytest.raises(InputError, match="of which no row trains|no row of the set-up"):
+        split_rows(data, SplitRule(split_by=("group",)))
+
+
+@pytest.mark.parametrize(("text", "high"), [("q2:high:0.3", True), ("q2:low:0.3", False)])
+def test_range_holds_out_the_tail(text, high):
+    data = measured(200)
+    split = split_rows(data, SplitRule(holdout_range=HoldoutRange.parse(text)))
+    q2 = data.readings[:, 1]
+    assert len(split.holdout) == 60
+    assert len(split.train) == 140
+    if high:
+        assert q2[split.holdout].min() > q2[split.train].max()
+    else:
+        assert q2[split.holdout].max() < q2[split.train].min()
+
+
+def test_training_rows_beside_a_range_are_a_permutation():
+    data = measured(200)
+    split = split_rows(data, SplitRule(holdout_range=HoldoutRange(2, True, 0.3)))
+    assert not np.array_equal(split.train, np.sort(split.train))
+    assert sorted([*split.train, *split.holdout]) == list(range(200))
+
+
+def test_equal_readings_at_the_range_s_boundary_stay_together():
+    data = measured(100, q2=np.repeat(np.linspace(0.0, 1.0, 10), 10))
+    split = split_rows(data, SplitRule(holdout_range=HoldoutRange(2, True, 0.25)))
+    assert not set(data.readings[split.train, 1]) & set(data.readings[split.holdout, 1])
+    assert len(split.holdout) == 30
+
+
+@pytest.mark.parametrize("rule", [SplitRule(), SplitRule(split_by=("lot",)), SplitRule(train_size=40)])
+def test_repeated_joint_vectors_stay_on_one_side(rule):
+    frame = table(240, lot=np.arange(240) % 7 * 1.0)
+    configuration = np.random.default_rng(3).integers(0, 24, 240)
+    for j in (1, 2, 3):
+        frame[f"q{j}"] = np.linspace(-1.0, 1.0, 24)[configuration] * j
+    split = split_rows(Measurements.from_dataframe(frame), rule)
+    assert not set(configuration[split.train]) & set(configuration[split.holdout])
+    assert len(split.holdout) > 20
+    if rule.train_size is None:
+        assert len(split.train) + len(split.holdout) == 240
+
+
+def test_the_rows_of_a_pair_stay_on_one_side():
+    frame = table(100, pair=[f"p{k // 2}" for k in range(100)], distance=1.0).drop(columns=["x", "y", "z"])
+    split = split_rows(Measurements.from_dataframe(frame), SplitRule())
+    assert not set(split.train // 2) & set(split.holdout // 2)
+
+
+@pytest.mark.parametrize(
+    "text", ["q2", "q2:high", "q2:up:0.3", "2:high:0.3", "q0:high:0.3", "q2:high:much", "q2:high:1.5"]
+)
+def test_ranges_that_are_none(text):
+    with pytest.raises(UsageError, match="range to hold out|between 0 and 1"):
+        HoldoutRange.parse(text)
+
+
+def test_a_range_reads_back_as_it_was_written():
+    assert str(HoldoutRange.parse("q2:high:0.3")) == "q2:high:0.3"
+
+
+@pytest.mark.parametrize("wrong", [{"holdout": 0.0}, {"holdout": 1.0}, {"seed": -1}, {"train_size": 0}])
+def test_rules_that_cannot_be(wrong):
+    with pytest.raises(UsageError):
+        SplitRule(**wrong)
+
+
+def test_columns_and_a_range_exclude_each_other():
+    with pytest.raises(UsageError, match="not both"):
+        SplitRule(split_by=("place",), holdout_range=HoldoutRange(1, True, 0.3))
+
+
+def test_an_unknown_column_is_refused_with_the_nearest():
+    with pytest.raises(UsageError, match=r'no column "plaec".*"place"'):
+        split_rows(measured(20, place=1.0), SplitRule(split_by=("plaec",)))
+
+
+def test_an_empty_key_is_refused_by_row():
+    place = np.arange(20.0)
+    place[4] = np.nan
+    with pytest.raises(InputError, match=r'"place" is empty in row 5'):
+        split_rows(measured(20, place=place), SplitRule(split_by=("place",)))
+
+
+def test_a_joint_that_is_not_there_is_refused():
+    with pytest.raises(UsageError, match=r"joint 4.*3 joints"):
+        split_rows(measured(20), SplitRule(holdout_range=HoldoutRange(4, True, 0.3)))
+
+
+def test_one_row_cannot_be_split():
+    with pytest.raises(InputError, match="no row would be left to train on"):
+        split_rows(measured(1), SplitRule())
+
+
+def test_one_value_to_split_by_leaves_nothing_to_train_on():
+    with pytest.raises(InputError, match="no row would be"):
+        split_rows(measured(20, place=1.0), SplitRule(split_by=("place",)))
+
+
+def test_a_set_up_without_training_rows_is_refused():
+    group = ["morning"] * 190 + ["evening"] * 10
+    with pytest.raises(InputError, match=r'no row of the set-up "evening" trains'):
+        split_rows(measured(200, group=group), SplitRule(train_size=5))
