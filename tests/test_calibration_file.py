@@ -1,0 +1,198 @@
+"""Calibration files: everything comes back bit for bit, and no altered byte goes unnoticed."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from safetensors.numpy import save as save_arrays
+
+import truearm as ta
+from truearm import calibration_file
+from truearm.calibration_file import read_calibration_file, write_calibration_file
+from truearm.simulation import VirtualArm
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    arm = VirtualArm.paper(seed=2)
+    table = arm.measure_table(arm.poses(70), orientation=True)
+    table["temperature_C"] = np.linspace(20.0, 30.0, 70)
+    table["sigma_mm"] = 0.02
+    table["group"] = ["morning", "evening"] * 35
+    data = ta.Measurements.from_dataframe(table)
+    return arm, ta.calibrate(arm.robot, data, features="temperature_C", split_by="temperature_C")
+
+
+@pytest.fixture(scope="module")
+def written(calibrated, tmp_path_factory):
+    path = tmp_path_factory.mktemp("file") / "arm.calib"
+    calibrated[1].save(path)
+    return path
+
+
+@pytest.mark.parametrize("method", ["position", "pose", "parameters", "position_std", "pose_std"])
+def test_predictions_come_back_bit_for_bit(calibrated, written, method):
+    arm, calibration = calibrated
+    again = ta.Calibration.load(written)
+    asked = {"features": {"temperature_C": 24.0}}
+    q = arm.poses(10, seed=4)
+    np.testing.assert_array_equal(
+        getattr(again, method)(q, **asked), getattr(calibration, method)(q, **asked)
+    )
+
+
+def test_a_target_in_world_comes_back_bit_for_bit(calibrated, written):
+    arm, calibration = calibrated
+    again = ta.Calibration.load(written)
+    asked = {"group": "evening", "target": 1, "features": {"temperature_C": 24.0}}
+    q = arm.poses(10, seed=4)
+    np.testing.assert_array_equal(again.pose(q, **asked), calibration.pose(q, **asked))
+
+
+def test_everything_else_comes_back(calibrated, written):
+    _, calibration = calibrated
+    again = ta.Calibration.load(written)
+    timeless = {key: value for key, value in calibration.summary.items() if key not in ("seconds", "notices")}
+    assert {key: again.summary[key] for key in timeless} == timeless
+    assert again.robot == calibration.robot
+    assert again.options == calibration.options
+    assert again.validation == calibration.validation
+    assert again.groups == calibration.groups
+    assert again.rows.data.hash() == calibration.rows.data.hash()
+    np.testing.assert_array_equal(again.rows.data.rows, calibration.rows.data.rows)
+    np.testing.assert_array_equal(again.rows.side, calibration.rows.side)
+    np.testing.assert_array_equal(again.constant.covariance, calibration.constant.covariance)
+
+
+def test_written_again_it_is_the_same_file(written, tmp_path):
+    ta.Calibration.load(written).save(tmp_path / "again.calib")
+    assert (tmp_path / "again.calib").read_bytes() == written.read_bytes()
+
+
+def test_a_constant_calibration_comes_back(calibrated, tmp_path):
+    arm, _ = calibrated
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant")
+    calibration.save(tmp_path / "c.calib")
+    again = ta.Calibration.load(tmp_path / "c.calib")
+    q = arm.poses(5, seed=4)
+    np.testing.assert_array_equal(again.position_std(q), calibration.position_std(q))
+    assert set(again.models) == {"nominal", "constant"}
+
+
+def test_parallel_within_and_frame_come_back(tmp_path):
+    arm = VirtualArm.paper(seed=2)
+    calibration = ta.calibrate(
+        arm.robot, arm.measure(arm.poses(60)), frame="world", parallel_within_deg=1.0, model="constant"
+    )
+    calibration.save(tmp_path / "w.calib")
+    again = ta.Calibration.load(tmp_path / "w.calib")
+    assert again.arm.candidates == calibration.arm.candidates
+    q = arm.poses(5, seed=4)
+    np.testing.assert_array_equal(again.position(q), calibration.position(q))
+
+
+def test_without_rows_it_predicts_and_says_why_it_has_no_deviations(calibrated, tmp_path):
+    arm, calibration = calibrated
+    calibration.save(tmp_path / "small.calib", with_rows=False)
+    again = ta.Calibration.load(tmp_path / "small.calib")
+    q, asked = arm.poses(5, seed=4), {"features": {"temperature_C": 24.0}}
+    np.testing.assert_array_equal(again.position(q, **asked), calibration.position(q, **asked))
+    with pytest.raises(ta.WorkError, match="left out of this file"):
+        again.position_std(q, **asked)
+
+
+@given(data=st.data())
+def test_any_altered_byte_is_noticed(written, data):
+    content = bytearray(written.read_bytes())
+    place = data.draw(st.integers(0, len(content) - 1))
+    content[place] ^= data.draw(st.integers(1, 255))
+    altered = written.with_name("altered.calib")
+    altered.write_bytes(content)
+    with pytest.raises(ta.InputError, match=r"altered\.calib: "):
+        ta.Calibration.load(altered)
+
+
+@given(place=st.integers(0, 3000), change=st.integers(1, 255))
+def test_any_altered_byte_of_the_header_is_noticed(written, place, change):
+    content = bytearray(written.read_bytes())
+    content[place] ^= change
+    altered = written.with_name("altered.calib")
+    altered.write_bytes(content)
+    with pytest.raises(ta.InputError, match=r"altered\.calib: "):
+        ta.Calibration.load(altered)
+
+
+@given(share=st.floats(0.0, 1.0, exclude_max=True))
+def test_any_truncated_file_is_noticed(written, share):
+    content = written.read_bytes()
+    cut = written.with_name("cut.calib")
+    cut.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(ta.InputError, match="cut short|no calibration file|empty file"):
+        ta.Calibration.load(cut)
+
+
+def test_bytes_behind_the_end_are_noticed(written, tmp_path):
+    (tmp_path / "long.calib").write_bytes(written.read_bytes() + b"\0")
+    with pytest.raises(ta.InputError, match="altered"):
+        ta.Calibration.load(tmp_path / "long.calib")
+
+
+def test_another_schema_version_is_said(monkeypatch, tmp_path):
+    monkeypatch.setattr(calibration_file, "SCHEMA", 99)
+    write_calibration_file(tmp_path / "new.calib", {"a": np.zeros(2)}, {"version": "9.9.0"})
+    monkeypatch.undo()
+    with pytest.raises(ta.InputError, match=r"version 99.*reads version \d+.*truearm 9\.9\.0"):
+        ta.Calibration.load(tmp_path / "new.calib")
+
+
+def test_a_missing_key_is_said(tmp_path):
+    write_calibration_file(tmp_path / "odd.calib", {"a": np.zeros(2)}, {"version": "0.1.0"})
+    with pytest.raises(ta.InputError, match="has no '"):
+        ta.Calibration.load(tmp_path / "odd.calib")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "empty file"),
+        (b"q1,q2,x,y,z\n1,2,3,4,5\n", "no calibration file"),
+        (b"PK\x03\x04" + bytes(100), "no calibration file"),
+        (save_arrays({"a": np.zeros(3)}), "safetensors file, but no calibration"),
+        (save_arrays({"a": np.zeros(3)}, {"truearm": "[1]"}), "no JSON object"),
+        (json.dumps({"robot": "UR10"}).encode(), "no calibration file"),
+    ],
+)
+def test_files_that_are_no_calibration(content, words, tmp_path):
+    (tmp_path / "x.calib").write_bytes(content)
+    with pytest.raises(ta.InputError, match=words):
+        ta.Calibration.load(tmp_path / "x.calib")
+
+
+def test_a_file_that_is_not_there():
+    with pytest.raises(ta.InputError, match="no such file"):
+        ta.Calibration.load("nowhere.calib")
+
+
+def test_a_failed_write_leaves_nothing(calibrated, tmp_path, monkeypatch):
+    _, calibration = calibrated
+    monkeypatch.setattr("pathlib.Path.replace", _refuse)
+    with pytest.raises(OSError, match="disk"):
+        calibration.save(tmp_path / "arm.calib")
+    assert list(tmp_path.iterdir()) == []
+
+
+def _refuse(*_):
+    raise OSError("disk full")
+
+
+def test_the_content_is_arrays_and_plain_json(written):
+    arrays, content = read_calibration_file(written)
+    assert content["schema"] == calibration_file.SCHEMA
+    assert content["robot"]["name"] == "RV-M2"
+    assert content["controller_model"] is None
+    assert "payload" in content["robot"]
+    assert set(content["models"]) == {"nominal", "constant", "variable"}
+    assert arrays["rows.readings"].shape == (70, 5)
+    assert arrays["variable.constants"].shape == (5, 5)
