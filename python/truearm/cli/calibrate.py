@@ -108,7 +108,8 @@ def command(
         return
     print_results(calibration)
     print_places(output)
-    say(f"Judge it on other measurements: truearm evaluate {output / CALIBRATION_NAME} OTHER.csv")
+    say("Judge it on other measurements:")
+    say(f"  truearm evaluate {output / CALIBRATION_NAME} OTHER.csv")
 
 
 def check_directory(output: Path) -> None:

@@ -1,0 +1,96 @@
+"""`truearm evaluate` as people run it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import truearm as ta
+from truearm.cli import main
+from truearm.simulation import VirtualArm
+
+PROGRAM = str(Path(sys.executable).parent / "truearm")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("evaluate")
+    arm = VirtualArm.paper(seed=2)
+    ta.calibrate(arm.robot, arm.measure(arm.poses(80))).save(place / "arm.calib")
+    arm.measure_table(arm.poses(60, seed=1), seed=1).to_csv(place / "other.csv", index=False)
+    return place
+
+
+@pytest.fixture(autouse=True)
+def inside(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def test_an_evaluation_as_people_run_it():
+    command = [PROGRAM, "evaluate", "arm.calib", "other.csv"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "20 rows found the frame, 40 rows judged" in done.stdout
+    for word in ("nominal", "constant", "variable", "mean", "max"):
+        assert word in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+def test_json_is_all_that_is_printed(capsys):
+    assert main(["evaluate", "arm.calib", "other.csv", "--frame-rows", "10", "--seed", "3", "--json"]) == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert printed.err == ""
+    assert (found["n_frame"], found["n_judged"]) == (10, 50)
+    assert list(found["errors"]) == ["nominal", "constant", "variable"]
+    assert list(found["errors"]["variable"]) == ["mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm"]
+
+
+def test_kept_frames_judge_all_rows(capsys):
+    assert main(["evaluate", "arm.calib", "other.csv", "--keep-frames"]) == 0
+    assert "frame and tool kept, 60 rows judged" in capsys.readouterr().out
+
+
+def test_a_kept_tool(capsys):
+    options = ["--keep-tool", "--frame-rows", "4", "--json"]
+    assert main(["evaluate", "arm.calib", "other.csv", *options]) == 0
+    assert json.loads(capsys.readouterr().out)["errors"]["variable"]["mean_mm"] < 0.3
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(b"", "empty file"), (b"q1,x\n0,0\n", "no calibration file"), (None, "no such file")],
+)
+def test_a_calibration_that_is_none(content, words, tmp_path, capsys):
+    if content is not None:
+        (tmp_path / "bad.calib").write_bytes(content)
+    assert main(["evaluate", str(tmp_path / "bad.calib"), "other.csv"]) == 1
+    printed = capsys.readouterr()
+    assert words in printed.err
+    assert printed.out == ""
+
+
+def test_an_altered_and_a_truncated_calibration(folder, tmp_path, capsys):
+    content = (folder / "arm.calib").read_bytes()
+    altered = bytearray(content)
+    altered[-5] ^= 1
+    for name, changed, words in (("a", bytes(altered), "altered"), ("t", content[:-9], "cut short")):
+        (tmp_path / name).write_bytes(changed)
+        assert main(["evaluate", str(tmp_path / name), "other.csv"]) == 1
+        assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "words"),
+    [
+        (["--frame-rows", "2"], 2, "At least 3"),
+        (["--frame-rows", "60"], 1, "some must be left to judge"),
+        (["--frame-rows", "9", "--keep-frames"], 2, "none to find"),
+        (["--use", "pose"], 2, "no orientation was measured"),
+    ],
+)
+def test_wrong_usage(options, status, words, capsys):
+    assert main(["evaluate", "arm.calib", "other.csv", *options]) == status
+    assert words in capsys.readouterr().err
