@@ -30,6 +30,12 @@ def variable():
     return arm, data, ta.calibrate(arm.robot, data)
 
 
+def rows_of(calibration):
+    """The rows of a calibration that has them."""
+    assert calibration.rows is not None
+    return calibration.rows
+
+
 def named_errors(arm, names):
     kinds = ("theta", "d", "a", "alpha", "beta")
     return np.array([arm.errors[int(name[-1]) - 1, kinds.index(name[:-1])] for name in names])
@@ -70,8 +76,9 @@ def test_pose_measurements_tell_the_tool_s_orientation():
     arm = ur10(imperfections=EXACT)
     data = arm.measure(arm.poses(60), orientation=True)
     calibration = ta.calibrate(arm.robot, data, model="constant")
-    assert calibration.validation.holdout["nominal"].orientation.mean > 0.5
-    assert calibration.validation.holdout["constant"].orientation.mean < 1e-4
+    errors = {name: found.to_dict() for name, found in calibration.validation.holdout.items()}
+    assert errors["nominal"]["mean_mrad"] > 0.5
+    assert errors["constant"]["mean_mrad"] < 1e-4
     q = arm.poses(5, seed=3)
     world = calibration.pose(q, group="data", target=1)
     measured = arm.measure(q, orientation=True)
@@ -177,9 +184,9 @@ def test_same_bits_whatever_the_number_of_threads():
     found = [ta.calibrate(arm.robot, data, threads=threads) for threads in (1, 2, 4)]
     q = arm.poses(20, seed=3)
     for other in found[1:]:
-        assert found[0].variable.hyper == other.variable.hyper
+        assert vars(found[0].variable) == vars(other.variable)
         np.testing.assert_array_equal(found[0].parameters(q), other.parameters(q))
-        np.testing.assert_array_equal(found[0].rows.residual, other.rows.residual)
+        np.testing.assert_array_equal(rows_of(found[0]).residual, rows_of(other).residual)
         assert found[0].validation == other.validation
 
 
@@ -197,12 +204,12 @@ def test_no_refit_keeps_the_training_fit():
     kept = ta.calibrate(arm.robot, data, model="constant", train_size=50, refit=False)
     again = ta.calibrate(arm.robot, data, model="constant", train_size=50)
     order = np.random.default_rng(7).permutation(100)
-    np.testing.assert_array_equal(kept.rows.data.rows, order[:50] + 1)
-    assert sorted(again.rows.data.rows) == list(range(1, 101))
+    np.testing.assert_array_equal(rows_of(kept).data.rows, order[:50] + 1)
+    assert sorted(rows_of(again).data.rows) == list(range(1, 101))
     assert kept.validation == again.validation
     alone = ta.calibrate(arm.robot, data.select(order[:70]), model="constant", refit=True)
     assert not np.array_equal(alone.models["constant"].constants, kept.models["constant"].constants)
-    assert [int((again.rows.side == side).sum()) for side in (0, 1, 2)] == [20, 50, 30]
+    assert [int((rows_of(again).side == side).sum()) for side in (0, 1, 2)] == [20, 50, 30]
 
 
 def test_several_set_ups_have_frames_of_their_own():

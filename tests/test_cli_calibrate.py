@@ -53,7 +53,7 @@ def test_a_calibration_as_people_run_it(folder):
     assert files(folder) == ["calibration.calib", "summary.json"]
     calibration = ta.Calibration.load("result/calibration.calib")
     assert calibration.validation.n_train == 50
-    assert len(calibration.rows.data) == 80
+    assert calibration.summary["n_fitted"] == 80
 
 
 def test_the_summary_on_disk_and_on_stdout_is_one(folder):
