@@ -1,6 +1,6 @@
 //! Normal equations accumulated over lanes: no Jacobian is ever stored whole.
 
-use truearm_kinematics::{Isa, LANES, Lane};
+use truearm_kinematics::{Isa, Lane};
 
 /// Columns of a chunk of rows: `width` columns (the last is the residual) of `height` lanes each.
 pub struct Columns {
@@ -12,7 +12,7 @@ pub struct Columns {
 impl Columns {
     /// Zeroed columns.
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, lanes: vec![Lane::splat(0.0); width * height] }
+        Self { width, height, lanes: vec![Lane::ZERO; width * height] }
     }
 
     /// One entry.
@@ -52,21 +52,22 @@ impl Columns {
     fn add_tile<I: Isa>(&self, rows: usize, first: usize, second: usize, gram: &mut [f64]) {
         // Columns past the end repeat the last one; their sums are dropped.
         let last = self.width - 1;
-        let left: [&[Lane]; TILE] = std::array::from_fn(|i| &self.column((first + i).min(last))[..rows]);
-        let right: [&[Lane]; TILE] = std::array::from_fn(|i| &self.column((second + i).min(last))[..rows]);
-        let mut sums = [[Lane::splat(0.0); TILE]; TILE];
+        let (mut left, mut right) = ([&self.lanes[..0]; TILE], [&self.lanes[..0]; TILE]);
+        for k in 0..TILE {
+            left[k] = &self.column((first + k).min(last))[..rows];
+            right[k] = &self.column((second + k).min(last))[..rows];
+        }
+        let mut sums = [[Lane::ZERO; TILE]; TILE];
         for row in 0..rows {
-            let a: [Lane; TILE] = std::array::from_fn(|i| left[i][row]);
-            for j in 0..TILE {
-                let b = right[j][row];
-                for i in 0..TILE {
-                    sums[i][j] = I::mul_add(a[i], b, sums[i][j]);
+            for (line, a) in sums.iter_mut().zip(left) {
+                for (sum, b) in line.iter_mut().zip(right) {
+                    *sum = I::mul_add(a[row], b[row], *sum);
                 }
             }
         }
         for (i, line) in sums.iter().enumerate().take(self.width - first) {
             for (j, sum) in line.iter().enumerate().take(self.width - second) {
-                gram[(first + i) * self.width + second + j] += horizontal_sum(sum);
+                gram[(first + i) * self.width + second + j] += sum.sum();
             }
         }
     }
@@ -75,24 +76,16 @@ impl Columns {
 /// Columns that a tile of the Gram matrix takes from each side: 16 sums stay in registers.
 const TILE: usize = 4;
 
-#[inline(always)]
-fn horizontal_sum(lane: &Lane) -> f64 {
-    let mut half = [0.0; LANES / 2];
-    for i in 0..LANES / 2 {
-        half[i] = lane.0[i] + lane.0[i + LANES / 2];
-    }
-    (half[0] + half[2]) + (half[1] + half[3])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use truearm_kinematics::{Kernel, dispatch};
+    use truearm_kinematics::{Kernel, LANES, dispatch};
 
     struct Gram<'a>(&'a Columns, &'a mut [f64]);
 
     impl Kernel for Gram<'_> {
         type Output = ();
+        #[inline(always)]
         fn run<I: Isa>(self) {
             self.0.add_gram::<I>(5, self.1);
         }

@@ -65,13 +65,16 @@ struct ChunkGram<'a> {
 impl Kernel for ChunkGram<'_> {
     type Output = Vec<f64>;
 
+    #[inline(always)]
+
     fn run<I: Isa>(self) -> Vec<f64> {
         let packets = self.packets.of(self.chunk);
         let (rows, width) = (self.builder.rows(), self.builder.width());
         let group = &self.builder.point.setup.groups[self.chunk.group];
         let mut columns = Columns::new(width, rows * packets.len());
+        let mut sweep = self.builder.scratch();
         for (index, packet) in packets.iter().enumerate() {
-            self.builder.fill::<I>(packet, group, &mut columns, index * rows);
+            self.builder.fill::<I>(packet, group, &mut sweep, &mut columns, index * rows);
         }
         let mut gram = vec![0.0; width * width];
         columns.add_gram::<I>(rows * packets.len(), &mut gram);

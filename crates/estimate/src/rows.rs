@@ -34,8 +34,8 @@ struct Weights {
     orientation: Lane,
 }
 
-/// Scratch of a sweep through the chain.
-struct Sweep {
+/// Scratch of a sweep through the chain, reused from packet to packet.
+pub struct Sweep {
     frame: LaneFrame,
     screws: Vec<Screw>,
 }
@@ -84,18 +84,25 @@ impl<'a> RowBuilder<'a> {
         }
     }
 
+    /// Scratch for [`RowBuilder::fill`].
+    pub fn scratch(&self) -> Sweep {
+        let frame = LaneFrame::splat(&Transform::IDENTITY);
+        Sweep { frame, screws: vec![Screw::ZERO; self.problem.columns.len()] }
+    }
+
     #[inline(always)]
-    fn sweep<I: Isa>(&self, packet: &Packet) -> Sweep {
+    fn sweep<I: Isa>(&self, packet: &Packet, sweep: &mut Sweep) {
         let columns = self.problem.columns;
-        let start = LaneFrame::splat(&Transform::IDENTITY);
-        let mut sweep = Sweep { frame: start, screws: vec![Screw::ZERO; columns.len()] };
         let chain = self.problem.chain;
+        let lanes;
         let parameters = match &self.shared {
             Some(shared) => LaneParameters::Shared(shared),
-            None => LaneParameters::Each(&self.lanes_of_parameters(packet)),
+            None => {
+                lanes = self.lanes_of_parameters(packet);
+                LaneParameters::Each(&lanes)
+            }
         };
         chain.sweep::<I>(&packet.joints, parameters, columns, &mut sweep.frame, &mut sweep.screws);
-        sweep
     }
 
     fn lanes_of_parameters(&self, packet: &Packet) -> Vec<Lane> {
@@ -105,16 +112,23 @@ impl<'a> RowBuilder<'a> {
 
     /// Writes the packet's rows from `row` on.
     #[inline(always)]
-    pub fn fill<I: Isa>(&self, packet: &Packet, group: &GroupSetup, columns: &mut Columns, row: usize) {
-        let sweep = self.sweep::<I>(packet);
+    pub fn fill<I: Isa>(
+        &self,
+        packet: &Packet,
+        group: &GroupSetup,
+        sweep: &mut Sweep,
+        columns: &mut Columns,
+        row: usize,
+    ) {
+        self.sweep::<I>(packet, sweep);
         let weights = self.weights(packet);
         for target in 0..self.problem.measurements.target_count {
             let weight = packet.present[target] * weights.position;
-            self.target_rows::<I>(packet, group, &sweep, (target, weight), columns, row + 3 * target);
+            self.target_rows::<I>(packet, group, sweep, (target, weight), columns, row + 3 * target);
         }
         if self.layout.rotation == 3 {
             let weight = packet.present[self.problem.measurements.target_count] * weights.orientation;
-            self.rotation_rows::<I>(packet, group, &sweep, weight, columns, row + 3 * self.layout.targets);
+            self.rotation_rows::<I>(packet, group, sweep, weight, columns, row + 3 * self.layout.targets);
         }
     }
 
@@ -128,8 +142,11 @@ impl<'a> RowBuilder<'a> {
         columns: &mut Columns,
         row: usize,
     ) {
-        let arm = rotate::<I>(&sweep.frame.rotation, &group.targets[target].map(Lane::splat));
-        let point: [Lane; 3] = std::array::from_fn(|k| sweep.frame.position[k] + arm[k]);
+        let arm = rotate::<I>(&sweep.frame.rotation, &splat(&group.targets[target]));
+        let mut point = sweep.frame.position;
+        for (coordinate, offset) in point.iter_mut().zip(arm) {
+            *coordinate += offset;
+        }
         for (column, screw) in sweep.screws.iter().enumerate() {
             let turned = cross::<I>(&screw.angular, &arm);
             for k in 0..3 {
@@ -139,20 +156,18 @@ impl<'a> RowBuilder<'a> {
         let mut column = self.layout.arm;
         let zero = Lane::splat(0.0);
         if self.layout.frame == 6 {
-            let [x, y, z] = point.map(|coordinate| weight * coordinate);
+            let (x, y, z) = (weight * point[0], weight * point[1], weight * point[2]);
             let block = [
-                [weight, zero, zero, zero, z, zero - y],
-                [zero, weight, zero, zero - z, zero, x],
-                [zero, zero, weight, y, zero - x, zero],
+                [weight, zero, zero, zero, z, -y],
+                [zero, weight, zero, -z, zero, x],
+                [zero, zero, weight, y, -x, zero],
             ];
             set_block(columns, column, row, &block);
             column += 6;
         }
         for other in 0..self.layout.targets {
             let here = if other == target { weight } else { zero };
-            let block: [[Lane; 3]; 3] =
-                std::array::from_fn(|i| std::array::from_fn(|j| here * sweep.frame.rotation[3 * i + j]));
-            set_block(columns, column + 3 * other, row, &block);
+            set_rotation(columns, column + 3 * other, row, (here, &sweep.frame.rotation));
         }
         column += 3 * self.layout.targets;
         for _ in 0..self.layout.rotation {
@@ -191,10 +206,8 @@ impl<'a> RowBuilder<'a> {
             set_block(columns, column, row, &[[zero], [zero], [zero]]);
             column += 1;
         }
-        let predicted = product::<I>(&sweep.frame.rotation, &group.flange_from_target.map(Lane::splat));
-        let block: [[Lane; 3]; 3] =
-            std::array::from_fn(|i| std::array::from_fn(|j| weight * predicted[3 * i + j]));
-        set_block(columns, column, row, &block);
+        let predicted = product::<I>(&sweep.frame.rotation, &splat(&group.flange_from_target));
+        set_rotation(columns, column, row, (weight, &predicted));
         let residual = rotation_residual(packet, &group.world_from_base, &predicted);
         for k in 0..3 {
             columns.set(column + 3, row + k, weight * residual[k]);
@@ -211,36 +224,65 @@ fn set_block<const W: usize>(columns: &mut Columns, column: usize, row: usize, b
     }
 }
 
+/// Three columns: a weight times a rotation.
+#[inline(always)]
+fn set_rotation(columns: &mut Columns, column: usize, row: usize, (weight, rotation): (Lane, &[Lane; 9])) {
+    for (k, &entry) in rotation.iter().enumerate() {
+        columns.set(column + k % 3, row + k / 3, weight * entry);
+    }
+}
+
 #[inline(always)]
 fn rotate<I: Isa>(rotation: &[Lane; 9], vector: &[Lane; 3]) -> [Lane; 3] {
-    std::array::from_fn(|i| {
+    let mut out = [Lane::ZERO; 3];
+    for (i, value) in out.iter_mut().enumerate() {
         let partial = rotation[3 * i] * vector[0];
         let partial = I::mul_add(rotation[3 * i + 1], vector[1], partial);
-        I::mul_add(rotation[3 * i + 2], vector[2], partial)
-    })
+        *value = I::mul_add(rotation[3 * i + 2], vector[2], partial);
+    }
+    out
 }
 
 #[inline(always)]
 fn product<I: Isa>(left: &[Lane; 9], right: &[Lane; 9]) -> [Lane; 9] {
-    let columns: [[Lane; 3]; 3] =
-        std::array::from_fn(|j| rotate::<I>(left, &[right[j], right[3 + j], right[6 + j]]));
-    std::array::from_fn(|k| columns[k % 3][k / 3])
+    let mut out = [Lane::ZERO; 9];
+    for j in 0..3 {
+        let column = rotate::<I>(left, &[right[j], right[3 + j], right[6 + j]]);
+        for i in 0..3 {
+            out[3 * i + j] = column[i];
+        }
+    }
+    out
 }
 
 #[inline(always)]
 fn cross<I: Isa>(a: &[Lane; 3], b: &[Lane; 3]) -> [Lane; 3] {
-    std::array::from_fn(|k| {
+    let mut out = [Lane::ZERO; 3];
+    for (k, value) in out.iter_mut().enumerate() {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        I::mul_add(a[i], b[j], Lane::splat(0.0) - a[j] * b[i])
-    })
+        *value = I::mul_add(a[i], b[j], -(a[j] * b[i]));
+    }
+    out
 }
 
 /// A world point in base coordinates.
 #[inline(always)]
 fn into_base<I: Isa>(world_from_base: &Transform, point: &[Lane; 3]) -> [Lane; 3] {
     let inverse = world_from_base.inverse();
-    let rotated = rotate::<I>(&inverse.rotation.map(Lane::splat), point);
-    std::array::from_fn(|k| rotated[k] + Lane::splat(inverse.translation[k]))
+    let mut out = rotate::<I>(&splat(&inverse.rotation), point);
+    for (value, shift) in out.iter_mut().zip(inverse.translation) {
+        *value += Lane::splat(shift);
+    }
+    out
+}
+
+#[inline(always)]
+fn splat<const N: usize>(values: &[f64; N]) -> [Lane; N] {
+    let mut out = [Lane::ZERO; N];
+    for (lane, value) in out.iter_mut().zip(values) {
+        *lane = Lane::splat(*value);
+    }
+    out
 }
 
 fn rotation_residual(packet: &Packet, world_from_base: &Transform, predicted: &[Lane; 9]) -> [Lane; 3] {
@@ -283,15 +325,18 @@ struct Unpack<'a> {
 impl Kernel for Unpack<'_> {
     type Output = ();
 
+    #[inline(always)]
+
     fn run<I: Isa>(self) {
         let Self { builder, packets, out } = self;
         let (rows, width) = (builder.rows(), builder.width());
         let (arm, setup) = (builder.layout.arm, builder.layout.group_width());
         let mut columns = Columns::new(width, rows);
+        let mut sweep = builder.scratch();
         for chunk in &packets.chunks {
             let group = &builder.point.setup.groups[chunk.group];
             for packet in packets.of(chunk) {
-                builder.fill::<I>(packet, group, &mut columns, 0);
+                builder.fill::<I>(packet, group, &mut sweep, &mut columns, 0);
                 for lane in 0..packet.count {
                     for row in 0..rows {
                         let at = packet.poses[lane] * rows + row;

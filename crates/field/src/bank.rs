@@ -43,6 +43,8 @@ struct Evaluate<'a> {
 impl Kernel for Evaluate<'_> {
     type Output = ();
 
+    #[inline(always)]
+
     fn run<I: Isa>(self) {
         let Self { bank, values, out } = self;
         let mut sums = vec![0.0; bank.parameter_count];

@@ -9,6 +9,9 @@
 //! joint), `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
 //! together: those that the evidence chooses, and the last three).
 
+#[cfg(test)]
+extern crate self as truearm_field;
+
 mod bank;
 mod cells;
 mod data_space;
@@ -27,6 +30,8 @@ mod posterior;
 mod predict;
 mod refine;
 mod select;
+#[cfg(test)]
+mod tests;
 mod training;
 mod weight_space;
 

@@ -1,0 +1,92 @@
+//! The evidence against its definition, and its gradient against finite differences.
+
+use truearm_estimate::{Cancel, EstimateError};
+
+use super::oracle::{Exact, Oracle};
+use super::sets::{hyper, line_inputs, poses_in_two_groups, positions};
+use crate::FieldError;
+use crate::evidence::Evidence;
+use crate::hyper::Hyper;
+use crate::training::Training;
+
+/// Every derivative against central differences; the error of both is far below a millionth of the curvature.
+fn check_gradient(training: &Training, hyper: &Hyper) {
+    const STEP: f64 = 1e-4;
+    let cancel = Cancel::default();
+    let evidence = Evidence::new(training, &cancel);
+    let logs = hyper.to_logs();
+    let gradient = evidence.score(hyper).unwrap().gradient;
+    assert_eq!(gradient.len(), logs.len());
+    for (k, found) in gradient.iter().enumerate() {
+        let at = |step: f64| {
+            let mut moved = logs.clone();
+            moved[k] += step;
+            evidence.score(&hyper.with_logs(&moved)).unwrap().value
+        };
+        let wanted = (8.0 * (at(STEP) - at(-STEP)) - (at(2.0 * STEP) - at(-2.0 * STEP))) / (12.0 * STEP);
+        assert!(
+            (found - wanted).abs() < 1e-5 * (1.0 + wanted.abs()),
+            "hyper-parameter {k}: {found} instead of {wanted}"
+        );
+    }
+}
+
+fn check_value(training: &Training, hyper: &Hyper) {
+    let cancel = Cancel::default();
+    let found = Evidence::new(training, &cancel).score(hyper).unwrap().value;
+    let wanted = Oracle { training, hyper, kernels: Exact(training, hyper) }.evidence();
+    assert!((found - wanted).abs() < 1e-6 * wanted.abs(), "{found} instead of {wanted}");
+}
+
+#[test]
+fn gradient_with_positions() {
+    let training = positions(22);
+    check_gradient(&training, &hyper(&training, 6));
+}
+
+#[test]
+fn gradient_with_poses_of_two_groups_and_rows_of_their_own_sigma_and_weight() {
+    let training = poses_in_two_groups(18);
+    check_gradient(&training, &hyper(&training, 6));
+}
+
+#[test]
+fn gradient_with_a_prismatic_joint_and_a_feature() {
+    let training = line_inputs(16);
+    check_gradient(&training, &hyper(&training, 4));
+}
+
+#[test]
+fn gradient_with_the_major_block_over_all_joints() {
+    let training = positions(20);
+    check_gradient(&training, &Hyper::start(&[0, 1, 2, 3, 4, 5], 6, [5e-5, 1e-4]));
+}
+
+#[test]
+fn value_is_that_of_the_covariance_written_out() {
+    let training = positions(22);
+    check_value(&training, &hyper(&training, 6));
+    let training = poses_in_two_groups(18);
+    check_value(&training, &hyper(&training, 6));
+    let training = line_inputs(16);
+    check_value(&training, &hyper(&training, 4));
+}
+
+#[test]
+fn values_that_are_no_numbers_are_refused() {
+    let mut training = positions(12);
+    training.jacobian[5] = f64::NAN;
+    let cancel = Cancel::default();
+    let refused = Evidence::new(&training, &cancel).score(&hyper(&training, 6)).unwrap_err();
+    assert_eq!(refused, FieldError::NotPositiveDefinite { rows: 36 });
+}
+
+#[test]
+fn a_request_to_stop_is_obeyed() {
+    let training = positions(12);
+    let cancel = Cancel::default();
+    let evidence = Evidence::new(&training, &cancel);
+    cancel.request();
+    let stopped = evidence.score(&hyper(&training, 6)).unwrap_err();
+    assert_eq!(stopped, FieldError::Estimate(EstimateError::Cancelled));
+}

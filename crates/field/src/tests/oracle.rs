@@ -1,0 +1,245 @@
+//! The slow and obvious way: every covariance written out, set-up unknowns as further unknowns with unit priors.
+
+use faer::{Mat, Par};
+use truearm_estimate::dense::{Cholesky, column};
+
+use crate::cells::CellKernel;
+use crate::hyper::{Hyper, OWN_LEVER};
+use crate::kernel::InputKind;
+use crate::model::Model;
+use crate::training::{Class, Training};
+
+/// Correlations of two configurations.
+pub trait Kernels {
+    fn own(&self, input: usize, a: f64, b: f64) -> f64;
+    fn smooth(&self, input: usize, a: f64, b: f64) -> f64;
+    /// Of axis `axis` of product `product`, which varies with `input`.
+    fn product(&self, product: usize, axis: usize, input: usize, a: f64, b: f64) -> f64;
+}
+
+/// The formulas.
+pub struct Exact<'a>(pub &'a Training, pub &'a Hyper);
+
+impl Exact<'_> {
+    fn squared_exponential(&self, input: usize, a: f64, b: f64, length: f64) -> f64 {
+        (-self.distance(input, a, b) / length.powi(2)).exp()
+    }
+
+    fn distance(&self, input: usize, a: f64, b: f64) -> f64 {
+        let difference = self.0.inputs[input].scale * (a - b);
+        match self.0.inputs[input].kind {
+            InputKind::Angle => 1.0 - difference.cos(),
+            InputKind::Line => 0.5 * difference.powi(2),
+        }
+    }
+}
+
+impl Kernels for Exact<'_> {
+    fn own(&self, input: usize, a: f64, b: f64) -> f64 {
+        let r = (2.0 * self.distance(input, a, b)).max(0.0).sqrt() / self.1.own_length;
+        let s = 5f64.sqrt() * r;
+        (1.0 + s + 5.0 * r * r / 3.0) * (-s).exp()
+    }
+
+    fn smooth(&self, input: usize, a: f64, b: f64) -> f64 {
+        self.squared_exponential(input, a, b, self.1.smooth_length)
+    }
+
+    fn product(&self, product: usize, axis: usize, input: usize, a: f64, b: f64) -> f64 {
+        self.squared_exponential(input, a, b, self.1.products[product].lengths[axis])
+    }
+}
+
+/// What cells imply.
+pub struct OfCells<'a>(pub &'a Model);
+
+fn implied(cells: &CellKernel, a: f64, b: f64) -> f64 {
+    let grades = |value: f64| {
+        let mut grades = vec![0.0; cells.axis.count];
+        cells.axis.active(value).nonzero().for_each(|(cell, grade)| grades[cell] += grade);
+        grades
+    };
+    let (a, b) = (grades(a), grades(b));
+    let pairs = (0..a.len()).flat_map(|i| (0..b.len()).map(move |j| (i, j)));
+    pairs.map(|(i, j)| a[i] * cells.correlation[i.abs_diff(j)] * b[j]).sum()
+}
+
+impl Kernels for OfCells<'_> {
+    fn own(&self, input: usize, a: f64, b: f64) -> f64 {
+        self.0.cells.own[input].as_ref().map_or(0.0, |cells| implied(cells, a, b))
+    }
+
+    fn smooth(&self, input: usize, a: f64, b: f64) -> f64 {
+        implied(&self.0.cells.smooth[input], a, b)
+    }
+
+    fn product(&self, product: usize, axis: usize, input: usize, a: f64, b: f64) -> f64 {
+        let (found, cells) = &self.0.cells.products[product][axis];
+        assert_eq!(*found, input);
+        implied(cells, a, b)
+    }
+}
+
+/// Gaussian inference written out.
+pub struct Oracle<'a, K> {
+    pub training: &'a Training,
+    pub hyper: &'a Hyper,
+    pub kernels: K,
+}
+
+/// Prior variances of each column: of the constant, and of what varies.
+pub struct Variances {
+    pub constant: Vec<f64>,
+    pub varying: Vec<f64>,
+}
+
+impl<K: Kernels> Oracle<'_, K> {
+    pub fn variances(&self, a: &[f64], b: &[f64]) -> Variances {
+        let hyper = self.hyper;
+        let of = |column: &crate::Column| {
+            let mut sum = 0.0;
+            if column.driven {
+                let class = Class::of(column.parameter).index();
+                for k in 0..self.training.inputs.len() {
+                    sum += hyper.smooth[class].powi(2) * self.kernels.smooth(k, a[k], b[k]);
+                }
+                for (index, product) in hyper.products.iter().enumerate() {
+                    let factor =
+                        |(axis, &k): (usize, &usize)| self.kernels.product(index, axis, k, a[k], b[k]);
+                    let kernel: f64 = product.joints.iter().enumerate().map(factor).product();
+                    sum += product.amplitudes[class].powi(2) * kernel;
+                }
+            }
+            if let Some(k) = column.own {
+                sum += (hyper.own * self.lever(k)).powi(2) * self.kernels.own(k, a[k], b[k]);
+            }
+            sum
+        };
+        let columns = &self.training.columns;
+        Variances {
+            constant: columns.iter().map(|column| (hyper.constant * column.constant).powi(2)).collect(),
+            varying: columns.iter().map(of).collect(),
+        }
+    }
+
+    fn lever(&self, input: usize) -> f64 {
+        if self.training.inputs[input].kind == InputKind::Line { OWN_LEVER } else { 1.0 }
+    }
+
+    fn setup_row(&self, row: usize) -> &[f64] {
+        let width = self.training.setup_width;
+        &self.training.setup[row * width..(row + 1) * width]
+    }
+
+    fn pose_of(&self, row: usize) -> usize {
+        (0..self.training.pose_count()).find(|&pose| self.training.rows(pose).contains(&row)).unwrap()
+    }
+
+    /// Covariance of all rows, the set-up's share included, (R, R).
+    pub fn covariance(&self) -> Mat<f64> {
+        let training = self.training;
+        let rows = training.row_count();
+        let mut matrix = Mat::zeros(rows, rows);
+        for i in 0..training.pose_count() {
+            for j in 0..training.pose_count() {
+                let v = self.variances(training.values_of(i), training.values_of(j));
+                let total: Vec<f64> = v.constant.iter().zip(&v.varying).map(|(a, b)| a + b).collect();
+                for r in training.rows(i) {
+                    for c in training.rows(j) {
+                        let arm = inner(training.jacobian_row(r), &total, training.jacobian_row(c));
+                        matrix[(r, c)] = arm + dot(self.setup_row(r), self.setup_row(c));
+                        if i == j {
+                            matrix[(r, c)] += self.anew(training.jacobian_row(r), training.jacobian_row(c));
+                        }
+                    }
+                }
+            }
+        }
+        (0..rows).for_each(|row| matrix[(row, row)] += training.noise_variance(row, self.hyper.noise));
+        matrix
+    }
+
+    /// What joints do not repeat.
+    pub fn anew(&self, a: &[f64], b: &[f64]) -> f64 {
+        let of = |(p, column): (usize, &crate::Column)| {
+            column.own.map_or(0.0, |k| a[p] * b[p] * (self.hyper.repeatability * self.lever(k)).powi(2))
+        };
+        self.training.columns.iter().enumerate().map(of).sum()
+    }
+
+    fn factor(&self) -> Cholesky {
+        Cholesky::new(self.covariance(), Par::Seq).unwrap()
+    }
+
+    /// Logarithm of evidence and priors.
+    pub fn evidence(&self) -> f64 {
+        let factor = self.factor();
+        let residual = &self.training.residual;
+        let mut value = -0.5 * (factor.log_determinant() + dot(residual, &factor.solve_vector(residual)));
+        for (range, log) in self.hyper.ranges().iter().zip(self.hyper.to_logs()) {
+            if range.spread.is_finite() {
+                value -= 0.5 * ((log - range.start.ln()) / range.spread).powi(2);
+            }
+        }
+        value
+    }
+
+    /// Constants, set-up, and the varying part at a configuration.
+    pub fn solution(&self, residual: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let training = self.training;
+        let alpha = self.factor().solve_vector(residual);
+        let mut constant = vec![0.0; training.columns.len()];
+        let mut varying = constant.clone();
+        let mut setup = vec![0.0; training.setup_width];
+        for (row, weight) in alpha.iter().enumerate() {
+            let v = self.variances(values, training.values_of(self.pose_of(row)));
+            for (p, entry) in training.jacobian_row(row).iter().enumerate() {
+                constant[p] += v.constant[p] * entry * weight;
+                varying[p] += v.varying[p] * entry * weight;
+            }
+            setup.iter_mut().zip(self.setup_row(row)).for_each(|(sum, entry)| *sum += entry * weight);
+        }
+        (constant, setup, varying)
+    }
+
+    /// Posterior covariance (m, m) of rows of a Jacobian (m, P) at a configuration, with set-up columns (m, s).
+    pub fn posterior(&self, values: &[f64], jacobian: &[f64], setup: &[f64]) -> Mat<f64> {
+        let training = self.training;
+        let (columns, width) = (training.columns.len(), training.setup_width);
+        let rows = jacobian.len() / columns;
+        let line = |i: usize| &jacobian[i * columns..(i + 1) * columns];
+        let own = |i: usize| &setup[i * width..(i + 1) * width];
+        let total = |other: &[f64]| -> Vec<f64> {
+            let v = self.variances(values, other);
+            v.constant.iter().zip(&v.varying).map(|(a, b)| a + b).collect()
+        };
+        let mut cross = Mat::zeros(training.row_count(), rows);
+        for row in 0..training.row_count() {
+            let v = total(training.values_of(self.pose_of(row)));
+            for i in 0..rows {
+                cross[(row, i)] =
+                    inner(training.jacobian_row(row), &v, line(i)) + dot(self.setup_row(row), own(i));
+            }
+        }
+        let mut solved = cross.clone();
+        self.factor().solve(solved.as_mut());
+        let here = total(values);
+        let prior = Mat::from_fn(rows, rows, |i, j| inner(line(i), &here, line(j)) + dot(own(i), own(j)));
+        prior - cross.transpose() * solved
+    }
+}
+
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+fn inner(a: &[f64], weights: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(weights).zip(b).map(|((x, w), y)| x * w * y).sum()
+}
+
+/// Quadratic form `x^T A^-1 x`.
+pub fn squared(matrix: Mat<f64>, x: &[f64]) -> f64 {
+    let mut z = column(x);
+    Cholesky::new(matrix, Par::Seq).unwrap().solve_lower(z.as_mut());
+    z.squared_norm_l2()
+}

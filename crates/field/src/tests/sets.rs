@@ -1,0 +1,59 @@
+//! Small training sets and hyper-parameters at which nothing is negligible.
+
+use truearm_estimate::{MeasurementSet, Point, Setup};
+
+use super::common::{Arm, Measure, Truth, options, problem, scara, six_axes};
+use crate::fit::FieldOptions;
+use crate::hyper::Hyper;
+use crate::kernel::Input;
+use crate::linear::training;
+use crate::training::Training;
+
+/// Rows of measurements, linearised at the constant fit.
+pub fn rows_of(arm: &Arm, set: &MeasurementSet, change: impl Fn(&mut FieldOptions)) -> Training {
+    let (constant, mut options) = options(arm, set).unwrap();
+    change(&mut options);
+    let setup: &Setup = &constant.setup;
+    let point = Point { parameters: &constant.parameters, setup };
+    training(&problem(arm, set, &arm.columns), point, &options).unwrap()
+}
+
+/// Positions of a six-axis arm.
+pub fn positions(poses: usize) -> Training {
+    let arm = six_axes(Truth::BENDING);
+    rows_of(&arm, &Measure::poses(poses).of(&arm), |_| ())
+}
+
+/// Poses in two groups, with rows of a sigma and a weight of their own and a few not measured at all.
+pub fn poses_in_two_groups(poses: usize) -> Training {
+    let arm = six_axes(Truth::BENDING);
+    let measure = Measure { groups: 2, orientation: Some(1e-4), ..Measure::poses(poses) };
+    let mut set = measure.of(&arm);
+    for pose in 0..poses {
+        set.sigma[pose] = 1e-5 * (pose % 4) as f64;
+        set.weight[pose] = [1.0, 0.6, 1.0, 0.3, 1.0][pose % 5];
+    }
+    set.targets[3 * 4..3 * 5].fill(f64::NAN);
+    set.rotations[9 * 7..9 * 8].fill(f64::NAN);
+    set.weight[9] = 0.0;
+    rows_of(&arm, &set, |_| ())
+}
+
+/// A prismatic joint and a feature.
+pub fn line_inputs(poses: usize) -> Training {
+    let arm = scara(Truth { own: 2e-4, ..Truth::RIGID });
+    let set = Measure { orientation: Some(1e-4), ..Measure::poses(poses) }.of(&arm);
+    rows_of(&arm, &set, |options| {
+        options.features = vec![Input::line(12.0)];
+        options.feature_values = (0..poses).map(|pose| 20.0 + 12.0 * (pose as f64 * 0.618).fract()).collect();
+    })
+}
+
+/// Hyper-parameters away from the centre of their priors.
+pub fn hyper(training: &Training, joints: usize) -> Hyper {
+    let start = Hyper::start(&[1, 2], joints, [4e-5, 1.2e-4]);
+    let mut logs = start.to_logs();
+    logs.iter_mut().enumerate().for_each(|(k, log)| *log += 0.3 * (k as f64 * 1.7).sin());
+    assert!(training.row_count() > 0);
+    start.with_logs(&logs)
+}
