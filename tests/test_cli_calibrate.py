@@ -17,7 +17,7 @@ from truearm.simulation import VirtualArm
 
 PROGRAM = str(Path(sys.executable).parent / "truearm")
 STATISTICS = ["mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm"]
-SUMMARY = ["robot", "n_train", "n_holdout", "holdout", "train", "identifiability", "noise_mm", "outliers"]
+SUMMARY = ["robot", "n_train", "n_holdout", "holdout", "train", "coverage_95", "identifiability", "noise_mm"]
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +67,7 @@ def test_the_summary_on_disk_and_on_stdout_is_one(folder):
         for errors in printed[side].values():
             assert list(errors) == STATISTICS
     assert set(printed["seconds"]) == {"constant", "variable"}
+    assert 0.8 < printed["coverage_95"] <= 1.0
     assert printed["identifiability"]["rank"] == len(printed["identifiability"]["determined"])
     kinds = [block["name"] for block in printed["blocks"]]
     assert kinds.count("own") == 5

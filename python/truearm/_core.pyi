@@ -249,6 +249,14 @@ class FieldFit:
         """Factor on standard deviations that makes them agree with leave-one-out residuals."""
 
     @property
+    def weights(self) -> NDArray[np.float64]:
+        """Weight of each pose in the fit, (n,): one, or next to nothing for outliers."""
+
+    @property
+    def posterior(self) -> Posterior:
+        """What the rows leave uncertain."""
+
+    @property
     def outliers(self) -> list[int]:
         """Poses taken out of the fit."""
 
@@ -293,8 +301,32 @@ class Posterior:
     ) -> None:
         """The posterior, linearised at parameters (L, 5) and set-up; options as for fit_field."""
 
-    def covariance(self, inputs: NDArray[np.float64], jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Covariance (n, m, m) of jacobian (n, m, P), by the problem's columns, times parameters."""
+    def covariance(
+        self,
+        inputs: NDArray[np.float64],
+        jacobian: NDArray[np.float64],
+        setup: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Covariance (n, m, m) of jacobian (n, m, P), by the problem's columns, times parameters.
+
+        With `setup` (n, m, s), by the unknowns of all set-ups, their part is added.
+        """
+
+    def measurement_covariance(
+        self,
+        problem: Problem,
+        parameters: NDArray[np.float64],
+        setup: Setup,
+        inputs: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Covariance (n, m, m) of the residuals of new measurements, base frame: arm, set-up and noise.
+
+        Args:
+            problem: The new measurements, with the columns and groups of the fit.
+            parameters: The calibrated parameters there (n, L, 5).
+            setup: Of the fit.
+            inputs: Joint values and features there (n, I).
+        """
 
 def fit_constant(problem: Problem, options: Mapping[str, Any]) -> ConstantFit:
     """Fit constants and set-up.

@@ -24,6 +24,7 @@ from truearm.fitting import (
 )
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
+from truearm.intervals import interval_coverage
 from truearm.judging import judge
 from truearm.measurements import Measurements
 from truearm.options import Options
@@ -65,7 +66,8 @@ def calibrate(
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))
-    validation = _validate(task, trained, given, split)
+    with stages("judging on held-out rows"):
+        validation = _validate(task, trained, given, split)
     final, order, hyper = trained, split.train, None
     if chosen.refit:
         order = np.random.default_rng(chosen.split.seed).permutation(len(given))
@@ -124,6 +126,7 @@ def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> Va
         n_holdout=len(held),
         holdout=judge(task, models, held, trained.data),
         train=judge(task, models, trained.data, trained.data),
+        coverage_95=interval_coverage(task, trained, held),
     )
 
 

@@ -18,8 +18,6 @@ Floats = NDArray[np.float64]
 UNUSED: Final = 0
 TRAINED: Final = 1
 HELD_OUT: Final = 2
-OUTLIER_WEIGHT: Final = 1e-3
-"""Weight of a row that was taken out of the fit."""
 OVERWHELMING: Final = 1e-6
 """A row is an outlier where the model makes errors as large as its own less likely than this."""
 
@@ -53,10 +51,8 @@ class FittedRows:
             residual = fits.constant.residuals.reshape(-1, width)
             score, distance = _judge_constant(fits, residual, selection)
             return cls(fits.data, side, fits.constant.weights, residual, score, distance)
-        weight = np.ones(len(fits.data))
-        weight[fits.variable.outliers] = OUTLIER_WEIGHT
         variable = fits.variable
-        return cls(fits.data, side, weight, variable.residuals, variable.scores, variable.distances)
+        return cls(fits.data, side, variable.weights, variable.residuals, variable.scores, variable.distances)
 
     def outliers(self) -> list[dict[str, Any]]:
         """File, row, score and distance_mm of each outlier, the worst first."""

@@ -76,12 +76,15 @@ class Validation:
         n_holdout: Rows that were held out.
         holdout: Errors of "nominal", "constant" and, if fitted, "variable" on held-out rows.
         train: The same on training rows.
+        coverage_95: Share of the held-out coordinates that lie within the 95 % intervals of the variable
+            model; None where there is none.
     """
 
     n_train: int
     n_holdout: int
     holdout: Mapping[str, Errors]
     train: Mapping[str, Errors]
+    coverage_95: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
@@ -90,6 +93,7 @@ class Validation:
             "n_holdout": self.n_holdout,
             "holdout": {name: errors.to_dict() for name, errors in self.holdout.items()},
             "train": {name: errors.to_dict() for name, errors in self.train.items()},
+            "coverage_95": self.coverage_95,
         }
 
     @classmethod
@@ -99,7 +103,7 @@ class Validation:
             side: {name: Errors.from_dict(errors) for name, errors in content[side].items()}
             for side in ("holdout", "train")
         }
-        return cls(content["n_train"], content["n_holdout"], **sides)
+        return cls(content["n_train"], content["n_holdout"], **sides, coverage_95=content["coverage_95"])
 
 
 def measure_errors(

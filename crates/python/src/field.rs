@@ -1,6 +1,7 @@
 //! `_core.fit_field`, `_core.Field` and `_core.Posterior`: CEPs that vary.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use numpy::ndarray::Array3;
 use numpy::{
@@ -118,7 +119,7 @@ fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
 /// A variable calibration, see the stub.
 #[pyclass(frozen, module = "truearm._core")]
 pub struct FieldFit {
-    core: CoreFit,
+    core: Arc<CoreFit>,
     rows: usize,
 }
 
@@ -137,7 +138,7 @@ pub fn fit_field(
         with_threads(threads, || fit(&problem.core(), constant.core(), &core))
     })?;
     let rows = problem.core().measurements.rows_per_pose();
-    Ok(FieldFit { core, rows })
+    Ok(FieldFit { core: Arc::new(core), rows })
 }
 
 #[pymethods]
@@ -194,6 +195,20 @@ impl FieldFit {
     #[getter]
     fn inflation(&self) -> f64 {
         self.core.judgement.inflation
+    }
+
+    /// Weight of each pose in the fit, (n,).
+    #[getter]
+    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let training = self.core.posterior.training();
+        let of_pose = |pose| training.rows(pose).next().map_or(1.0, |row| training.weight[row]);
+        vector(py, &(0..training.pose_count()).map(of_pose).collect::<Vec<f64>>())
+    }
+
+    /// The posterior of the fit itself.
+    #[getter]
+    fn posterior(&self) -> Posterior {
+        Posterior { held: Held::Fitted(Arc::clone(&self.core)) }
     }
 
     /// Poses taken out of the fit.
@@ -321,7 +336,22 @@ fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {
 /// Standard deviations of a calibration, see the stub.
 #[pyclass(frozen, module = "truearm._core")]
 pub struct Posterior {
-    core: CorePosterior,
+    held: Held,
+}
+
+/// Who owns a posterior.
+enum Held {
+    Alone(Box<CorePosterior>),
+    Fitted(Arc<CoreFit>),
+}
+
+impl Posterior {
+    fn core(&self) -> &CorePosterior {
+        match &self.held {
+            Held::Alone(core) => core,
+            Held::Fitted(fit) => &fit.posterior,
+        }
+    }
 }
 
 #[pymethods]
@@ -344,7 +374,7 @@ impl Posterior {
             let point = Point { parameters: &values, setup: setup.core() };
             with_threads(threads, || restore(&problem.core(), point, &known, hyper))
         })?;
-        Ok(Self { core })
+        Ok(Self { held: Held::Alone(Box::new(core)) })
     }
 
     /// Covariance (n, m, m) of the residuals of new measurements, base frame, see the stub.
@@ -360,7 +390,7 @@ impl Posterior {
         let parameters: Vec<f64> = parameters.as_array().iter().copied().collect();
         let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
         let point = Point { parameters: &parameters, setup: setup.core() };
-        let values = quick(py, || measurement_covariance(&self.core, &core, point, &inputs))?;
+        let values = quick(py, || measurement_covariance(self.core(), &core, point, &inputs))?;
         let rows = core.measurements.rows_per_pose();
         array3(py, values, (core.measurements.pose_count(), rows, rows))
     }
@@ -378,7 +408,8 @@ impl Posterior {
         let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
         let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
         let setup_columns: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
-        let values = quick(py, || self.core.covariance(&inputs, &jacobian, setup_columns.as_deref(), rows))?;
+        let values =
+            quick(py, || self.core().covariance(&inputs, &jacobian, setup_columns.as_deref(), rows))?;
         array3(py, values, (poses, rows, rows))
     }
 }

@@ -141,6 +141,9 @@ def print_results(calibration: Calibration) -> None:
     print_determined(calibration)
     print_errors(validation.holdout, f"{validation.n_holdout} held-out rows")
     say(f"Noise that no model explains: {summary['noise_mm']:.3f} mm in each coordinate.")
+    if validation.coverage_95 is not None:
+        inside = f"{100 * validation.coverage_95:.1f} %"
+        say(f"The variable model's 95 % intervals hold {inside} of the held-out coordinates.")
     _print_outliers(summary["outliers"], calibration)
     if calibration.options.refit and calibration.rows is not None:
         say(f"After that fitted to all {len(calibration.rows.data)} rows.")
