@@ -3,8 +3,8 @@
     python -m benches.figures OUT [--data DIR] [--seeds 10] [--only NAME]
     python docs/make_results.py OUT
 
-Writes OUT/NAME/case.json and OUT/NAME/seed-S/summary.json and coverage.json, or evaluation.json; what is
-there is not run again. The first seed is 7, for which targets are stated; the others follow from 0.
+Writes OUT/NAME/case.json and OUT/NAME/seed-S/summary.json, or evaluation.json; what is there is not run
+again. The first seed is 7, for which targets are stated; the others follow from 0.
 """
 
 import argparse
@@ -13,8 +13,6 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-
-from benches.coverage import coverage_of_file
 
 FIRST_SEED = 7
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -125,14 +123,11 @@ def run(case: Case, out: Path, data: Path, count: int) -> None:
 
 
 def calibrate(case: Case, folder: Path, data: Path, seed: int) -> None:
-    """Fit to training rows alone; where held-out rows judge, see how many their intervals cover."""
+    """Fit to training rows alone."""
     files = [str(data / name) for name in case.files]
     use = [] if "--use" in case.options else ["--use", "position"]
     options = [*use, "--seed", str(seed), "--no-refit", *case.options]
     truearm("calibrate", case.robot, *files, "-o", str(folder), *options)
-    if not case.judge and "--judge-target" not in case.options:
-        covered = coverage_of_file(folder / "calibration.calib", files)
-        (folder / "coverage.json").write_text(json.dumps(covered))
 
 
 def seeds(count: int) -> list[int]:

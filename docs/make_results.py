@@ -64,9 +64,7 @@ def read_cases(out: Path) -> dict[str, dict[str, Any]]:
             int(folder.name.removeprefix("seed-")): read_errors(folder, bool(case["judge"]))
             for folder in folders
         }
-        case["coverage"] = [
-            json.loads(path.read_text()) for folder in folders for path in folder.glob("coverage.json")
-        ]
+        case["coverage"] = [] if case["judge"] else [read_coverage(folder) for folder in folders]
         if FIRST_SEED in case["errors"]:
             cases[case["name"]] = case
     return cases
@@ -79,6 +77,11 @@ def read_errors(folder: Path, judged_elsewhere: bool) -> dict[str, dict[str, flo
     else:
         content = json.loads((folder / "summary.json").read_text())["holdout"]
     return {model: content[model] for model in MODELS if model in content}
+
+
+def read_coverage(folder: Path) -> float:
+    """Share of held-out coordinates within the intervals given for them."""
+    return float(json.loads((folder / "summary.json").read_text())["coverage_95"])
 
 
 def first_seed_table(cases: dict[str, dict[str, Any]]) -> str:
