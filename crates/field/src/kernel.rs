@@ -81,7 +81,7 @@ mod tests {
     fn derivatives_match_finite_differences() {
         for kernel in [squared_exponential, matern] {
             for distance in [0.0, 1e-4, 0.03, 0.7, 2.0] {
-                let (length, step) = (0.37_f64, 1e-6);
+                let (length, step) = (0.37_f64, 1e-6_f64);
                 let difference = (kernel(distance, length * step.exp()).kernel
                     - kernel(distance, length * (-step).exp()).kernel)
                     / (2.0 * step);

@@ -1,0 +1,21 @@
+//! What the tests share: arms whose true parameters vary in a known way, their measurements, and the way from
+//! measurements to a fit.
+#![allow(
+    dead_code,
+    missing_docs,
+    unused_imports,
+    clippy::unwrap_used,
+    reason = "each test binary uses a part of it"
+)]
+
+mod arms;
+mod measuring;
+mod pipeline;
+mod random;
+
+pub use arms::{Arm, Truth, scara, seven_axes, six_axes};
+pub use measuring::{Measure, subset};
+pub use pipeline::{
+    Fitted, deviations, fit, fit_from, fitted, options, problem, root_mean_square, spans, with_threads,
+};
+pub use random::Random;
