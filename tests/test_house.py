@@ -83,7 +83,7 @@ def test_python_functions_are_short(path):
 
 def test_kernels_are_inlined_into_their_instruction_set():
     """A kernel that is not inlined is compiled for the plainest machine: ten times slower, same results."""
-    kernel = re.compile(r"(?P<before>.*)\n *fn run<I: Isa>\(self\).*\{$", re.MULTILINE)
+    kernel = re.compile(r"(?P<before>.*)\n+ *fn run<I: Isa>\(self\).*\{$", re.MULTILINE)
     found = [(path, match["before"]) for path in RUST_FILES for match in kernel.finditer(path.read_text())]
     plain = [str(path.relative_to(ROOT)) for path, before in found if "#[inline(always)]" not in before]
     assert found
