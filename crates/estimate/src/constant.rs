@@ -14,7 +14,7 @@ use crate::minimise::{Minimum, Objective, Reason, State};
 use crate::noise::Squares;
 use crate::packets::Packets;
 use crate::robust::{Robust, scale_from_median};
-use crate::rows::{Point, residuals};
+use crate::rows::{Point, residuals_of};
 use crate::setup::Setup;
 use crate::start::initial_setup;
 use crate::{Cancel, EstimateError};
@@ -151,19 +151,25 @@ impl Fit<'_> {
         let noise = self.options.noise.unwrap_or(Noise::GUESS);
         let mut balance = Balance { noise, scale: 1.0, weights: set.weight.clone() };
         let mut minimum = self.minimise(start, &balance)?;
+        let mut covariance = self.covariance(&minimum, &balance)?;
+        let mut residuals = self.residuals(&minimum.state)?;
         for _ in 0..ROUNDS {
-            let covariance = self.covariance(&minimum, &balance)?;
-            let residuals = self.residuals(&minimum.state)?;
             let renewed = self.renewed(&balance, &minimum, &covariance, &residuals);
-            let settled = self.settled(&balance, &renewed);
-            balance = renewed;
-            if settled {
+            if self.settled(&balance, &renewed) {
+                let ratio = if self.only_scales_the_cost() {
+                    renewed.noise.position / balance.noise.position
+                } else {
+                    1.0
+                };
+                covariance *= faer::Scale(ratio * ratio);
+                balance = renewed;
                 break;
             }
+            balance = renewed;
             minimum = self.minimise(minimum.state, &balance)?;
+            covariance = self.covariance(&minimum, &balance)?;
+            residuals = self.residuals(&minimum.state)?;
         }
-        let covariance = self.covariance(&minimum, &balance)?;
-        let residuals = self.residuals(&minimum.state)?;
         let Minimum { state, iterations, reason, .. } = minimum;
         Ok(ConstantFit {
             parameters: state.parameters,
@@ -179,7 +185,8 @@ impl Fit<'_> {
     }
 
     fn residuals(&self, state: &State) -> Result<Vec<f64>, EstimateError> {
-        residuals(self.problem, Point { parameters: &state.parameters, setup: &state.setup })
+        let point = Point { parameters: &state.parameters, setup: &state.setup };
+        residuals_of(self.problem, self.packets, point)
     }
 
     /// Inverse of the normal equations with the prior, rescaled to the balance's noise. A set-up counts as known to a
@@ -234,13 +241,13 @@ impl Fit<'_> {
     /// Noise of positions (or distances) and of orientations; the unknowns are shared out by rows.
     fn noise(&self, old: &Balance, residuals: &[f64], unknowns: f64) -> Noise {
         let (position, orientation) = self.squares(residuals, &old.weights);
-        let rows = (position.rows.len() + orientation.rows.len()) as f64;
+        let rows = position.rows() + orientation.rows();
         let of = |squares: &Squares| match self.options.robust {
             Some(Robust::Huber | Robust::Cauchy) => {
-                let mut absolute: Vec<f64> = squares.rows.iter().map(|row| row.0.sqrt()).collect();
+                let mut absolute: Vec<f64> = squares.sizes();
                 scale_from_median(&mut absolute) * (rows / (rows - unknowns).max(1.0)).sqrt()
             }
-            _ => squares.noise(unknowns * squares.rows.len() as f64 / rows),
+            _ => squares.noise(unknowns * squares.rows() / rows),
         };
         let noise = Noise { position: of(&position), orientation: of(&orientation) };
         Noise { position: noise.position.max(NOISE_FLOOR), orientation: noise.orientation.max(NOISE_FLOOR) }
@@ -252,7 +259,7 @@ impl Fit<'_> {
         if set.is_distances() {
             for (distance, residual) in set.distances.iter().zip(residuals) {
                 let own = set.sigma[distance.pose].powi(2);
-                position.rows.push((residual * residual, own, weights[distance.pose]));
+                position.push(residual * residual, own, weights[distance.pose]);
             }
             return (position, orientation);
         }
@@ -263,9 +270,9 @@ impl Fit<'_> {
                 let square = residuals[pose * rows + row].powi(2);
                 let target = row / 3;
                 if target < set.target_count && set.has_target(pose, target) {
-                    position.rows.push((square, own, weights[pose]));
+                    position.push(square, own, weights[pose]);
                 } else if target == set.target_count && set.has_rotation(pose) {
-                    orientation.rows.push((square, 0.0, weights[pose]));
+                    orientation.push(square, 0.0, weights[pose]);
                 }
             }
         }
@@ -306,12 +313,17 @@ impl Fit<'_> {
         let set = self.problem.measurements;
         let noise = same(old.noise.position, new.noise.position)
             && (!set.has_rotations() || same(old.noise.orientation, new.noise.orientation));
-        let only_scales_the_cost = self.options.prior.is_none()
+        let weights = old.weights.iter().zip(&new.weights).all(|(a, b)| (a - b).abs() < 1e-2);
+        weights && (self.only_scales_the_cost() || noise && same(old.scale, new.scale))
+    }
+
+    /// Whether the noise weighs all rows alike, so that its value moves nothing.
+    fn only_scales_the_cost(&self) -> bool {
+        let set = self.problem.measurements;
+        self.options.prior.is_none()
             && !set.has_rotations()
             && set.sigma.iter().all(|&sigma| sigma == 0.0)
-            && self.options.robust.is_none_or(|robust| robust == Robust::None);
-        let weights = old.weights.iter().zip(&new.weights).all(|(a, b)| (a - b).abs() < 1e-2);
-        weights && (only_scales_the_cost || noise && same(old.scale, new.scale))
+            && self.options.robust.is_none_or(|robust| robust == Robust::None)
     }
 }
 

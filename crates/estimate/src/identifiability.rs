@@ -116,7 +116,7 @@ fn dense_distances(problem: &Problem, layout: &Layout, point: Point) -> Result<M
 }
 
 /// Gram-Schmidt in order, twice over for accuracy; the first `own` columns belong to the set-up.
-fn in_order(columns: MatRef<f64>, own: usize, arm: usize) -> Identifiability {
+pub fn in_order(columns: MatRef<f64>, own: usize, arm: usize) -> Identifiability {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut accepted: Vec<usize> = Vec::new();
     let mut rejected: Vec<usize> = Vec::new();

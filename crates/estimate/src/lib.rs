@@ -27,6 +27,14 @@ mod rows;
 mod setup;
 mod start;
 
+#[cfg(test)]
+extern crate self as truearm_estimate;
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[cfg(test)]
+mod tests;
+
 pub use cancel::Cancel;
 pub use constant::{ConstantFit, ConstantOptions, Prior, fit_constant};
 pub use distance::{Distance, DistanceTo};

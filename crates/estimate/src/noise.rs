@@ -12,26 +12,46 @@ pub fn row_weight(noise: f64, sigma: f64, weight: f64) -> f64 {
 #[derive(Debug, Clone, Default)]
 pub struct Squares {
     /// Squared residual, own variance, outlier weight of every row.
-    pub rows: Vec<(f64, f64, f64)>,
+    rows: Vec<(f64, f64, f64)>,
+    has_own: bool,
 }
 
 impl Squares {
+    /// Adds a row.
+    pub fn push(&mut self, square: f64, own_variance: f64, weight: f64) {
+        self.has_own |= own_variance > 0.0;
+        self.rows.push((square, own_variance, weight));
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> f64 {
+        self.rows.len() as f64
+    }
+
+    /// Sizes of the residuals.
+    pub fn sizes(&self) -> Vec<f64> {
+        self.rows.iter().map(|row| row.0.sqrt()).collect()
+    }
+
     /// The noise for which the weighted squares add up to the degrees of freedom, or 0 when the rows' own
     /// sigmas explain more than the residuals.
     ///
     /// `unknowns` is the number of effective unknowns that these rows determine.
     pub fn noise(&self, unknowns: f64) -> f64 {
         let freedom = (self.rows.iter().map(|row| row.2).sum::<f64>() - unknowns).max(1.0);
-        let excess = |variance: f64| {
-            let sum: f64 =
-                self.rows.iter().map(|(square, own, weight)| weight * square / (own + variance)).sum();
-            sum - freedom
-        };
         let largest = self.rows.iter().map(|row| row.2 * row.0).sum::<f64>() / freedom;
-        if largest == 0.0 || excess(largest * 1e-12) <= 0.0 {
+        if !self.has_own || largest == 0.0 {
+            return largest.sqrt();
+        }
+        let excess = |variance: f64| {
+            let rows = self.rows.iter();
+            rows.map(|(square, own, weight)| weight * square / (own + variance)).sum::<f64>() - freedom
+        };
+        let smallest = largest * 1e-12;
+        if excess(smallest) <= 0.0 {
             return 0.0;
         }
-        bisect(excess, largest * 1e-12, largest).sqrt()
+        bisect(excess, smallest, largest).sqrt()
     }
 }
 
@@ -54,18 +74,24 @@ impl Noise {
 mod tests {
     use super::*;
 
+    fn alike(own_variance: f64) -> Squares {
+        let mut squares = Squares::default();
+        (0..12).for_each(|_| squares.push(4.0, own_variance, 1.0));
+        squares
+    }
+
     #[test]
     fn noise_of_equal_rows_is_their_root_mean_square() {
-        let squares = Squares { rows: vec![(4.0, 0.0, 1.0); 12] };
+        let squares = alike(0.0);
         assert!((squares.noise(0.0) - 2.0).abs() < 1e-8);
         assert!((squares.noise(3.0) - (48.0f64 / 9.0).sqrt()).abs() < 1e-8);
     }
 
     #[test]
     fn own_sigma_is_taken_off() {
-        let squares = Squares { rows: vec![(4.0, 3.0, 1.0); 12] };
+        let squares = alike(3.0);
         assert!((squares.noise(0.0) - 1.0).abs() < 1e-8);
-        let explained = Squares { rows: vec![(4.0, 5.0, 1.0); 12] };
+        let explained = alike(5.0);
         assert_eq!(explained.noise(0.0), 0.0);
     }
 }

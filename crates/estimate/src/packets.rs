@@ -10,16 +10,18 @@ use crate::MeasurementSet;
 const PACKETS_PER_CHUNK: usize = 16;
 
 /// Eight poses of one group; the last packet of a group repeats its last pose with weight zero.
-pub struct Packet {
+#[derive(Clone, Copy)]
+pub struct Packet<'a> {
     pub poses: [usize; LANES],
     pub count: usize,
-    pub joints: Vec<Lane>,
-    /// Measured points in world, missing ones zero.
-    pub targets: Vec<[Lane; 3]>,
-    /// Measured rotations in world, row-major, missing ones zero.
-    pub rotation: [Lane; 9],
-    /// One where the target (then: the orientation) was measured, else zero.
-    pub present: Vec<Lane>,
+    /// (J,).
+    pub joints: &'a [Lane],
+    /// Measured points in world, (3 T,), missing ones zero.
+    pub targets: &'a [Lane],
+    /// Measured rotations in world, row-major, (9,), missing ones zero; empty where none was measured at all.
+    pub rotation: &'a [Lane],
+    /// One where the target (then: the orientation) was measured, else zero, (T + 1,).
+    pub present: &'a [Lane],
     pub sigma: Lane,
 }
 
@@ -29,64 +31,102 @@ pub struct Chunk {
     pub packets: Range<usize>,
 }
 
-/// All measurements as packets, chunk by chunk.
+/// All measurements as packets, chunk by chunk, each kind of value in one array.
 pub struct Packets {
-    pub packets: Vec<Packet>,
     pub chunks: Vec<Chunk>,
+    poses: Vec<([usize; LANES], usize)>,
+    joints: Vec<Lane>,
+    targets: Vec<Lane>,
+    rotations: Vec<Lane>,
+    present: Vec<Lane>,
+    sigma: Vec<Lane>,
 }
 
 impl Packets {
     pub fn new(set: &MeasurementSet) -> Self {
-        let mut packed = Self { packets: Vec::new(), chunks: Vec::new() };
+        let count = set.pose_count().div_ceil(LANES) + set.group_count;
+        let mut packed = Self {
+            chunks: Vec::new(),
+            poses: Vec::with_capacity(count),
+            joints: Vec::with_capacity(count * set.joint_count),
+            targets: Vec::with_capacity(count * 3 * set.target_count),
+            rotations: Vec::with_capacity(if set.has_rotations() { 9 * count } else { 0 }),
+            present: Vec::with_capacity(count * (set.target_count + 1)),
+            sigma: Vec::with_capacity(count),
+        };
         for group in 0..set.group_count {
             let poses: Vec<usize> = (0..set.pose_count()).filter(|&pose| set.group[pose] == group).collect();
-            let start = packed.packets.len();
-            packed.packets.extend(poses.chunks(LANES).map(|eight| Packet::new(set, eight)));
-            let end = packed.packets.len();
-            packed.chunks.extend(
-                (start..end)
-                    .step_by(PACKETS_PER_CHUNK)
-                    .map(|first| Chunk { group, packets: first..(first + PACKETS_PER_CHUNK).min(end) }),
-            );
+            let start = packed.len();
+            poses.chunks(LANES).for_each(|eight| packed.push(set, eight));
+            let end = packed.len();
+            let firsts = (start..end).step_by(PACKETS_PER_CHUNK);
+            let packets = |first: usize| first..(first + PACKETS_PER_CHUNK).min(end);
+            packed.chunks.extend(firsts.map(|first| Chunk { group, packets: packets(first) }));
         }
         packed
     }
 
-    pub fn of(&self, chunk: &Chunk) -> &[Packet] {
-        &self.packets[chunk.packets.clone()]
+    /// Packets in all.
+    pub fn len(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// The packets of a chunk.
+    pub fn of(&self, chunk: &Chunk) -> impl Iterator<Item = Packet<'_>> {
+        chunk.packets.clone().map(|index| self.packet(index))
+    }
+
+    fn packet(&self, index: usize) -> Packet<'_> {
+        let part = |lanes: &'_ [Lane]| {
+            let width = lanes.len() / self.len();
+            index * width..(index + 1) * width
+        };
+        let (poses, count) = self.poses[index];
+        Packet {
+            poses,
+            count,
+            joints: &self.joints[part(&self.joints)],
+            targets: &self.targets[part(&self.targets)],
+            rotation: &self.rotations[part(&self.rotations)],
+            present: &self.present[part(&self.present)],
+            sigma: self.sigma[index],
+        }
+    }
+
+    fn push(&mut self, set: &MeasurementSet, eight: &[usize]) {
+        let mut poses = [eight[eight.len() - 1]; LANES];
+        poses[..eight.len()].copy_from_slice(eight);
+        let count = eight.len();
+        self.poses.push((poses, count));
+        gather(&mut self.joints, &set.joints, set.joint_count, &poses);
+        self.sigma.push(Lane::from_fn(|lane| set.sigma[poses[lane]]));
+        let width = 3 * set.target_count;
+        let first = self.targets.len();
+        gather(&mut self.targets, &set.targets, width, &poses);
+        for target in 0..set.target_count {
+            let here = |lane: usize| lane < count && set.has_target(poses[lane], target);
+            self.present.push(Lane::from_fn(|lane| f64::from(u8::from(here(lane)))));
+        }
+        let here = |lane: usize| lane < count && set.has_rotation(poses[lane]);
+        self.present.push(Lane::from_fn(|lane| f64::from(u8::from(here(lane)))));
+        zero_missing(&mut self.targets[first..]);
+        if set.has_rotations() {
+            let first = self.rotations.len();
+            gather(&mut self.rotations, &set.rotations, 9, &poses);
+            zero_missing(&mut self.rotations[first..]);
+        }
     }
 }
 
-impl Packet {
-    fn new(set: &MeasurementSet, eight: &[usize]) -> Self {
-        let poses = std::array::from_fn(|lane| eight[lane.min(eight.len() - 1)]);
-        let count = eight.len();
-        let lanes = |value: &dyn Fn(usize) -> f64| Lane(poses.map(value));
-        let measured = |value: &dyn Fn(usize) -> f64| {
-            let filled = |lane: usize| if lane < count { value(poses[lane]) } else { 0.0 };
-            Lane(std::array::from_fn(|lane| if filled(lane).is_nan() { 0.0 } else { filled(lane) }))
-        };
-        let here = |has: &dyn Fn(usize) -> bool| {
-            Lane(std::array::from_fn(|lane| f64::from(u8::from(lane < count && has(poses[lane])))))
-        };
-        let width = set.target_count;
-        let mut present: Vec<Lane> =
-            (0..width).map(|target| here(&|pose| set.has_target(pose, target))).collect();
-        present.push(here(&|pose| set.has_rotation(pose)));
-        Self {
-            poses,
-            count,
-            joints: (0..set.joint_count)
-                .map(|j| lanes(&|pose| set.joints[pose * set.joint_count + j]))
-                .collect(),
-            targets: (0..width)
-                .map(|t| std::array::from_fn(|k| measured(&|pose| set.targets[3 * (pose * width + t) + k])))
-                .collect(),
-            rotation: std::array::from_fn(|k| {
-                measured(&|pose| if set.has_rotation(pose) { set.rotations[9 * pose + k] } else { 0.0 })
-            }),
-            present,
-            sigma: lanes(&|pose| set.sigma[pose]),
+/// Appends rows (width,) of eight poses as lanes.
+fn gather(lanes: &mut Vec<Lane>, rows: &[f64], width: usize, poses: &[usize; LANES]) {
+    lanes.extend((0..width).map(|k| Lane::from_fn(|lane| rows[poses[lane] * width + k])));
+}
+
+fn zero_missing(lanes: &mut [Lane]) {
+    for value in lanes.iter_mut().flat_map(|lane| &mut lane.0) {
+        if value.is_nan() {
+            *value = 0.0;
         }
     }
 }

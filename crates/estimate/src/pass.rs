@@ -68,16 +68,16 @@ impl Kernel for ChunkGram<'_> {
     #[inline(always)]
 
     fn run<I: Isa>(self) -> Vec<f64> {
-        let packets = self.packets.of(self.chunk);
+        let count = self.chunk.packets.len();
         let (rows, width) = (self.builder.rows(), self.builder.width());
         let group = &self.builder.point.setup.groups[self.chunk.group];
-        let mut columns = Columns::new(width, rows * packets.len());
+        let mut columns = Columns::new(width, rows * count);
         let mut sweep = self.builder.scratch();
-        for (index, packet) in packets.iter().enumerate() {
-            self.builder.fill::<I>(packet, group, &mut sweep, &mut columns, index * rows);
+        for (index, packet) in self.packets.of(self.chunk).enumerate() {
+            self.builder.fill::<I>(&packet, group, &mut sweep, &mut columns, index * rows);
         }
         let mut gram = vec![0.0; width * width];
-        columns.add_gram::<I>(rows * packets.len(), &mut gram);
+        columns.add_gram::<I>(rows * count, &mut gram);
         gram
     }
 }
@@ -95,7 +95,7 @@ pub fn normal_equations(
     let builder = RowBuilder::new(problem, point, weighting);
     let gram = |chunk: &Chunk| dispatch(ChunkGram { builder: &builder, packets, chunk });
     let mut normal = Normal::zeros(builder.layout.len());
-    let threaded = rayon::current_num_threads() > 1 && packets.packets.len() * LANES > THREADED_POSES;
+    let threaded = rayon::current_num_threads() > 1 && packets.len() * LANES > THREADED_POSES;
     if threaded {
         let grams: Vec<Vec<f64>> = packets.chunks.par_iter().map(gram).collect();
         for (chunk, gram) in packets.chunks.iter().zip(&grams) {

@@ -102,7 +102,7 @@ impl<'a> RowBuilder<'a> {
                 LaneParameters::Each(&lanes)
             }
         };
-        chain.sweep::<I>(&packet.joints, parameters, columns, &mut sweep.frame, &mut sweep.screws);
+        chain.sweep::<I>(packet.joints, parameters, columns, &mut sweep.frame, &mut sweep.screws);
     }
 
     fn lanes_of_parameters(&self, packet: &Packet) -> Vec<Lane> {
@@ -174,7 +174,7 @@ impl<'a> RowBuilder<'a> {
             set_block(columns, column, row, &[[zero], [zero], [zero]]);
             column += 1;
         }
-        let measured = into_base::<I>(&group.world_from_base, &packet.targets[target]);
+        let measured = into_base::<I>(&group.world_from_base, &packet.targets[3 * target..3 * target + 3]);
         for k in 0..3 {
             columns.set(column, row + k, weight * (measured[k] - point[k]));
         }
@@ -267,9 +267,9 @@ fn cross<I: Isa>(a: &[Lane; 3], b: &[Lane; 3]) -> [Lane; 3] {
 
 /// A world point in base coordinates.
 #[inline(always)]
-fn into_base<I: Isa>(world_from_base: &Transform, point: &[Lane; 3]) -> [Lane; 3] {
+fn into_base<I: Isa>(world_from_base: &Transform, point: &[Lane]) -> [Lane; 3] {
     let inverse = world_from_base.inverse();
-    let mut out = rotate::<I>(&splat(&inverse.rotation), point);
+    let mut out = rotate::<I>(&splat(&inverse.rotation), &[point[0], point[1], point[2]]);
     for (value, shift) in out.iter_mut().zip(inverse.translation) {
         *value += Lane::splat(shift);
     }
@@ -289,8 +289,10 @@ fn rotation_residual(packet: &Packet, world_from_base: &Transform, predicted: &[
     let base_from_world = world_from_base.inverse();
     let mut residual = [Lane::splat(0.0); 3];
     for lane in 0..packet.count {
-        let measured =
-            Transform { rotation: packet.rotation.map(|entry| entry.0[lane]), translation: [0.0; 3] };
+        let measured = Transform {
+            rotation: std::array::from_fn(|k| packet.rotation[k].0[lane]),
+            translation: [0.0; 3],
+        };
         if measured.rotation.iter().all(|&entry| entry == 0.0) {
             continue;
         }
@@ -319,6 +321,8 @@ pub struct Linearised {
 struct Unpack<'a> {
     builder: RowBuilder<'a>,
     packets: &'a Packets,
+    /// Derivatives too, not the residuals alone.
+    derivatives: bool,
     out: &'a mut Linearised,
 }
 
@@ -326,9 +330,8 @@ impl Kernel for Unpack<'_> {
     type Output = ();
 
     #[inline(always)]
-
     fn run<I: Isa>(self) {
-        let Self { builder, packets, out } = self;
+        let Self { builder, packets, derivatives, out } = self;
         let (rows, width) = (builder.rows(), builder.width());
         let (arm, setup) = (builder.layout.arm, builder.layout.group_width());
         let mut columns = Columns::new(width, rows);
@@ -336,14 +339,16 @@ impl Kernel for Unpack<'_> {
         for chunk in &packets.chunks {
             let group = &builder.point.setup.groups[chunk.group];
             for packet in packets.of(chunk) {
-                builder.fill::<I>(packet, group, &mut sweep, &mut columns, 0);
-                for lane in 0..packet.count {
+                builder.fill::<I>(&packet, group, &mut sweep, &mut columns, 0);
+                for (lane, pose) in packet.poses[..packet.count].iter().enumerate() {
                     for row in 0..rows {
-                        let at = packet.poses[lane] * rows + row;
-                        let value = |column| columns.get(column, row).0[lane];
-                        (0..arm).for_each(|c| out.arm[at * arm + c] = value(c));
-                        (0..setup).for_each(|c| out.setup[at * setup + c] = value(arm + c));
-                        out.residual[at] = value(arm + setup);
+                        let at = pose * rows + row;
+                        out.residual[at] = columns.get(arm + setup, row).0[lane];
+                        if derivatives {
+                            (0..arm).for_each(|c| out.arm[at * arm + c] = columns.get(c, row).0[lane]);
+                            (0..setup)
+                                .for_each(|c| out.setup[at * setup + c] = columns.get(arm + c, row).0[lane]);
+                        }
                     }
                 }
             }
@@ -363,7 +368,7 @@ pub fn linearise(problem: &Problem, point: Point) -> Linearised {
     };
     let builder = RowBuilder::new(problem, point, None);
     let packets = Packets::new(problem.measurements);
-    dispatch(Unpack { builder, packets: &packets, out: &mut out });
+    dispatch(Unpack { builder, packets: &packets, derivatives: true, out: &mut out });
     out
 }
 
@@ -372,8 +377,18 @@ pub fn linearise(problem: &Problem, point: Point) -> Linearised {
 /// # Errors
 /// [`EstimateError::Kinematics`] where the chain refuses the joint values.
 pub fn residuals(problem: &Problem, point: Point) -> Result<Vec<f64>, EstimateError> {
+    residuals_of(problem, &Packets::new(problem.measurements), point)
+}
+
+/// [`residuals`] of measurements that are sorted into lanes already.
+pub fn residuals_of(problem: &Problem, packets: &Packets, point: Point) -> Result<Vec<f64>, EstimateError> {
     if problem.measurements.is_distances() {
         return distance::residuals(problem, point);
     }
-    Ok(linearise(&problem.with_columns(&[]), point).residual)
+    let alone = problem.with_columns(&[]);
+    let builder = RowBuilder::new(&alone, point, None);
+    let (n, rows) = (problem.measurements.pose_count(), problem.measurements.rows_per_pose());
+    let mut out = Linearised { rows, arm: Vec::new(), setup: Vec::new(), residual: vec![0.0; n * rows] };
+    dispatch(Unpack { builder, packets, derivatives: false, out: &mut out });
+    Ok(out.residual)
 }
