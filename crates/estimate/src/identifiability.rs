@@ -4,6 +4,11 @@
 //! set-up first, then links in order. A column that the ones before it span is undetermined; its combination
 //! of them says with what it is confounded. The count of the others is
 //! `rank([arm, set-up]) - rank(set-up)`.
+//!
+//! Of two confounded columns the earlier one is kept. Between (anti-)parallel axes d is confounded with the
+//! next link's d, and Hayati's beta is what describes an error of direction: offer beta there in place of d,
+//! on no other link, and the base's row likewise. Offered so, the paper's arm keeps exactly the paper's fifteen;
+//! with all five parameters of each row the rank is the same, but others take the place of some of them.
 
 use faer::linalg::solvers::{Qr, SolveLstsq};
 use faer::{Mat, MatRef};
