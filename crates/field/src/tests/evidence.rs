@@ -35,7 +35,7 @@ fn check_gradient(training: &Training, hyper: &Hyper) {
 fn check_value(training: &Training, hyper: &Hyper) {
     let cancel = Cancel::default();
     let found = Evidence::new(training, &cancel).score(hyper).unwrap().value;
-    let wanted = Oracle { training, hyper, kernels: Exact(training, hyper) }.evidence();
+    let wanted = Oracle::new(training, hyper, Exact(training, hyper)).evidence();
     assert!((found - wanted).abs() < 1e-6 * wanted.abs(), "{found} instead of {wanted}");
 }
 

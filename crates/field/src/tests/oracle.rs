@@ -82,9 +82,10 @@ impl Kernels for OfCells<'_> {
 
 /// Gaussian inference written out.
 pub struct Oracle<'a, K> {
-    pub training: &'a Training,
-    pub hyper: &'a Hyper,
-    pub kernels: K,
+    training: &'a Training,
+    hyper: &'a Hyper,
+    kernels: K,
+    factor: Option<Cholesky>,
 }
 
 /// Prior variances of each column: of the constant, and of what varies.
@@ -93,7 +94,13 @@ pub struct Variances {
     pub varying: Vec<f64>,
 }
 
-impl<K: Kernels> Oracle<'_, K> {
+impl<'a, K: Kernels> Oracle<'a, K> {
+    pub fn new(training: &'a Training, hyper: &'a Hyper, kernels: K) -> Self {
+        let mut oracle = Self { training, hyper, kernels, factor: None };
+        oracle.factor = Cholesky::new(oracle.covariance(), Par::Seq);
+        oracle
+    }
+
     pub fn variances(&self, a: &[f64], b: &[f64]) -> Variances {
         let hyper = self.hyper;
         let of = |column: &crate::Column| {
@@ -167,8 +174,8 @@ impl<K: Kernels> Oracle<'_, K> {
         self.training.columns.iter().enumerate().map(of).sum()
     }
 
-    fn factor(&self) -> Cholesky {
-        Cholesky::new(self.covariance(), Par::Seq).unwrap()
+    fn factor(&self) -> &Cholesky {
+        self.factor.as_ref().unwrap()
     }
 
     /// Logarithm of evidence and priors.

@@ -24,6 +24,12 @@ pub fn positions(poses: usize) -> Training {
     rows_of(&arm, &Measure::poses(poses).of(&arm), |_| ())
 }
 
+/// The same where only a few columns vary.
+pub fn few_driven(poses: usize) -> Training {
+    let arm = six_axes(Truth::BENDING);
+    rows_of(&arm, &Measure::poses(poses).of(&arm), |options| options.driven = vec![0, 4, 5, 9])
+}
+
 /// Poses in two groups, with rows of a sigma and a weight of their own and a few not measured at all.
 pub fn poses_in_two_groups(poses: usize) -> Training {
     let arm = six_axes(Truth::BENDING);
@@ -56,4 +62,13 @@ pub fn hyper(training: &Training, joints: usize) -> Hyper {
     logs.iter_mut().enumerate().for_each(|(k, log)| *log += 0.3 * (k as f64 * 1.7).sin());
     assert!(training.row_count() > 0);
     start.with_logs(&logs)
+}
+
+/// The same with long length scales, so that weights are few.
+pub fn long(training: &Training, joints: usize) -> Hyper {
+    let mut hyper = hyper(training, joints);
+    hyper.own_length = 0.9;
+    hyper.smooth_length = 3.0;
+    hyper.products.iter_mut().for_each(|product| product.lengths.fill(4.0));
+    hyper
 }

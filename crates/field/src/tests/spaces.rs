@@ -1,1 +1,135 @@
+//! What a posterior must be wherever it is asked: positive semidefinite, surer among the data than away from it, back at
+//! the constants far away; and the choice between the spaces.
 
+use faer::Side;
+use truearm_estimate::Cancel;
+
+use super::common::{Measure, Truth, scara};
+use super::sets::{few_driven, hyper, positions, rows_of};
+use crate::data_space::DataSpace;
+use crate::hyper::Hyper;
+use crate::model::Model;
+use crate::posterior::Posterior;
+use crate::training::Training;
+use crate::weight_space::WeightSpace;
+
+fn both(training: &Training, hyper: &Hyper) -> [Posterior; 2] {
+    let model = || Model::new(training.clone(), hyper.clone(), 2);
+    let cancel = Cancel::default();
+    [
+        Posterior::Data(Box::new(DataSpace::new(model(), &cancel).unwrap())),
+        Posterior::Weight(Box::new(WeightSpace::new(model(), &cancel).unwrap())),
+    ]
+}
+
+/// Short length scales, so that the data ends somewhere.
+fn short(training: &Training) -> Hyper {
+    let mut hyper = hyper(training, 6);
+    hyper.smooth_length = 0.5;
+    hyper.own_length = 0.1;
+    hyper.products.truncate(1);
+    hyper.products.iter_mut().for_each(|product| product.lengths.fill(0.6));
+    hyper
+}
+
+/// Variances of every column's CEP alone at a configuration, (P,).
+fn variances(posterior: &Posterior, values: &[f64]) -> Vec<f64> {
+    let columns = posterior.training().columns.len();
+    let identity: Vec<f64> =
+        (0..columns * columns).map(|k| if k / columns == k % columns { 1.0 } else { 0.0 }).collect();
+    let covariance = posterior.covariance(values, &identity, None, columns).unwrap();
+    let matrix = faer::Mat::from_fn(columns, columns, |i, j| covariance[i * columns + j]);
+    let eigenvalues = matrix.self_adjoint_eigenvalues(Side::Lower).unwrap();
+    let largest = eigenvalues[columns - 1];
+    assert!(eigenvalues[0] > -1e-9 * largest, "{eigenvalues:?}");
+    (0..columns).map(|p| matrix[(p, p)]).collect()
+}
+
+#[test]
+fn covariance_grows_away_from_the_data_up_to_the_prior() {
+    let mut training = few_driven(60);
+    training.values.iter_mut().for_each(|value| *value *= 0.3);
+    let hyper = short(&training);
+    for posterior in both(&training, &hyper) {
+        let prior = posterior.model();
+        let here = training.values_of(3).to_vec();
+        let at = |distance: f64| -> Vec<f64> { here.iter().map(|x| x + distance).collect() };
+        let sums: Vec<f64> =
+            [0.0, 0.4, 0.8].map(|d| variances(&posterior, &at(d)).iter().sum::<f64>()).to_vec();
+        assert!(sums[0] < sums[1] && sums[1] < sums[2], "{sums:?}");
+        let far = at(1.3);
+        let excited = prior.cells.excite(&far);
+        let most = prior.variances(&excited, &excited);
+        for (found, most) in variances(&posterior, &far).iter().zip(&most) {
+            assert!(*found <= most * (1.0 + 1e-9), "{found} {most}");
+        }
+    }
+}
+
+#[test]
+fn beyond_the_cells_nothing_is_left_but_the_constants() {
+    let mut training = few_driven(40);
+    training.values.iter_mut().for_each(|value| *value *= 0.2);
+    let hyper = short(&training);
+    for posterior in both(&training, &hyper) {
+        let solution = posterior.solve(&training.residual).unwrap();
+        let far: Vec<f64> = (0..6).map(|k| training.values[k] + std::f64::consts::PI).collect();
+        let mut ceps = vec![0.0; training.parameter_count];
+        solution.bank.add(&far, &mut ceps).unwrap();
+        assert!(solution.bank.blocks.iter().any(|block| !block.grid.axes[0].closed));
+        let closed = |k: usize| {
+            let blocks = &solution.bank.blocks;
+            blocks
+                .iter()
+                .any(|block| block.grid.inputs.contains(&k) && block.grid.axes.iter().any(|a| a.closed))
+        };
+        assert!((0..6).all(|k| !closed(k)), "the test needs data on a part of the turn");
+        assert_eq!(ceps, vec![0.0; training.parameter_count]);
+        assert!(solution.constant.iter().any(|constant| *constant != 0.0));
+    }
+}
+
+/// Positions of a SCARA with few weights, more rows than data space is used for.
+fn many_rows() -> (Training, Hyper) {
+    let arm = scara(Truth { own: 1e-4, ..Truth::RIGID });
+    let training = rows_of(&arm, &Measure::poses(2300).of(&arm), |_| ());
+    let mut hyper = Hyper::start(&[0, 1], 4, [3e-5, 1e-4]);
+    hyper.own_length = 1.0;
+    hyper.smooth_length = 3.0;
+    hyper.products.iter_mut().for_each(|product| product.lengths.fill(3.0));
+    (training, hyper)
+}
+
+#[test]
+fn many_rows_go_to_weight_space_where_suspicious_poses_are_judged_exactly() {
+    let (mut training, hyper) = many_rows();
+    for pose in [101, 1503] {
+        training.residual[3 * pose] += 2e-3;
+    }
+    let posterior = Posterior::new(training.clone(), hyper, 2, &Cancel::default()).unwrap();
+    assert!(matches!(posterior, Posterior::Weight(_)));
+    let judgement = crate::outliers::judge(&posterior).unwrap();
+    assert_eq!(judgement.outliers, [101, 1503]);
+    let left_out = posterior.leave_one_out(&training.residual).unwrap();
+    assert!(!left_out.sampled[3 * 101] && left_out.sampled[0] && !left_out.sampled[3 * 7]);
+}
+
+#[test]
+fn few_rows_stay_in_data_space() {
+    let training = positions(12);
+    let posterior = Posterior::new(training.clone(), hyper(&training, 6), 2, &Cancel::default()).unwrap();
+    assert!(matches!(posterior, Posterior::Data(_)));
+}
+
+#[test]
+fn poses_that_fill_the_space_are_far_apart() {
+    let mut training = positions(40);
+    let width = training.inputs.len();
+    let first = training.values[..width].to_vec();
+    training.values[5 * width..6 * width].copy_from_slice(&first);
+    let kept = training.fill_space(39);
+    let alike = kept.iter().filter(|&&pose| pose == 0 || pose == 5).count();
+    assert_eq!((kept.len(), alike), (39, 1), "of two poses that are the same one is enough");
+    assert!(kept.windows(2).all(|pair| pair[0] < pair[1]));
+    assert_eq!(training.fill_space(100).len(), 40);
+}
