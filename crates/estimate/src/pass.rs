@@ -66,7 +66,6 @@ impl Kernel for ChunkGram<'_> {
     type Output = Vec<f64>;
 
     #[inline(always)]
-
     fn run<I: Isa>(self) -> Vec<f64> {
         let count = self.chunk.packets.len();
         let (rows, width) = (self.builder.rows(), self.builder.width());

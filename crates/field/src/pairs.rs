@@ -186,7 +186,6 @@ impl Kernel for PoseColumns<'_> {
     type Output = ();
 
     #[inline(always)]
-
     fn run<I: Isa>(self) {
         let Self { training, by_column, hyper, factors, pose, out } = self;
         let rows = training.rows(pose);
