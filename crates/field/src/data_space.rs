@@ -6,13 +6,14 @@
 
 use faer::{Mat, MatMut, MatRef};
 use truearm_estimate::Cancel;
-use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
+use truearm_estimate::dense::{Cholesky, parallelism};
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::model::{BlockPlan, Excited, Implied, Model};
 use crate::pairs::covariance;
 use crate::posterior::{LeaveOneOut, Query, Solution};
+use crate::product::{product, times};
 
 /// Poses whose covariances are found together.
 const BATCH: usize = 64;
@@ -64,15 +65,16 @@ impl DataSpace {
     }
 
     fn setup_step(&self, residual: &[f64]) -> Vec<f64> {
-        let right = to_vec((self.spread.transpose() * column(residual)).as_ref());
+        let right = times(self.spread.transpose(), residual);
         if right.is_empty() { Vec::new() } else { self.inner.solve_vector(&right) }
     }
 
     fn alpha(&self, residual: &[f64], step: &[f64]) -> Vec<f64> {
         let training = &self.model.training;
         let setup = MatRef::from_row_major_slice(&training.setup, training.row_count(), training.setup_width);
-        let rest = column(residual) - setup * column(step);
-        self.factor.solve_vector(&to_vec(rest.as_ref()))
+        let explained = times(setup, step);
+        let rest: Vec<f64> = residual.iter().zip(&explained).map(|(all, part)| all - part).collect();
+        self.factor.solve_vector(&rest)
     }
 
     /// J_i^T alpha_i of every pose, (n, P).
@@ -194,7 +196,7 @@ impl DataSpace {
             self.cross(&excited, query.jacobian_of(pose), cross.as_mut().subcols_mut(index * rows, rows));
             priors.push(self.model.variances(&excited, &excited));
         }
-        let mut lost = self.spread.transpose() * &cross * faer::Scale(-1.0);
+        let mut lost = product(self.spread.transpose(), cross.as_ref()) * faer::Scale(-1.0);
         if let Some(setup) = query.setup {
             for (index, pose) in poses.clone().enumerate() {
                 for (i, line) in

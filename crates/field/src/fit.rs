@@ -62,6 +62,9 @@ pub struct FieldFit {
 /// Rows that hyper-parameters are chosen on: the evidence costs their cube.
 const ROWS_FOR_SELECTION: usize = 540;
 const ROWS_FOR_HYPER: usize = 900;
+/// Poses that are wanted all the same where each brings many rows.
+const POSES_FOR_SELECTION: usize = 120;
+const POSES_FOR_HYPER: usize = 200;
 const ROWS_FOR_POLISH: usize = 3000;
 const ROWS_FOR_EXTRAPOLATION: usize = 1200;
 const SEARCH: Limits = Limits { evaluations: 60, gain: 0.02 };
@@ -144,7 +147,7 @@ impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         let mut hyper = self.searched(training, noise)?;
         if self.options.hyper.is_none() {
-            let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION));
+            let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION, 0));
             hyper.extrapolation =
                 extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         }
@@ -156,9 +159,9 @@ impl Search<'_> {
             return Ok(hyper.clone());
         }
         let joints = self.problem.measurements.joint_count;
-        let small = training.select(&spread_poses(training, ROWS_FOR_SELECTION));
+        let small = training.select(&spread_poses(training, ROWS_FOR_SELECTION, POSES_FOR_SELECTION));
         let chosen = select_major(&small, joints, noise, &self.options.cancel)?;
-        let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER));
+        let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
         let evidence = Evidence::new(&middle, &self.options.cancel);
         let mut found = refine(&evidence, chosen.hyper, SEARCH)?;
         found.evaluations += chosen.evaluations;
@@ -177,7 +180,7 @@ impl Search<'_> {
         if self.options.hyper.is_some() {
             return Ok(hyper);
         }
-        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH));
+        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0));
         let found = refine(&Evidence::new(&large, &self.options.cancel), hyper, POLISH)?;
         self.note(&found);
         Ok(found.hyper)
@@ -207,10 +210,11 @@ fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Foun
     Ok(Found { evaluations: found.evaluations + better.evaluations, ..better })
 }
 
-/// Poses spread evenly over the training set (and so over its groups) with at most `rows` rows.
-fn spread_poses(training: &Training, rows: usize) -> Vec<usize> {
+/// Poses spread evenly over the training set (and so over its groups) with at most `rows` rows, or
+/// `at_least` poses.
+fn spread_poses(training: &Training, rows: usize, at_least: usize) -> Vec<usize> {
     let poses = training.pose_count();
     let per_pose = (training.row_count() as f64 / poses.max(1) as f64).max(1.0);
-    let wanted = ((rows as f64 / per_pose) as usize).clamp(1, poses);
+    let wanted = ((rows as f64 / per_pose) as usize).max(at_least).clamp(1, poses);
     (0..wanted).map(|k| k * poses / wanted).collect()
 }

@@ -214,6 +214,12 @@ impl Hyper {
         self.products.first().map_or(&[], |product| &product.joints)
     }
 
+    /// Whether all `major` joints belong to the `wrist` block, which holds what they do together already.
+    pub fn major_is_wrist(&self) -> bool {
+        let wrist = self.products.iter().find(|product| product.name == WRIST_NAME);
+        wrist.is_some_and(|wrist| self.major_joints().iter().all(|joint| wrist.joints.contains(joint)))
+    }
+
     /// The same hyper-parameters with a fresh `major` block over other joints.
     pub fn with_major(&self, joints: Vec<usize>) -> Self {
         let mut other = self.clone();

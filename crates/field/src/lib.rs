@@ -28,6 +28,7 @@ mod outliers;
 mod pairs;
 mod posterior;
 mod predict;
+mod product;
 mod refine;
 mod select;
 #[cfg(test)]

@@ -76,7 +76,11 @@ pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result
         if rival == present.major_joints() || rival.is_empty() {
             continue;
         }
-        let candidate = refine(evidence, present.with_major(rival), RIVAL)?;
+        let rival = present.with_major(rival);
+        if rival.major_is_wrist() {
+            continue;
+        }
+        let candidate = refine(evidence, rival, RIVAL)?;
         evaluations += candidate.evaluations;
         if net(&candidate) > net(&best) {
             best = candidate;
@@ -102,10 +106,15 @@ pub fn prune_major(evidence: &Evidence, mut best: Found) -> Result<Found, FieldE
     Ok(best)
 }
 
+/// The removal that costs least, among those that leave more than joints of the wrist.
 fn cheapest_removal(evidence: &Evidence, from: &Hyper, evaluations: &mut usize) -> Result<Found, FieldError> {
     let mut best: Option<Found> = None;
     for position in 0..from.major_joints().len() {
-        let found = refine(evidence, from.without_major(position), REFIT)?;
+        let candidate = from.without_major(position);
+        if candidate.major_is_wrist() {
+            continue;
+        }
+        let found = refine(evidence, candidate, REFIT)?;
         *evaluations += found.evaluations;
         if best.as_ref().is_none_or(|best| found.value > best.value) {
             best = Some(found);

@@ -16,6 +16,7 @@ use crate::bank::{Bank, Block};
 use crate::cells::CellKernel;
 use crate::model::{BlockPlan, Model};
 use crate::posterior::{LeaveOneOut, Query, Solution};
+use crate::product::{product, times};
 
 /// Eigenvalues (of products: their products) below this share of the largest are left out.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -231,7 +232,7 @@ impl WeightSpace {
         let mut right = Mat::<f64>::zeros(self.width, 1);
         for batch in parts.batches() {
             let rows = parts.whitened(batch.clone(), self.width)?;
-            right += rows.transpose() * column(&parts.whitened_values(batch, residual)?);
+            right += product(rows.transpose(), column(&parts.whitened_values(batch, residual)?).as_ref());
         }
         Ok(self.factor.solve_vector(&to_vec(right.as_ref())))
     }
@@ -274,7 +275,8 @@ impl WeightSpace {
         let stride = training.pose_count().div_ceil(JUDGED_EXACTLY);
         for batch in parts.batches() {
             let rows = parts.whitened(batch.clone(), self.width)?;
-            let left = column(&parts.whitened_values(batch.clone(), residual)?) - &rows * &solution;
+            let left = column(&parts.whitened_values(batch.clone(), residual)?)
+                - product(rows.as_ref(), solution.as_ref());
             let first = training.rows(batch.start).start;
             let square =
                 |pose: usize| training.rows(pose).map(|row| left[(row - first, 0)].powi(2)).sum::<f64>();
@@ -322,7 +324,7 @@ impl WeightSpace {
             let free = Cholesky::new(free, faer::Par::Seq).ok_or_else(error)?;
             let local: Vec<f64> = range.clone().map(|row| left[(row - first, 0)]).collect();
             let noise = self.model.noise_factor(pose)?;
-            let left_out = to_vec((&noise * column(&free.solve_vector(&local))).as_ref());
+            let left_out = times(noise.as_ref(), &free.solve_vector(&local));
             let covariance = &noise * free.inverse() * noise.transpose();
             out.set(&self.model, pose, &left_out, covariance)?;
         }

@@ -96,7 +96,8 @@ fn many_rows() -> (Training, Hyper) {
     let mut hyper = Hyper::start(&[0, 1], 4, [3e-5, 1e-4]);
     hyper.own_length = 1.0;
     hyper.smooth_length = 3.0;
-    hyper.products.iter_mut().for_each(|product| product.lengths.fill(3.0));
+    hyper.products.truncate(1);
+    hyper.products[0].lengths.fill(3.0);
     (training, hyper)
 }
 
