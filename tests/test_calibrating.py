@@ -443,3 +443,23 @@ def test_public_names_are_found_on_the_package():
     assert set(ta.__all__) <= set(dir(ta))
     with pytest.raises(AttributeError, match="nonsense"):
         _ = ta.nonsense
+
+
+def test_a_target_that_no_held_out_row_holds_is_said():
+    arm = ur10()
+    table = arm.measure_table(arm.poses(60))
+    table[["x2", "y2", "z2"]] = table[["x", "y", "z"]].to_numpy()
+    held = np.random.default_rng(7).permutation(60)[42:]
+    table.loc[held, ["x", "y", "z"]] = np.nan
+    with pytest.raises(ta.InputError, match="target 1 was measured in none of 18 rows"):
+        ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+
+
+def test_points_and_orientations_may_be_missing_here_and_there():
+    arm = ur10(imperfections=EXACT)
+    table = arm.measure_table(arm.poses(80), orientation=True)
+    table.loc[::7, ["qw", "qx", "qy", "qz"]] = np.nan
+    calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+    np.testing.assert_allclose(
+        named_corrections(calibration), named_errors(arm, calibration.constant.names), atol=2e-7
+    )

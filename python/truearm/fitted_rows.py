@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammainccinv
 
 from truearm.core_set import Selection
 from truearm.fitting import Fits
@@ -87,4 +87,5 @@ def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> tuple
         variance[:, -3:] = orientation**2
     squares = (residual**2 / variance).sum(axis=1)
     freedom = np.maximum((residual != 0.0).sum(axis=1), 1)
-    return squares / chi2.isf(OVERWHELMING, freedom), np.linalg.norm(residual[:, :3], axis=1)
+    limit = 2.0 * gammainccinv(freedom / 2.0, OVERWHELMING)
+    return squares / limit, np.linalg.norm(residual[:, :3], axis=1)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Problem, Setup, residuals
 from truearm.core_set import Selection, core_set
+from truearm.errors import InputError
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
 
@@ -29,9 +30,7 @@ class Statistics:
 
     @classmethod
     def of(cls, errors: Floats) -> "Statistics":
-        """Statistics of errors (n,) in m or rad; of none they are NaN."""
-        if len(errors) == 0:
-            return cls(*[float("nan")] * 5)
+        """Statistics of errors (n,) in m or rad; there must be one."""
         scaled = errors / MILLI
         p95, p99 = np.quantile(scaled, [0.95, 0.99])
         rms = np.sqrt(np.square(scaled).mean())
@@ -123,14 +122,25 @@ def measure_errors(
         groups: Names of the set-ups, in the order of `setup`.
         parameters: Parameters (L, 5), or (n, L, 5) of each row.
         setup: Frames and targets of the groups.
+
+    Raises:
+        InputError: If no row holds the target.
     """
     problem = Problem(arm.flange_chain, core_set(arm.robot, data, selection, groups), [], arm.world_is_known)
     left = residuals(problem, np.ascontiguousarray(parameters), setup)
     if selection.distances:
         return Errors(Statistics.of(np.abs(left[:, 0])))
     seen = np.isfinite(data.targets[:, selection.targets[0]]).all(axis=1)
+    if not seen.any():
+        raise InputError(
+            f"target {selection.targets[0] + 1} was measured in none of {len(data)} rows to judge",
+            where=", ".join(data.files),
+            way_out="Judge at another target, or measure it at more poses",
+        )
     position = Statistics.of(np.linalg.norm(left[seen, :3], axis=1))
     if not selection.orientation or data.orientations is None:
         return Errors(position)
     turned = np.isfinite(data.orientations).all(axis=1)
+    if not turned.any():
+        return Errors(position)
     return Errors(position, Statistics.of(np.linalg.norm(left[turned, -3:], axis=1)))

@@ -155,6 +155,11 @@ def print_determined(calibration: Calibration) -> None:
     say(f"The poses determine {found.rank} of {found.parameters} parameters of the arm.")
     for words, names in _by_reason(found.undetermined, found.words).items():
         say_wrapped(f"  {', '.join(names)} {words}")
+    if len(calibration.selection.targets) in (1, 2) and not calibration.selection.orientation:
+        say_wrapped(
+            "Orientation was not measured: how the tool is turned follows from positions alone, "
+            "and is judged by nothing below."
+        )
 
 
 def _by_reason(names: tuple[str, ...], sentences: tuple[str, ...]) -> dict[str, list[str]]:
