@@ -61,6 +61,12 @@ impl Arm {
         Self { chain, columns, ranges, truth, constants }
     }
 
+    /// The same arm with one true parameter changed.
+    pub fn changed(mut self, column: usize, by: f64) -> Self {
+        self.constants[column] += by;
+        self
+    }
+
     /// Candidates that get constants: all but what a prismatic joint adds to.
     pub fn constant_columns(&self) -> Vec<usize> {
         let links = self.chain.links();

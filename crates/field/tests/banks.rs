@@ -1,0 +1,149 @@
+//! Evaluation of a bank: one by one, in batches, by many threads, and what a bank must hold.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+mod common;
+
+use common::{Random, with_threads};
+use truearm_field::{Axis, Bank, Block, FieldError, Grid, Input};
+
+const INPUTS: usize = 3;
+const PARAMETERS: usize = 10;
+
+fn block(name: &str, inputs: &[usize], outputs: &[usize], degree: usize, random: &mut Random) -> Block {
+    let axis = |&k: &usize| {
+        let input = if k == 2 { Input::line(2.0) } else { Input::ANGLE };
+        let reach = if k == 0 { 6.2 } else { 2.0 };
+        let values = (0..100).map(|i| reach * f64::from(i) / 99.0);
+        Axis::covering(input, values.collect::<Vec<_>>().into_iter(), 0.7, 2.0, degree)
+    };
+    let grid = Grid { inputs: inputs.to_vec(), axes: inputs.iter().map(axis).collect() };
+    let weights = (0..grid.cell_count() * outputs.len()).map(|_| random.normal()).collect();
+    Block { name: name.to_owned(), grid, outputs: outputs.to_vec(), weights }
+}
+
+fn bank(degree: usize) -> Bank {
+    let mut random = Random::new(1);
+    let blocks = vec![
+        block("own", &[0], &[0], degree, &mut random),
+        block("smooth", &[2], &[1, 4, 9], degree, &mut random),
+        block("major", &[0, 1], &[2, 3], degree, &mut random),
+        block("wrist", &[2, 0, 1], &[5, 0], degree, &mut random),
+    ];
+    Bank { blocks, ..Bank::empty(INPUTS, PARAMETERS) }
+}
+
+fn values(poses: usize) -> Vec<f64> {
+    let mut random = Random::new(2);
+    (0..poses * INPUTS).map(|_| random.between(-7.0, 7.0)).collect()
+}
+
+fn evaluate(bank: &Bank, values: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; values.len() / INPUTS * PARAMETERS];
+    bank.add(values, &mut out).unwrap();
+    out
+}
+
+/// Membership of the cell with the given centre, by the divided differences of truncated powers.
+fn membership(degree: usize, distance: f64) -> f64 {
+    let n = degree as i32;
+    if distance.abs() >= 0.5 * f64::from(n + 1) {
+        return 0.0;
+    }
+    let mut binomial = 1.0;
+    let mut sum = 0.0;
+    for k in 0..=n + 1 {
+        let knot = f64::from(k) - 0.5 * f64::from(n + 1);
+        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+        sum += sign * binomial * (distance - knot).max(0.0).powi(n);
+        binomial *= f64::from(n + 1 - k) / f64::from(k + 1);
+    }
+    sum / f64::from((1..=n).product::<i32>())
+}
+
+/// Grade of every cell at a value, with as many turns as reach it.
+fn grades(axis: &Axis, value: f64) -> Vec<f64> {
+    let scaled = axis.input.scale * value;
+    let turns: Vec<f64> = match axis.input == Input::ANGLE {
+        true => (-4..=4).map(|turn| f64::from(turn) * std::f64::consts::TAU).collect(),
+        false => vec![0.0],
+    };
+    let of = |cell: usize| {
+        let apart = |turn: &f64| (scaled + turn - axis.origin) / axis.spacing - cell as f64;
+        turns.iter().map(|turn| membership(axis.degree, apart(turn))).sum()
+    };
+    (0..axis.count).map(of).collect()
+}
+
+#[test]
+fn a_block_is_the_sum_of_its_cells_weights_times_b_splines() {
+    for degree in [2, 3] {
+        let bank = bank(degree);
+        let block = &bank.blocks[2];
+        for q in values(20).chunks(INPUTS) {
+            let (first, second) = (grades(&block.grid.axes[0], q[0]), grades(&block.grid.axes[1], q[1]));
+            let mut wanted = 0.0;
+            for (i, a) in first.iter().enumerate() {
+                for (j, b) in second.iter().enumerate() {
+                    wanted += a * b * block.weights[(i * second.len() + j) * 2 + 1];
+                }
+            }
+            let found = evaluate(&bank, q)[3];
+            assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
+        }
+    }
+}
+
+#[test]
+fn a_batch_is_one_by_one_and_threads_change_nothing() {
+    for degree in [2, 3] {
+        let (bank, values) = (bank(degree), values(5000));
+        let alone: Vec<f64> = values.chunks(INPUTS).flat_map(|q| evaluate(&bank, q)).collect();
+        for threads in [1, 2, 4] {
+            assert!(with_threads(threads, || evaluate(&bank, &values)) == alone, "{threads} threads");
+        }
+    }
+}
+
+#[test]
+fn seams_do_not_show() {
+    let pi = std::f64::consts::PI;
+    for degree in [2, 3] {
+        let bank = bank(degree);
+        let (left, right) = (evaluate(&bank, &[-pi, 0.5, 1.0]), evaluate(&bank, &[pi, 0.5, 1.0]));
+        for (a, b) in left.iter().zip(&right) {
+            assert!((a - b).abs() < 1e-10, "{a} {b}");
+        }
+        let near = evaluate(&bank, &[pi - 1e-7, 0.5, 1.0]);
+        assert!(near.iter().zip(&left).all(|(a, b)| (a - b).abs() < 1e-5));
+    }
+}
+
+#[test]
+fn beyond_an_open_axis_a_block_is_zero() {
+    let bank = bank(2);
+    let far = evaluate(&bank, &[0.3, 0.5, 40.0]);
+    assert_eq!([far[1], far[4], far[9], far[5]], [0.0; 4]);
+    assert!(far[2] != 0.0 && far[3] != 0.0);
+}
+
+#[test]
+fn banks_that_contradict_themselves_are_refused() {
+    assert_eq!(bank(2).check(), Ok(()));
+    let refused = |change: &dyn Fn(&mut Bank), what: &str| {
+        let mut bank = bank(2);
+        change(&mut bank);
+        let Err(FieldError::Length { what: found, .. }) = bank.check() else { panic!("{what} was accepted") };
+        assert_eq!(found, what);
+    };
+    refused(&|bank| bank.blocks[1].weights.truncate(1), "weights of a block");
+    refused(&|bank| bank.blocks[0].grid.inputs[0] = INPUTS, "inputs of a block");
+    refused(&|bank| bank.blocks[0].grid.inputs.push(1), "inputs of a block");
+    refused(&|bank| bank.blocks[2].outputs[1] = PARAMETERS, "outputs of a block");
+}
+
+#[test]
+fn arrays_that_do_not_fit_are_refused() {
+    let bank = bank(2);
+    assert!(bank.add(&[0.0; 4], &mut [0.0; PARAMETERS]).is_err());
+    assert!(bank.add(&[0.0; 3], &mut [0.0; PARAMETERS + 1]).is_err());
+}

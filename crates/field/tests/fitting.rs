@@ -1,0 +1,92 @@
+//! Fits of arms whose truth is known: error and intervals on poses that took no part.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+mod common;
+
+use common::{Arm, Fitted, Measure, Truth, deviations, fit, fitted, problem, root_mean_square, six_axes};
+use truearm_estimate::Point;
+use truearm_field::measurement_covariance;
+
+const NOISE: f64 = 3e-5;
+
+fn held_out(poses: usize) -> Measure {
+    Measure { seed: 99, ..Measure::poses(poses) }
+}
+
+/// Share of position components within 1.96 predicted standard deviations.
+fn coverage(arm: &Arm, fit: &Fitted, measure: &Measure) -> f64 {
+    let set = measure.of(arm);
+    let (_, deviations) = deviations(arm, fit, &set);
+    let problem = problem(arm, &set, &arm.columns);
+    let varying = fitted(&fit.field, &set.joints);
+    let point = Point { parameters: &varying, setup: &fit.field.setup };
+    let covariance = measurement_covariance(&fit.field.posterior, &problem, point, &set.joints).unwrap();
+    let rows = set.rows_per_pose();
+    let within = |(k, x): (usize, &f64)| {
+        let (pose, row) = (k / rows, k % rows);
+        x.abs() < 1.96 * covariance[(pose * rows + row) * rows + row].sqrt()
+    };
+    let count = deviations.iter().enumerate().filter(|entry| within(*entry)).count();
+    count as f64 / deviations.len() as f64
+}
+
+#[test]
+fn what_varies_is_found_and_intervals_hold() {
+    let arm = six_axes(Truth::BENDING);
+    let fit = fit(&arm, &Measure::poses(250).of(&arm)).unwrap();
+    let (constant, field) = deviations(&arm, &fit, &held_out(200).of(&arm));
+    let (constant, field) = (root_mean_square(&constant), root_mean_square(&field));
+    assert!(constant > 4.0 * NOISE, "the constants leave {constant}");
+    assert!(field < 1.7 * NOISE, "the field leaves {field}, the constants {constant}");
+    let share = coverage(&arm, &fit, &held_out(200));
+    assert!((0.90..=0.99).contains(&share), "{share} of the components lie within their 95 % intervals");
+    assert!((0.5..1.7).contains(&(fit.field.hyper.noise[0] / NOISE)), "{:?}", fit.field.hyper);
+    assert!(fit.field.judgement.outliers.is_empty(), "{:?}", fit.field.judgement.outliers);
+}
+
+#[test]
+fn joints_that_act_together_are_the_major_ones() {
+    let truth = Truth { coupled: (8e-4, [2, 4]), ..Truth::RIGID };
+    let arm = six_axes(truth);
+    let fit = fit(&arm, &Measure::poses(150).of(&arm)).unwrap();
+    let found = fit.field.hyper.major_joints();
+    assert!(found.contains(&2) && found.contains(&4), "{found:?}");
+}
+
+/// Held-out error with the field over that without, mean of three draws.
+fn cost_of_varying(arm: &Arm, poses: usize) -> f64 {
+    let of = |seed: u64| {
+        let fit = fit(arm, &Measure { seed, ..Measure::poses(poses) }.of(arm)).unwrap();
+        let (constant, field) = deviations(arm, &fit, &held_out(300).of(arm));
+        root_mean_square(&field) / root_mean_square(&constant)
+    };
+    (of(7) + of(8) + of(9)) / 3.0
+}
+
+#[test]
+fn a_rigid_arm_is_left_alone() {
+    let arm = six_axes(Truth::RIGID);
+    let cost = cost_of_varying(&arm, 100);
+    assert!(cost < 1.03, "100 poses: {cost} times the constants' error");
+    // Priors expect an arm to bend: thirty poses of a rigid one, ninety values, do not talk them out of it.
+    let cost = cost_of_varying(&arm, 30);
+    assert!(cost < 1.25, "30 poses: {cost} times the constants' error");
+}
+
+#[test]
+fn few_poses_do_no_harm() {
+    let arm = six_axes(Truth::BENDING);
+    for poses in [12, 20, 30] {
+        let fit = fit(&arm, &Measure::poses(poses).of(&arm)).unwrap();
+        let (constant, field) = deviations(&arm, &fit, &held_out(200).of(&arm));
+        let (constant, field) = (root_mean_square(&constant), root_mean_square(&field));
+        assert!(field < 1.1 * constant, "{poses} poses: the field leaves {field}, the constants {constant}");
+    }
+}
+
+#[test]
+fn too_few_poses_are_refused() {
+    let arm = six_axes(Truth::BENDING);
+    let Err(refused) = fit(&arm, &Measure::poses(2).of(&arm)) else { panic!("two poses determine nothing") };
+    assert!(refused.to_string().contains("measure at least 3 poses"), "{refused}");
+}

@@ -1,0 +1,30 @@
+//! Gross errors are found and innocent poses are not.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+mod common;
+
+use common::{Measure, Truth, deviations, fit, root_mean_square, six_axes};
+
+#[test]
+fn gross_errors_are_named_and_others_are_not() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = Measure::poses(120).of(&arm);
+    for (pose, shift) in [(3, 2e-3), (50, -1e-3), (97, 5e-3)] {
+        set.targets[3 * pose + pose % 3] += shift;
+    }
+    let fit = fit(&arm, &set).unwrap();
+    assert_eq!(fit.field.judgement.outliers, [3, 50, 97]);
+    let training = fit.field.posterior.training();
+    assert!(training.rows(50).all(|row| training.weight[row] < 0.01));
+    let (constant, field) = deviations(&arm, &fit, &Measure { seed: 99, ..Measure::poses(200) }.of(&arm));
+    let (constant, field) = (root_mean_square(&constant), root_mean_square(&field));
+    assert!(field < 0.6 * constant, "{field} with the field, {constant} without");
+    assert!(fit.field.judgement.distance[97] > 4e-3);
+}
+
+#[test]
+fn genuine_local_error_is_no_outlier() {
+    let arm = six_axes(Truth { own: 6e-4, ..Truth::BENDING });
+    let fit = fit(&arm, &Measure::poses(80).of(&arm)).unwrap();
+    assert!(fit.field.judgement.outliers.is_empty(), "{:?}", fit.field.judgement);
+}
