@@ -206,6 +206,7 @@ def test_files_that_are_no_table_are_refused(content, folder, capsys):
         (["--holdout-range", "q9:high:0.3"], "joint 9"),
         (["--holdout-range", "tail"], "qJ:low:SHARE"),
         (["--split-by", "place"], 'no column "place"'),
+        (["--holdout", "0.2", "--holdout-range", "q1:low:0.2"], "Give one of them"),
         (["--split-by", "group", "--holdout-range", "q1:low:0.2"], "not both"),
         (["--use", "targets"], "one point was measured"),
         (["--use", "all"], "Either position or pose or targets"),
@@ -229,6 +230,8 @@ def test_an_unknown_robot_or_file_is_said(folder, capsys):
     (folder / "taken").write_text("")
     assert main(["calibrate", "rv-m2", "arm.csv", "-o", "taken"]) == 1
     assert "-o names a directory" in capsys.readouterr().err
+    assert main(["calibrate", "rv-m2", "arm.csv", "-o", "taken/below"]) == 1
+    assert "taken: this is a file" in capsys.readouterr().err
 
 
 def test_an_open_set_up_is_warned_of(folder, capsys):

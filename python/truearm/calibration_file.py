@@ -42,11 +42,8 @@ def write_calibration_file(path: Path, arrays: Arrays, content: Mapping[str, Any
     )
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     data = save(contiguous, {METADATA_KEY: text})
-    place = DIGEST.search(data)
-    if place is None:
-        raise AssertionError("the digest has no place in the header")
-    digest = hashlib.sha256(data).hexdigest().encode()
-    write_whole(path, data[: place.start(1)] + digest + data[place.end(1) :])
+    before, _, behind = data.partition(NO_DIGEST.encode())
+    write_whole(path, before + hashlib.sha256(data).hexdigest().encode() + behind)
 
 
 def read_calibration_file(path: Path) -> tuple[Arrays, dict[str, Any]]:

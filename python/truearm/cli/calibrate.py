@@ -1,6 +1,7 @@
 """`truearm calibrate`: learn an arm's parameters from measurements and judge them on held-out ones."""
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,11 +13,12 @@ from truearm.cli.console import print_json, say, say_wrapped, warn
 from truearm.cli.error_tables import print_errors
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 from truearm.files import write_whole
 from truearm.measurements import Measurements
 from truearm.options import Options
 from truearm.robot import Robot
+from truearm.splitting import DEFAULT_HOLDOUT, DEFAULT_SEED
 
 CALIBRATION_NAME = "calibration.calib"
 SUMMARY_NAME = "summary.json"
@@ -31,8 +33,10 @@ def command(
         list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")],
-    holdout: Annotated[float, typer.Option(help="Share of the rows that is held out.")] = 0.3,
-    seed: Annotated[int, typer.Option(help="Seed of the split.")] = 7,
+    holdout: Annotated[
+        float | None, typer.Option(help=f"Share of the rows that is held out.  [default: {DEFAULT_HOLDOUT}]")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the split.")] = DEFAULT_SEED,
     train_size: Annotated[
         int | None, typer.Option(metavar="N", help="Training rows of each file.  [default: all others]")
     ] = None,
@@ -80,7 +84,7 @@ def command(
     Writes DIR/calibration.calib, fitted to all rows after the errors were judged, and DIR/summary.json.
     """
     options = Options.of(
-        holdout=holdout,
+        holdout=_holdout(holdout, holdout_range),
         seed=seed,
         train_size=train_size,
         split_by=split_by or (),
@@ -112,10 +116,21 @@ def command(
     say(f"  truearm evaluate {output / CALIBRATION_NAME} OTHER.csv")
 
 
+def _holdout(share: float | None, holdout_range: str | None) -> float:
+    if share is not None and holdout_range is not None:
+        raise UsageError(
+            "--holdout and --holdout-range both say how much is held out", way_out="Give one of them"
+        )
+    return DEFAULT_HOLDOUT if share is None else share
+
+
 def check_directory(output: Path) -> None:
-    """Raise InputError, before any work, if `output` is there and is no directory."""
-    if output.exists() and not output.is_dir():
-        raise InputError("this is a file", where=str(output), rule="-o names a directory")
+    """Raise InputError, before any work, if nothing can be written to the directory `output`."""
+    there = next(place for place in (output, *output.absolute().parents) if place.exists())
+    if not there.is_dir():
+        raise InputError("this is a file", where=str(there), rule="-o names a directory")
+    if not os.access(there, os.W_OK):
+        raise InputError("no permission to write here", where=str(there), way_out="Name another with -o")
 
 
 def write_results(calibration: Calibration, output: Path) -> dict[str, Any]:
