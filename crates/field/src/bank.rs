@@ -44,7 +44,6 @@ impl Kernel for Evaluate<'_> {
     type Output = ();
 
     #[inline(always)]
-
     fn run<I: Isa>(self) {
         let Self { bank, values, out } = self;
         let mut sums = vec![0.0; bank.parameter_count];
@@ -57,7 +56,7 @@ impl Kernel for Evaluate<'_> {
                 block.grid.visit(values, |cell, grade| {
                     let weights = &block.weights[cell * width..(cell + 1) * width];
                     for (sum, weight) in sums.iter_mut().zip(weights) {
-                        *sum = grade * weight + *sum;
+                        *sum += grade * weight;
                     }
                 });
                 for (&output, sum) in block.outputs.iter().zip(&*sums) {

@@ -208,7 +208,7 @@ impl Kernel for PoseGradient<'_> {
         if self.evidence.training.rows(self.pose).is_empty() {
             return vec![0.0; self.hyper.to_logs().len()];
         }
-        let shares = self.shares::<I>();
+        let shares = self.shares();
         self.contract(&shares)
     }
 }
@@ -251,7 +251,7 @@ impl Shares {
 
 impl PoseGradient<'_> {
     #[inline(always)]
-    fn shares<I: Isa>(&self) -> Shares {
+    fn shares(&self) -> Shares {
         let training = self.evidence.training;
         let by_column = &self.evidence.by_column;
         let rows = training.rows(self.pose);
@@ -260,7 +260,7 @@ impl PoseGradient<'_> {
         let mut sums = ClassSums::default();
         let mut weights = vec![0.0; by_column.rows - first];
         for row in rows {
-            sums.fill::<I>(by_column, row, first);
+            sums.fill(by_column, row, first);
             self.weights(row, first, &mut weights);
             let own_variance = training.noise_variance(row, [0.0; 2]);
             let noise = training.noise_variance(row, self.hyper.noise) - own_variance;
@@ -338,9 +338,10 @@ impl PoseGradient<'_> {
         for (i, (kernel, distances)) in kernels.iter().zip(distances).enumerate().take(shares.constant.len())
         {
             let mut total = 0.0;
-            for class in 0..3 {
-                let share = product.amplitudes[class].powi(2) * shares.classes[class][i] * kernel;
-                gradient[class] += share;
+            let classes = product.amplitudes.iter().zip(&shares.classes);
+            for (slope, (amplitude, shares)) in gradient.iter_mut().zip(classes) {
+                let share = amplitude.powi(2) * shares[i] * kernel;
+                *slope += share;
                 total += share;
             }
             for (k, exponent) in exponents(product, distances).enumerate() {

@@ -87,7 +87,7 @@ fn columns(problem: &Problem, options: &FieldOptions) -> Vec<Column> {
         }
     }
     let own = |parameter: usize| match joint_of_link[parameter / 5] {
-        Some((joint, Joint::Revolute)) if parameter % 5 == 0 => Some(joint),
+        Some((joint, Joint::Revolute)) if parameter.is_multiple_of(5) => Some(joint),
         Some((joint, Joint::Prismatic)) if parameter % 5 == 1 => Some(joint),
         _ => None,
     };

@@ -71,13 +71,14 @@ impl Cells {
             _ => 0.0,
         });
         let smooth = self.smooth.iter().zip(a.smooth.iter().zip(&b.smooth));
-        let product = |(axes, (a, b)): (&Vec<(usize, CellKernel)>, (&Vec<Active>, &Vec<Active>))| {
-            axes.iter().zip(a.iter().zip(b)).map(|((_, cells), (a, b))| cells.implied(a, b)).product()
+        let product = |(index, axes): (usize, &Vec<(usize, CellKernel)>)| {
+            let pairs = a.products[index].iter().zip(&b.products[index]);
+            axes.iter().zip(pairs).map(|((_, cells), (a, b))| cells.implied(a, b)).product()
         };
         Correlations {
             own: own.collect(),
             smooth: smooth.map(|(cells, (a, b))| cells.implied(a, b)).sum(),
-            products: self.products.iter().zip(a.products.iter().zip(&b.products)).map(product).collect(),
+            products: self.products.iter().enumerate().map(product).collect(),
         }
     }
 }

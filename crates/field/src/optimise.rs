@@ -189,6 +189,8 @@ impl Inverse {
 
 #[cfg(test)]
 mod tests {
+    use truearm_estimate::EstimateError;
+
     use super::*;
 
     fn ranges(high: f64) -> Vec<Range> {
@@ -218,7 +220,57 @@ mod tests {
     #[test]
     fn stays_within_bounds() {
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let optimum = maximise(valley, &[0.0; 4], &ranges(1.2), limits).unwrap();
+        let ranges = ranges(1.2);
+        let mut seen = Vec::new();
+        let watched = |point: &[f64]| {
+            seen.extend(point.to_vec());
+            valley(point)
+        };
+        let optimum = maximise(watched, &[9.0; 4], &ranges, limits).unwrap();
         assert!(optimum.point.iter().all(|x| (x - 1.2_f64.ln()).abs() < 1e-9), "{optimum:?}");
+        assert!(seen.iter().all(|x| (1e-3_f64.ln()..=1.2_f64.ln()).contains(x)));
+    }
+
+    #[test]
+    fn a_bound_holds_one_coordinate_and_not_the_others() {
+        let mut ranges = ranges(1e3);
+        ranges[1].high = 1.1;
+        let limits = Limits { evaluations: 200, gain: 1e-12 };
+        let optimum = maximise(valley, &[-1.0; 4], &ranges, limits).unwrap();
+        assert!((optimum.point[1] - 1.1_f64.ln()).abs() < 1e-12);
+        assert!([0, 2, 3].iter().all(|&k| (optimum.point[k] - 0.5_f64).abs() < 1e-4), "{optimum:?}");
+    }
+
+    #[test]
+    fn points_where_the_function_fails_are_kept_away_from() {
+        let fails_beyond = |point: &[f64]| {
+            if point[0] > 0.4 { Err(FieldError::NotPositiveDefinite { rows: 1 }) } else { valley(point) }
+        };
+        let limits = Limits { evaluations: 200, gain: 1e-12 };
+        let optimum = maximise(fails_beyond, &[-1.0; 4], &ranges(1e3), limits).unwrap();
+        assert!(optimum.point[0] <= 0.4 && optimum.value > valley(&[-1.0; 4]).unwrap().value + 10.0);
+        let refused = maximise(fails_beyond, &[1.0; 4], &ranges(1e3), limits).unwrap_err();
+        assert_eq!(refused, FieldError::NotPositiveDefinite { rows: 1 });
+    }
+
+    #[test]
+    fn a_request_to_stop_is_passed_on() {
+        let mut left = 5;
+        let stops = |point: &[f64]| {
+            left -= 1;
+            if left == 0 { Err(FieldError::Estimate(EstimateError::Cancelled)) } else { valley(point) }
+        };
+        let limits = Limits { evaluations: 200, gain: 1e-12 };
+        let stopped = maximise(stops, &[0.0; 4], &ranges(1e3), limits).unwrap_err();
+        assert_eq!(stopped, FieldError::Estimate(EstimateError::Cancelled));
+        assert_eq!(left, 0, "nothing is evaluated after the request");
+    }
+
+    #[test]
+    fn evaluations_are_bounded() {
+        let limits = Limits { evaluations: 3, gain: 0.0 };
+        let optimum = maximise(valley, &[-3.0; 4], &ranges(1e3), limits).unwrap();
+        assert_eq!(optimum.evaluations, 3);
+        assert!(optimum.value > valley(&[-3.0; 4]).unwrap().value);
     }
 }

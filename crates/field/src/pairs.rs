@@ -97,7 +97,7 @@ impl ByColumn {
 
     /// `out[r] = sum over p of J[r, p] weight_p J[c, p]` for rows r from `first` on.
     #[inline(always)]
-    pub fn products<I: Isa>(
+    pub fn products(
         &self,
         terms: impl Iterator<Item = (usize, f64)>,
         row: usize,
@@ -123,13 +123,13 @@ pub struct ClassSums {
 
 impl ClassSums {
     #[inline(always)]
-    pub fn fill<I: Isa>(&mut self, by_column: &ByColumn, row: usize, first: usize) {
+    pub fn fill(&mut self, by_column: &ByColumn, row: usize, first: usize) {
         let count = by_column.rows - first;
         self.constant.resize(count, 0.0);
-        by_column.products::<I>(by_column.constant.iter().copied(), row, first, &mut self.constant);
+        by_column.products(by_column.constant.iter().copied(), row, first, &mut self.constant);
         for (class, sums) in self.classes.iter_mut().enumerate() {
             sums.resize(count, 0.0);
-            by_column.products::<I>(by_column.driven[class].iter().map(|&p| (p, 1.0)), row, first, sums);
+            by_column.products(by_column.driven[class].iter().map(|&p| (p, 1.0)), row, first, sums);
         }
     }
 }
@@ -193,7 +193,7 @@ impl Kernel for PoseColumns<'_> {
         let mut sums = ClassSums::default();
         for (k, row) in rows.enumerate() {
             let column = &mut out[k * by_column.rows + first..(k + 1) * by_column.rows];
-            sums.fill::<I>(by_column, row, first);
+            sums.fill(by_column, row, first);
             let constant = hyper.constant * hyper.constant;
             for (value, sum) in column.iter_mut().zip(&sums.constant) {
                 *value = constant * sum;

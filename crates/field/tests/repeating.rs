@@ -17,6 +17,12 @@ fn bits(field: &FieldFit) -> Vec<u64> {
     let judged = field.judgement.score.iter().chain(&field.judgement.distance).copied();
     let hyper = [field.evidence, field.judgement.inflation, field.hyper.extrapolation, field.hyper.noise[0]];
     let constants = field.parameters.iter().chain(&field.residuals).copied();
+    let columns = field.posterior.training().columns.len();
+    let jacobian: Vec<f64> = (0..3 * columns).map(|k| (k as f64).sin()).collect();
+    let values = vec![0.1; field.bank.input_count];
+    let sure =
+        [1, 3].map(|rows| field.posterior.covariance(&values, &jacobian[..rows * columns], None, rows));
+    let constants = constants.chain(sure.into_iter().flat_map(Result::unwrap));
     constants.chain(blocks).chain(setup).chain(judged).chain(hyper).map(f64::to_bits).collect()
 }
 
