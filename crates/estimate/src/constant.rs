@@ -7,6 +7,7 @@
 
 use faer::{Mat, Par};
 
+use crate::alike::check_poses;
 use crate::dense::Cholesky;
 use crate::layout::{Layout, Problem};
 use crate::measurements::Noise;
@@ -50,7 +51,7 @@ pub struct ConstantOptions {
     pub prior: Option<Prior>,
     /// Known noise; estimated from the residuals where there is none.
     pub noise: Option<Noise>,
-    /// Loss; `None` is least squares.
+    /// Loss of a pose's residuals; `None` is least squares, as are distances always.
     pub robust: Option<Robust>,
     /// A set-up to start from, instead of the closed form.
     pub start: Option<Setup>,
@@ -93,7 +94,8 @@ const SCALE_RANGE: (f64, f64) = (0.1, 5.0);
 /// Fits the columns' constants and the set-up.
 ///
 /// # Errors
-/// [`EstimateError`] where lengths or values are wrong, measurements are too few or too alike, or on request.
+/// [`EstimateError`] where lengths or values are wrong, measurements are too few, the poses too alike to determine
+/// the set-up, or on request.
 pub fn fit_constant(problem: &Problem, options: &ConstantOptions) -> Result<ConstantFit, EstimateError> {
     problem.check(options.prior.is_some())?;
     let nominal = problem.chain.nominal();
@@ -151,6 +153,7 @@ impl Fit<'_> {
         let noise = self.options.noise.unwrap_or(Noise::GUESS);
         let mut balance = Balance { noise, scale: 1.0, weights: set.weight.clone() };
         let mut minimum = self.minimise(start, &balance)?;
+        check_poses(self.problem, &minimum.state, &minimum.normal)?;
         let mut covariance = self.covariance(&minimum, &balance)?;
         let mut residuals = self.residuals(&minimum.state)?;
         for _ in 0..ROUNDS {
@@ -190,14 +193,16 @@ impl Fit<'_> {
     }
 
     /// Inverse of the normal equations with the prior, rescaled to the balance's noise. A set-up counts as known to a
-    /// metre and a radian: flat, but never singular where frame and targets cannot be told apart, as on a SCARA.
+    /// metre and a radian, or as well as rounding allows where the data is exact: flat, but never singular where frame
+    /// and targets cannot be told apart, as on a SCARA.
     fn covariance(&self, minimum: &Minimum, balance: &Balance) -> Result<Mat<f64>, EstimateError> {
         let mut matrix = minimum.normal.matrix.clone();
         for (k, precision) in self.precision(balance.scale).into_iter().enumerate() {
             matrix[(k, k)] += precision;
         }
         let n = matrix.nrows();
-        (self.problem.columns.len()..n).for_each(|k| matrix[(k, k)] += 1.0);
+        (self.problem.columns.len()..n)
+            .for_each(|k| matrix[(k, k)] += f64::max(1.0, ROUNDING * matrix[(k, k)]));
         let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
         let scaled = Mat::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
         let factor = Cholesky::new(scaled, Par::Seq).ok_or_else(|| EstimateError::Singular {
@@ -239,6 +244,9 @@ impl Fit<'_> {
     }
 
     /// Noise of positions (or distances) and of orientations; the unknowns are shared out by rows.
+    ///
+    /// Where there are no more values than unknowns the residuals can be made as small as one likes and tell nothing:
+    /// the noise is then no less than the guess, or the covariance would promise what nobody measured.
     fn noise(&self, old: &Balance, residuals: &[f64], unknowns: f64) -> Noise {
         let (position, orientation) = self.squares(residuals, &old.weights);
         let rows = position.rows() + orientation.rows();
@@ -250,7 +258,12 @@ impl Fit<'_> {
             _ => squares.noise(unknowns * squares.rows() / rows),
         };
         let noise = Noise { position: of(&position), orientation: of(&orientation) };
-        Noise { position: noise.position.max(NOISE_FLOOR), orientation: noise.orientation.max(NOISE_FLOOR) }
+        let tells = self.problem.measurements.measured_values() > Layout::new(self.problem).len();
+        let floor = if tells { NOISE_FLOOR } else { Noise::GUESS };
+        Noise {
+            position: noise.position.max(floor.position),
+            orientation: noise.orientation.max(floor.orientation),
+        }
     }
 
     fn squares(&self, residuals: &[f64], weights: &[f64]) -> (Squares, Squares) {
@@ -327,5 +340,7 @@ impl Fit<'_> {
     }
 }
 
+/// Share of a diagonal entry below which a pivot of the normal equations is nothing but rounding.
+const ROUNDING: f64 = 1e-12;
 /// Below what any instrument resolves; keeps weights finite where data is exact.
-const NOISE_FLOOR: f64 = 1e-12;
+const NOISE_FLOOR: Noise = Noise { position: 1e-12, orientation: 1e-12 };

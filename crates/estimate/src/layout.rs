@@ -29,9 +29,11 @@ impl Problem<'_> {
     /// Checks the measurements and that there are enough of them for the unknowns without a prior.
     ///
     /// # Errors
-    /// Whatever [`MeasurementSet::check`] finds, and [`EstimateError::TooFew`].
+    /// Whatever [`MeasurementSet::check`] finds, [`EstimateError::Option`] where joints or columns are not the
+    /// chain's, and [`EstimateError::TooFew`].
     pub fn check(&self, columns_have_prior: bool) -> Result<(), EstimateError> {
         self.measurements.check()?;
+        self.check_chain()?;
         let layout = Layout::new(self);
         let per_pose = self.measurements.rows_per_pose().max(1);
         for group in 0..self.measurements.group_count {
@@ -57,6 +59,24 @@ impl Problem<'_> {
             return Err(EstimateError::TooFew { rows, unknowns: free, needed, hint: String::new() });
         }
         Ok(())
+    }
+}
+
+impl Problem<'_> {
+    fn check_chain(&self) -> Result<(), EstimateError> {
+        let refuse = |what, value, rule| Err(EstimateError::Option { what, value: value as f64, rule });
+        if self.measurements.joint_count != self.chain.joint_count() {
+            let rule = "the chain has another number of moving joints: measure and describe the same arm";
+            return refuse("the measurements' number of joints", self.measurements.joint_count, rule);
+        }
+        let count = self.chain.parameter_count();
+        let fits = |k: usize| self.columns[k] < count && (k == 0 || self.columns[k - 1] < self.columns[k]);
+        match (0..self.columns.len()).find(|&k| !fits(k)) {
+            Some(k) => {
+                refuse("a column", self.columns[k], "columns ascend and stay below 5 times the chain's links")
+            }
+            None => Ok(()),
+        }
     }
 }
 

@@ -9,6 +9,9 @@
 //! beta), then group by group: translation (3) and rotation (3) of `world_from_base`, target points
 //! (3 each), target rotation (3, where orientation is measured), anchors (3 each, of distances).
 
+#![allow(clippy::needless_range_loop, reason = "loops over lanes go through several arrays with one index")]
+
+mod alike;
 mod cancel;
 mod constant;
 pub mod dense;

@@ -63,7 +63,7 @@ impl MeasurementSet {
     /// Measured values that take part: rows that are neither missing nor of weight zero.
     pub fn measured_values(&self) -> usize {
         if self.is_distances() {
-            return self.distances.len();
+            return self.distances.iter().filter(|distance| self.weight[distance.pose] > 0.0).count();
         }
         (0..self.pose_count()).map(|pose| self.measured_values_of(pose)).sum()
     }
@@ -90,7 +90,8 @@ impl MeasurementSet {
     /// Checks lengths and values once, at the door.
     ///
     /// # Errors
-    /// [`EstimateError::Length`] and [`EstimateError::NotFinite`].
+    /// [`EstimateError::Length`], [`EstimateError::NotFinite`] (also of a target or orientation of which only a part
+    /// is missing) and [`EstimateError::Option`].
     pub fn check(&self) -> Result<(), EstimateError> {
         let n = self.pose_count();
         let length = |what, found, expected| {
@@ -102,16 +103,34 @@ impl MeasurementSet {
         length("sigma", self.sigma.len(), n)?;
         length("weight", self.weight.len(), n)?;
         finite("joint value", &self.joints, self.joint_count)?;
-        let infinite = |what, values: &[f64], width: usize| match values.iter().position(|v| v.is_infinite())
-        {
-            Some(at) => Err(EstimateError::NotFinite { what, pose: at / width.max(1) }),
-            None => Ok(()),
-        };
-        infinite("target", &self.targets, 3 * self.target_count)?;
-        infinite("rotation", &self.rotations, 9)?;
+        whole_or_missing("target", &self.targets, 3, self.target_count)?;
+        whole_or_missing("rotation", &self.rotations, 9, 1)?;
         finite("sigma", &self.sigma, 1)?;
         finite("weight", &self.weight, 1)?;
+        self.check_ranges()?;
         self.check_distances()
+    }
+
+    fn check_ranges(&self) -> Result<(), EstimateError> {
+        let refuse = |what, value, rule| Err(EstimateError::Option { what, value, rule });
+        if let Some(&sigma) = self.sigma.iter().find(|&&sigma| sigma < 0.0) {
+            return refuse(
+                "a pose's sigma",
+                sigma,
+                "a standard deviation is zero or more: give it in metres",
+            );
+        }
+        if let Some(&weight) = self.weight.iter().find(|weight| !(0.0..=1.0).contains(*weight)) {
+            return refuse("a pose's weight", weight, "weights are between 0 (left out) and 1");
+        }
+        if let Some(&group) = self.group.iter().find(|&&group| group >= self.group_count) {
+            return refuse(
+                "a pose's group",
+                group as f64,
+                "groups count from 0 and end below the number of groups",
+            );
+        }
+        Ok(())
     }
 
     fn check_distances(&self) -> Result<(), EstimateError> {
@@ -127,8 +146,25 @@ impl MeasurementSet {
                     expected: self.pose_count(),
                 });
             }
+            if !distance.value.is_finite() {
+                return Err(EstimateError::NotFinite { what: "distance", pose: distance.pose });
+            }
         }
         Ok(())
+    }
+}
+
+/// Every `width` values are finite, or all of them NaN; `per_pose` such parts belong to a pose.
+fn whole_or_missing(
+    what: &'static str,
+    values: &[f64],
+    width: usize,
+    per_pose: usize,
+) -> Result<(), EstimateError> {
+    let bad = |part: &[f64]| !part.iter().all(|v| v.is_finite()) && !part.iter().all(|v| v.is_nan());
+    match values.chunks_exact(width).position(bad) {
+        Some(at) => Err(EstimateError::NotFinite { what, pose: at / per_pose }),
+        None => Ok(()),
     }
 }
 

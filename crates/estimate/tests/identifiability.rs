@@ -67,11 +67,8 @@ fn the_paper_s_fifteen_are_twelve_and_a_free_target() {
 fn moving_the_wrist_and_measuring_its_orientation_determine_more_of_the_paper_s_arm() {
     let every = columns(&[[0, 1, 2, 3, 4].as_slice(); 6]);
     let spans = vec![2.6, 1.1, 1.0, 1.5, 2.5];
-    let still = Plan {
-        frame: FrameMode::World,
-        spans: RV_M2_SPANS.to_vec(),
-        ..Plan::new(rv_m2(), every, 200)
-    };
+    let still =
+        Plan { frame: FrameMode::World, spans: RV_M2_SPANS.to_vec(), ..Plan::new(rv_m2(), every, 200) };
     let moving = Plan { spans, ..still.clone() };
     let measured = Plan { rotations: true, ..moving.clone() };
     let ranks = [&still, &moving, &measured].map(|plan| of(plan).0.total_rank);

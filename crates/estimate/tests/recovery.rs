@@ -7,7 +7,7 @@ use common::arms::{
     ALPHA, PLAIN, THETA, columns, rv_m2, rv_m2_fifteen, scara, seven_axis, ur10, ur10_determined,
 };
 use common::scene::{Plan, Scene};
-use common::{assert_close, distance};
+use common::{assert_close, distance, root_mean_square};
 use truearm_estimate::{ConstantFit, ConstantOptions, FrameMode, Prior, Reason, fit_constant};
 
 #[track_caller]
@@ -75,11 +75,21 @@ fn of_large_errors() {
 
 #[test]
 fn of_a_scara_whose_frame_and_target_cannot_be_told_apart_along_its_axes() {
+    for rotations in [false, true] {
+        let scene = Plan { rotations, ..Plan::new(scara(), columns(&[&[2], &[THETA]]), 40) }.make();
+        let found = fit(&scene);
+        assert!(found.residuals.iter().all(|r| r.abs() < 1e-9));
+        assert!(scene.error_of(&found.parameters) < 1e-9, "{}", scene.error_of(&found.parameters));
+    }
+}
+
+#[test]
+fn of_a_scara_whose_axes_are_nearly_parallel_down_to_the_noise() {
     let arm = columns(&[&[2, ALPHA], &[THETA, 2, ALPHA]]);
-    let scene = Plan { rotations: true, ..Plan::new(scara(), arm, 40) }.make();
+    let scene = Plan { noise: (1e-4, 0.0), ..Plan::new(scara(), arm, 80) }.make();
     let found = fit(&scene);
-    assert!(found.residuals.iter().all(|r| r.abs() < 1e-9));
-    assert!(scene.error_of(&found.parameters) < 1e-7, "{}", scene.error_of(&found.parameters));
+    let left = root_mean_square(&found.residuals);
+    assert!((0.7e-4..1.1e-4).contains(&left), "{left}");
 }
 
 #[test]

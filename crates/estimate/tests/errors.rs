@@ -1,0 +1,178 @@
+//! Refusals: what is wrong, the rule, and the way out; never a plausible answer.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+mod common;
+
+use common::arms::{ur10, ur10_columns, ur10_determined};
+use common::scene::{Plan, Scene};
+use truearm_estimate::{
+    Cancel, ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Prior,
+    fit_constant,
+};
+
+fn plan() -> Plan {
+    Plan { noise: (1e-4, 0.0), ..Plan::new(ur10(), ur10_determined(), 40) }
+}
+
+#[track_caller]
+fn refusal(scene: &Scene, prior: Option<Prior>) -> EstimateError {
+    let options = ConstantOptions { prior, ..ConstantOptions::default() };
+    let answer = fit_constant(&scene.problem(), &options);
+    answer.map(|found| found.parameters).unwrap_err()
+}
+
+#[track_caller]
+fn assert_refused(wanted: &str, spoil: impl Fn(&mut MeasurementSet)) {
+    let mut scene = Plan { rotations: true, targets: 2, ..plan() }.make();
+    spoil(&mut scene.set);
+    let said = refusal(&scene, None).to_string();
+    assert!(said.contains(wanted), "'{said}' does not say '{wanted}'");
+}
+
+#[test]
+fn arrays_of_another_length() {
+    assert_refused("joints has 239 values where 240 are needed", |set| set.joints.truncate(239));
+    assert_refused("targets has 237 values where 240", |set| set.targets.truncate(237));
+    assert_refused("rotations has 359 values where 360", |set| set.rotations.truncate(359));
+    assert_refused("sigma has 41 values where 40", |set| set.sigma.push(0.0));
+    assert_refused("weight has 0 values where 40", |set| set.weight.clear());
+}
+
+#[test]
+fn values_that_are_not_finite_with_their_pose() {
+    assert_refused("joint value is not finite at pose 17", |set| set.joints[6 * 17 + 4] = f64::NAN);
+    assert_refused("target is not finite at pose 9", |set| set.targets[6 * 9 + 5] = f64::INFINITY);
+    assert_refused("rotation is not finite at pose 39", |set| set.rotations[9 * 39 + 8] = f64::NEG_INFINITY);
+    assert_refused("sigma is not finite at pose 3", |set| set.sigma[3] = f64::NAN);
+    assert_refused("weight is not finite at pose 0", |set| set.weight[0] = f64::INFINITY);
+}
+
+#[test]
+fn targets_and_orientations_of_which_a_part_is_missing() {
+    for k in 0..3 {
+        assert_refused("target is not finite at pose 4", |set| set.targets[6 * 4 + 3 + k] = f64::NAN);
+    }
+    assert_refused("rotation is not finite at pose 2", |set| set.rotations[9 * 2 + 7] = f64::NAN);
+}
+
+#[test]
+fn values_out_of_range() {
+    assert_refused("weight is -0.5", |set| set.weight[3] = -0.5);
+    assert_refused("weight is 2, but weights are between 0 (left out) and 1", |set| set.weight[3] = 2.0);
+    assert_refused("sigma is -0.001", |set| set.sigma[3] = -1e-3);
+    assert_refused("group is 1, but groups count from 0", |set| set.group[3] = 1);
+}
+
+#[test]
+fn distances_that_refer_to_nothing_or_are_no_number() {
+    let scene = plan().make().with_distances(&[], 0.0);
+    let with = |pose, to, value| {
+        let mut other = scene.clone();
+        other.set.distances.push(Distance { pose, to, value });
+        refusal(&other, None)
+    };
+    let lost = [(40, DistanceTo::Pose(0)), (0, DistanceTo::Pose(40)), (0, DistanceTo::Anchor(0))];
+    for (pose, to) in lost {
+        assert!(matches!(with(pose, to, 1.0), EstimateError::Length { .. }));
+    }
+    let wanted = EstimateError::NotFinite { what: "distance", pose: 5 };
+    assert_eq!(with(5, DistanceTo::Pose(6), f64::NAN), wanted);
+}
+
+#[test]
+fn another_arm() {
+    let mut scene = plan().make();
+    scene.set.joint_count = 5;
+    scene.set.joints.truncate(200);
+    assert!(refusal(&scene, None).to_string().contains("number of joints is 5"));
+    for columns in [vec![2, 30], vec![3, 2], vec![2, 2]] {
+        let said = refusal(&Scene { columns, ..plan().make() }, None).to_string();
+        assert!(said.contains("columns ascend"), "{said}");
+    }
+    let parameters = Some(vec![0.0; 31]);
+    let options = ConstantOptions { parameters, ..ConstantOptions::default() };
+    let said = fit_constant(&plan().make().problem(), &options).unwrap_err().to_string();
+    assert!(said.contains("parameters has 31 values where 30"), "{said}");
+}
+
+#[test]
+fn too_few_measurements_say_how_many_are_needed() {
+    let few = Plan { poses: vec![8], ..plan() }.make();
+    let said = refusal(&few, None).to_string();
+    assert_eq!(said, "24 measured values cannot determine 27 unknowns: measure at least 9 poses");
+    let prior = Some(Prior::default());
+    let options = ConstantOptions { prior, ..ConstantOptions::default() };
+    assert!(fit_constant(&few.problem(), &options).is_ok());
+    let said = refusal(&Plan { poses: vec![30, 2], ..plan() }.make(), prior).to_string();
+    assert!(
+        said.contains("6 measured values cannot determine 9 unknowns: measure at least 3 poses"),
+        "{said}"
+    );
+    assert!(said.contains("group 1, whose frame and targets are unknown"), "{said}");
+}
+
+#[test]
+fn weights_of_zero_and_missing_targets_do_not_count_as_measured() {
+    let mut scene = plan().make();
+    scene.set.weight[8..].fill(0.0);
+    assert!(matches!(refusal(&scene, None), EstimateError::TooFew { rows: 24, .. }));
+    let mut scene = plan().make();
+    scene.set.targets[15..].fill(f64::NAN);
+    assert!(matches!(refusal(&scene, None), EstimateError::TooFew { rows: 15, .. }));
+    let mut scene = plan().make().with_distances(&[], 0.0);
+    scene.set.weight[5..].fill(0.0);
+    assert!(matches!(refusal(&scene, None), EstimateError::TooFew { rows: 10, .. }));
+}
+
+#[test]
+fn poses_all_alike() {
+    for rotations in [false, true] {
+        let mut scene = Plan { rotations, ..plan() }.make();
+        let first = scene.set.joints[..6].to_vec();
+        scene.set.joints = first.repeat(40);
+        for prior in [None, Some(Prior::default())] {
+            let said = refusal(&scene, prior).to_string();
+            assert!(said.contains("too alike") && said.contains("spread them"), "{said}");
+        }
+    }
+}
+
+#[test]
+fn poses_that_move_too_little_of_the_arm() {
+    let prior = Some(Prior::default());
+    for spans in [vec![2.0, 0.0, 0.0, 0.0, 0.0, 0.0], vec![0.0, 1.0, 1.0, 1.0, 0.0, 0.0]] {
+        let scene = Plan { spans, errors: 0.0, ..plan() }.make();
+        let found = refusal(&scene, prior);
+        assert!(matches!(found, EstimateError::Singular { .. }), "{found}");
+    }
+}
+
+#[test]
+fn one_group_s_poses_all_alike() {
+    let mut scene = Plan { poses: vec![30, 10], columns: ur10_columns(), ..plan() }.make();
+    let first = scene.set.joints[180..186].to_vec();
+    scene.set.joints.truncate(180);
+    scene.set.joints.extend(first.repeat(10));
+    assert!(matches!(refusal(&scene, Some(Prior::default())), EstimateError::Singular { .. }));
+}
+
+#[test]
+fn alike_poses_are_enough_for_a_target_in_a_known_world() {
+    let mut scene = Plan { frame: FrameMode::World, columns: vec![], ..plan() }.make();
+    let first = scene.set.joints[..6].to_vec();
+    scene.set.joints = first.repeat(40);
+    assert!(fit_constant(&scene.problem(), &ConstantOptions::default()).is_ok());
+}
+
+#[test]
+fn a_request_to_stop_is_obeyed() {
+    let scene = plan().make();
+    let options = ConstantOptions::default();
+    options.cancel.clone().request();
+    assert_eq!(fit_constant(&scene.problem(), &options).unwrap_err(), EstimateError::Cancelled);
+    let flag = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));
+    let options = ConstantOptions { cancel: Cancel::from_flag(flag.clone()), ..ConstantOptions::default() };
+    assert_eq!(fit_constant(&scene.problem(), &options).unwrap_err(), EstimateError::Cancelled);
+    flag.store(false, std::sync::atomic::Ordering::Relaxed);
+    assert!(fit_constant(&scene.problem(), &options).is_ok());
+}
