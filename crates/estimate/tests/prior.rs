@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::arms::{ur10, ur10_columns, ur10_plain_columns};
+use common::arms::{ur10, ur10_columns, ur10_plain_columns, with_parameters};
 use common::scene::{Plan, Scene};
 use truearm_estimate::{ConstantFit, ConstantOptions, Noise, Prior, fit_constant};
 
@@ -30,23 +30,11 @@ fn undetermined_parameters_stay_nominal() {
 
 #[test]
 fn parameters_that_only_their_sum_determines_share_it_equally() {
-    let mut scene = Plan { columns: ur10_plain_columns(), errors: 0.0, noise: (0.0, 0.0), ..plan() }.make();
-    scene.truth[16] += 1e-3;
-    let made = Plan { chain: scene.chain.clone(), ..plan() };
-    let moved = truearm_kinematics::Chain::new(
-        made.chain.convention(),
-        made.chain
-            .links()
-            .iter()
-            .enumerate()
-            .map(|(k, link)| truearm_kinematics::Link { d: scene.truth[5 * k + 1], ..*link })
-            .collect(),
-        *made.chain.base(),
-        *made.chain.end(),
-    )
-    .unwrap();
-    let measured = Plan { chain: moved, errors: 0.0, noise: (0.0, 0.0), ..plan() }.make();
-    scene.set = measured.set;
+    let mut truth = ur10().nominal();
+    truth[16] += 1e-3;
+    let chain = with_parameters(&ur10(), &truth);
+    let exact = Plan { errors: 0.0, noise: (0.0, 0.0), columns: ur10_plain_columns(), chain, ..plan() };
+    let scene = Scene { chain: ur10(), ..exact.make() };
     let noise = Some(Noise { position: 1e-6, orientation: 1e-6 });
     let prior = Some(Prior { scaled: false, ..Prior::default() });
     let options = ConstantOptions { prior, noise, ..ConstantOptions::default() };

@@ -102,6 +102,14 @@ pub fn scara() -> Chain {
     chain(Convention::Standard, &rows)
 }
 
+/// The same chain with other parameters (5 L,).
+pub fn with_parameters(chain: &Chain, parameters: &[f64]) -> Chain {
+    let rows = chain.links().iter().zip(parameters.chunks_exact(5));
+    let links =
+        rows.map(|(link, p)| Link { theta: p[0], d: p[1], a: p[2], alpha: p[3], beta: p[4], ..*link });
+    Chain::new(chain.convention(), links.collect(), *chain.base(), *chain.end()).unwrap()
+}
+
 /// Indices 5 * link + kind, given the kinds of each link from the first on.
 pub fn columns(kinds: &[&[usize]]) -> Vec<usize> {
     kinds.iter().enumerate().flat_map(|(link, kinds)| kinds.iter().map(move |kind| 5 * link + kind)).collect()
