@@ -34,6 +34,7 @@ mod select;
 #[cfg(test)]
 mod tests;
 mod training;
+mod unknowns;
 mod weight_space;
 
 pub use bank::{Bank, Block};

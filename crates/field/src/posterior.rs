@@ -12,7 +12,8 @@ use crate::data_space::DataSpace;
 use crate::hyper::Hyper;
 use crate::model::Model;
 use crate::training::Training;
-use crate::weight_space::{self, WeightSpace};
+use crate::unknowns;
+use crate::weight_space::WeightSpace;
 
 /// Rows up to which data space is always affordable: half a gigabyte and seconds.
 const FEW_ROWS: usize = 6000;
@@ -90,7 +91,7 @@ impl Posterior {
         if rows <= FEW_ROWS {
             return Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)));
         }
-        let weights = weight_space::size(&model).ok_or(FieldError::NotPositiveDefinite { rows })?;
+        let weights = unknowns::size(&model).ok_or(FieldError::NotPositiveDefinite { rows })?;
         if weights <= rows && weights <= AFFORDABLE {
             return Ok(Self::Weight(Box::new(WeightSpace::new(model, cancel)?)));
         }

@@ -7,60 +7,23 @@
 
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::prelude::ReborrowMut;
-use faer::{Accum, Mat, MatMut, MatRef, Side};
+use faer::{Accum, Mat, MatMut, MatRef};
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, column, mirror_lower, parallelism, to_vec};
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
-use crate::cells::CellKernel;
 use crate::model::{BlockPlan, Model};
 use crate::posterior::{LeaveOneOut, Query, Solution};
 use crate::product::{product, times};
+use crate::unknowns::{Unknowns, unknowns};
 
-/// Eigenvalues (of products: their products) below this share of the largest are left out.
-const NEGLIGIBLE: f64 = 1e-6;
 /// Poses whose rows are formed together.
-const BATCH: usize = 128;
+const BATCH: usize = 512;
 /// Left-out residuals of sets above this are found exactly for suspicious and sampled poses alone.
-const JUDGED_EXACTLY: usize = 2000;
+const JUDGED_EXACTLY: usize = 600;
 /// A pose is suspicious when its squared residual reaches this many times its number of rows.
 const SUSPICIOUS: f64 = 3.0;
-
-/// E of one axis, (cells, r).
-struct Root {
-    entries: Mat<f64>,
-    values: Vec<f64>,
-}
-
-impl Root {
-    fn new(cells: &CellKernel) -> Option<Self> {
-        let n = cells.axis.count;
-        let matrix = Mat::from_fn(n, n, |i, j| cells.correlation[i.abs_diff(j)]);
-        let eigen = matrix.self_adjoint_eigen(Side::Lower).ok()?;
-        let (vectors, values) = (eigen.U(), eigen.S().column_vector());
-        let largest = values[n - 1];
-        let kept: Vec<usize> = (0..n).rev().filter(|&k| values[k] > NEGLIGIBLE * largest).collect();
-        let entries = Mat::from_fn(n, kept.len(), |i, k| vectors[(i, kept[k])] * values[kept[k]].sqrt());
-        Some(Self { entries, values: kept.iter().map(|&k| values[k] / largest).collect() })
-    }
-
-    /// E^T times the excitation of a value.
-    fn features(&self, cells: &CellKernel, value: f64) -> Vec<f64> {
-        let mut features = vec![0.0; self.entries.ncols()];
-        for (cell, grade) in cells.axis.active(value).nonzero() {
-            features.iter_mut().enumerate().for_each(|(k, x)| *x += grade * self.entries[(cell, k)]);
-        }
-        features
-    }
-}
-
-/// Unknowns of one block: for each kept combination of the axes' eigenvectors, one per driven column.
-struct Unknowns {
-    start: usize,
-    roots: Vec<Root>,
-    combinations: Vec<[usize; 3]>,
-}
 
 /// Factors of the weights' normal equations.
 pub struct WeightSpace {
@@ -70,41 +33,6 @@ pub struct WeightSpace {
     /// I + A^T A, lower triangle.
     normal: Mat<f64>,
     factor: Cholesky,
-}
-
-/// Unknowns that a model has in weight space, constants and set-up included; `None` where the cells' priors fail.
-fn unknowns(model: &Model) -> Option<(Vec<Unknowns>, usize)> {
-    let mut start = model.by_column.constant.len() + model.training.setup_width;
-    let mut all = Vec::new();
-    for plan in model.plans() {
-        let roots: Vec<Root> = plan.axes.iter().map(|(_, cells)| Root::new(cells)).collect::<Option<_>>()?;
-        let combinations = combinations(&roots);
-        let count = combinations.len() * plan.driven.len();
-        all.push(Unknowns { start, roots, combinations });
-        start += count;
-    }
-    Some((all, start))
-}
-
-fn combinations(roots: &[Root]) -> Vec<[usize; 3]> {
-    let count = |k: usize| roots.get(k).map_or(1, |root| root.values.len());
-    let value = |k: usize, i: usize| roots.get(k).map_or(1.0, |root| root.values[i]);
-    let mut kept = Vec::new();
-    for i in 0..count(0) {
-        for j in 0..count(1) {
-            for k in 0..count(2) {
-                if value(0, i) * value(1, j) * value(2, k) > NEGLIGIBLE {
-                    kept.push([i, j, k]);
-                }
-            }
-        }
-    }
-    kept
-}
-
-/// Unknowns in weight space: what its cost grows with.
-pub fn size(model: &Model) -> Option<usize> {
-    unknowns(model).map(|found| found.1)
 }
 
 /// Rows of one pose: (m, u) before whitening.

@@ -66,11 +66,11 @@ fn cost_of_varying(arm: &Arm, poses: usize) -> f64 {
 #[test]
 fn a_rigid_arm_is_left_alone() {
     let arm = six_axes(Truth::RIGID);
+    // Priors expect an arm to bend: the values of some poses of a rigid one do not quite talk them out of it.
     let cost = cost_of_varying(&arm, 100);
-    assert!(cost < 1.03, "100 poses: {cost} times the constants' error");
-    // Priors expect an arm to bend: thirty poses of a rigid one, ninety values, do not talk them out of it.
+    assert!(cost < 1.05, "100 poses: {cost} times the constants' error");
     let cost = cost_of_varying(&arm, 30);
-    assert!(cost < 1.25, "30 poses: {cost} times the constants' error");
+    assert!(cost < 1.15, "30 poses: {cost} times the constants' error");
 }
 
 #[test]
