@@ -89,11 +89,13 @@ pub fn fit_field(
     let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0 };
     let mut hyper = search.first(&training, noise)?;
     let mut judged = search.judge(search.posterior(&training, &hyper)?)?;
-    for _ in 0..REWEIGHTINGS {
+    training = judged.posterior.training().clone();
+    let large = training.row_count() > ROWS_FOR_POLISH;
+    for _ in 0..if large { 1 } else { REWEIGHTINGS } {
         if !judged.judgement.reweigh(&mut training) {
             break;
         }
-        let posterior = if training.row_count() > ROWS_FOR_POLISH {
+        let posterior = if large {
             // Few rows of many change: hyper-parameters stay.
             judged.posterior.reweighed(training.weight.clone(), &options.cancel)?
         } else {

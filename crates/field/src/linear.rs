@@ -30,6 +30,7 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
         residual: Vec::new(),
         variance: Vec::new(),
         weight: Vec::new(),
+        source: Vec::new(),
         is_orientation: Vec::new(),
     };
     for pose in 0..set.pose_count() {
@@ -74,6 +75,7 @@ fn push_row(
     training.residual.push(linear.residual[at] + known);
     training.variance.push(if orientation { 0.0 } else { set.sigma[pose].powi(2) });
     training.weight.push(set.weight[pose]);
+    training.source.push(at);
     training.is_orientation.push(orientation);
 }
 

@@ -100,7 +100,7 @@ impl Posterior {
         }
         let per_pose = rows.div_ceil(model.training.pose_count());
         let kept = model.training.fill_space(SPACE_FILLING.min(AFFORDABLE / per_pose));
-        let model = Model::new(model.training.select(&kept), model.hyper, degree);
+        let model = Model::new(model.training.only(&kept), model.hyper, degree);
         Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)))
     }
 

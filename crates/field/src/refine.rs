@@ -28,33 +28,13 @@ pub fn relinearised(
     let mut refined = apply(problem, point, posterior, &solution)?;
     for _ in 0..RELINEARISATIONS {
         let explained = explained(posterior, &solution)?;
-        let rows = problem.measurements.rows_per_pose();
-        let exact = present_rows(problem, &refined.residuals, rows);
-        let linear: Vec<f64> = exact.iter().zip(&explained).map(|(a, b)| a + b).collect();
+        let source = posterior.training().source.iter();
+        let linear: Vec<f64> =
+            source.zip(&explained).map(|(&at, part)| refined.residuals[at] + part).collect();
         solution = posterior.solve(&linear)?;
         refined = apply(problem, point, posterior, &solution)?;
     }
     Ok(refined)
-}
-
-/// Residuals of the rows that the training holds, out of (n, m).
-fn present_rows(problem: &Problem, residuals: &[f64], rows: usize) -> Vec<f64> {
-    let set = problem.measurements;
-    let mut out = Vec::new();
-    for pose in (0..set.pose_count()).filter(|&pose| set.weight[pose] > 0.0) {
-        for row in 0..rows {
-            let target = row / 3;
-            let measured = if target >= set.target_count {
-                set.has_rotation(pose)
-            } else {
-                set.has_target(pose, target)
-            };
-            if measured {
-                out.push(residuals[pose * rows + row]);
-            }
-        }
-    }
-    out
 }
 
 /// What constants, field and set-up of a solution explain of the training's residual, (R,).

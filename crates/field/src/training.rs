@@ -72,6 +72,8 @@ pub struct Training {
     pub variance: Vec<f64>,
     /// Weight of each row, (R,): the noise variance is divided by it.
     pub weight: Vec<f64>,
+    /// Place of each row among the residuals (n, m) of all measurements, (R,).
+    pub source: Vec<usize>,
     /// Whether a row is an orientation (else a position), (R,).
     pub is_orientation: Vec<bool>,
 }
@@ -108,6 +110,20 @@ impl Training {
         (noise * noise + self.variance[row]) / self.weight[row]
     }
 
+    /// All poses, with the rows of some of them (ascending) alone.
+    pub fn only(&self, kept: &[usize]) -> Training {
+        let mut thinned = self.select(kept);
+        let mut rows = kept.iter().map(|&pose| (pose, self.rows(pose).len())).peekable();
+        let mut offsets = vec![0];
+        for pose in 0..self.pose_count() {
+            let own = rows.next_if(|entry| entry.0 == pose).map_or(0, |entry| entry.1);
+            offsets.push(offsets[pose] + own);
+        }
+        thinned.offsets = offsets;
+        thinned.values.clone_from(&self.values);
+        thinned
+    }
+
     /// The rows of some poses, in the given order.
     pub fn select(&self, poses: &[usize]) -> Training {
         let rows: Vec<usize> = poses.iter().flat_map(|&pose| self.rows(pose)).collect();
@@ -130,6 +146,7 @@ impl Training {
             residual: take(&self.residual, 1),
             variance: take(&self.variance, 1),
             weight: take(&self.weight, 1),
+            source: rows.iter().map(|&row| self.source[row]).collect(),
             is_orientation: rows.iter().map(|&row| self.is_orientation[row]).collect(),
         }
     }
@@ -167,6 +184,7 @@ impl Training {
         length("setup", self.setup.len(), rows * self.setup_width)?;
         length("variance", self.variance.len(), rows)?;
         length("weight", self.weight.len(), rows)?;
+        length("source", self.source.len(), rows)?;
         length("is_orientation", self.is_orientation.len(), rows)
     }
 }

@@ -6,7 +6,7 @@ use crate::cells::CellKernel;
 use crate::model::Model;
 
 /// Eigenvalues (of products: their products) below this share of the largest are left out.
-const NEGLIGIBLE: f64 = 1e-6;
+const NEGLIGIBLE: f64 = 1e-5;
 
 /// E of one axis, (cells, r).
 pub struct Root {

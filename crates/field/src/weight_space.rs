@@ -111,7 +111,7 @@ impl WeightSpace {
         let parts = WeightSpaceParts { model: &model, unknowns: &unknowns };
         for batch in parts.batches() {
             cancel.check()?;
-            add_gram(&mut normal, &parts.whitened(batch, width)?, 1.0);
+            add_gram(&mut normal, &parts.whitened(&batch, width)?, 1.0);
         }
         let factor = factored(&normal)?;
         Ok(Self { model, unknowns, width, normal, factor })
@@ -126,8 +126,8 @@ impl WeightSpace {
             if let Some(weight) = weight {
                 self.model.training.weight = weight;
             }
-            for &pose in &changed {
-                let rows = self.parts().whitened(pose..pose + 1, self.width)?;
+            for some in changed.chunks(BATCH) {
+                let rows = self.parts().whitened(some, self.width)?;
                 add_gram(&mut self.normal, &rows, sign);
             }
         }
@@ -159,8 +159,8 @@ impl WeightSpace {
         let parts = self.parts();
         let mut right = Mat::<f64>::zeros(self.width, 1);
         for batch in parts.batches() {
-            let rows = parts.whitened(batch.clone(), self.width)?;
-            right += product(rows.transpose(), column(&parts.whitened_values(batch, residual)?).as_ref());
+            let rows = parts.whitened(&batch, self.width)?;
+            right += product(rows.transpose(), column(&parts.whitened_values(&batch, residual)?).as_ref());
         }
         Ok(self.factor.solve_vector(&to_vec(right.as_ref())))
     }
@@ -202,19 +202,16 @@ impl WeightSpace {
         let mut out = LeaveOneOut::zeros(training.row_count());
         let stride = training.pose_count().div_ceil(JUDGED_EXACTLY);
         for batch in parts.batches() {
-            let rows = parts.whitened(batch.clone(), self.width)?;
-            let left = column(&parts.whitened_values(batch.clone(), residual)?)
-                - product(rows.as_ref(), solution.as_ref());
-            let first = training.rows(batch.start).start;
+            let rows = parts.whitened(&batch, self.width)?;
+            let left =
+                column(&parts.whitened_values(&batch, residual)?) - product(rows.as_ref(), solution.as_ref());
+            let first = training.rows(batch[0]).start;
             let square =
                 |pose: usize| training.rows(pose).map(|row| left[(row - first, 0)].powi(2)).sum::<f64>();
-            let exact: Vec<usize> = batch
-                .clone()
-                .filter(|&pose| {
-                    pose % stride == 0 || square(pose) > SUSPICIOUS * training.rows(pose).len() as f64
-                })
-                .collect();
-            for pose in batch.filter(|pose| !exact.contains(pose)) {
+            let (exact, clear): (Vec<usize>, Vec<usize>) = batch.into_iter().partition(|&pose| {
+                pose % stride == 0 || square(pose) > SUSPICIOUS * training.rows(pose).len() as f64
+            });
+            for pose in clear {
                 let local: Vec<f64> = training.rows(pose).map(|row| left[(row - first, 0)]).collect();
                 out.approximate(training.rows(pose), &local);
             }
@@ -291,33 +288,35 @@ impl WeightSpace {
 }
 
 impl WeightSpaceParts<'_> {
-    fn batches(&self) -> Vec<std::ops::Range<usize>> {
-        let poses = self.model.training.pose_count();
-        (0..poses).step_by(BATCH).map(|first| first..(first + BATCH).min(poses)).collect()
+    fn batches(&self) -> Vec<Vec<usize>> {
+        let poses: Vec<usize> = (0..self.model.training.pose_count()).collect();
+        poses.chunks(BATCH).map(<[usize]>::to_vec).collect()
     }
 
     /// Whitened rows (r, u) of a batch of poses.
-    fn whitened(&self, poses: std::ops::Range<usize>, width: usize) -> Result<Mat<f64>, FieldError> {
+    fn whitened(&self, poses: &[usize], width: usize) -> Result<Mat<f64>, FieldError> {
         let training = &self.model.training;
         let plans = self.model.plans();
         let rows = Rows { space: self, plans: &plans };
-        let first = training.rows(poses.start).start;
-        let mut out = Mat::zeros(training.rows(poses.end - 1).end - first, width);
-        for pose in poses {
+        let count = poses.iter().map(|&pose| training.rows(pose).len()).sum();
+        let mut out = Mat::zeros(count, width);
+        let mut at = 0;
+        for &pose in poses {
             let range = training.rows(pose);
             let columns = training.columns.len();
             let jacobian = &training.jacobian[range.start * columns..range.end * columns];
             let setup = &training.setup[range.start * training.setup_width..range.end * training.setup_width];
-            let mut target = out.as_mut().subrows_mut(range.start - first, range.len());
+            let mut target = out.as_mut().subrows_mut(at, range.len());
+            at += range.len();
             rows.fill(training.values_of(pose), jacobian, Some(setup), target.rb_mut());
             self.model.noise_cholesky(pose)?.solve_lower(target);
         }
         Ok(out)
     }
 
-    fn whitened_values(&self, poses: std::ops::Range<usize>, values: &[f64]) -> Result<Vec<f64>, FieldError> {
+    fn whitened_values(&self, poses: &[usize], values: &[f64]) -> Result<Vec<f64>, FieldError> {
         let mut out = Vec::new();
-        for pose in poses {
+        for &pose in poses {
             let mut local = column(&values[self.model.training.rows(pose)]);
             self.model.noise_cholesky(pose)?.solve_lower(local.as_mut());
             out.extend(to_vec(local.as_ref()));
