@@ -1,10 +1,8 @@
 //! A bank of blocks: inputs in, CEPs out, by summing the weights of the excited cells.
 
-use rayon::prelude::*;
-use truearm_kinematics::{Isa, Kernel, dispatch};
-
 use crate::FieldError;
 use crate::cells::Grid;
+use crate::compiled::Compiled;
 
 /// One FCMAC: a grid of cells, each with a weight for every parameter that the block drives.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,43 +26,6 @@ pub struct Bank {
     pub parameter_count: usize,
     /// The blocks.
     pub blocks: Vec<Block>,
-}
-
-/// Below this many poses threads cost more than they bring.
-const THREADED_POSES: usize = 4096;
-const POSES_PER_TASK: usize = 256;
-
-struct Evaluate<'a> {
-    bank: &'a Bank,
-    values: &'a [f64],
-    out: &'a mut [f64],
-}
-
-impl Kernel for Evaluate<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        let Self { bank, values, out } = self;
-        let mut sums = vec![0.0; bank.parameter_count];
-        let poses = values.chunks_exact(bank.input_count).zip(out.chunks_exact_mut(bank.parameter_count));
-        for (values, parameters) in poses {
-            for block in &bank.blocks {
-                let width = block.outputs.len();
-                let sums = &mut sums[..width];
-                sums.fill(0.0);
-                block.grid.visit(values, |cell, grade| {
-                    let weights = &block.weights[cell * width..(cell + 1) * width];
-                    for (sum, weight) in sums.iter_mut().zip(weights) {
-                        *sum += grade * weight;
-                    }
-                });
-                for (&output, sum) in block.outputs.iter().zip(&*sums) {
-                    parameters[output] += sum;
-                }
-            }
-        }
-    }
 }
 
 impl Bank {
@@ -106,24 +67,12 @@ impl Bank {
     /// # Errors
     /// [`FieldError::Length`].
     pub fn add(&self, values: &[f64], out: &mut [f64]) -> Result<(), FieldError> {
-        let poses = values.len() / self.input_count.max(1);
-        if poses * self.input_count != values.len() {
-            let expected = poses * self.input_count;
-            return Err(FieldError::Length { what: "inputs", found: values.len(), expected });
-        }
-        if out.len() != poses * self.parameter_count {
-            let expected = poses * self.parameter_count;
-            return Err(FieldError::Length { what: "parameters", found: out.len(), expected });
-        }
-        if poses < THREADED_POSES || rayon::current_num_threads() == 1 {
-            dispatch(Evaluate { bank: self, values, out });
-        } else {
-            let tasks = values.par_chunks(POSES_PER_TASK * self.input_count);
-            tasks
-                .zip(out.par_chunks_mut(POSES_PER_TASK * self.parameter_count))
-                .for_each(|(values, out)| dispatch(Evaluate { bank: self, values, out }));
-        }
-        Ok(())
+        self.compiled().add(values, out)
+    }
+
+    /// The bank prepared for evaluation: made once, it is fast from then on.
+    pub fn compiled(&self) -> Compiled {
+        Compiled::new(self)
     }
 
     /// Association cells of all blocks.

@@ -14,6 +14,9 @@ extern crate self as truearm_field;
 
 mod bank;
 mod cells;
+mod compiled;
+mod compiled_axis;
+mod compiled_table;
 mod data_space;
 mod error;
 mod evidence;
@@ -39,6 +42,7 @@ mod weight_space;
 
 pub use bank::{Bank, Block};
 pub use cells::{Axis, Grid};
+pub use compiled::Compiled;
 pub use error::FieldError;
 pub use fit::{FieldFit, FieldOptions, fit_field, restore};
 pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME};

@@ -1,5 +1,6 @@
 //! `_core.fit_field`, `_core.Field` and `_core.Posterior`: CEPs that vary.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -13,11 +14,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
-    Axis, Bank, Block, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind, MAJOR_NAME,
-    Posterior as CorePosterior, Product, WRIST_NAME, fit_field as fit, measurement_covariance, restore,
+    Axis, Bank, Block, Compiled, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind,
+    MAJOR_NAME, Posterior as CorePosterior, Product, WRIST_NAME, fit_field as fit, measurement_covariance,
+    restore,
 };
 
-use crate::door::{CoreError, long, quick, with_threads};
+use crate::door::{CoreError, Failure, long, quick, with_threads};
 use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
 use crate::measured::{Setup, matrix, vector};
 
@@ -151,7 +153,7 @@ impl FieldFit {
 
     #[getter]
     fn field(&self) -> Field {
-        Field { core: self.core.bank.clone() }
+        Field::wrap(self.core.bank.clone())
     }
 
     #[getter]
@@ -222,6 +224,14 @@ impl FieldFit {
 #[pyclass(frozen, module = "truearm._core")]
 pub struct Field {
     core: Bank,
+    compiled: Compiled,
+}
+
+impl Field {
+    fn wrap(core: Bank) -> Self {
+        let compiled = core.compiled();
+        Self { core, compiled }
+    }
 }
 
 #[pymethods]
@@ -231,7 +241,7 @@ impl Field {
         let blocks = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
         let core = Bank { input_count, parameter_count, blocks };
         core.check().map_err(|error| CoreError::new_err(error.to_string()))?;
-        Ok(Self { core })
+        Ok(Self::wrap(core))
     }
 
     #[getter]
@@ -271,14 +281,24 @@ impl Field {
                 constants.len()
             )));
         }
-        let start: Vec<f64> = constants.as_array().iter().copied().collect();
-        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
-        let values = quick(py, || {
-            let mut values = Vec::with_capacity(poses * width);
-            (0..poses).for_each(|_| values.extend_from_slice(&start));
-            self.core.add(&inputs, &mut values).map(|()| values)
-        })?;
+        let (start, inputs) = (numbers(&constants), numbers(&inputs));
+        let values = if poses < HELD_POSES {
+            self.compiled.parameters(&start, &inputs).map_err(Failure::into_exception)
+        } else {
+            quick(py, || self.compiled.parameters(&start, &inputs))
+        }?;
         array3(py, values, (poses, width / 5, 5))
+    }
+}
+
+/// Below this many poses letting other Python threads run costs more than the work.
+const HELD_POSES: usize = 64;
+
+/// The numbers of an array row by row, copied only where they do not lie so.
+fn numbers<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> Cow<'a, [f64]> {
+    match array.as_slice() {
+        Ok(slice) => Cow::Borrowed(slice),
+        Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
     }
 }
 

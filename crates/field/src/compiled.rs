@@ -1,0 +1,166 @@
+//! A bank prepared for evaluation: eight poses at once for the memberships, eight outputs at once for the weights.
+//!
+//! Blocks that see an input through the same cells share its memberships, and blocks with the same outputs share
+//! their sums, which stay in registers.
+
+use rayon::prelude::*;
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
+
+use crate::FieldError;
+use crate::bank::{Bank, Block};
+use crate::cells::MOST_ACTIVE;
+use crate::compiled_axis::{CompiledAxis, Excited};
+use crate::compiled_table::{Line, MOST_LANES, Sheet};
+
+/// Below this many poses threads cost more than they bring.
+const THREADED_POSES: usize = 4096;
+/// Their inputs and outputs stay in the nearest caches.
+const POSES_PER_TASK: usize = 256;
+
+/// A bank prepared for evaluation, see [`Bank::compiled`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compiled {
+    input_count: usize,
+    parameter_count: usize,
+    /// Cells that a value excites, 3 or 4.
+    active: usize,
+    axes: Vec<CompiledAxis>,
+    lines: Vec<Line>,
+    sheets: Vec<Sheet>,
+}
+
+impl Compiled {
+    pub(crate) fn new(bank: &Bank) -> Self {
+        let degrees = bank.blocks.iter().flat_map(|block| &block.grid.axes).map(|axis| axis.degree);
+        let mut compiled = Self {
+            input_count: bank.input_count,
+            parameter_count: bank.parameter_count,
+            active: degrees.max().map_or(MOST_ACTIVE, |degree| degree + 1),
+            axes: Vec::new(),
+            lines: Vec::new(),
+            sheets: Vec::new(),
+        };
+        bank.blocks.iter().for_each(|block| compiled.push(block));
+        compiled
+    }
+
+    fn push(&mut self, block: &Block) {
+        let inputs = block.grid.inputs.iter().zip(&block.grid.axes);
+        let axes: Vec<usize> =
+            inputs.map(|(&input, axis)| self.axis(CompiledAxis::new(input, axis))).collect();
+        if let (&[axis], &[output]) = (&axes[..], &block.outputs[..]) {
+            self.lines.push(Line { axis, output, weights: block.weights.clone() });
+            return;
+        }
+        for first in (0..block.outputs.len()).step_by(MOST_LANES * LANES) {
+            let outputs = &block.outputs[first..block.outputs.len().min(first + MOST_LANES * LANES)];
+            let place = self.sheets.iter().position(|sheet| sheet.outputs == outputs).unwrap_or_else(|| {
+                self.sheets.push(Sheet::new(outputs));
+                self.sheets.len() - 1
+            });
+            self.sheets[place].push(block, first, &axes);
+        }
+    }
+
+    fn axis(&mut self, axis: CompiledAxis) -> usize {
+        self.axes.iter().position(|known| *known == axis).unwrap_or_else(|| {
+            self.axes.push(axis);
+            self.axes.len() - 1
+        })
+    }
+
+    /// Adds the CEPs of the given inputs (n, I) to `out` (n, 5 L).
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn add(&self, values: &[f64], out: &mut [f64]) -> Result<(), FieldError> {
+        let expected = self.poses(values)? * self.parameter_count;
+        if out.len() != expected {
+            return Err(FieldError::Length { what: "parameters", found: out.len(), expected });
+        }
+        if self.threaded(values) {
+            let tasks = values.par_chunks(POSES_PER_TASK * self.input_count);
+            tasks
+                .zip(out.par_chunks_mut(POSES_PER_TASK * self.parameter_count))
+                .for_each(|(values, out)| dispatch(Evaluate { bank: self, values, out }));
+        } else {
+            dispatch(Evaluate { bank: self, values, out });
+        }
+        Ok(())
+    }
+
+    /// Constants (5 L) plus the CEPs of the given inputs (n, I): (n, 5 L).
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn parameters(&self, constants: &[f64], values: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let poses = self.poses(values)?;
+        if constants.len() != self.parameter_count {
+            let (found, expected) = (constants.len(), self.parameter_count);
+            return Err(FieldError::Length { what: "constants", found, expected });
+        }
+        let mut out = Vec::with_capacity(poses * self.parameter_count);
+        let chunk = if self.threaded(values) { poses } else { POSES_PER_TASK };
+        for first in (0..poses).step_by(chunk.max(1)) {
+            let (from, last) = (out.len(), poses.min(first + chunk));
+            (first..last).for_each(|_| out.extend_from_slice(constants));
+            self.add(&values[first * self.input_count..last * self.input_count], &mut out[from..])?;
+        }
+        Ok(out)
+    }
+
+    fn poses(&self, values: &[f64]) -> Result<usize, FieldError> {
+        let poses = values.len() / self.input_count.max(1);
+        let expected = poses * self.input_count;
+        if expected != values.len() {
+            return Err(FieldError::Length { what: "inputs", found: values.len(), expected });
+        }
+        Ok(poses)
+    }
+
+    fn threaded(&self, values: &[f64]) -> bool {
+        values.len() >= THREADED_POSES * self.input_count.max(1) && rayon::current_num_threads() > 1
+    }
+}
+
+struct Evaluate<'a> {
+    bank: &'a Compiled,
+    values: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Kernel for Evaluate<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        if self.bank.active == MOST_ACTIVE { self.all::<I, 4>() } else { self.all::<I, 3>() }
+    }
+}
+
+impl Evaluate<'_> {
+    #[inline(always)]
+    fn all<I: Isa, const K: usize>(self) {
+        let Self { bank, values, out } = self;
+        if bank.axes.is_empty() {
+            return;
+        }
+        let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
+        let (wide, width) = (bank.input_count * LANES, bank.parameter_count);
+        for (values, out) in values.chunks(wide).zip(out.chunks_mut(width * LANES)) {
+            for (axis, excited) in bank.axes.iter().zip(&mut excited) {
+                let mut lane = Lane::ZERO;
+                for (value, pose) in lane.0.iter_mut().zip(values.chunks_exact(bank.input_count)) {
+                    *value = pose[axis.input];
+                }
+                axis.excite::<I, K>(lane, excited);
+            }
+            for line in &bank.lines {
+                line.add::<I, K>(&excited, out, width);
+            }
+            for sheet in &bank.sheets {
+                sheet.add::<I, K>(&excited, out, width);
+            }
+        }
+    }
+}
