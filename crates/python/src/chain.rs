@@ -58,13 +58,16 @@ impl Chain {
     }
 }
 
+/// One of a batch's methods: joint values, parameters, results.
+type Work<'a> = fn(&Batch<'a>, &[f64], Parameters<'_>, &mut [f64]) -> Result<(), KinematicsError>;
+
 /// What a method was called with, beside q.
 struct Call<'a, 'py, D> {
     parameters: Option<PyReadonlyArrayDyn<'py, f64>>,
     out: Option<Array<'py, D>>,
     shape: D,
     threads: Option<NonZeroUsize>,
-    work: fn(&Batch<'a>, &[f64], Parameters<'_>, &mut [f64]) -> Result<(), KinematicsError>,
+    work: Work<'a>,
     chain: &'a Chain,
 }
 

@@ -170,6 +170,6 @@ pub fn vector<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>>
 
 /// Rows of equal width as a new array.
 pub fn matrix<'py>(py: Python<'py>, values: &[f64], width: usize) -> Bound<'py, PyArray2<f64>> {
-    let rows = if width == 0 { 0 } else { values.len() / width };
+    let rows = values.len().checked_div(width).unwrap_or(0);
     Array2::from_shape_fn((rows, width), |(i, j)| values[i * width + j]).into_pyarray(py)
 }
