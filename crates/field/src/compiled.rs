@@ -3,6 +3,8 @@
 //! Blocks that see an input through the same cells share its memberships, and blocks with the same outputs share
 //! their sums, which stay in registers.
 
+use std::cmp::Reverse;
+
 use rayon::prelude::*;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
@@ -10,7 +12,7 @@ use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::cells::MOST_ACTIVE;
 use crate::compiled_axis::{CompiledAxis, Excited};
-use crate::compiled_table::{Line, MOST_LANES, Sheet};
+use crate::compiled_table::{Line, MOST_LANES, Numbered, Sheet};
 
 /// Below this many poses threads cost more than they bring.
 const THREADED_POSES: usize = 4096;
@@ -40,7 +42,9 @@ impl Compiled {
             lines: Vec::new(),
             sheets: Vec::new(),
         };
-        bank.blocks.iter().for_each(|block| compiled.push(block));
+        let mut blocks: Vec<&Block> = bank.blocks.iter().collect();
+        blocks.sort_by_key(|block| Reverse(block.grid.axes.len()));
+        blocks.into_iter().for_each(|block| compiled.push(block));
         compiled
     }
 
@@ -48,8 +52,9 @@ impl Compiled {
         let inputs = block.grid.inputs.iter().zip(&block.grid.axes);
         let axes: Vec<usize> =
             inputs.map(|(&input, axis)| self.axis(CompiledAxis::new(input, axis))).collect();
+        let axes: Vec<Numbered<'_>> = axes.into_iter().map(|axis| (axis, &self.axes[axis])).collect();
         if let (&[axis], &[output]) = (&axes[..], &block.outputs[..]) {
-            self.lines.push(Line { axis, output, weights: block.weights.clone() });
+            self.lines.push(Line::new(block, axis, output));
             return;
         }
         for first in (0..block.outputs.len()).step_by(MOST_LANES * LANES) {

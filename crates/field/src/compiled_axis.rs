@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use truearm_kinematics::{Isa, LANES, Lane};
 
-use crate::cells::Axis;
+use crate::cells::{Axis, MOST_ACTIVE};
 use crate::kernel::InputKind;
 
 /// Added and taken away it rounds to a whole number.
@@ -12,18 +12,32 @@ const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
 /// Added to a whole number it leaves that number in the lowest bits.
 const WHOLE: f64 = (1_u64 << 52) as f64;
 
+/// Cells without weights beyond each end of an open axis: what lies outside excites them alone.
+const EMPTY: usize = MOST_ACTIVE;
+/// More than any index: taken away it leaves a larger number.
+const NEVER: u32 = 1 << 31;
+
 /// Cells that eight values excite, and how much.
 #[derive(Debug, Clone, Copy)]
 pub struct Excited<const K: usize> {
-    /// Cell of each grade, always one that exists.
+    /// Cell of each grade, always one that tables have.
     pub cell: [[u32; LANES]; K],
-    /// Membership grades; zero beyond the axis.
+    /// Membership grades.
     pub grade: [Lane; K],
 }
 
 impl<const K: usize> Excited<K> {
     /// No membership at all.
     pub const NONE: Self = Self { cell: [[0; LANES]; K], grade: [Lane::ZERO; K] };
+}
+
+/// How scaled values fold to one turn.
+#[derive(Debug, Clone, PartialEq)]
+struct Turn {
+    period: f64,
+    per_period: f64,
+    /// Middle of the axis, in turns from its origin.
+    middle: f64,
 }
 
 /// An axis with its constants worked out.
@@ -34,9 +48,16 @@ pub struct CompiledAxis {
     scale: f64,
     origin: f64,
     per_spacing: f64,
-    /// Period of the scaled value and the middle of the turn to fold to; none on an open line.
-    turn: Option<(f64, f64)>,
-    count: f64,
+    /// None on an open line.
+    turn: Option<Turn>,
+    /// Bounds of the centre cell: beyond them all excited cells are empty.
+    lowest: f64,
+    highest: f64,
+    /// Added to the centre it leaves the first excited cell's index in the lowest bits, a turn more on a closed axis.
+    whole: f64,
+    /// Cells of a turn; more than there are on an open axis.
+    wrap: u32,
+    count: usize,
     closed: bool,
     cubic: bool,
 }
@@ -48,25 +69,54 @@ impl CompiledAxis {
             InputKind::Angle => Some(TAU),
             InputKind::Line => axis.closed.then_some(axis.spacing * count),
         };
+        let beyond = EMPTY as f64 - 1.0;
         Self {
             input,
             scale: axis.input.scale,
             origin: axis.origin,
             per_spacing: 1.0 / axis.spacing,
-            turn: period.map(|period| (period, 0.5 * axis.spacing * (count - 1.0))),
-            count,
+            turn: period.map(|period| Turn {
+                period,
+                per_period: 1.0 / period,
+                middle: 0.5 * axis.spacing * (count - 1.0) / period,
+            }),
+            lowest: if axis.closed { -1.0 } else { -beyond },
+            highest: if axis.closed { count } else { count + 1.0 },
+            whole: WHOLE + if axis.closed { count - 1.0 } else { beyond },
+            wrap: if axis.closed { axis.count as u32 } else { NEVER },
+            count: axis.count,
             closed: axis.closed,
             cubic: axis.degree == 3,
         }
+    }
+
+    /// Cells that tables have along this axis, with the empty ones beyond the ends of an open axis.
+    pub fn room(&self) -> usize {
+        if self.closed { self.count } else { self.count + 2 * EMPTY }
+    }
+
+    /// Where tables keep a cell of the axis.
+    pub fn place(&self, cell: usize) -> usize {
+        if self.closed { cell } else { cell + EMPTY }
+    }
+
+    /// Cells of the axis.
+    pub fn cell_count(&self) -> usize {
+        self.count
+    }
+
+    /// Whether grades add up to one everywhere.
+    pub fn is_closed(&self) -> bool {
+        self.closed
     }
 
     /// Cells and grades of eight raw values.
     #[inline(always)]
     pub fn excite<I: Isa, const K: usize>(&self, values: Lane, excited: &mut Excited<K>) {
         let mut offset = I::mul_add(values, Lane::splat(self.scale), Lane::splat(-self.origin));
-        if let Some((period, middle)) = self.turn {
-            let turns = I::mul_add(offset, Lane::splat(1.0 / period), Lane::splat(-middle / period));
-            offset = I::mul_add(nearest(turns), Lane::splat(-period), offset);
+        if let Some(turn) = &self.turn {
+            let turns = I::mul_add(offset, Lane::splat(turn.per_period), Lane::splat(-turn.middle));
+            offset = I::mul_add(nearest(turns), Lane::splat(-turn.period), offset);
         }
         let position = offset * self.per_spacing;
         let mut grade = [Lane::ZERO; 4];
@@ -79,31 +129,25 @@ impl CompiledAxis {
             quadratic::<I>(position - middle, &mut grade);
             middle
         };
-        for k in 0..K {
-            self.place(centre + Lane::splat(k as f64 - 1.0), &mut grade[k], &mut excited.cell[k]);
-            excited.grade[k] = grade[k];
-        }
+        excited.grade.copy_from_slice(&grade[..K]);
+        self.cells(centre, &mut excited.cell);
     }
 
-    /// Wraps a closed axis's cells; takes the grade of cells beyond an open one.
+    /// Indices of the cells around a centre, in the tables.
     #[inline(always)]
-    fn place(&self, cell: Lane, grade: &mut Lane, index: &mut [u32; LANES]) {
-        let last = self.count - 1.0;
-        let mut cell = cell;
-        if self.closed {
-            for c in &mut cell.0 {
-                *c += if *c < 0.0 { self.count } else { 0.0 };
-                *c -= if *c > last { self.count } else { 0.0 };
-            }
-        } else {
-            for (g, c) in grade.0.iter_mut().zip(&cell.0) {
-                *g = if (*c < 0.0) | (*c > last) { 0.0 } else { *g };
-            }
+    fn cells<const K: usize>(&self, centre: Lane, cell: &mut [[u32; LANES]; K]) {
+        let mut first = [0_u32; LANES];
+        for p in 0..LANES {
+            let high = if centre.0[p] > self.lowest { centre.0[p] } else { self.lowest };
+            let inside = if high < self.highest { high } else { self.highest };
+            first[p] = (inside + self.whole).to_bits() as u32;
         }
-        for (i, c) in index.iter_mut().zip(&cell.0) {
-            let high = if *c > 0.0 { *c } else { 0.0 };
-            let inside = if high < last { high } else { last };
-            *i = (inside + WHOLE).to_bits() as u32;
+        for k in 0..K {
+            for p in 0..LANES {
+                let index = first[p] + k as u32;
+                let once = index.min(index.wrapping_sub(self.wrap));
+                cell[k][p] = once.min(once.wrapping_sub(self.wrap));
+            }
         }
     }
 }

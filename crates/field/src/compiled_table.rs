@@ -3,7 +3,7 @@
 use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::bank::Block;
-use crate::compiled_axis::Excited;
+use crate::compiled_axis::{CompiledAxis, Excited};
 
 /// Lanes of outputs whose sums fit into registers.
 pub const MOST_LANES: usize = 5;
@@ -45,7 +45,7 @@ pub struct Sheet {
     tables: Vec<Table>,
 }
 
-/// Weights of one block, (cells, lanes), over up to three axes, the last of them always there.
+/// Weights of one block, (cells, lanes), over up to three axes, the last running fastest.
 #[derive(Debug, Clone, PartialEq)]
 struct Table {
     /// The last axis and its cells.
@@ -53,7 +53,22 @@ struct Table {
     /// The one before and its cells.
     middle: Option<(usize, usize)>,
     first: Option<usize>,
+    /// Whether all its axes close.
+    closed: bool,
     weights: Vec<Lane>,
+}
+
+/// A compiled axis and its index.
+pub type Numbered<'a> = (usize, &'a CompiledAxis);
+
+impl Line {
+    pub fn new(block: &Block, (axis, cells): Numbered<'_>, output: usize) -> Self {
+        let mut weights = vec![0.0; cells.room()];
+        for (cell, weight) in block.weights.iter().enumerate() {
+            weights[cells.place(cell)] = *weight;
+        }
+        Self { axis, output, weights }
+    }
 }
 
 impl Sheet {
@@ -65,57 +80,100 @@ impl Sheet {
         self.outputs.len().div_ceil(LANES)
     }
 
-    /// Takes in a block's outputs from `offset` on, over the given compiled axes.
-    pub fn push(&mut self, block: &Block, offset: usize, axes: &[usize]) {
-        let (wide, count, lanes) = (block.outputs.len(), self.outputs.len(), self.lanes());
-        let mut weights = vec![Lane::ZERO; block.grid.cell_count() * lanes];
-        for (source, target) in block.weights.chunks_exact(wide).zip(weights.chunks_exact_mut(lanes)) {
-            for (i, weight) in source[offset..offset + count].iter().enumerate() {
+    /// Takes in a block's outputs from `offset` on, over the given axes.
+    ///
+    /// Larger blocks come first: one over a single axis that closes is added to a table over it and others that close,
+    /// whose grades add up to one.
+    pub fn push(&mut self, block: &Block, offset: usize, axes: &[Numbered<'_>]) {
+        let axes = &axes[..axes.len().min(MOST_AXES)];
+        let room = |k: usize| axes.get(k).map_or(1, |axis| axis.1.room());
+        let shape = [room(0), room(1), room(2)];
+        let lanes = self.lanes();
+        let mut weights = vec![Lane::ZERO; shape.iter().product::<usize>() * lanes];
+        for (cell, source) in block.weights.chunks_exact(block.outputs.len()).enumerate() {
+            let target = &mut weights[place(axes, cell) * lanes..][..lanes];
+            for (i, weight) in source[offset..offset + self.outputs.len()].iter().enumerate() {
                 target[i / LANES].0[i % LANES] = *weight;
             }
         }
-        let axes = &axes[..axes.len().min(MOST_AXES)];
-        let mut from_last = axes.iter().zip(&block.grid.axes).map(|(&axis, cells)| (axis, cells.count)).rev();
+        let mut from_last = axes.iter().map(|&(axis, cells)| (axis, cells.room())).rev();
         let Some(last) = from_last.next() else { return };
         let middle = from_last.next();
         let first = from_last.next().map(|(axis, _)| axis);
-        self.tables.push(Table { last, middle, first, weights });
+        let closed = axes.iter().all(|axis| axis.1.is_closed());
+        let table = Table { last, middle, first, closed, weights };
+        if !self.tables.iter_mut().any(|larger| larger.absorb(&table, lanes)) {
+            self.tables.push(table);
+        }
     }
 
     /// Adds to the outputs (up to 8, `width`) of the poses.
     #[inline(always)]
     pub fn add<I: Isa, const K: usize>(&self, excited: &[Excited<K>], out: &mut [f64], width: usize) {
-        for (pose, out) in out.chunks_exact_mut(width).enumerate() {
-            match self.lanes() {
-                1 => self.pose::<I, K, 1>(excited, pose, out),
-                2 => self.pose::<I, K, 2>(excited, pose, out),
-                3 => self.pose::<I, K, 3>(excited, pose, out),
-                4 => self.pose::<I, K, 4>(excited, pose, out),
-                _ => self.pose::<I, K, MOST_LANES>(excited, pose, out),
-            }
+        match self.lanes() {
+            1 => self.poses::<I, K, 1>(excited, out, width),
+            2 => self.poses::<I, K, 2>(excited, out, width),
+            3 => self.poses::<I, K, 3>(excited, out, width),
+            4 => self.poses::<I, K, 4>(excited, out, width),
+            _ => self.poses::<I, K, MOST_LANES>(excited, out, width),
         }
     }
 
     #[inline(always)]
-    fn pose<I: Isa, const K: usize, const W: usize>(
+    fn poses<I: Isa, const K: usize, const W: usize>(
         &self,
         excited: &[Excited<K>],
-        pose: usize,
         out: &mut [f64],
+        width: usize,
     ) {
-        let mut sums = [Lane::ZERO; W];
-        for table in &self.tables {
-            table.add::<I, K, W>(excited, pose, &mut sums);
-        }
-        for (outputs, sums) in self.outputs.chunks(LANES).zip(&sums) {
-            for (&output, sum) in outputs.iter().zip(&sums.0) {
-                out[output] += sum;
+        for (pose, out) in out.chunks_exact_mut(width).enumerate() {
+            let mut sums = [Lane::ZERO; W];
+            for table in &self.tables {
+                table.add::<I, K, W>(excited, pose, &mut sums);
+            }
+            for (outputs, sums) in self.outputs.chunks(LANES).zip(&sums) {
+                for (&output, sum) in outputs.iter().zip(&sums.0) {
+                    out[output] += sum;
+                }
             }
         }
     }
 }
 
+/// Where a table over the given axes keeps a cell of their grid.
+fn place(axes: &[Numbered<'_>], cell: usize) -> usize {
+    let (mut rest, mut stride, mut index) = (cell, 1, 0);
+    for (_, axis) in axes.iter().rev() {
+        index += axis.place(rest % axis.cell_count()) * stride;
+        rest /= axis.cell_count();
+        stride *= axis.room();
+    }
+    index
+}
+
 impl Table {
+    /// Takes in a table over one of its axes, where that changes no sum; says whether it did.
+    fn absorb(&mut self, other: &Table, lanes: usize) -> bool {
+        let axis = other.last.0;
+        let middle_cells = self.middle.map_or(1, |middle| middle.1);
+        let stride = match (self.middle, self.first) {
+            _ if self.last.0 == axis => 1,
+            (Some(middle), _) if middle.0 == axis => self.last.1,
+            (_, Some(first)) if first == axis => middle_cells * self.last.1,
+            _ => return false,
+        };
+        if other.middle.is_some() || !self.closed || !other.closed {
+            return false;
+        }
+        for (cell, target) in self.weights.chunks_exact_mut(lanes).enumerate() {
+            let along = cell / stride % other.last.1;
+            for (sum, weight) in target.iter_mut().zip(&other.weights[along * lanes..]) {
+                *sum += *weight;
+            }
+        }
+        true
+    }
+
     #[inline(always)]
     fn add<I: Isa, const K: usize, const W: usize>(
         &self,
