@@ -137,16 +137,16 @@ impl CompiledAxis {
     #[inline(always)]
     fn cells<const K: usize>(&self, centre: Lane, cell: &mut [[u32; LANES]; K]) {
         let mut first = [0_u32; LANES];
-        for p in 0..LANES {
-            let high = if centre.0[p] > self.lowest { centre.0[p] } else { self.lowest };
+        for (first, &centre) in first.iter_mut().zip(&centre.0) {
+            let high = if centre > self.lowest { centre } else { self.lowest };
             let inside = if high < self.highest { high } else { self.highest };
-            first[p] = (inside + self.whole).to_bits() as u32;
+            *first = (inside + self.whole).to_bits() as u32;
         }
-        for k in 0..K {
-            for p in 0..LANES {
-                let index = first[p] + k as u32;
+        for (k, cell) in cell.iter_mut().enumerate() {
+            for (cell, first) in cell.iter_mut().zip(&first) {
+                let index = first + k as u32;
                 let once = index.min(index.wrapping_sub(self.wrap));
-                cell[k][p] = once.min(once.wrapping_sub(self.wrap));
+                *cell = once.min(once.wrapping_sub(self.wrap));
             }
         }
     }
