@@ -1,0 +1,109 @@
+"""What a motion statement is executed with: its tool, its work object, and offsets on its target."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Transform = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A tool (flange_from_tool) or a work object (base_from_object).
+
+    Attributes:
+        true: Transform (4, 4) as it is, in m; the one that compensation aims with.
+        controller: What the controller computes with; the same unless a frames file re-identified it.
+        name: As the program names it; empty for one that is written out.
+        unknown: Why it is not known; the transforms mean nothing then.
+    """
+
+    true: Transform
+    controller: Transform
+    name: str = ""
+    unknown: str = ""
+
+    @classmethod
+    def of(cls, transform: Transform, name: str = "") -> "Frame":
+        """One that is as the controller believes it to be."""
+        return cls(transform, transform, name)
+
+    @classmethod
+    def missing(cls, reason: str, name: str = "") -> "Frame":
+        """One that is not known, and why: a sentence that ends the line of a listing."""
+        return cls(np.eye(4), np.eye(4), name, reason)
+
+    @property
+    def key(self) -> tuple[bytes, bytes, str]:
+        """Equal for frames that are the same."""
+        return self.true.tobytes(), self.controller.tobytes(), self.unknown
+
+
+IDENTITY = Frame.of(np.eye(4))
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """How a stored target becomes a place of the tool: work_object @ before @ stored @ after.
+
+    Attributes:
+        tool: flange_from_tool.
+        work_object: base_from_object.
+        before: Constant offset in the object's frame (RAPID Offs, PDispSet), (4, 4).
+        after: Constant offset in the tool's frame (RAPID RelTool), (4, 4).
+        problem: Why targets used in this environment cannot be changed at all, joint targets included
+            (a stationary tool, external axes, an offset known at run time only for Cartesian ones).
+        cartesian_problem: The same for Cartesian targets only.
+        payload_kg: Mass that the program states for the load, if it does.
+    """
+
+    tool: Frame = IDENTITY
+    work_object: Frame = IDENTITY
+    before: Transform = field(default_factory=lambda: np.eye(4))
+    after: Transform = field(default_factory=lambda: np.eye(4))
+    problem: str = ""
+    cartesian_problem: str = ""
+    payload_kg: float | None = None
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Equal for environments that put a stored target at the same place with the same tool."""
+        return (
+            self.tool.key,
+            self.work_object.key,
+            self.before.tobytes(),
+            self.after.tobytes(),
+            self.problem,
+            self.cartesian_problem,
+            self.payload_kg,
+        )
+
+    @property
+    def why_not_poses(self) -> str:
+        """Why a Cartesian target cannot be changed here; empty if it can."""
+        return self.problem or self.cartesian_problem or self.tool.unknown or self.work_object.unknown
+
+
+class Environments:
+    """The environments of a program, each once.
+
+    Attributes:
+        all: They, by number.
+    """
+
+    def __init__(self) -> None:
+        self.all: list[Environment] = []
+        self._numbers: dict[tuple[object, ...], int] = {}
+
+    def number(self, environment: Environment) -> int:
+        """The number of an environment; a new one is added."""
+        found = self._numbers.setdefault(environment.key, len(self.all))
+        if found == len(self.all):
+            self.all.append(environment)
+        return found
+
+    def payloads_kg(self) -> Mapping[float, int]:
+        """Payloads that the program states, and the number of one environment of each."""
+        return {e.payload_kg: number for number, e in enumerate(self.all) if e.payload_kg is not None}

@@ -1,0 +1,31 @@
+"""The languages, and which one a file is written in."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from truearm.errors import UsageError, list_names
+from truearm.programs.program import Language
+
+LANGUAGES: Final[tuple[Language, ...]] = ()
+
+
+def language_of(path: Path, name: str | None = None, known: Sequence[Language] = LANGUAGES) -> Language:
+    """The language of a file by its ending, or by `name`.
+
+    Raises:
+        UsageError: If there is no such language, or the ending belongs to none or to several.
+    """
+    if name is not None:
+        found = [one for one in known if one.name.casefold() == name.casefold()]
+    else:
+        found = [one for one in known if path.suffix.lower() in one.endings]
+    if len(found) == 1:
+        return found[0]
+    asked = f'language "{name}"' if name is not None else f'the ending "{path.suffix}"'
+    raise UsageError(
+        f"{asked} belongs to {'no' if not found else 'more than one'} known language",
+        where=str(path),
+        rule=f"Languages are {list_names(one.name for one in known)}",
+        way_out="Name one with --language",
+    )

@@ -1,0 +1,226 @@
+"""How the numbers of a target stand for joint readings or for a pose, and back."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from truearm.rotations import matrix_from_quaternion, quaternion_from_matrix
+
+Floats = NDArray[np.float64]
+
+FULL_TURN: Final = 2.0 * np.pi
+LOCKED: Final = 1e-7
+DECIMALS_MM, DECIMALS_M, DECIMALS_DEG, DECIMALS_RAD, DECIMALS_QUATERNION = 3, 6, 4, 6, 7
+
+
+class JointLayout(Protocol):
+    """Numbers that stand for joint readings."""
+
+    @property
+    def width(self) -> int:
+        """How many numbers a target has."""
+        ...
+
+    @property
+    def least_decimals(self) -> Sequence[int]:
+        """Digits behind the point that are written at least, (width,)."""
+        ...
+
+    def to_readings(self, values: Floats) -> Floats:
+        """Readings (n, N), rad and m, of numbers (n, width)."""
+        ...
+
+    def from_readings(self, q: Floats, near: Floats) -> Floats:
+        """Numbers (n, width) of readings (n, N); `near` are those that the text has."""
+        ...
+
+
+class PoseLayout(Protocol):
+    """Numbers that stand for a pose: its six or seven, then the integers of its configuration."""
+
+    @property
+    def width(self) -> int:
+        """How many numbers a target has, those of the configuration included."""
+        ...
+
+    @property
+    def configuration(self) -> int:
+        """How many of them, the last ones, tell the branch and the turns."""
+        ...
+
+    @property
+    def least_decimals(self) -> Sequence[int]:
+        """Digits behind the point that are written at least, (width,)."""
+        ...
+
+    def to_poses(self, values: Floats) -> Floats:
+        """Poses (n, 4, 4), m, of numbers (n, width - configuration)."""
+        ...
+
+    def from_poses(self, poses: Floats, near: Floats) -> Floats:
+        """Numbers (n, width - configuration) of poses, in the notation nearest to `near`."""
+        ...
+
+
+Layout = JointLayout | PoseLayout
+
+
+@dataclass(frozen=True)
+class Joints:
+    """One number a joint, in the arm's order: deg or rad for revolute, mm or m for prismatic ones.
+
+    Attributes:
+        units: What one unit of each number is in rad or m, (N,).
+        least_decimals: As in JointLayout.
+    """
+
+    units: tuple[float, ...]
+    least_decimals: tuple[int, ...]
+
+    @classmethod
+    def of(cls, joints: Sequence[str], *, degrees: bool = True, millimetres: bool = True) -> "Joints":
+        """For an arm's `joints`, each "revolute" or "prismatic"."""
+        angle = (np.pi / 180.0, DECIMALS_DEG) if degrees else (1.0, DECIMALS_RAD)
+        length = (1e-3, DECIMALS_MM) if millimetres else (1.0, DECIMALS_M)
+        chosen = [angle if joint == "revolute" else length for joint in joints]
+        return cls(tuple(unit for unit, _ in chosen), tuple(decimals for _, decimals in chosen))
+
+    @property
+    def width(self) -> int:
+        """One number a joint."""
+        return len(self.units)
+
+    def to_readings(self, values: Floats) -> Floats:
+        """As in JointLayout."""
+        readings: Floats = values * np.array(self.units)
+        return readings
+
+    def from_readings(self, q: Floats, near: Floats) -> Floats:
+        """As in JointLayout."""
+        values: Floats = q / np.array(self.units)
+        return values
+
+
+@dataclass(frozen=True)
+class EulerPose:
+    """X Y Z in mm and three angles in deg, of the rotation Rz Ry Rx.
+
+    Attributes:
+        columns: Which of the three numbers behind X Y Z turns about z, y and x: (0, 1, 2) for KUKA's A B C,
+            (2, 1, 0) for W P R and for Mitsubishi's A B C.
+        configuration: As in PoseLayout.
+    """
+
+    columns: tuple[int, int, int] = (0, 1, 2)
+    configuration: int = 0
+
+    @property
+    def width(self) -> int:
+        """Six and the configuration."""
+        return 6 + self.configuration
+
+    @property
+    def least_decimals(self) -> tuple[int, ...]:
+        """As in PoseLayout."""
+        return (DECIMALS_MM,) * 3 + (DECIMALS_DEG,) * 3 + (0,) * self.configuration
+
+    def to_poses(self, values: Floats) -> Floats:
+        """As in PoseLayout."""
+        angles = np.deg2rad(values[:, 3:6][:, self.columns])
+        matrices = Rotation.from_euler("ZYX", angles).as_matrix()
+        return _poses(values[:, :3] * 1e-3, matrices)
+
+    def from_poses(self, poses: Floats, near: Floats) -> Floats:
+        """As in PoseLayout: of the two triples of angles and their full turns the one nearest to `near`."""
+        wanted = near[:, 3:6][:, self.columns]
+        angles = _nearest_angles(poses[:, :3, :3], np.deg2rad(wanted))
+        written = np.empty((len(poses), 6))
+        written[:, :3] = poses[:, :3, 3] * 1e3
+        written[:, [3 + column for column in self.columns]] = np.rad2deg(angles)
+        return written
+
+
+@dataclass(frozen=True)
+class QuaternionPose:
+    """X Y Z in mm and a quaternion, w first; the sign is that of the text."""
+
+    configuration: int = 0
+
+    @property
+    def width(self) -> int:
+        """Seven and the configuration."""
+        return 7 + self.configuration
+
+    @property
+    def least_decimals(self) -> tuple[int, ...]:
+        """As in PoseLayout."""
+        return (DECIMALS_MM,) * 3 + (DECIMALS_QUATERNION,) * 4 + (0,) * self.configuration
+
+    def to_poses(self, values: Floats) -> Floats:
+        """As in PoseLayout; a quaternion is scaled to unit length first."""
+        return _poses(values[:, :3] * 1e-3, matrix_from_quaternion(values[:, 3:7]))
+
+    def from_poses(self, poses: Floats, near: Floats) -> Floats:
+        """As in PoseLayout."""
+        quaternions = quaternion_from_matrix(poses[:, :3, :3])
+        flipped = np.sum(quaternions * near[:, 3:7], axis=1) < 0.0
+        quaternions[flipped] *= -1.0
+        return np.hstack([poses[:, :3, 3] * 1e3, quaternions])
+
+
+@dataclass(frozen=True)
+class RotationVectorPose:
+    """x y z in m and a rotation vector in rad."""
+
+    configuration: int = 0
+    width: int = 6
+    least_decimals: tuple[int, ...] = (DECIMALS_M,) * 3 + (DECIMALS_RAD,) * 3
+
+    def to_poses(self, values: Floats) -> Floats:
+        """As in PoseLayout."""
+        return _poses(values[:, :3], Rotation.from_rotvec(values[:, 3:6]).as_matrix())
+
+    def from_poses(self, poses: Floats, near: Floats) -> Floats:
+        """As in PoseLayout: the vector, lengthened by full turns, that is nearest to `near`."""
+        vectors = Rotation.from_matrix(poses[:, :3, :3]).as_rotvec()
+        lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+        axes = np.divide(vectors, lengths, out=_unit(near[:, 3:6]), where=lengths > 0.0)
+        turns = np.round((np.sum(near[:, 3:6] * axes, axis=1, keepdims=True) - lengths) / FULL_TURN)
+        return np.hstack([poses[:, :3, 3], vectors + turns * FULL_TURN * axes])
+
+
+def _poses(points: Floats, matrices: Floats) -> Floats:
+    poses = np.zeros((len(points), 4, 4))
+    poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = matrices, points, 1.0
+    return poses
+
+
+def _unit(vectors: Floats) -> Floats:
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    units: Floats = np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0.0)
+    return units
+
+
+def _nearest_angles(matrices: Floats, near: Floats) -> Floats:
+    """Angles (n, 3) about z, y and x of rotation matrices (n, 3, 3), those nearest to `near`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # gimbal lock: handled below
+        first = Rotation.from_matrix(matrices).as_euler("ZYX")
+    second = np.stack([first[:, 0] + np.pi, np.pi - first[:, 1], first[:, 2] + np.pi], axis=1)
+    locked = np.cos(first[:, 1]) < LOCKED
+    first[locked] = _locked(first[locked], near[locked])
+    both = [angles + FULL_TURN * np.round((near - angles) / FULL_TURN) for angles in (first, second)]
+    distances = [np.abs(angles - near).sum(axis=1) for angles in both]
+    return np.where((distances[0] <= distances[1])[:, None] | locked[:, None], both[0], both[1])
+
+
+def _locked(angles: Floats, near: Floats) -> Floats:
+    """Where the middle angle is +-90 deg only a sum of the other two counts: the third is kept."""
+    sign = np.where(angles[:, 1] > 0.0, 1.0, -1.0)
+    together = angles[:, 0] - sign * angles[:, 2]
+    return np.stack([together + sign * near[:, 2], angles[:, 1], near[:, 2]], axis=1)

@@ -1,0 +1,130 @@
+"""A program as a language's reader found it, and what a language has to know for that."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from truearm.programs.configuration import Configuration
+from truearm.programs.environment import Environment
+from truearm.programs.frames import Frames
+from truearm.programs.layouts import Layout
+from truearm.programs.source import Source
+from truearm.programs.tables import Motion, Moves, Targets
+from truearm.robot import Robot
+
+
+@dataclass(frozen=True, order=True)
+class Listed:
+    """A target or a motion that is left as it is.
+
+    Attributes:
+        file: Number of its file.
+        line: Line, from 1.
+        column: Column, from 1.
+        name: The target's name, or the text of the statement where it has none.
+        reason: Why, in words that end a line.
+    """
+
+    file: int
+    line: int
+    column: int
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """What a reader found.
+
+    Attributes:
+        language: Who read it, and can write it.
+        sources: The files; the first is the one that was named.
+        layouts: How numbers stand for joints or poses; targets name one by number.
+        targets: Numbers that are targets, each once, in the order of the text.
+        moves: Uses of targets, in the order of the text.
+        environments: Tools, objects and offsets; moves name one by number.
+        listed: What the reader could not take for a target with certainty.
+        configuration: How poses tell their branch; None in a language that does not.
+        accurate: Why the controller is known to compute with a model of its own, where the program says so.
+    """
+
+    language: "Language"
+    sources: tuple[Source, ...]
+    layouts: tuple[Layout, ...]
+    targets: Targets
+    moves: Moves
+    environments: tuple[Environment, ...]
+    listed: tuple[Listed, ...] = ()
+    configuration: Configuration | None = None
+    accurate: str = ""
+
+
+@dataclass(frozen=True)
+class LinearStep:
+    """A waypoint to insert before a linear move.
+
+    Attributes:
+        line: Line of the move, from 1, in file `file`.
+        file: Number of the file.
+        move: Number of the move.
+        values: Numbers in the layout of the move's target, (width,), configuration included.
+        decimals: Digits behind the point of each, (width,).
+    """
+
+    line: int
+    file: int
+    move: int
+    values: tuple[float, ...]
+    decimals: tuple[int, ...]
+
+
+class Language(Protocol):
+    """A reader and writer of programs in one language."""
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        ...
+
+    @property
+    def endings(self) -> tuple[str, ...]:
+        """Endings of its files, in small letters, with the dot; the first is the usual one."""
+        ...
+
+    @property
+    def controller_differs(self) -> str:
+        """Why its controllers may compute with another model than the nominal one, in words that end a
+        sentence; empty where they do not. A controller must be declared then.
+        """
+        ...
+
+    def companions(self, path: Path) -> tuple[Path, ...]:
+        """Further files of the program that exist beside `path`, such as KUKA's .dat."""
+        ...
+
+    def read(self, sources: Sequence[Source], robot: Robot, frames: Frames) -> Program:
+        """The program of these texts, for an arm.
+
+        Args:
+            sources: The files, the named one first.
+            robot: The arm, for its joints and for geometry that configuration data depends on.
+            frames: Tools and objects from outside the program.
+
+        Raises:
+            InputError: If the text is no program of this language; names file, line and column.
+        """
+        ...
+
+    def mark(self, source: Source, text: str) -> tuple[int, str]:
+        """Where a comment with `text` goes, and the whole line(s) to insert there, line end included."""
+        ...
+
+    def linear_step(self, program: Program, step: LinearStep) -> str | None:
+        """The line to insert before the line of a linear move, line end included; None if it cannot be."""
+        ...
+
+
+def motion_is_straight(motion: int) -> bool:
+    """Whether a motion follows a line or an arc, on which a step would show."""
+    return motion in (Motion.LINEAR, Motion.VIA, Motion.CIRCULAR)

@@ -1,0 +1,252 @@
+"""Targets and moves of a program, in columns: 100,000 of them are a few arrays.
+
+A target is numbers in the text, stored under a name or written in a motion statement; a move uses one.
+"""
+
+from array import array
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Integers = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+ABSENT_AT: Final = -1
+
+
+class Motion(IntEnum):
+    """How a move reaches its target."""
+
+    JOINT = 0
+    LINEAR = 1
+    VIA = 2
+    CIRCULAR = 3
+    NONE = 4
+
+
+class Number(NamedTuple):
+    """A number in the text.
+
+    Attributes:
+        start: Offset of its first character, the sign included.
+        end: Offset behind its last one.
+        value: What the text says, before `factor`.
+        decimals: Digits behind the point.
+        factor: What makes of it a number in the layout's unit, such as pi/180 within d2r( ).
+    """
+
+    start: int
+    end: int
+    value: float
+    decimals: int
+    factor: float = 1.0
+
+
+ABSENT: Final = Number(ABSENT_AT, ABSENT_AT, float("nan"), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """All targets: (t,) columns and, in order, the numbers of all of them, (s,) columns.
+
+    Attributes:
+        source: Number of the file.
+        at: Offset of the target's name or opening bracket.
+        layout: Number of its layout.
+        first: Where its numbers begin, (t + 1,).
+        starts: Offset of each number; ABSENT_AT for one that is not written.
+        ends: Offset behind each number.
+        values: The numbers as they are written; NaN where they are not.
+        decimals: Digits behind the point.
+        factors: What makes of them numbers in the layout's units.
+        names: Names of the targets that have one, by number.
+    """
+
+    source: Integers
+    at: Integers
+    layout: Integers
+    first: Integers
+    starts: Integers
+    ends: Integers
+    values: Floats
+    decimals: Integers
+    factors: Floats
+    names: dict[int, str]
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    def numbers(self, which: Integers, width: int) -> Integers:
+        """Places of the numbers of targets `which` (n,) of one layout, (n, width)."""
+        return self.first[which][:, None] + np.arange(width)
+
+
+@dataclass(frozen=True, eq=False)
+class Moves:
+    """All uses of targets in the order of the text, (m,) columns.
+
+    Attributes:
+        target: Number of the target.
+        source: Number of the file of the statement.
+        at: Offset of the statement.
+        motion: A Motion; NONE for a use that does not move, such as a home position that is compared.
+        blended: Whether the arm does not stop at the target.
+        environment: Number of the environment.
+        follows: Whether the move before, in this table, is the one executed before: False behind labels,
+            at the heads of loops and behind branches, where the arm may come from several places.
+    """
+
+    target: Integers
+    source: Integers
+    at: Integers
+    motion: Integers
+    blended: NDArray[np.bool_]
+    environment: Integers
+    follows: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.target)
+
+
+class TargetTable:
+    """Collects targets, one by one or many at once."""
+
+    def __init__(self) -> None:
+        self._columns = [_Column(code) for code in "iqi"]
+        self._counts = _Column("i")
+        self._numbers = [_Column(code) for code in "qqdid"]
+        self._names: dict[int, str] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, source: int, at: int, layout: int, numbers: Sequence[Number], name: str = "") -> int:
+        """Add a target; its number. `numbers` are those of the layout, ABSENT where not written."""
+        for column, value in zip(self._columns, (source, at, layout), strict=True):
+            column.append(value)
+        self._counts.append(len(numbers))
+        for number in numbers:
+            for column, part in zip(self._numbers, number, strict=True):
+                column.append(part)
+        if name:
+            self._names[self._count] = name
+        self._count += 1
+        return self._count - 1
+
+    def extend(self, source: int, at: Integers, layout: int, numbers: Sequence[NDArray[Any]]) -> Integers:
+        """Add n targets without names; their numbers.
+
+        Args:
+            source: Their file.
+            at: Their offsets, (n,).
+            layout: Their layout.
+            numbers: Columns starts, ends, values, decimals and factors, (n, width) each.
+        """
+        count, width = len(at), numbers[0].shape[1]
+        for column, value in zip(
+            self._columns, (np.full(count, source), at, np.full(count, layout)), strict=True
+        ):
+            column.extend(value)
+        self._counts.extend(np.full(count, width))
+        for column, value in zip(self._numbers, numbers, strict=True):
+            column.extend(np.ascontiguousarray(value).reshape(-1))
+        self._count += count
+        return np.arange(self._count - count, self._count)
+
+    def freeze(self) -> Targets:
+        """The columns."""
+        first = np.concatenate([[0], np.cumsum(self._counts.whole(np.int64))])
+        source, at, layout = (column.whole(np.int64) for column in self._columns)
+        starts, ends, values, decimals, factors = (column.whole(None) for column in self._numbers)
+        return Targets(
+            source,
+            at,
+            layout,
+            first.astype(np.int64),
+            starts.astype(np.int64, copy=False),
+            ends.astype(np.int64, copy=False),
+            values.astype(np.float64, copy=False),
+            decimals.astype(np.int64, copy=False),
+            factors.astype(np.float64, copy=False),
+            self._names,
+        )
+
+
+class MoveTable:
+    """Collects moves, one by one or many at once."""
+
+    def __init__(self) -> None:
+        self._columns = [_Column(code) for code in "qiqbbib"]
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(
+        self,
+        target: int,
+        place: tuple[int, int],
+        motion: Motion,
+        *,
+        environment: int,
+        blended: bool = False,
+        follows: bool = True,
+    ) -> None:
+        """Add a move to a target; `place` is the file and the offset of the statement."""
+        row = (target, *place, int(motion), int(blended), environment, int(follows))
+        for column, value in zip(self._columns, row, strict=True):
+            column.append(value)
+        self._count += 1
+
+    def extend(self, columns: Sequence[NDArray[Any]]) -> None:
+        """Add n moves: columns target, source, at, motion, blended, environment and follows, (n,) each."""
+        for column, values in zip(self._columns, columns, strict=True):
+            column.extend(values)
+        self._count += len(columns[0])
+
+    def freeze(self) -> Moves:
+        """The columns."""
+        target, source, at, motion, blended, environment, follows = (
+            column.whole(np.int64) for column in self._columns
+        )
+        return Moves(target, source, at, motion, blended.astype(bool), environment, follows.astype(bool))
+
+
+class _Column:
+    """A growing column: single values are gathered compactly, arrays are kept as they are."""
+
+    def __init__(self, code: str) -> None:
+        self._code = code
+        self._pending = array(code)
+        self._chunks: list[NDArray[Any]] = []
+
+    def append(self, value: float) -> None:
+        self._pending.append(value)  # type: ignore[arg-type]
+
+    def extend(self, values: NDArray[Any]) -> None:
+        self._flush()
+        self._chunks.append(values)
+
+    def whole(self, kind: type | None) -> NDArray[Any]:
+        self._flush()
+        if not self._chunks:
+            return np.empty(0, dtype=kind or np.dtype(self._code))
+        joined = self._chunks[0] if len(self._chunks) == 1 else np.concatenate(self._chunks)
+        return joined if kind is None else joined.astype(kind, copy=False)
+
+    def _flush(self) -> None:
+        if self._pending:
+            self._chunks.append(np.array(self._pending))
+            self._pending = array(self._code)
+
+
+def number_columns(rows: Iterable[Sequence[Number]]) -> tuple[Floats, Floats]:
+    """Values and factors, (n, width) each, of numbers that did not go through a table."""
+    listed = [[(number.value, number.factor) for number in row] for row in rows]
+    both = np.array(listed, dtype=np.float64)
+    return both[..., 0], both[..., 1]
