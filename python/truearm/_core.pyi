@@ -372,3 +372,47 @@ def residuals(problem: Problem, parameters: NDArray[np.float64], setup: Setup) -
         parameters: (L, 5), or (n, L, 5) where they vary.
         setup: Frames, targets and anchors.
     """
+
+def scan_lines(
+    text: bytes,
+) -> tuple[
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.int64],
+    NDArray[np.float64],
+    NDArray[np.int64],
+]:
+    """Lines of a program's text and all their numbers.
+
+    Digits within names are no numbers; a sign belongs to its number unless something that it could be
+    subtracted from stands before it. Lines end with a line feed.
+
+    Returns:
+        First byte of each line and the length of the text (l + 1,); for each line which of the different
+        lines it is, numbers apart (l,); for each different line the first that is so (k,); for each line its
+        first number, and how many there are (l + 1,); and of the numbers (m,) the first byte, the byte behind
+        the last, the value, and the digits behind the point.
+    """
+
+def splice_numbers(
+    text: bytes,
+    spans: tuple[NDArray[np.int64], NDArray[np.int64]],
+    values: NDArray[np.float64],
+    decimals: NDArray[np.int64],
+    words: list[tuple[int, int, bytes]],
+) -> bytes:
+    """`text` with other numbers and words in it; every other byte stays.
+
+    Args:
+        text: The text.
+        spans: First byte, and the byte behind the last, of what the numbers replace, in order, (m,) each.
+        values: The numbers, (m,). A number that replaces one with a "+" gets one.
+        decimals: Digits behind the point, (m,).
+        words: First byte, the byte behind the last, and what replaces them, in order; an empty span inserts.
+
+    Raises:
+        CoreError: Spans do not fit the text or overlap, or a number is not finite.
+    """

@@ -7,6 +7,7 @@ mod door;
 mod estimate;
 mod field;
 mod measured;
+mod text;
 
 /// The compiled core of truearm: private, wrapped by the Python package.
 #[pymodule]
@@ -26,5 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;
     module.add_function(wrap_pyfunction!(field::fit_field, module)?)?;
+    module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(text::splice_numbers, module)?)?;
     Ok(())
 }

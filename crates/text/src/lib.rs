@@ -1,0 +1,13 @@
+//! Numbers in the text of a program: found, and replaced with every other byte kept.
+
+mod error;
+mod format;
+mod number;
+mod scan;
+mod splice;
+
+pub use error::TextError;
+pub use format::write_fixed;
+pub use number::Number;
+pub use scan::{Lines, scan_lines};
+pub use splice::{Numbers, Words, splice};

@@ -1,0 +1,90 @@
+//! A text with other numbers in it.
+
+use crate::error::TextError;
+use crate::format::write_fixed;
+
+/// Bytes that a number grows by, usually less.
+const GROWTH: usize = 4;
+
+/// Numbers to write over spans of a text, in the order of the text; all columns have the same length.
+#[derive(Clone, Copy, Debug)]
+pub struct Numbers<'a> {
+    /// First byte of each.
+    pub starts: &'a [i64],
+    /// Behind the last byte of each.
+    pub ends: &'a [i64],
+    /// What to write.
+    pub values: &'a [f64],
+    /// With how many digits behind the point.
+    pub decimals: &'a [i64],
+}
+
+/// Bytes to put over a span of a text; over an empty one they are inserted.
+#[derive(Clone, Copy, Debug)]
+pub struct Words<'a> {
+    /// First byte of the span.
+    pub start: usize,
+    /// Behind its last byte.
+    pub end: usize,
+    /// What.
+    pub bytes: &'a [u8],
+}
+
+/// `text` with numbers and words, both in the order of the text, and every other byte as it is.
+///
+/// # Errors
+/// If a span does not fit the text or overlaps another one, or a value is not finite.
+pub fn splice(text: &[u8], numbers: Numbers<'_>, words: &[Words<'_>]) -> Result<Vec<u8>, TextError> {
+    let count = numbers.starts.len();
+    for other in [numbers.ends.len(), numbers.values.len(), numbers.decimals.len()] {
+        if other != count {
+            return Err(TextError::Lengths { first: count, other });
+        }
+    }
+    let inserted: usize = words.iter().map(|word| word.bytes.len()).sum();
+    let mut out = Vec::with_capacity(text.len() + inserted + count * GROWTH);
+    let mut copied = 0;
+    let mut waiting = words.iter().peekable();
+    for row in 0..count {
+        let span = span(numbers.starts[row], numbers.ends[row], copied, text.len())?;
+        while let Some(word) = waiting.next_if(|word| word.start <= span.0) {
+            copied = put(&mut out, text, copied, word)?;
+        }
+        if span.0 < copied {
+            return Err(TextError::Span { start: span.0, end: span.1, after: copied, length: text.len() });
+        }
+        out.extend_from_slice(&text[copied..span.0]);
+        let value = numbers.values[row];
+        if !value.is_finite() {
+            return Err(TextError::NotFinite { start: span.0, value });
+        }
+        let decimals = u32::try_from(numbers.decimals[row]).unwrap_or(0);
+        write_fixed(&mut out, value, decimals, text[span.0] == b'+');
+        copied = span.1;
+    }
+    for word in waiting {
+        copied = put(&mut out, text, copied, word)?;
+    }
+    out.extend_from_slice(&text[copied..]);
+    Ok(out)
+}
+
+/// The text from `copied` to a word and the word; where copying goes on.
+fn put(out: &mut Vec<u8>, text: &[u8], copied: usize, word: &Words<'_>) -> Result<usize, TextError> {
+    if word.start < copied || word.end < word.start || word.end > text.len() {
+        return Err(TextError::Span { start: word.start, end: word.end, after: copied, length: text.len() });
+    }
+    out.extend_from_slice(&text[copied..word.start]);
+    out.extend_from_slice(word.bytes);
+    Ok(word.end)
+}
+
+fn span(start: i64, end: i64, after: usize, length: usize) -> Result<(usize, usize), TextError> {
+    let both = usize::try_from(start).ok().zip(usize::try_from(end).ok());
+    both.filter(|&(start, end)| after <= start && start < end && end <= length).ok_or(TextError::Span {
+        start: usize::try_from(start).unwrap_or(0),
+        end: usize::try_from(end).unwrap_or(0),
+        after,
+        length,
+    })
+}

@@ -1,0 +1,112 @@
+//! What is found in texts and what is written over it.
+
+use proptest::prelude::*;
+use truearm_text::{Numbers, TextError, Words, scan_lines, splice, write_fixed};
+
+fn fixed(value: f64, decimals: u32, plus: bool) -> String {
+    let mut out = Vec::new();
+    write_fixed(&mut out, value, decimals, plus);
+    String::from_utf8_lossy(&out).into_owned()
+}
+
+fn found(text: &str) -> Vec<(&str, f64, i32)> {
+    let lines = scan_lines(text.as_bytes());
+    lines.numbers.iter().map(|n| (&text[n.start..n.end], n.value, n.decimals)).collect()
+}
+
+#[test]
+fn numbers_of_a_line() {
+    assert_eq!(
+        found("movej([-0.5, +1., .25,1E-3], a=2)"),
+        [("-0.5", -0.5, 1), ("+1.", 1.0, 0), (".25", 0.25, 2), ("1E-3", 1e-3, 3), ("2", 2.0, 0)]
+    );
+}
+
+#[test]
+fn digits_of_names_are_no_numbers() {
+    assert_eq!(found("p12 _3 $4 6DOF 1.2.3 \u{e4}5 x2.5"), []);
+}
+
+#[test]
+fn a_sign_behind_an_operand_is_an_operator() {
+    assert_eq!(
+        found("a-1 b - 2 (3)-4 [-5"),
+        [("1", 1.0, 0), ("2", 2.0, 0), ("3", 3.0, 0), ("4", 4.0, 0), ("-5", -5.0, 0)]
+    );
+}
+
+#[test]
+fn lines_that_differ_in_numbers_only_are_alike() {
+    let lines = scan_lines(b"mov 1,-2\r\n# x\r\nmov 3,4.5\r\nlast");
+    assert_eq!(lines.skeleton, [0, 1, 0, 2]);
+    assert_eq!(lines.representative, [0, 1, 3]);
+    assert_eq!(lines.first_number, [0, 2, 2, 4, 4]);
+    assert_eq!(lines.starts, [0, 10, 15, 26, 30]);
+}
+
+#[test]
+fn words_go_between_numbers() {
+    let numbers = Numbers { starts: &[2, 6], ends: &[3, 8], values: &[10.25, -3.0], decimals: &[1, 0] };
+    let words = [Words { start: 0, end: 0, bytes: b"# mark\n" }, Words { start: 4, end: 5, bytes: b"!" }];
+    let out = splice(b"a 1 b 22 c", numbers, &words).unwrap();
+    assert_eq!(String::from_utf8(out).unwrap(), "# mark\na 10.3 ! -3 c");
+}
+
+#[test]
+fn overlapping_spans_and_nan_are_refused() {
+    let overlapping = Numbers { starts: &[0, 1], ends: &[2, 3], values: &[1.0, 2.0], decimals: &[0, 0] };
+    assert!(matches!(splice(b"1234", overlapping, &[]), Err(TextError::Span { start: 1, .. })));
+    let nan = Numbers { starts: &[0], ends: &[1], values: &[f64::NAN], decimals: &[0] };
+    assert!(matches!(splice(b"1", nan, &[]), Err(TextError::NotFinite { start: 0, .. })));
+    let inside = Numbers { starts: &[0], ends: &[3], values: &[1.0], decimals: &[0] };
+    let over = [Words { start: 0, end: 2, bytes: b"x" }];
+    assert!(
+        splice(b"123", Numbers { starts: &[1], ends: &[3], values: &[1.0], decimals: &[0] }, &over).is_err()
+    );
+    assert!(splice(b"123", inside, &[Words { start: 1, end: 1, bytes: b"x" }]).is_err());
+}
+
+#[test]
+fn zeros_and_signs() {
+    assert_eq!(fixed(-0.00001, 3, false), "0.000");
+    assert_eq!(fixed(-0.0006, 3, false), "-0.001");
+    assert_eq!(fixed(0.5, 2, true), "+0.50");
+    assert_eq!(fixed(12.0, 0, false), "12");
+    assert_eq!(fixed(0.0, 0, false), "0");
+    assert_eq!(fixed(-1e-30, 20, false), "0.00000000000000000000");
+}
+
+proptest! {
+    #[test]
+    fn written_numbers_are_within_half_a_digit(value in -1e6..1e6_f64, decimals in 0..9_u32) {
+        let back: f64 = fixed(value, decimals, false).parse().unwrap();
+        prop_assert!((back - value).abs() <= 0.51 * 10_f64.powi(-(decimals as i32)));
+        let text = fixed(value, decimals, false);
+        prop_assert_eq!(text.split('.').nth(1).map_or(0, str::len), decimals as usize);
+    }
+
+    #[test]
+    fn any_text_is_scanned(text in any::<Vec<u8>>()) {
+        let lines = scan_lines(&text);
+        prop_assert_eq!(lines.starts.len(), lines.skeleton.len() + 1);
+        let mut after = 0;
+        for number in &lines.numbers {
+            prop_assert!(after <= number.start && number.start < number.end && number.end <= text.len());
+            prop_assert!(number.value.is_finite());
+            after = number.end;
+        }
+    }
+
+    #[test]
+    fn numbers_written_over_themselves_say_the_same(values in prop::collection::vec(-1e3..1e3_f64, 1..20)) {
+        let text: String = values.iter().map(|v| format!("x({v:.4}) ")).collect();
+        let lines = scan_lines(text.as_bytes());
+        let starts: Vec<i64> = lines.numbers.iter().map(|n| n.start as i64).collect();
+        let ends: Vec<i64> = lines.numbers.iter().map(|n| n.end as i64).collect();
+        let same: Vec<f64> = lines.numbers.iter().map(|n| n.value).collect();
+        let decimals: Vec<i64> = lines.numbers.iter().map(|n| i64::from(n.decimals)).collect();
+        let numbers = Numbers { starts: &starts, ends: &ends, values: &same, decimals: &decimals };
+        let out = String::from_utf8(splice(text.as_bytes(), numbers, &[]).unwrap()).unwrap();
+        prop_assert_eq!(out.replace("-0.0000", "0.0000"), text.replace("-0.0000", "0.0000"));
+    }
+}
