@@ -4,9 +4,12 @@ import contextlib
 import io
 import os
 import sys
+from collections.abc import Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 
 from truearm.cli import COMMANDS, main
+from truearm.cli.lazy import Entry
 
 PAGE = Path(__file__).parent / "reference" / "cli.md"
 HEAD = """# Command line
@@ -21,17 +24,24 @@ nothing else.
 
 def page() -> str:
     """The page as it has to be."""
-    parts = [HEAD, _section("truearm", ["--help"])]
-    parts += [_section(f"truearm {entry.name}", [entry.name, "--help"]) for entry in COMMANDS]
-    return "\n".join(parts)
+    return "\n".join([HEAD, _section([]), *_sections([], COMMANDS)])
 
 
-def _section(title: str, arguments: list[str]) -> str:
+def _sections(words: list[str], entries: Sequence[Entry]) -> Iterator[str]:
+    """A section for each command, behind that of the command that it belongs to."""
+    for entry in entries:
+        yield _section([*words, entry.name])
+        below = getattr(import_module(entry.module), "COMMANDS", ())
+        yield from _sections([*words, entry.name], below)
+
+
+def _section(words: list[str]) -> str:
+    title = " ".join(["truearm", *words])
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
-        status = main(arguments)
+        status = main([*words, "--help"])
     if status != 0:
-        raise RuntimeError(f"truearm {' '.join(arguments)} ended with status {status}")
+        raise RuntimeError(f"{title} ended with status {status}")
     return f"## {title}\n\n```text\n{printed.getvalue().strip()}\n```\n"
 
 

@@ -102,7 +102,7 @@ def test_measuring_in_sequence_shows_the_play():
     arm = two_links(joint_errors=(JointError(1, backlash_deg=0.1),))
     q = np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0], [0.5, 0.0]])
     points = arm.measure_table(q)[["x", "y", "z"]].to_numpy()
-    reach = np.linalg.norm(arm.target_in_flange + [1.5, 0, 0])
+    reach = np.linalg.norm(arm.target_in_flange + np.array([1.5, 0, 0]))
     assert np.linalg.norm(points[1] - points[3]) == pytest.approx(np.deg2rad(0.1) * reach, rel=0.1)
 
 

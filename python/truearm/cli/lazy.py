@@ -14,7 +14,10 @@ INTERRUPTED_BY_TYPER = 130
 
 @dataclass(frozen=True)
 class Entry:
-    """A command of the table: its name, its module with a function `command`, and one line of help."""
+    """A command of the table: its name, its module, and one line of help.
+
+    The module has a function `command`, or a table COMMANDS of commands below it.
+    """
 
     name: str
     module: str
@@ -33,13 +36,16 @@ class LazyCommand(TyperCommand):
         return self._load().make_context(info_name, args, *more, **extra)
 
     def _load(self) -> Any:  # noqa: ANN401
+        module = import_module(self._entry.module)
+        if hasattr(module, "COMMANDS"):
+            return group(module.COMMANDS, _summarised(self._entry.summary), name=self._entry.name)
         application = typer.Typer(add_completion=False, rich_markup_mode=None)
-        application.command(self._entry.name)(import_module(self._entry.module).command)
+        application.command(self._entry.name)(module.command)
         return typer.main.get_command(application)
 
 
-def build(entries: Sequence[Entry]) -> Callable[[list[str]], int]:
-    """The program over a table of commands: takes the words behind its name, returns the exit status."""
+def group(entries: Sequence[Entry], callback: Callable[..., None], *, name: str | None = None) -> Any:  # noqa: ANN401
+    """A command that is a table of commands; `callback` has its own options and its help."""
 
     class Group(TyperGroup):
         def __init__(self, **attributes: Any) -> None:
@@ -50,10 +56,15 @@ def build(entries: Sequence[Entry]) -> Callable[[list[str]], int]:
             return list(self.commands)
 
     application = typer.Typer(
-        cls=Group, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+        name=name, cls=Group, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
     )
-    application.callback(no_args_is_help=True)(_program)
-    program = typer.main.get_command(application)
+    application.callback(no_args_is_help=True)(callback)
+    return typer.main.get_command(application)
+
+
+def build(entries: Sequence[Entry]) -> Callable[[list[str]], int]:
+    """The program over a table of commands: takes the words behind its name, returns the exit status."""
+    program = group(entries, _program)
 
     def run(arguments: list[str]) -> int:
         try:
@@ -65,6 +76,14 @@ def build(entries: Sequence[Entry]) -> Callable[[list[str]], int]:
         return 0
 
     return run
+
+
+def _summarised(summary: str) -> Callable[[], None]:
+    def described() -> None:
+        return None
+
+    described.__doc__ = summary
+    return described
 
 
 def _print_version(asked: bool) -> None:

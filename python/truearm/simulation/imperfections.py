@@ -41,10 +41,10 @@ class JointError:
     Attributes:
         joint: Number from 1.
         harmonics: Of gears.
-        eccentricity_deg: Amplitude of the error, once a turn, of an encoder or a wheel that sits off its axis.
+        eccentricity_deg: Error, once a turn, of an encoder or a wheel that sits off its axis.
         eccentricity_phase_deg: Its phase at reading zero.
-        backlash_deg: The whole play. The joint stops half of it short of where it is sent, on the side that it
-            came from.
+        backlash_deg: The whole play. The joint stops half of it short of where it is sent, on the side
+            that it came from.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -157,8 +157,8 @@ class Conditions:
     Attributes:
         payload_kg: Mass at the flange.
         temperature_c: Temperature of the arm; that of reference with None.
-        approach: Sign (n, N) of each joint's last movement; +1 where it came from smaller readings. Without it
-            nothing lags: joints stand in the middle of their play.
+        approach: Sign (n, N) of each joint's last movement; +1 where it came from smaller readings.
+            Without it nothing lags: joints stand in the middle of their play.
     """
 
     payload_kg: ArrayLike = 0.0

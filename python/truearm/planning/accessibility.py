@@ -1,0 +1,211 @@
+"""Which poses can be measured: rules that are combined, each a function of places to true or false."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.errors import InputError
+from truearm.planning.configurations import link_frames
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEAST_CONTACT_DEG: Final = 15.0
+STEPS_ALONG_LINK: Final = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """n poses of a nominal arm, and where its parts are then, in the base frame.
+
+    Attributes:
+        robot: The arm.
+        readings: Joint readings (n, N).
+        flange_from_tool: Transform (4, 4) of the tool.
+    """
+
+    robot: Robot
+    readings: Floats
+    flange_from_tool: Floats
+
+    @cached_property
+    def base_from_tool(self) -> Floats:
+        """Poses of the tool (n, 4, 4)."""
+        into_tool = np.linalg.inv(self.robot.tool) @ self.flange_from_tool
+        return np.asarray(self.robot.pose(self.readings) @ into_tool)
+
+    @property
+    def point(self) -> Floats:
+        """Tool points (n, 3), m."""
+        return self.base_from_tool[:, :3, 3]
+
+    @cached_property
+    def arm_points(self) -> Floats:
+        """Points (n, k, 3) along the straight lines between the frames of the links and the tool."""
+        values = self.robot.joints_from_readings(self.readings)
+        corners = [np.broadcast_to(self.robot.base[:3, 3], self.point.shape)]
+        corners += [link_frames(self.robot, values, k + 1)[:, :3, 3] for k in range(self.robot.joint_count)]
+        corners.append(self.point)
+        line = np.stack(corners, axis=1)
+        part = np.linspace(0.0, 1.0, STEPS_ALONG_LINK)[:, None]
+        pieces = line[:, :-1, None] * (1.0 - part) + line[:, 1:, None] * part
+        return np.asarray(pieces.reshape(len(line), -1, 3))
+
+
+Rule = Callable[[Places], Mask]
+
+
+def accessible(
+    robot: Robot, readings: Floats, rules: Iterable[Rule], *, tool: ArrayLike | None = None
+) -> Mask:
+    """Which of readings (n, N) every rule allows, (n,).
+
+    Args:
+        robot: The nominal arm.
+        readings: Poses.
+        rules: Any of this module's, or functions of Places.
+        tool: Transform (4, 4) from flange to tool; the robot's own by default.
+
+    Raises:
+        InputError: If a rule answers with another shape than (n,).
+    """
+    flange_from_tool = robot.tool if tool is None else np.asarray(tool, dtype=np.float64)
+    allowed = np.ones(len(readings), dtype=np.bool_)
+    for rule in rules:
+        rows = np.flatnonzero(allowed)
+        answer = np.asarray(rule(Places(robot, readings[rows], flange_from_tool)))
+        if answer.shape != rows.shape:
+            raise InputError(
+                f"a rule of accessibility answered with shape {answer.shape}",
+                where=getattr(rule, "__name__", type(rule).__name__),
+                rule=f"It must say true or false of each of {len(rows)} poses",
+            )
+        allowed[rows] = answer.astype(np.bool_)
+    return allowed
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Readings stay within the robot's limits, and so far from them."""
+
+    margin_rad: float = 0.0
+    margin_m: float = 0.0
+
+    def __call__(self, places: Places) -> Mask:
+        """Of each pose."""
+        margin = np.where(np.array(places.robot.joints) == "revolute", self.margin_rad, self.margin_m)
+        low, high = places.robot.limits.T
+        inside = (places.readings >= low + margin) & (places.readings <= high - margin)
+        return np.asarray(inside.all(axis=1))
+
+
+@dataclass(frozen=True)
+class InBox:
+    """The tool point lies in a box in the base frame, from `low` to `high` (3,), m."""
+
+    low: ArrayLike
+    high: ArrayLike
+
+    def __call__(self, places: Places) -> Mask:
+        """Of each pose."""
+        return np.asarray(
+            ((places.point >= np.asarray(self.low)) & (places.point <= np.asarray(self.high))).all(axis=1)
+        )
+
+
+@dataclass(frozen=True)
+class InSphere:
+    """The tool point is between `least_m` and `radius_m` away from `centre` (3,) in the base frame."""
+
+    centre: ArrayLike
+    radius_m: float
+    least_m: float = 0.0
+
+    def __call__(self, places: Places) -> Mask:
+        """Of each pose."""
+        distance = np.linalg.norm(places.point - np.asarray(self.centre), axis=1)
+        return np.asarray((distance <= self.radius_m) & (distance >= self.least_m))
+
+
+@dataclass(frozen=True)
+class InCone:
+    """A device at `apex` sees the tool point, within `half_angle_rad` of the `axis` that it looks along.
+
+    Attributes:
+        apex: Where the device stands in the base frame (3,), m.
+        axis: Where it looks, in the base frame (3,).
+        half_angle_rad: How far from it it sees.
+        target_half_angle_rad: From how far beside its z axis the tool may be seen; from all sides by default.
+    """
+
+    apex: ArrayLike
+    axis: ArrayLike
+    half_angle_rad: float
+    target_half_angle_rad: float = np.pi
+
+    def __call__(self, places: Places) -> Mask:
+        """Of each pose."""
+        sight = places.point - np.asarray(self.apex)
+        seen = _angle(sight, np.broadcast_to(np.asarray(self.axis, dtype=np.float64), sight.shape))
+        facing = _angle(-sight, places.base_from_tool[:, :3, 2])
+        return np.asarray((seen <= self.half_angle_rad) & (facing <= self.target_half_angle_rad))
+
+
+@dataclass(frozen=True)
+class LeastContactAngle:
+    """The pin meets the touch panel at no less than an angle, 15 deg in section 7 of the paper.
+
+    Attributes:
+        normal: Of the panel, in the base frame (3,).
+        pin: Direction of the pin in the tool's frame (3,).
+        least_deg: Least angle between the pin and the panel's plane.
+    """
+
+    normal: ArrayLike
+    pin: ArrayLike = (1.0, 0.0, 0.0)
+    least_deg: float = LEAST_CONTACT_DEG
+
+    def __call__(self, places: Places) -> Mask:
+        """Of each pose."""
+        pin = places.base_from_tool[:, :3, :3] @ np.asarray(self.pin, dtype=np.float64)
+        from_normal = _angle(pin, np.broadcast_to(np.asarray(self.normal, dtype=np.float64), pin.shape))
+        from_plane = np.pi / 2.0 - np.minimum(from_normal, np.pi - from_normal)
+        return np.asarray(np.pi / 2.0 - from_plane <= np.pi / 2.0 - np.deg2rad(self.least_deg))
+
+
+@dataclass(frozen=True)
+class KeepOut:
+    """No part of the arm is in a box in the base frame, from `low` to `high` (3,), m.
+
+    The arm is taken as straight lines between the frames of its links, `margin_m` thick on every side.
+    """
+
+    low: ArrayLike
+    high: ArrayLike
+    margin_m: float = 0.0
+
+    def __call__(self, places: Places) -> Mask:
+        """Of each pose."""
+        low, high = np.asarray(self.low) - self.margin_m, np.asarray(self.high) + self.margin_m
+        inside = ((places.arm_points >= low) & (places.arm_points <= high)).all(axis=2)
+        return np.asarray(~np.logical_or.reduce(inside, axis=1))
+
+
+def either(*rules: Rule) -> Rule:
+    """A rule that allows what any of `rules` allows, such as the sight of one device or another."""
+
+    def any_of(places: Places) -> Mask:
+        return np.asarray(np.logical_or.reduce([rule(places) for rule in rules]))
+
+    return any_of
+
+
+def _angle(vectors: Floats, others: Floats) -> Floats:
+    """Angles (n,) between vectors (n, 3), rad."""
+    across = np.linalg.norm(np.cross(vectors, others), axis=1)
+    return np.asarray(np.arctan2(across, np.einsum("ni,ni->n", vectors, others)))

@@ -1,0 +1,167 @@
+"""Spaces lead to poses and back, and rules say which of them can be measured."""
+
+import numpy as np
+import pytest
+
+from truearm.errors import InputError, UsageError, WorkError
+from truearm.planning.accessibility import (
+    InBox,
+    InCone,
+    InSphere,
+    JointLimits,
+    KeepOut,
+    LeastContactAngle,
+    accessible,
+    either,
+)
+from truearm.planning.configurations import Configuration
+from truearm.planning.pool import PoolOptions, draw_pool, needed_pool
+from truearm.planning.spaces import CartesianSpace, JointSpace, SphericalSpace
+from truearm.robot import Robot
+
+RV_M2 = Robot.load("rv-m2")
+SHOULDER = (0.0, -0.08, 0.4)
+PAPER_LOW, PAPER_HIGH = np.array([0.5, *np.deg2rad([-150, -45])]), np.array([0.805, *np.deg2rad([150, 45])])
+
+
+def spherical(**more):
+    return SphericalSpace(RV_M2, PAPER_LOW, PAPER_HIGH, SHOULDER, **more)
+
+
+@pytest.mark.parametrize(
+    "space",
+    [
+        JointSpace(RV_M2),
+        CartesianSpace(RV_M2, np.array([-0.5, 0.2, 0.1]), np.array([0.5, 0.6, 0.9])),
+        spherical(),
+    ],
+    ids=lambda space: type(space).__name__,
+)
+def test_coordinates_to_readings_and_back(space):
+    drawn = np.random.default_rng(1).uniform(space.low, space.high, (400, 3))
+    readings, reached = space.readings(drawn)
+    assert reached.mean() > 0.4
+    np.testing.assert_allclose(space.coordinates(readings[reached]), drawn[reached], atol=1e-8)
+    assert np.isnan(readings[~reached]).all()
+    low, high = RV_M2.limits.T
+    assert np.all((readings[reached] >= low) & (readings[reached] <= high))
+
+
+def test_spherical_coordinates_are_those_of_figure_4c():
+    space = SphericalSpace(RV_M2, PAPER_LOW, PAPER_HIGH, (0.0, 0.0, 0.0))
+    x, y, z = RV_M2.position([[0.4, 0.3, -0.2, 0, 0]])[0]
+    radius, theta, phi = space.coordinates(np.array([[0.4, 0.3, -0.2, 0, 0]]))[0]
+    assert radius * np.cos(phi) * np.sin(theta) == pytest.approx(x)
+    assert radius * np.cos(phi) * np.cos(theta) == pytest.approx(y)
+    assert radius * np.sin(phi) == pytest.approx(z)
+
+
+def test_what_is_out_of_reach_is_said_to_be():
+    space = CartesianSpace(RV_M2, np.zeros(3), np.full(3, 2.0))
+    readings, reached = space.readings(np.array([[0.1, 0.6, 0.5], [1.5, 1.5, 1.5]]))
+    assert reached.tolist() == [True, False]
+    assert np.isnan(readings[1]).all()
+
+
+@pytest.mark.parametrize(
+    ("arm", "elbow"), [("front", "up"), ("front", "down"), ("back", "up"), ("back", "down")]
+)
+def test_a_configuration_is_kept(arm, elbow):
+    robot, wanted = Robot.load("puma-560"), Configuration(arm=arm, elbow=elbow)
+    held = np.zeros(6)
+    others = [
+        Configuration(arm=a, elbow=e)
+        for a in ("front", "back")
+        for e in ("up", "down")
+        if (a, e) != (arm, elbow)
+    ]
+    space = CartesianSpace(
+        robot, np.array([-0.4, -0.4, 0.2]), np.array([0.4, 0.4, 0.9]), configuration=wanted, held=held
+    )
+    drawn = np.random.default_rng(2).uniform(space.low, space.high, (200, 3))
+    readings, reached = space.readings(drawn)
+    assert reached.sum() > 20
+    np.testing.assert_allclose(robot.position(readings[reached]), drawn[reached], atol=1e-8)
+    assert wanted.holds(robot, readings[reached]).all()
+    assert not any(other.holds(robot, readings[reached]).any() for other in others)
+
+
+def test_unknown_branch_is_refused():
+    with pytest.raises(UsageError, match="front or back"):
+        Configuration(arm="left")  # type: ignore[arg-type]
+
+
+def test_rules_of_the_volume():
+    readings = np.zeros((3, 5))
+    readings[:, 0] = [0.0, 1.0, 2.0]
+    points = RV_M2.position(readings)
+    assert accessible(RV_M2, readings, [InBox(points[0] - 0.01, points[0] + 0.01)]).tolist() == [
+        True,
+        False,
+        False,
+    ]
+    assert accessible(RV_M2, readings, [InSphere(points[1], 0.01)]).tolist() == [False, True, False]
+    assert accessible(RV_M2, readings, [InSphere(points[1], 9.0, 0.01)]).tolist() == [True, False, True]
+    apex = np.array([0.0, 3.0, 0.4])
+    sees = InCone(apex, points[0] - apex, 0.05)
+    assert accessible(RV_M2, readings, [sees]).tolist() == [True, False, False]
+    assert accessible(RV_M2, readings, [either(sees, InSphere(points[1], 0.01))]).tolist() == [
+        True,
+        True,
+        False,
+    ]
+
+
+def test_limits_with_a_margin():
+    readings = np.zeros((2, 5))
+    readings[:, :3] = np.deg2rad([[149.0, 0, -10], [100.0, 0, -10]])
+    assert accessible(RV_M2, readings, [JointLimits(np.deg2rad(5.0))]).tolist() == [False, True]
+
+
+def test_the_pin_must_meet_the_panel_steeply_enough():
+    """The tool's x axis is the pin: level at home, pointing up when joint 2 is lifted."""
+    readings = np.zeros((4, 5))
+    readings[:, 1] = np.deg2rad([0.0, 14.0, 16.0, 90.0])
+    allowed = accessible(RV_M2, readings, [LeastContactAngle((0.0, 0.0, 1.0))])
+    assert allowed.tolist() == [False, False, True, True]
+
+
+def test_no_part_of_the_arm_may_be_in_the_box():
+    straight, lifted = np.zeros(5), np.array([0.0, np.pi / 2, 0, 0, 0])
+    elbow_room = KeepOut((-0.05, 0.2, 0.35), (0.05, 0.3, 0.45))
+    assert accessible(RV_M2, np.stack([straight, lifted]), [elbow_room]).tolist() == [False, True]
+
+
+def test_a_users_own_rule_and_its_shape():
+    readings = np.zeros((4, 5))
+    readings[:, 0] = [0.1, 0.2, 0.3, 0.4]
+    kept = accessible(RV_M2, readings, [lambda places: places.readings[:, 0] > 0.15, JointLimits()])
+    assert kept.tolist() == [False, True, True, True]
+    with pytest.raises(InputError, match="shape"):
+        accessible(RV_M2, readings, [lambda _: np.array([True])])
+
+
+def test_a_pool_obeys_its_box_and_rules():
+    space, low = spherical(), np.array([0.6, 0.2, -0.3])
+    high = low + np.array([0.05, 0.3, 0.3])
+    rule = InBox((-1, -1, 0.35), (1, 1, 1))
+    pool = draw_pool(space, 50, PoolOptions(rules=[rule], seed=3), box=(low, high))
+    assert len(pool) == 50
+    assert np.all((pool.coordinates >= low) & (pool.coordinates <= high))
+    assert np.all(RV_M2.position(pool.readings)[:, 2] >= 0.35)
+    again = draw_pool(space, 50, PoolOptions(rules=[rule], seed=3), box=(low, high))
+    np.testing.assert_array_equal(pool.readings, again.readings)
+
+
+def test_a_pool_that_cannot_be_filled_says_so():
+    nowhere = PoolOptions(rules=[InSphere((5.0, 0.0, 0.0), 0.1)])
+    assert len(draw_pool(JointSpace(RV_M2), 10, nowhere)) == 0
+    with pytest.raises(WorkError, match="0 of 10 poses"):
+        needed_pool(JointSpace(RV_M2), 10, nowhere)
+
+
+def test_a_space_needs_a_box():
+    with pytest.raises(UsageError, match="low"):
+        JointSpace(RV_M2, low=np.array([1.0, 1.0, 1.0]), high=np.array([0.0, 2.0, 2.0]))
+    with pytest.raises(UsageError, match="R, theta, phi"):
+        SphericalSpace(RV_M2, np.array([0.1, 0.2]), np.array([0.3, 0.4]))
