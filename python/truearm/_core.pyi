@@ -94,6 +94,46 @@ class Chain:
         """Derivative with respect to the joint values, (n, 3, J), or (n, 6, J) with `pose`; rows as above."""
 
 @final
+class Inverse:
+    """All inverse kinematics of a plain arm; readings (N,), limits included.
+
+    Raises:
+        CoreError: A shape does not fit, a target is not rigid, a seed is not finite.
+    """
+
+    def __init__(
+        self,
+        chain: Chain,
+        coupling: NDArray[np.float64],
+        back: NDArray[np.float64],
+        limits: NDArray[np.float64],
+    ) -> None:
+        """Look at an arm.
+
+        Args:
+            chain: Base to flange.
+            coupling: (N, N) joint values from readings.
+            back: (N, N) its inverse.
+            limits: (N, 2) lowest and highest reading, infinite where there is none.
+        """
+
+    @property
+    def method(self) -> str:
+        """One of "spherical wrist", "three parallel axes" and "numeric"."""
+
+    def solutions(self, target: NDArray[np.float64], turns: bool = False) -> NDArray[np.float64]:
+        """Readings (k, N) that reach a target (4, 4); with `turns` all that differ by whole turns."""
+
+    def all(self, targets: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
+        """Readings (sum of k, N) that reach targets (n, 4, 4), target by target, and each one's k."""
+
+    def near(self, targets: NDArray[np.float64], seeds: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Readings (n, N) nearest to the seeds (n, N); NaN where a target is not reached."""
+
+    def branches(self, readings: NDArray[np.float64]) -> list[tuple[bool, bool, bool | None] | None]:
+        """For each row whether the wrist is in front, the elbow up and the wrist flipped."""
+
+@final
 class MeasurementSet:
     """Measurements of n poses, as the estimators read them. SI units; NaN where nothing was measured.
 

@@ -1,9 +1,13 @@
 """Arrays that come in from outside, checked once at the door: numbers, shape, finite."""
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.errors import InputError, list_rows
+
+RIGID_WITHIN: Final = 1e-8
 
 
 def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.float64], bool]:
@@ -54,3 +58,33 @@ def frozen(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
     array = np.array(values, dtype=np.float64).reshape(shape)
     array.flags.writeable = False
     return array
+
+
+def as_transforms(values: ArrayLike, *, what: str) -> tuple[NDArray[np.float64], bool]:
+    """`values` (n, 4, 4) or (4, 4) as a C-contiguous (n, 4, 4) array of rigid transforms.
+
+    Args:
+        values: Anything NumPy makes numbers of.
+        what: What the values are, for messages, such as "poses".
+
+    Returns:
+        The array, and whether it was given as one transform.
+
+    Raises:
+        InputError: If these are no numbers, the shape is another, a value is not finite, a last row is not
+            0 0 0 1, or a rotation is not orthonormal to eight digits.
+    """
+    shape = np.shape(values)
+    if len(shape) not in {2, 3} or shape[-2:] != (4, 4):
+        raise InputError(f"{what} have shape {shape}", rule="The shape must be (4, 4) or (n, 4, 4)")
+    rows = as_rows(np.reshape(values, (-1, 16)), 16, what=what)[0].reshape(-1, 4, 4)
+    turned = rows[:, :3, :3]
+    square = np.abs(turned.transpose(0, 2, 1) @ turned - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    whole = (rows[:, 3] == [0.0, 0.0, 0.0, 1.0]).all(axis=1) & (np.linalg.det(turned) > 0.0)
+    bad = np.flatnonzero((square > RIGID_WITHIN) | ~whole)
+    if len(bad):
+        raise InputError(
+            f"{what} are not rigid in {list_rows(bad.tolist())} (counted from 0)",
+            rule="A rotation must be orthonormal without a mirror, and the last row 0 0 0 1",
+        )
+    return rows, len(shape) == 2

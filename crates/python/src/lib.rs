@@ -6,6 +6,7 @@ mod chain;
 mod door;
 mod estimate;
 mod field;
+mod inverse;
 mod measured;
 mod text;
 
@@ -23,6 +24,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::FieldFit>()?;
     module.add_class::<field::Field>()?;
     module.add_class::<field::Posterior>()?;
+    module.add_class::<inverse::Inverse>()?;
     module.add_function(wrap_pyfunction!(estimate::fit_constant, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;

@@ -1,0 +1,144 @@
+//! Between joint values and the readings a controller shows: coupling, limits and whole turns.
+
+use std::f64::consts::TAU;
+
+use crate::error::InverseError;
+
+/// How far outside its limits a reading may be found, rad or m: the rounding of a controller's numbers.
+const SLACK: f64 = 1e-9;
+/// Turns each way that are listed of a joint without limits.
+const TURNS_WITHOUT_LIMITS: f64 = 1.0;
+/// How far two readings may differ and still be one solution, rad or m.
+const SAME: f64 = 1e-6;
+
+/// Coupling and limits of an arm with J joints.
+#[derive(Debug, Clone)]
+pub struct Readings {
+    joints_from_readings: Vec<f64>,
+    readings_from_joints: Vec<f64>,
+    limits: Vec<[f64; 2]>,
+    turns: Vec<bool>,
+}
+
+impl Readings {
+    /// Couplings are J x J, row-major; `revolute` says which joint values are angles.
+    ///
+    /// # Errors
+    /// [`InverseError::Length`] if a length does not fit.
+    pub fn new(
+        joints_from_readings: Vec<f64>,
+        readings_from_joints: Vec<f64>,
+        limits: Vec<[f64; 2]>,
+        revolute: &[bool],
+    ) -> Result<Readings, InverseError> {
+        let count = revolute.len();
+        for (name, got, wanted) in [
+            ("the coupling", joints_from_readings.len(), count * count),
+            ("the inverse coupling", readings_from_joints.len(), count * count),
+            ("limits", limits.len(), count),
+        ] {
+            if got != wanted {
+                return Err(InverseError::Length { name, got, wanted });
+            }
+        }
+        let turns = (0..count)
+            .map(|j| {
+                (0..count).all(|i| {
+                    let part: f64 = joints_from_readings[i * count + j];
+                    if revolute[i] { part.fract() == 0.0 } else { part == 0.0 }
+                })
+            })
+            .collect();
+        Ok(Readings { joints_from_readings, readings_from_joints, limits, turns })
+    }
+
+    /// Number of joints.
+    pub fn count(&self) -> usize {
+        self.limits.len()
+    }
+
+    /// Lowest and highest reading of a joint, infinite where there is none.
+    pub(crate) fn limits(&self, joint: usize) -> [f64; 2] {
+        self.limits[joint]
+    }
+
+    /// Joint values of readings.
+    pub fn joints(&self, readings: &[f64]) -> Vec<f64> {
+        product(&self.joints_from_readings, readings)
+    }
+
+    /// Readings of joint values.
+    pub fn readings(&self, joints: &[f64]) -> Vec<f64> {
+        product(&self.readings_from_joints, joints)
+    }
+
+    /// The readings with each joint turned to lie within its limits and as near as can be to `near`.
+    pub(crate) fn turned(&self, readings: &[f64], near: &[f64]) -> Option<Vec<f64>> {
+        let turned = (0..self.count()).map(|j| {
+            let [low, high] = self.limits[j];
+            if !self.turns[j] {
+                return self.within(j, readings[j]);
+            }
+            let wanted = ((near[j] - readings[j]) / TAU).round();
+            let first = ((low - SLACK - readings[j]) / TAU).ceil();
+            let last = ((high + SLACK - readings[j]) / TAU).floor();
+            (first <= last).then(|| readings[j] + TAU * wanted.clamp(first, last))
+        });
+        turned.collect()
+    }
+
+    /// The middle of the limits; zero where there are none.
+    pub(crate) fn middle(&self) -> Vec<f64> {
+        let middle = |[low, high]: &[f64; 2]| {
+            if low.is_finite() && high.is_finite() { 0.5 * (low + high) } else { 0.0 }
+        };
+        self.limits.iter().map(middle).collect()
+    }
+
+    /// All readings within limits that differ from these by whole turns; none if these cannot be turned in.
+    pub(crate) fn all_turns(&self, readings: &[f64]) -> Vec<Vec<f64>> {
+        let mut found = vec![Vec::new()];
+        for (j, &reading) in readings.iter().enumerate() {
+            let choices = self.choices(j, reading);
+            found = found
+                .iter()
+                .flat_map(|start| choices.iter().map(|&choice| [start.as_slice(), &[choice]].concat()))
+                .collect();
+        }
+        found
+    }
+
+    fn choices(&self, j: usize, reading: f64) -> Vec<f64> {
+        if !self.turns[j] {
+            return self.within(j, reading).into_iter().collect();
+        }
+        let bound = TAU * TURNS_WITHOUT_LIMITS;
+        let [low, high] = self.limits[j];
+        let (low, high) = (finite_or(low, -bound), finite_or(high, bound));
+        let first = ((low - SLACK - reading) / TAU).ceil() as i64;
+        let last = ((high + SLACK - reading) / TAU).floor() as i64;
+        (first..=last).map(|k| reading + TAU * k as f64).collect()
+    }
+
+    fn within(&self, j: usize, reading: f64) -> Option<f64> {
+        let [low, high] = self.limits[j];
+        (low - SLACK <= reading && reading <= high + SLACK).then_some(reading)
+    }
+
+    /// Whether readings differ by whole turns or nothing.
+    pub(crate) fn same(&self, a: &[f64], b: &[f64]) -> bool {
+        (0..self.count()).all(|j| {
+            let apart = a[j] - b[j];
+            let apart = if self.turns[j] { apart - TAU * (apart / TAU).round() } else { apart };
+            apart.abs() < SAME
+        })
+    }
+}
+
+fn finite_or(value: f64, other: f64) -> f64 {
+    if value.is_finite() { value } else { other }
+}
+
+fn product(matrix: &[f64], vector: &[f64]) -> Vec<f64> {
+    matrix.chunks_exact(vector.len()).map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum()).collect()
+}
