@@ -104,7 +104,7 @@ def _robot(axes: list[Axis], end: Floats, *, source: str, nominal: Robot | None)
         **kept,
         source=source,
         convention="standard",
-        joints=("revolute",) * count,
+        joints=tuple(axis.kind for axis in axes),
         table=table,
         base=base,
         flange=flange,
