@@ -456,3 +456,236 @@ def splice_numbers(
     Raises:
         CoreError: Spans do not fit the text or overlap, or a number is not finite.
     """
+
+def linearise(
+    problem: Problem, parameters: NDArray[np.float64], setup: Setup
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Derivatives with respect to the problem's columns, (n, m, P), and residuals, (n, m), base frame.
+
+    The set-up is held; rows where nothing was measured are zero.
+
+    Args:
+        problem: Of points or poses, not of distances.
+        parameters: (L, 5), or (n, L, 5) where they vary.
+        setup: Frames and targets.
+    """
+
+@final
+class Network:
+    """A CMAC or FCMAC of I inputs and P outputs, after section 5 and the appendix of the paper.
+
+    Every input has a sensor: cells at equal distances between its ends, of which the c with the largest
+    grades are active. An association cell combines one cell of each sensor; the output is the centroid (A4)
+    of the weights of the A active ones. Inputs beyond a sensor's range count as its nearest end. Association
+    cells are numbered with the last input running fastest. A network does not change: training and fitting
+    make new ones.
+
+    Raises:
+        CoreError: A number is out of its range, a shape does not fit, a value is not finite.
+    """
+
+    def __init__(
+        self, sensors: Sequence[tuple[float, float, int, int]], outputs: int, options: Mapping[str, Any]
+    ) -> None:
+        """A network whose weights are zero.
+
+        Args:
+            sensors: For each input its lower and upper end, number of cells, and c, 1 to 8.
+            outputs: P.
+            options: membership "gaussian" (A3), "bspline" (degree c - 1, c from 2 to 4) or "quantised" (the
+                CMAC); sigma, in cells, of "gaussian"; composition "min" or "product"; table, the rows of a
+                hash table, or None for a row of weights for each association cell.
+        """
+
+    @property
+    def sensors(self) -> list[tuple[float, float, int, int]]:
+        """For each input its lower and upper end, number of cells, and c."""
+
+    @property
+    def outputs(self) -> int:
+        """P."""
+
+    @property
+    def sensor_cells(self) -> int:
+        """Cells of all sensors."""
+
+    @property
+    def cell_count(self) -> int:
+        """Association cells, whether or not they share rows of weights."""
+
+    @property
+    def active_count(self) -> int:
+        """A, the product of all c."""
+
+    @property
+    def table_size(self) -> int:
+        """Rows of weights."""
+
+    @property
+    def weights(self) -> NDArray[np.float64]:
+        """(table_size, P)."""
+
+    def with_weights(self, weights: NDArray[np.float64]) -> Network:
+        """The same network with other weights (table_size, P)."""
+
+    def active(self, s: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Active association cells and their excitation, (n, A) each, of inputs (n, I)."""
+
+    def output(
+        self, s: NDArray[np.float64], out: NDArray[np.float64] | None = None, threads: int | None = None
+    ) -> NDArray[np.float64]:
+        """Outputs (n, P) of inputs (n, I); into `out` if it is given. `threads` does not change them."""
+
+    def train(
+        self, s: NDArray[np.float64], ceps: NDArray[np.float64], options: Mapping[str, Any]
+    ) -> Training:
+        """Train by rule (A5) on wanted CEPs (k, P) at inputs (k, I); weights start at the mean CEPs.
+
+        Honours Ctrl-C.
+
+        Args:
+            s: Inputs.
+            ceps: m and rad.
+            options: columns (P,), parameter indices 5 * link + (theta, d, a, alpha, beta), which tell angles
+                from lengths; rate, above 0 and below 2; normalise "printed" for w += rate mu (CEP - CEP') or
+                "squares" for that times sum(mu) / sum(mu^2); tolerance, the largest difference allowed in m,
+                angles at 0.3 m; epochs at most.
+        """
+
+    def train_on_measurements(
+        self,
+        s: NDArray[np.float64],
+        jacobian: NDArray[np.float64],
+        residual: NDArray[np.float64],
+        options: Mapping[str, Any],
+    ) -> Training:
+        """Train by rule (A5) on rows as `linearise` gives them. Honours Ctrl-C.
+
+        The smallest change of CEPs that explains what is left of a pose's residual stands for CEP - CEP';
+        angles count at 0.3 m. Outputs are what is to be added to the parameters of the linearisation.
+
+        Args:
+            s: Inputs (n, I).
+            jacobian: (n, m, P).
+            residual: (n, m).
+            options: As for `train`; the tolerance is that of residuals.
+        """
+
+    def fit(
+        self,
+        s: NDArray[np.float64],
+        jacobian: NDArray[np.float64],
+        residual: NDArray[np.float64],
+        options: Mapping[str, Any],
+    ) -> NetworkFit:
+        """Fit the weights to rows as `linearise` gives them, with a roughness penalty. Honours Ctrl-C.
+
+        Args:
+            s: Inputs (n, I).
+            jacobian: (n, m, P).
+            residual: (n, m); n m is 12000 at most.
+            options: columns as for `train`; scales, standard deviations in m (angles at 0.3 m) of the noise,
+                of second differences of weights along an input, and of what has none, or None to find them by
+                maximum marginal likelihood; threads, or None for all.
+        """
+
+@final
+class Training:
+    """A trained network and how training went."""
+
+    @property
+    def network(self) -> Network:
+        """The network."""
+
+    @property
+    def epochs(self) -> int:
+        """Runs through all patterns."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether every difference is within the tolerance."""
+
+    @property
+    def reason(self) -> str:
+        """Why training ended, in words."""
+
+    @property
+    def largest(self) -> float:
+        """Largest difference left, m; angles at 0.3 m."""
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the differences left, m; angles at 0.3 m."""
+
+    @property
+    def cells_excited(self) -> int:
+        """Association cells that the patterns excite."""
+
+    @property
+    def collisions(self) -> int:
+        """How many of them share their row of weights with another one."""
+
+@final
+class NetworkFit:
+    """A network fitted to measurements."""
+
+    @property
+    def network(self) -> Network:
+        """The network."""
+
+    @property
+    def scales(self) -> tuple[float, float, float]:
+        """Standard deviations of noise, second differences and level, m."""
+
+    @property
+    def residual(self) -> NDArray[np.float64]:
+        """What the network leaves of the residuals, (n, m)."""
+
+@final
+class Choice:
+    """Chosen poses and what the choice gained. Indices are those of `observability`."""
+
+    @property
+    def chosen(self) -> list[int]:
+        """Indices into the pool, ascending."""
+
+    @property
+    def before(self) -> dict[str, float]:
+        """Indices of the start, or of candidates taken evenly from the pool."""
+
+    @property
+    def after(self) -> dict[str, float]:
+        """Indices of the chosen poses."""
+
+    @property
+    def exchanges(self) -> int:
+        """Exchanges made."""
+
+    @property
+    def well_conditioned(self) -> bool:
+        """Whether kappa is finite and within the limit; else the pool cannot be well conditioned."""
+
+def choose_poses(jacobian: NDArray[np.float64], count: int, options: Mapping[str, Any]) -> Choice:
+    """Choose poses from a pool by exchange. Honours Ctrl-C.
+
+    Args:
+        jacobian: The candidates' (N, m, P), m and rad, m from 3 to 6.
+        count: How many to choose.
+        options: columns (P,), parameter indices; criterion "kappa", "d" (determinant) or "o1" to "o5"; limit
+            of kappa(M), or None; given (k, m, P), of poses that are measured anyway, or None; start (count,)
+            int64, candidates to exchange from, or None; passes, runs through the chosen poses at most.
+
+    Raises:
+        CoreError: A number is out of its range, a shape does not fit, a value is not finite.
+    """
+
+def observability(jacobian: NDArray[np.float64], columns: Sequence[int]) -> dict[str, float]:
+    """Indices of poses with Jacobians (n, m, P).
+
+    They are of the matrix M in mm (orientations at 300 mm) per mm and 1/300 rad.
+
+    Returns:
+        kappa, the condition number of M; kappa_normal, that of M^t M, equation (4) as meant; o1 (Borm and
+        Menq), o2 (Driels and Pathre), o3 (Nahvi, Hollerbach and Hayward), o4 (Nahvi and Hollerbach), o5 (Sun
+        and Hollerbach); log_det of M^t M.
+    """

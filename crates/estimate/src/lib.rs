@@ -13,6 +13,7 @@
 
 mod alike;
 mod cancel;
+mod choice;
 mod constant;
 pub mod dense;
 mod distance;
@@ -27,6 +28,7 @@ mod packets;
 mod pass;
 mod robust;
 mod rows;
+mod scale;
 mod setup;
 mod start;
 
@@ -39,6 +41,9 @@ mod common;
 mod tests;
 
 pub use cancel::Cancel;
+pub use choice::{
+    Choice, ChoiceOptions, Criterion, Observability, choose_poses, observability, observability_of,
+};
 pub use constant::{ConstantFit, ConstantOptions, Prior, fit_constant};
 pub use distance::{Distance, DistanceTo};
 pub use error::EstimateError;
@@ -48,5 +53,6 @@ pub use measurements::{MeasurementSet, Noise};
 pub use minimise::Reason;
 pub use robust::Robust;
 pub use rows::{Linearised, Point, linearise, residuals};
+pub use scale::{ANGLE_ARM, column_unit, row_unit, scaled_jacobian};
 pub use setup::{FrameMode, GroupSetup, Setup};
 pub use start::initial_setup;

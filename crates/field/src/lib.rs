@@ -14,6 +14,7 @@ extern crate self as truearm_field;
 
 mod bank;
 mod cells;
+pub mod cmac;
 mod compiled;
 mod compiled_axis;
 mod compiled_table;

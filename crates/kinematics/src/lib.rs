@@ -10,6 +10,7 @@
 mod batch;
 mod chain;
 mod error;
+mod exponential;
 mod frame;
 mod isa;
 mod lane;
@@ -27,6 +28,7 @@ mod x86;
 pub use batch::Batch;
 pub use chain::{Chain, Convention, Joint, Link};
 pub use error::KinematicsError;
+pub use exponential::exp;
 pub use frame::LaneFrame;
 pub use isa::{InstructionSet, Isa, Kernel, dispatch, dispatch_on};
 pub use lane::{LANES, Lane};

@@ -1,10 +1,11 @@
 //! `_core.fit_constant` and its companions: constants, set-up, identifiability, residuals.
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::ndarray::Array3;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use truearm_estimate::{
     ConstantFit as Core, ConstantOptions, FrameMode, Noise, Point, Prior, Problem, Robust,
-    fit_constant as fit, identifiability as identify, residuals as left_over,
+    fit_constant as fit, identifiability as identify, linearise as linear, residuals as left_over,
 };
 
 use crate::chain::Chain;
@@ -217,4 +218,30 @@ pub fn residuals<'py>(
     let rows = quick(py, || left_over(&core, point))?;
     let width = if core.measurements.is_distances() { 1 } else { core.measurements.rows_per_pose() };
     Ok(matrix(py, &rows, width))
+}
+
+/// Derivatives with respect to the problem's columns, (n, m, P), and residuals, (n, m), base frame; set-up held.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "two arrays")]
+pub fn linearise<'py>(
+    py: Python<'py>,
+    problem: &IdentificationProblem,
+    parameters: PyReadonlyArrayDyn<'py, f64>,
+    setup: &Setup,
+) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>)> {
+    let values: Vec<f64> = parameters.as_array().iter().copied().collect();
+    let core = problem.core();
+    let (size, poses) = (core.chain.parameter_count(), core.measurements.pose_count());
+    if values.len() != size && values.len() != size * poses || core.measurements.is_distances() {
+        return Err(CoreError::new_err(format!(
+            "parameters has shape {:?}, it must hold {size} values, or as many for each pose, of points or poses",
+            parameters.shape()
+        )));
+    }
+    let point = Point { parameters: &values, setup: setup.core() };
+    let rows = py.detach(|| linear(&core, point));
+    let shape = (poses, rows.rows, core.columns.len());
+    let jacobian = Array3::from_shape_vec(shape, rows.arm)
+        .map_err(|error| CoreError::new_err(format!("the Jacobian: {error}")))?;
+    Ok((jacobian.into_pyarray(py), matrix(py, &rows.residual, rows.rows)))
 }

@@ -3,6 +3,8 @@
 use pyo3::prelude::*;
 
 mod chain;
+mod choice;
+mod cmac;
 mod door;
 mod estimate;
 mod field;
@@ -21,10 +23,17 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<measured::Setup>()?;
     module.add_class::<estimate::IdentificationProblem>()?;
     module.add_class::<estimate::ConstantFit>()?;
+    module.add_class::<choice::Choice>()?;
+    module.add_class::<cmac::Network>()?;
+    module.add_class::<cmac::TrainedNetwork>()?;
+    module.add_class::<cmac::NetworkFit>()?;
     module.add_class::<field::FieldFit>()?;
     module.add_class::<field::Field>()?;
     module.add_class::<field::Posterior>()?;
     module.add_class::<inverse::Inverse>()?;
+    module.add_function(wrap_pyfunction!(choice::choose_poses, module)?)?;
+    module.add_function(wrap_pyfunction!(choice::observability, module)?)?;
+    module.add_function(wrap_pyfunction!(estimate::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::fit_constant, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;
