@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-SPINE = ["truearm-kinematics", "truearm-estimate", "truearm-field", "truearm-python"]
+SPINE = ["truearm-kinematics", "truearm-estimate", "truearm-field", "truearm-compensate", "truearm-python"]
 BESIDE = ["truearm-text", "truearm-inverse"]
 CRATES = [SPINE[0], *BESIDE, *SPINE[1:]]
 LONGEST_FILE = 500

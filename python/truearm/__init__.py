@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from truearm.calibrating import calibrate
     from truearm.calibration import Calibration
+    from truearm.compensation import Compensated, Compensator, Refusal
     from truearm.errors import InputError, Notice, TruearmError, UsageError, WorkError
     from truearm.evaluation import Evaluation, EvaluationOptions, evaluate
+    from truearm.limits import Limits
     from truearm.measurements import Measurements
     from truearm.options import Options
     from truearm.robot import Robot
@@ -24,13 +26,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Calibration",
+    "Compensated",
+    "Compensator",
     "Evaluation",
     "EvaluationOptions",
     "HoldoutRange",
     "InputError",
+    "Limits",
     "Measurements",
     "Notice",
     "Options",
+    "Refusal",
     "Robot",
     "SplitRule",
     "TruearmError",
@@ -43,6 +49,9 @@ __all__ = [
 _HOME: Final = {
     "calibrate": "calibrating",
     "Calibration": "calibration",
+    "Compensated": "compensation",
+    "Compensator": "compensation",
+    "Refusal": "compensation",
     "InputError": "errors",
     "Notice": "errors",
     "TruearmError": "errors",
@@ -51,6 +60,7 @@ _HOME: Final = {
     "Evaluation": "evaluation",
     "EvaluationOptions": "evaluation",
     "evaluate": "evaluation",
+    "Limits": "limits",
     "Measurements": "measurements",
     "Options": "options",
     "Robot": "robot",

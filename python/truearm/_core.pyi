@@ -368,6 +368,101 @@ class Posterior:
             inputs: Joint values and features there (n, I).
         """
 
+@final
+class ArmModel:
+    """An arm as somebody believes it to be: where readings put its flange."""
+
+    def __init__(
+        self,
+        chain: Chain,
+        constants: NDArray[np.float64],
+        coupling: NDArray[np.float64],
+        field: Field | None = None,
+        feature_count: int = 0,
+        covariance: tuple[Sequence[int], NDArray[np.float64]] | None = None,
+    ) -> None:
+        """Make a model.
+
+        Args:
+            chain: It ends at the flange.
+            constants: Absolute parameters (L, 5).
+            coupling: Joint values from readings (N, N).
+            field: What is added to the constants, over joint values and features.
+            feature_count: Features of the field.
+            covariance: Ascending parameter indices (P) and their covariance (P, P).
+        """
+
+@final
+class Corrector:
+    """Finds readings for which the calibrated model puts the tool where the programming model puts it."""
+
+    def __init__(
+        self,
+        calibrated: ArmModel,
+        programming: ArmModel,
+        tool: NDArray[np.float64],
+        options: Mapping[str, Any],
+    ) -> None:
+        """Make a corrector.
+
+        Args:
+            calibrated: What the arm is.
+            programming: What the program was written for.
+            tool: flange_from_tool (4, 4).
+            options: task "pose", "axis" or "position"; moving, ascending joints from 0, or None for all;
+                joints, lowest and highest readings (N, 2) or (0, 2); and in SI, infinite for no bound:
+                largest_angle, largest_slide, largest_shift, largest_turn, largest_std, shift_change,
+                turn_change, residual, residual_turn.
+
+        Raises:
+            CoreError: If the models have different joints or an option breaks a rule.
+        """
+
+    def with_tool(self, tool: NDArray[np.float64]) -> Corrector:
+        """The same for another flange_from_tool (4, 4)."""
+
+    def path(
+        self, readings: NDArray[np.float64], features: Sequence[float], threads: int | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[tuple[int, int, str]]]:
+        """Correct readings (n, N). Honours Ctrl-C; the result does not depend on the threads.
+
+        Returns:
+            Corrected readings (n, N), NaN where refused; residual (m, rad), size of the correction (m, rad)
+            and standard deviation (m), (n, 5); refused waypoints from 0, each with number and words for why.
+        """
+
+    def one(
+        self, readings: NDArray[np.float64], features: Sequence[float]
+    ) -> tuple[NDArray[np.float64], tuple[int, str] | None]:
+        """Correct readings (N,): corrected ones, NaN if refused; then number and words for why."""
+
+@final
+class Solver:
+    """Finds readings for poses, near a seed."""
+
+    def __init__(self, model: ArmModel, tool: NDArray[np.float64], options: Mapping[str, Any]) -> None:
+        """Make a solver for flange_from_tool (4, 4); options as for Corrector."""
+
+    def solve(
+        self,
+        poses: NDArray[np.float64],
+        seed: NDArray[np.float64],
+        features: Sequence[float],
+        threads: int | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[tuple[int, int, str]]]:
+        """Readings for base_from_tool (n, 4, 4).
+
+        Args:
+            poses: Targets.
+            seed: Readings (n, N) for each, or (N,) for the first; each other one starts from the one before.
+            features: Values of the model's features.
+            threads: Bound on the threads used.
+
+        Returns:
+            Readings (n, N), NaN where there is no solution; residuals in m and rad (n, 2); those without, as
+            for Corrector.path.
+        """
+
 def fit_constant(problem: Problem, options: Mapping[str, Any]) -> ConstantFit:
     """Fit constants and set-up.
 

@@ -21,9 +21,11 @@ from truearm.fitted_rows import FittedRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.inputs import feature_columns
+from truearm.limits import Task
 from truearm.models import CONSTANT, VARIABLE, ArmModel
 from truearm.options import Options
 from truearm.robot import Robot
+from truearm.solving import solve
 from truearm.summary import summarise
 from truearm.uncertainty import ConstantSpread, Spread, VariableSpread
 from truearm.validation import Validation
@@ -201,6 +203,35 @@ class Calibration:
     ) -> Floats:
         """The same of position and rotation vector in the base frame, (n, 6), m and rad."""
         return self._std(q, tool, features, pose=True)
+
+    def solve(
+        self,
+        base_from_tool: ArrayLike,
+        seed: ArrayLike,
+        *,
+        tool: ArrayLike | None = None,
+        task: Task = "pose",
+        features: Mapping[str, float] | None = None,
+    ) -> Floats:
+        """Inverse kinematics of the calibrated arm: readings for poses, on the branch and turn of a seed.
+
+        Args:
+            base_from_tool: Targets (n, 4, 4), or (4, 4) for one.
+            seed: Readings (n, N), near which the solution of each target is looked for; or (N,), near which
+                that of the first is, and of each other one near the one before.
+            tool: Transform (4, 4) from flange to tool, or a point (3,); the robot file's by default.
+            task: "pose": position and orientation; "axis": position and the tool's z axis; "position". Where
+                the arm has more joints than that needs, the change from the seed is small.
+            features: Features by name.
+
+        Returns:
+            Readings (n, N), or (N,) for one pose.
+
+        Raises:
+            WorkError: If a pose cannot be reached within the joint limits, or only on another branch.
+            InputError: If targets, seed or tool are none.
+        """
+        return solve(self, base_from_tool, seed, tool=tool, task=task, features=features)
 
     def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)

@@ -128,6 +128,64 @@ impl Compiled {
     }
 }
 
+/// What [`Compiled::excite_and_add`] writes to, made once for many groups of poses.
+#[derive(Debug, Clone)]
+pub struct FieldScratch {
+    three: Vec<Excited<3>>,
+    four: Vec<Excited<MOST_ACTIVE>>,
+}
+
+impl Compiled {
+    /// Inputs of a configuration: joints in order, then features.
+    pub fn input_count(&self) -> usize {
+        self.input_count
+    }
+
+    /// Parameters of the chain, 5 L.
+    pub fn parameter_count(&self) -> usize {
+        self.parameter_count
+    }
+
+    /// Room for the memberships of a group.
+    pub fn scratch(&self) -> FieldScratch {
+        let count = |active: usize| if self.active == active { self.axes.len() } else { 0 };
+        FieldScratch {
+            three: vec![Excited::NONE; self.axes.len() - count(MOST_ACTIVE)],
+            four: vec![Excited::NONE; count(MOST_ACTIVE)],
+        }
+    }
+
+    /// Adds the CEPs of a group to `rows` (up to 8, 5 L): for kernels, without checks or allocation.
+    ///
+    /// `inputs` are I lanes; `scratch` is this bank's own.
+    #[inline(always)]
+    pub fn excite_and_add<I: Isa>(&self, inputs: &[Lane], scratch: &mut FieldScratch, rows: &mut [f64]) {
+        if self.active == MOST_ACTIVE {
+            self.group::<I, MOST_ACTIVE>(|input| inputs[input], &mut scratch.four, rows);
+        } else {
+            self.group::<I, 3>(|input| inputs[input], &mut scratch.three, rows);
+        }
+    }
+
+    #[inline(always)]
+    fn group<I: Isa, const K: usize>(
+        &self,
+        input: impl Fn(usize) -> Lane,
+        excited: &mut [Excited<K>],
+        rows: &mut [f64],
+    ) {
+        for (axis, excited) in self.axes.iter().zip(excited.iter_mut()) {
+            axis.excite::<I, K>(input(axis.input), excited);
+        }
+        for line in &self.lines {
+            line.add::<I, K>(excited, rows, self.parameter_count);
+        }
+        for sheet in &self.sheets {
+            sheet.add::<I, K>(excited, rows, self.parameter_count);
+        }
+    }
+}
+
 struct Evaluate<'a> {
     bank: &'a Compiled,
     values: &'a [f64],
@@ -153,19 +211,14 @@ impl Evaluate<'_> {
         let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
         let (wide, width) = (bank.input_count * LANES, bank.parameter_count);
         for (values, out) in values.chunks(wide).zip(out.chunks_mut(width * LANES)) {
-            for (axis, excited) in bank.axes.iter().zip(&mut excited) {
+            let input = |index: usize| {
                 let mut lane = Lane::ZERO;
                 for (value, pose) in lane.0.iter_mut().zip(values.chunks_exact(bank.input_count)) {
-                    *value = pose[axis.input];
+                    *value = pose[index];
                 }
-                axis.excite::<I, K>(lane, excited);
-            }
-            for line in &bank.lines {
-                line.add::<I, K>(&excited, out, width);
-            }
-            for sheet in &bank.sheets {
-                sheet.add::<I, K>(&excited, out, width);
-            }
+                lane
+            };
+            bank.group::<I, K>(input, &mut excited, out);
         }
     }
 }

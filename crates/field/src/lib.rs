@@ -43,7 +43,7 @@ mod weight_space;
 
 pub use bank::{Bank, Block};
 pub use cells::{Axis, Grid};
-pub use compiled::Compiled;
+pub use compiled::{Compiled, FieldScratch};
 pub use error::FieldError;
 pub use fit::{FieldFit, FieldOptions, fit_field, restore};
 pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME};

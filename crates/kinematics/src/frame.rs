@@ -29,7 +29,7 @@ impl LaneFrame {
 
     /// Axis k, in the base frame.
     #[inline(always)]
-    pub(crate) fn axis(&self, k: usize) -> [Lane; 3] {
+    pub fn axis(&self, k: usize) -> [Lane; 3] {
         [self.rotation[k], self.rotation[3 + k], self.rotation[6 + k]]
     }
 

@@ -1,6 +1,6 @@
 //! Eight numbers worked on at once.
 
-use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Poses in a group.
 pub const LANES: usize = 8;
@@ -28,6 +28,36 @@ impl Lane {
             *value = f(i);
         }
         Lane(out)
+    }
+
+    /// Square roots.
+    #[inline(always)]
+    pub fn sqrt(self) -> Lane {
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = self.0[i].sqrt();
+        }
+        Lane(out)
+    }
+
+    /// Where a number of `self` is below the one of `bound`, that of `yes`, else that of `no`; NaN is below nothing.
+    #[inline(always)]
+    pub fn where_below(self, bound: Lane, yes: Lane, no: Lane) -> Lane {
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = if self.0[i] < bound.0[i] { yes.0[i] } else { no.0[i] };
+        }
+        Lane(out)
+    }
+
+    /// Whether any number is below the one of `bound`.
+    #[inline(always)]
+    pub fn any_below(self, bound: Lane) -> bool {
+        let mut any = false;
+        for i in 0..LANES {
+            any |= self.0[i] < bound.0[i];
+        }
+        any
     }
 
     /// Lanes as one run of numbers.
@@ -75,6 +105,18 @@ impl Mul for Lane {
         let mut out = [0.0; LANES];
         for i in 0..LANES {
             out[i] = self.0[i] * other.0[i];
+        }
+        Lane(out)
+    }
+}
+
+impl Div for Lane {
+    type Output = Lane;
+    #[inline(always)]
+    fn div(self, other: Lane) -> Lane {
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = self.0[i] / other.0[i];
         }
         Lane(out)
     }

@@ -200,7 +200,11 @@ fn prepared<'py, D: Dimension>(
     Ok(array)
 }
 
-fn contiguous<'a, D: Dimension>(name: &str, array: &'a PyReadonlyArray<'_, f64, D>) -> PyResult<&'a [f64]> {
+/// The numbers of an array, row by row.
+pub fn contiguous<'a, D: Dimension>(
+    name: &str,
+    array: &'a PyReadonlyArray<'_, f64, D>,
+) -> PyResult<&'a [f64]> {
     if !array.is_c_contiguous() {
         return Err(not_contiguous(name));
     }
@@ -213,7 +217,8 @@ fn not_contiguous(name: &str) -> PyErr {
     ))
 }
 
-fn transform(name: &'static str, matrix: &Rows<'_>) -> PyResult<Transform> {
+/// A transform of a homogeneous matrix.
+pub fn transform(name: &'static str, matrix: &Rows<'_>) -> PyResult<Transform> {
     let shape = matrix.shape();
     let values = contiguous(name, matrix)?;
     let matrix: &[f64; 16] = values

@@ -228,6 +228,11 @@ pub struct Field {
 }
 
 impl Field {
+    /// The field prepared for evaluation, for the other bindings.
+    pub fn compiled(&self) -> &Compiled {
+        &self.compiled
+    }
+
     fn wrap(core: Bank) -> Self {
         let compiled = core.compiled();
         Self { core, compiled }

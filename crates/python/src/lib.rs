@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 mod chain;
 mod choice;
 mod cmac;
+mod compensate;
 mod door;
 mod estimate;
 mod field;
@@ -34,6 +35,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(choice::choose_poses, module)?)?;
     module.add_function(wrap_pyfunction!(choice::observability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::linearise, module)?)?;
+    module.add_class::<compensate::ArmModel>()?;
+    module.add_class::<compensate::Corrector>()?;
+    module.add_class::<compensate::Solver>()?;
     module.add_function(wrap_pyfunction!(estimate::fit_constant, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;

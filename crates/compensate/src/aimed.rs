@@ -1,0 +1,137 @@
+//! A model with a tool on its flange, evaluated for eight poses at once.
+
+use std::sync::Arc;
+
+use truearm_field::FieldScratch;
+use truearm_kinematics::{
+    Chain, Isa, Kernel, LANES, Lane, LaneFrame, LaneParameters, Screw, Transform, dispatch_on, lane_room,
+    load_lanes,
+};
+
+use crate::error::CompensateError;
+use crate::model::Model;
+
+/// A model that ends at a tool.
+#[derive(Debug, Clone)]
+pub(crate) struct Aimed {
+    pub model: Arc<Model>,
+    pub chain: Chain,
+}
+
+impl Aimed {
+    pub fn new(model: Arc<Model>, flange_from_tool: &Transform) -> Result<Self, CompensateError> {
+        flange_from_tool.check("the tool")?;
+        let chain = model.chain.with_end(model.chain.end().compose(flange_from_tool))?;
+        Ok(Self { model, chain })
+    }
+
+    pub fn scratch(&self) -> AimedScratch {
+        let (joints, width) = (self.chain.joint_count(), self.chain.parameter_count());
+        let spread = self.model.spread.as_ref().map_or(0, |spread| spread.column_count());
+        AimedScratch {
+            inputs: vec![Lane::ZERO; joints + self.model.feature_count],
+            // One group of lanes more, so that whole blocks can be read.
+            rows: vec![0.0; LANES * (width + LANES)],
+            parameters: vec![Lane::ZERO; lane_room(width)],
+            screws: vec![Screw::ZERO; joints.max(spread)],
+            field: self.model.field.as_ref().map(|field| field.scratch()),
+        }
+    }
+}
+
+/// What an evaluation writes to.
+#[derive(Debug, Clone)]
+pub(crate) struct AimedScratch {
+    /// Joint values and features.
+    pub inputs: Vec<Lane>,
+    rows: Vec<f64>,
+    parameters: Vec<Lane>,
+    pub screws: Vec<Screw>,
+    field: Option<FieldScratch>,
+}
+
+impl AimedScratch {
+    /// The features of all poses to come.
+    pub fn set_features(&mut self, joints: usize, features: &[f64]) {
+        for (lane, value) in self.inputs[joints..].iter_mut().zip(features) {
+            *lane = Lane::splat(*value);
+        }
+    }
+}
+
+impl Aimed {
+    /// The tool's frame of N readings, and its motions by the joint values in `scratch.screws`.
+    ///
+    /// `alone`: all lanes hold the same pose.
+    #[inline(always)]
+    pub fn sweep<I: Isa>(&self, readings: &[Lane], alone: bool, scratch: &mut AimedScratch) -> LaneFrame {
+        self.sweep_columns::<I>(readings, alone, self.chain.joint_columns(), scratch)
+    }
+
+    /// The same by the parameters of the given columns.
+    #[inline(always)]
+    pub fn sweep_columns<I: Isa>(
+        &self,
+        readings: &[Lane],
+        alone: bool,
+        columns: &[usize],
+        scratch: &mut AimedScratch,
+    ) -> LaneFrame {
+        self.model.coupling.joints::<I>(readings, &mut scratch.inputs[..self.chain.joint_count()]);
+        dispatch_on(I::LEVEL, Sweep { aimed: self, alone, columns: Some(columns), scratch })
+    }
+
+    /// The tool's frame alone.
+    #[inline(always)]
+    pub fn end<I: Isa>(&self, readings: &[Lane], alone: bool, scratch: &mut AimedScratch) -> LaneFrame {
+        self.model.coupling.joints::<I>(readings, &mut scratch.inputs[..self.chain.joint_count()]);
+        dispatch_on(I::LEVEL, Sweep { aimed: self, alone, columns: None, scratch })
+    }
+}
+
+/// An evaluation at `scratch.inputs`: large, and so compiled once for each instruction set and not wherever it is needed.
+struct Sweep<'a> {
+    aimed: &'a Aimed,
+    alone: bool,
+    columns: Option<&'a [usize]>,
+    scratch: &'a mut AimedScratch,
+}
+
+impl Kernel for Sweep<'_> {
+    type Output = LaneFrame;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> LaneFrame {
+        let Self { aimed: Aimed { model, chain }, alone, columns, scratch } = self;
+        let AimedScratch { inputs, rows, parameters, screws, field } = scratch;
+        if let (Some(bank), Some(room)) = (&model.field, field) {
+            let count = if alone { 1 } else { LANES };
+            let width = chain.parameter_count();
+            for row in rows.chunks_exact_mut(width).take(count) {
+                row.copy_from_slice(&model.constants);
+            }
+            bank.excite_and_add::<I>(inputs, room, &mut rows[..count * width]);
+            spread_rows::<I>(rows, width, alone, parameters);
+        }
+        let parameters = match model.field {
+            None => LaneParameters::Shared(&model.shared),
+            Some(_) => LaneParameters::Each(&parameters[..chain.parameter_count()]),
+        };
+        let joints = &inputs[..chain.joint_count()];
+        let Some(columns) = columns else { return chain.end_frame::<I>(joints, parameters) };
+        let mut frame = LaneFrame::splat(&Transform::IDENTITY);
+        chain.sweep::<I>(joints, parameters, columns, &mut frame, screws);
+        frame
+    }
+}
+
+/// Lanes of eight rows of numbers, or of one for all poses.
+#[inline(always)]
+fn spread_rows<I: Isa>(rows: &[f64], width: usize, alone: bool, lanes: &mut [Lane]) {
+    if !alone {
+        return load_lanes::<I>(rows, width, 0, lanes);
+    }
+    for (lane, value) in lanes.iter_mut().zip(&rows[..width]) {
+        *lane = Lane::splat(*value);
+    }
+}

@@ -1,0 +1,69 @@
+//! How a correction changes along a path.
+//!
+//! The shift of the tool may change by so much for each metre of the tool's way, its turn by so much for each radian
+//! that the tool turns; a radian counts as [`LEVER`] metres, so that a tool that turns on the spot may
+//! be shifted differently as well.
+
+use truearm_kinematics::LaneFrame;
+
+use crate::corrector::{Correction, Corrector, length};
+use crate::newton::LEVER;
+use crate::refusal::{Reason, Refusal};
+
+/// Waypoints further apart in a joint are no path: the arm changes its configuration between them, rad.
+const PATH_JOINT: f64 = std::f64::consts::FRAC_PI_2;
+/// Change that is always allowed, m and rad: many times what converged searches differ by.
+const ALWAYS: f64 = 1e-7;
+
+/// Correction of a waypoint, and where the program means the tool to be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mark {
+    pub correction: Correction,
+    point: [f64; 3],
+    rotation: [f64; 9],
+}
+
+impl Mark {
+    #[inline(always)]
+    pub fn new(correction: Correction, target: &LaneFrame, i: usize) -> Self {
+        let mut mark = Self { correction, point: [0.0; 3], rotation: [0.0; 9] };
+        for (value, lane) in mark.point.iter_mut().zip(&target.position) {
+            *value = lane.0[i];
+        }
+        for (value, lane) in mark.rotation.iter_mut().zip(&target.rotation) {
+            *value = lane.0[i];
+        }
+        mark
+    }
+}
+
+impl Corrector {
+    /// Whether the correction changes too fast between two waypoints, both accepted; `readings` begin with theirs.
+    pub(crate) fn refuse_change(&self, before: &Mark, after: &Mark, readings: &[f64]) -> Option<Refusal> {
+        let (limits, count) = (&self.options.limits, self.joint_count());
+        let (from, to) = (&readings[..count], &readings[count..2 * count]);
+        let refused = before.correction.refusal.is_some() || after.correction.refusal.is_some();
+        if refused || from.iter().zip(to).any(|(a, b)| (a - b).abs() > PATH_JOINT) {
+            return None;
+        }
+        let way = apart(&before.point, &after.point);
+        let turned = chord(&before.rotation, &after.rotation);
+        let shift = apart(&before.correction.shift, &after.correction.shift);
+        let turn = apart(&before.correction.turn, &after.correction.turn);
+        let shift_limit = limits.shift_change * (way + LEVER * turned) + ALWAYS;
+        let turn_limit = limits.turn_change * (turned + way / LEVER) + ALWAYS;
+        if shift > shift_limit {
+            return Some(Refusal::new(Reason::ShiftChange, shift, shift_limit));
+        }
+        (turn > turn_limit).then(|| Refusal::new(Reason::TurnChange, turn, turn_limit))
+    }
+}
+
+fn apart(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    length(&[b[0] - a[0], b[1] - a[1], b[2] - a[2]])
+}
+
+/// Twice the sine of half the angle between two rotations, which is the angle but for the third order.
+fn chord(a: &[f64; 9], b: &[f64; 9]) -> f64 {
+    (0.5 * a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>()).sqrt()
+}

@@ -1,0 +1,50 @@
+//! From readings to Denavit-Hartenberg joint values: q_dh = C reading.
+
+use truearm_kinematics::{Isa, Lane, Screw};
+
+/// C, with the case of no coupling apart.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Coupling {
+    /// Readings are joint values.
+    None,
+    /// N x N, row-major.
+    Matrix(Vec<f64>),
+}
+
+impl Coupling {
+    pub fn new(matrix: &[f64], count: usize) -> Self {
+        let unit = |(k, &value): (usize, &f64)| value == f64::from(u8::from(k / count == k % count));
+        if matrix.iter().enumerate().all(unit) { Self::None } else { Self::Matrix(matrix.to_vec()) }
+    }
+
+    /// Joint values of N readings.
+    #[inline(always)]
+    pub fn joints<I: Isa>(&self, readings: &[Lane], joints: &mut [Lane]) {
+        match self {
+            Self::None => joints.copy_from_slice(readings),
+            Self::Matrix(matrix) => {
+                for (joint, row) in joints.iter_mut().zip(matrix.chunks_exact(readings.len())) {
+                    *joint = Lane::ZERO;
+                    for (reading, factor) in readings.iter().zip(row) {
+                        *joint = I::mul_add(*reading, Lane::splat(*factor), *joint);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Motion of the end by reading k, from the motions by all joint values.
+    #[inline(always)]
+    pub fn screw<I: Isa>(&self, screws: &[Screw], k: usize) -> Screw {
+        let Self::Matrix(matrix) = self else { return screws[k] };
+        let mut sum = Screw::ZERO;
+        for (screw, row) in screws.iter().zip(matrix.chunks_exact(screws.len())) {
+            let factor = Lane::splat(row[k]);
+            for i in 0..3 {
+                sum.angular[i] = I::mul_add(screw.angular[i], factor, sum.angular[i]);
+                sum.linear[i] = I::mul_add(screw.linear[i], factor, sum.linear[i]);
+            }
+        }
+        sum
+    }
+}

@@ -1,0 +1,69 @@
+//! What a model, a corrector or an array can have wrong.
+
+use truearm_kinematics::KinematicsError;
+
+/// Why a corrector could not be made, or a path not be worked on at all.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CompensateError {
+    /// Array lengths that contradict each other.
+    #[error("{what} has {found} values where {expected} are needed")]
+    Length {
+        /// The array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length needed.
+        expected: usize,
+    },
+    /// A number that is NaN or infinite.
+    #[error("{what} holds {value}, its numbers must be finite")]
+    NotFinite {
+        /// The array.
+        what: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// A bound that bounds nothing.
+    #[error("{what} is {value}, it must be positive; infinity switches it off")]
+    Bound {
+        /// The bound.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Moving joints that the arm does not have, or none.
+    #[error("joints {moving:?} (from 0) are to move, it must be some of the arm's {joints}, ascending")]
+    Moving {
+        /// What was given.
+        moving: Vec<usize>,
+        /// Joints of the arm.
+        joints: usize,
+    },
+    /// Two models of arms that differ in their joints.
+    #[error("the programming model has {programming} joints and the calibrated one {calibrated}")]
+    Joints {
+        /// Joints of the one.
+        programming: usize,
+        /// Joints of the other.
+        calibrated: usize,
+    },
+    /// The work was interrupted.
+    #[error("the work was interrupted")]
+    Cancelled,
+    /// The chain refused its input.
+    #[error(transparent)]
+    Kinematics(#[from] KinematicsError),
+}
+
+/// Check the length of an array.
+pub(crate) fn check_length(what: &'static str, found: usize, expected: usize) -> Result<(), CompensateError> {
+    if found == expected { Ok(()) } else { Err(CompensateError::Length { what, found, expected }) }
+}
+
+/// Check that all numbers are finite.
+pub(crate) fn check_finite(what: &'static str, values: &[f64]) -> Result<(), CompensateError> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(&value) => Err(CompensateError::NotFinite { what, value }),
+        None => Ok(()),
+    }
+}

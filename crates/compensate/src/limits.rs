@@ -1,0 +1,101 @@
+//! What a correction may be.
+
+use truearm_kinematics::Chain;
+
+use crate::error::CompensateError;
+use crate::newton::{LEVER, Plan};
+use crate::refusal::{Reason, Refusal};
+
+/// Bounds of a correction; infinity switches one off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limits {
+    /// Lowest and highest reading of each joint, rad or m; empty for none.
+    pub joints: Vec<[f64; 2]>,
+    /// Largest change of a revolute joint's reading, rad.
+    pub largest_angle: f64,
+    /// Largest change of a prismatic joint's reading, m.
+    pub largest_slide: f64,
+    /// Largest shift of the tool, m.
+    pub largest_shift: f64,
+    /// Largest turn of the tool, rad.
+    pub largest_turn: f64,
+    /// Largest standard deviation of the tool's position, m.
+    pub largest_std: f64,
+    /// Largest change of the shift along a path, m per m.
+    pub shift_change: f64,
+    /// Largest change of the turn along a path, rad per rad.
+    pub turn_change: f64,
+    /// How far from its target the tool may stay, m.
+    pub residual: f64,
+    /// How far it may stay turned from it, rad; with fewer than six joints, which cannot meet every orientation,
+    /// `largest_turn` counts.
+    pub residual_turn: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            joints: Vec::new(),
+            largest_angle: 3.0_f64.to_radians(),
+            largest_slide: 10e-3,
+            largest_shift: 5e-3,
+            largest_turn: 1.0_f64.to_radians(),
+            largest_std: f64::INFINITY,
+            shift_change: 0.05,
+            turn_change: 0.05,
+            residual: 1e-9,
+            residual_turn: 1e-9,
+        }
+    }
+}
+
+impl Limits {
+    pub(crate) fn check(&self, joints: usize) -> Result<(), CompensateError> {
+        if !self.joints.is_empty() && self.joints.len() != joints {
+            let (found, expected) = (self.joints.len(), joints);
+            return Err(CompensateError::Length { what: "the joint limits", found, expected });
+        }
+        let bounds = [
+            ("the largest joint correction", self.largest_angle),
+            ("the largest joint correction", self.largest_slide),
+            ("the largest shift", self.largest_shift),
+            ("the largest turn", self.largest_turn),
+            ("the largest standard deviation", self.largest_std),
+            ("the largest change of the shift", self.shift_change),
+            ("the largest change of the turn", self.turn_change),
+            ("the residual", self.residual),
+            ("the residual turn", self.residual_turn),
+        ];
+        match bounds.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
+            Some((what, value)) => Err(CompensateError::Bound { what, value }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Limits {
+    /// Whether the tool stays too far from its target, m and rad.
+    pub(crate) fn refuse_residual(&self, plan: &Plan, residual: [f64; 2]) -> Option<Refusal> {
+        let turn = if plan.turn_weight < LEVER { self.largest_turn } else { self.residual_turn };
+        Refusal::above(Reason::PositionNotReached, residual[0], self.residual)
+            .or_else(|| Refusal::above(Reason::OrientationNotReached, residual[1], turn))
+    }
+
+    /// The first joint whose reading is beyond its limits.
+    pub(crate) fn refuse_reading(&self, chain: &Chain, reading: impl Fn(usize) -> f64) -> Option<Refusal> {
+        for (joint, [low, high]) in self.joints.iter().enumerate() {
+            let value = reading(joint);
+            if value < *low || value > *high {
+                let limit = if value < *low { *low } else { *high };
+                let slides = slides(chain, joint);
+                return Some(Refusal { reason: Reason::JointLimit, joint: joint + 1, value, limit, slides });
+            }
+        }
+        None
+    }
+}
+
+/// Whether a joint, from 0, is a prismatic one.
+pub(crate) fn slides(chain: &Chain, joint: usize) -> bool {
+    chain.joint_columns()[joint] % 5 == 1
+}

@@ -1,0 +1,109 @@
+//! How uncertain a model is of where it puts the tool.
+
+use truearm_kinematics::{Isa, Lane};
+
+use crate::aimed::{Aimed, AimedScratch};
+use crate::error::{CompensateError, check_finite, check_length};
+use crate::model::Model;
+
+/// What is left of a variance by less than this part is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Standard deviation of the tool's position: the root of the sum of the variances of x, y and z.
+#[derive(Debug, Clone)]
+pub enum Spread {
+    /// The covariance of some parameters: exact for a model with constants alone.
+    Constant(ConstantSpread),
+}
+
+/// Covariance of some of the parameters, as a factor whose product with itself it is.
+#[derive(Debug, Clone)]
+pub struct ConstantSpread {
+    columns: Vec<usize>,
+    /// Lower triangle, row by row: the covariance is F F^T.
+    factor: Vec<f64>,
+}
+
+impl ConstantSpread {
+    /// From the covariance (P, P), row-major, of the parameters `columns` (P ascending indices, 5 link + k).
+    ///
+    /// # Errors
+    /// [`CompensateError::Length`] and [`CompensateError::NotFinite`].
+    pub fn new(columns: Vec<usize>, covariance: &[f64]) -> Result<ConstantSpread, CompensateError> {
+        let count = columns.len();
+        check_length("the covariance", covariance.len(), count * count)?;
+        check_finite("the covariance", covariance)?;
+        Ok(ConstantSpread { factor: semidefinite_factor(covariance, count), columns })
+    }
+
+    /// Variance of the end's position: |J F|^2.
+    #[inline(always)]
+    fn variance<I: Isa>(&self, scratch: &AimedScratch) -> Lane {
+        let mut sum = Lane::ZERO;
+        for column in 0..self.columns.len() {
+            let mut motion = [Lane::ZERO; 3];
+            for (row, screw) in scratch.screws[..self.columns.len()].iter().enumerate().skip(column) {
+                let factor = Lane::splat(self.factor[row * (row + 1) / 2 + column]);
+                for i in 0..3 {
+                    motion[i] = I::mul_add(screw.linear[i], factor, motion[i]);
+                }
+            }
+            for value in motion {
+                sum = I::mul_add(value, value, sum);
+            }
+        }
+        sum
+    }
+}
+
+impl Spread {
+    pub(crate) fn check(&self, model: &Model) -> Result<(), CompensateError> {
+        let Self::Constant(spread) = self;
+        let (last, all) = (spread.columns.last().map_or(0, |last| last + 1), model.chain.parameter_count());
+        if last > all || !spread.columns.is_sorted_by(|a, b| a < b) {
+            return Err(CompensateError::Length {
+                what: "the covariance's parameters",
+                found: last,
+                expected: all,
+            });
+        }
+        Ok(())
+    }
+
+    pub(crate) fn column_count(&self) -> usize {
+        let Self::Constant(spread) = self;
+        spread.columns.len()
+    }
+
+    /// Standard deviation of the tool's position, m, at N readings.
+    #[inline(always)]
+    pub(crate) fn at<I: Isa>(
+        &self,
+        aimed: &Aimed,
+        readings: &[Lane],
+        alone: bool,
+        scratch: &mut AimedScratch,
+    ) -> Lane {
+        let Self::Constant(spread) = self;
+        aimed.sweep_columns::<I>(readings, alone, &spread.columns, scratch);
+        spread.variance::<I>(scratch).sqrt()
+    }
+}
+
+/// Cholesky's factor, with zeros where a parameter adds nothing to those before it.
+fn semidefinite_factor(covariance: &[f64], count: usize) -> Vec<f64> {
+    let mut factor = vec![0.0_f64; count * (count + 1) / 2];
+    let at = |i: usize, j: usize| i * (i + 1) / 2 + j;
+    for j in 0..count {
+        let known: f64 = (0..j).map(|k| factor[at(j, k)].powi(2)).sum();
+        let left = covariance[j * count + j] - known;
+        let pivot = if left > ROUNDING * covariance[j * count + j] { left.sqrt() } else { 0.0 };
+        factor[at(j, j)] = pivot;
+        for i in j + 1..count {
+            let known: f64 = (0..j).map(|k| factor[at(i, k)] * factor[at(j, k)]).sum();
+            let left = covariance[i * count + j] - known;
+            factor[at(i, j)] = if pivot > 0.0 { left / pivot } else { 0.0 };
+        }
+    }
+    factor
+}

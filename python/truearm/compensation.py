@@ -1,0 +1,204 @@
+"""Compensation: readings to command so that the real tool goes where the program means it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm._core import CoreError, Corrector, Solver
+from truearm.arrays import as_rows
+from truearm.calibration import Calibration
+from truearm.endpoints import at_tool
+from truearm.errors import InputError, WorkError
+from truearm.limits import Limits, Task
+from truearm.robot import Robot
+from truearm.solving import as_poses, as_seed, calibrated_model, core_options, feature_values, plain_model
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+TO_SHOWN = np.array([MM_PER_METRE, 1e3, MM_PER_METRE, 1e3, MM_PER_METRE])
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A waypoint that must not be corrected.
+
+    Attributes:
+        number: Which, from 1.
+        reason: Why, for people.
+        code: Why, for programs: 1 not finite, 2 position or 3 orientation not reached, 4 joint limit, 5 joint
+            correction, 6 shift, 7 turn, 8 standard deviation, 9 change of the shift or 10 of the turn along
+            the path, 11 another branch.
+    """
+
+    number: int
+    reason: str
+    code: int
+
+
+@dataclass(frozen=True, eq=False)
+class Compensated:
+    """Corrected waypoints.
+
+    Attributes:
+        q: Corrected readings (n, N), rad and m; NaN where the waypoint is refused.
+        nominal: Readings (n, N) that were corrected: the program's, or the programming model's for its poses.
+        residual_mm: How far from its target the calibrated model puts the tool, (n,).
+        residual_mrad: How far turned from it, (n,).
+        correction_mm: How far the correction shifts the tool, (n,), as the programming model sees it.
+        correction_mrad: How far it turns it, (n,).
+        std_mm: Standard deviation of the tool's position, (n,): root of the sum of the variances of x, y, z.
+        refusals: The refused waypoints, ascending.
+    """
+
+    q: Floats
+    nominal: Floats
+    residual_mm: Floats
+    residual_mrad: Floats
+    correction_mm: Floats
+    correction_mrad: Floats
+    std_mm: Floats
+    refusals: tuple[Refusal, ...]
+
+    @cached_property
+    def refused(self) -> NDArray[np.bool_]:
+        """Which waypoints are refused, (n,)."""
+        refused = np.zeros(len(self.q), dtype=np.bool_)
+        refused[[refusal.number - 1 for refusal in self.refusals]] = True
+        return refused
+
+
+class Compensator:
+    """Corrects what a program says for the arm that will run it.
+
+    The corrected readings q^c put the tool of the calibrated arm where the programming model puts it for the
+    program's readings q^n: equation (3) of the paper, q^c = q^n - dq, carried to convergence.
+
+    Attributes:
+        calibration: The calibrated model.
+        programming: The model that the program was written with.
+        task: "pose": position and orientation; "axis": position and the tool's z axis; "position". With fewer
+            moving joints than that needs, the position is met first and the rest as near as the arm can.
+        limits: Bounds of the correction.
+    """
+
+    def __init__(
+        self,
+        calibration: Calibration,
+        *,
+        programming: Robot | None = None,
+        task: Task = "pose",
+        moving: Sequence[int] | None = None,
+        limits: Limits | None = None,
+        features: Mapping[str, float] | None = None,
+    ) -> None:
+        """Prepare a compensation.
+
+        Args:
+            calibration: What the arm is.
+            programming: What the program's author took it for; the calibration's nominal robot by default.
+            task: What is to be met.
+            moving: Joints that may change, counted from 1; all by default. Where they are more than the task
+                needs, the change is the smallest.
+            limits: Bounds; Limits() by default.
+            features: Values of the features that the calibration depends on.
+
+        Raises:
+            UsageError: If the task, a joint or the features are not those of the arm and the calibration.
+            InputError: If the programming model is of another arm.
+        """
+        self.calibration = calibration
+        self.programming = programming or calibration.robot
+        self.task: Task = task
+        self.limits = limits or Limits()
+        if self.programming.joints != calibration.robot.joints:
+            raise InputError(
+                f"the programming model {self.programming.name} has joints {self.programming.joints}",
+                rule=f"{calibration.robot.name} was calibrated with {calibration.robot.joints}",
+            )
+        self._options = core_options(calibration.robot, task, moving, self.limits)
+        self._features = feature_values(calibration, features)
+        self._programming = plain_model(self.programming)
+        self._calibrated = calibrated_model(calibration)
+        self._correctors: dict[bytes, Corrector] = {}
+
+    def joints(self, q: ArrayLike, *, tool: ArrayLike | None = None) -> Compensated:
+        """Correct the joint targets of a path.
+
+        Args:
+            q: Readings (n, N) of the program, or (N,) for one.
+            tool: flange_from_tool (4, 4), or a point (3,); the programming model's own by default.
+
+        Raises:
+            InputError: If the readings or the tool are none.
+        """
+        rows, _ = as_rows(q, self.programming.joint_count, what="joint readings")
+        return self._corrected(rows, self._tool(tool), {})
+
+    def poses(
+        self, base_from_tool: ArrayLike, seed: ArrayLike, *, tool: ArrayLike | None = None
+    ) -> Compensated:
+        """Correct the Cartesian targets of a path: the programming model's readings for them, corrected.
+
+        Args:
+            base_from_tool: Targets (n, 4, 4), or (4, 4) for one.
+            seed: Readings (n, N), near which the solution of each target is looked for; or (N,), near which
+                that of the first is, and of each other one near the one before. Branch and turn are kept.
+            tool: As for `joints`.
+
+        Raises:
+            InputError: If targets, seed or tool are none.
+        """
+        poses, _ = as_poses(base_from_tool)
+        seeds, flange_from_tool = as_seed(self.programming, seed, len(poses)), self._tool(tool)
+        options = core_options(self.programming, self.task, None, self.limits)
+        try:
+            solver = Solver(self._programming, flange_from_tool, options)
+            rows, _, refused = solver.solve(poses, seeds, [])
+        except CoreError as error:
+            raise InputError(str(error)) from None
+        unsolved = {place: Refusal(place + 1, reason, code) for place, code, reason in refused}
+        return self._corrected(rows, flange_from_tool, unsolved)
+
+    def correct(self, q: ArrayLike, *, tool: ArrayLike | None = None) -> Floats:
+        """Correct one waypoint, readings (N,), in microseconds; the path it may belong to is not looked at.
+
+        Raises:
+            WorkError: If it is refused.
+            InputError: If the readings or the tool are none.
+        """
+        try:
+            readings = np.ascontiguousarray(q, dtype=np.float64)
+            corrected, refusal = self._corrector(self._tool(tool)).one(readings, self._features)
+        except (TypeError, ValueError) as error:
+            raise InputError(str(error), where="joint readings") from None
+        if refusal is not None:
+            raise WorkError(refusal[1], where="waypoint")
+        return corrected
+
+    def _tool(self, tool: ArrayLike | None) -> Floats:
+        return self.programming.tool if tool is None else at_tool(self.programming, tool)
+
+    def _corrector(self, flange_from_tool: Floats) -> Corrector:
+        key = flange_from_tool.tobytes()
+        if key not in self._correctors:
+            tool = np.ascontiguousarray(flange_from_tool)
+            self._correctors[key] = Corrector(self._calibrated, self._programming, tool, self._options)
+        return self._correctors[key]
+
+    def _corrected(
+        self, rows: Floats, flange_from_tool: Floats, unsolved: Mapping[int, Refusal]
+    ) -> Compensated:
+        try:
+            corrector = self._corrector(flange_from_tool)
+        except CoreError as error:
+            raise InputError(str(error)) from None
+        q, numbers, refused = corrector.path(rows, self._features)
+        residual, turned, shift, turn, std = (numbers * TO_SHOWN).T
+        refusals = (
+            unsolved.get(place) or Refusal(place + 1, reason, code) for place, code, reason in refused
+        )
+        return Compensated(q, rows, residual, turned, shift, turn, std, tuple(refusals))

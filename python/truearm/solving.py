@@ -1,0 +1,133 @@
+"""Models of an arm in the core's terms, and readings for poses: inverse kinematics from a seed."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm._core import ArmModel, CoreError, Solver
+from truearm.arrays import as_rows, check_finite
+from truearm.endpoints import at_tool
+from truearm.errors import InputError, UsageError, WorkError, list_rows
+from truearm.inputs import feature_columns
+from truearm.limits import TASKS, Limits, Task
+from truearm.robot import Robot
+from truearm.uncertainty import ConstantSpread
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
+
+Floats = NDArray[np.float64]
+
+
+def plain_model(robot: Robot) -> ArmModel:
+    """The arm as its file describes it."""
+    return ArmModel(robot.flange_chain, robot.table, robot.coupling)
+
+
+def calibrated_model(calibration: "Calibration") -> ArmModel:
+    """The arm as identified, with what is known of its uncertainty."""
+    model, spread = calibration.model, ConstantSpread.of(calibration)
+    return ArmModel(
+        calibration.arm.flange_chain,
+        model.constants,
+        calibration.robot.coupling,
+        model.field,
+        len(calibration.options.features) if model.field is not None else 0,
+        (spread.columns, np.ascontiguousarray(spread.of_constants)),
+    )
+
+
+def core_options(robot: Robot, task: Task, moving: Sequence[int] | None, limits: Limits) -> dict[str, Any]:
+    """The core's options, with joints counted from 0.
+
+    Raises:
+        UsageError: If there is no such task or joint.
+    """
+    if task not in TASKS:
+        raise UsageError(f'"{task}" is not known', where="task", rule=f"One of {', '.join(TASKS)}")
+    if moving is not None and (not moving or not set(moving) <= set(range(1, robot.joint_count + 1))):
+        raise UsageError(
+            f"joints {list(moving)}",
+            where="moving",
+            rule=f"Some of the joints 1 to {robot.joint_count} of {robot.name}",
+        )
+    chosen = None if moving is None else sorted({joint - 1 for joint in moving})
+    return {"task": task, "moving": chosen, **limits.core(robot)}
+
+
+def feature_values(calibration: "Calibration", given: Mapping[str, float] | None) -> list[float]:
+    """The features of a calibration, one number each.
+
+    Raises:
+        UsageError: If one is missing, or is not needed.
+    """
+    names = calibration.options.features if calibration.model.field is not None else ()
+    return [float(value) for value in feature_columns(given, names, 1)[0]]
+
+
+def as_poses(base_from_tool: ArrayLike) -> tuple[Floats, bool]:
+    """Poses (n, 4, 4) or (4, 4) as a C-contiguous (n, 4, 4) array, and whether it was one.
+
+    Raises:
+        InputError: If the shape is another, a number is not finite, or a last row is not 0 0 0 1.
+    """
+    try:
+        poses = np.ascontiguousarray(base_from_tool, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the poses are not numbers: {error}") from None
+    single = poses.ndim == 2
+    poses = poses[None] if single else poses
+    if poses.ndim != 3 or poses.shape[1:] != (4, 4):
+        raise InputError(f"the poses have shape {np.shape(base_from_tool)}", rule="(n, 4, 4), or (4, 4)")
+    check_finite(poses, what="the poses")
+    if (poses[:, 3] != [0.0, 0.0, 0.0, 1.0]).any():
+        raise InputError("the last row of a pose is not 0 0 0 1", rule="Poses are homogeneous matrices")
+    return poses, single
+
+
+def as_seed(robot: Robot, seed: ArrayLike, count: int) -> Floats:
+    """A seed (N,) for a path, or (count, N) for each pose.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    rows, single = as_rows(seed, robot.joint_count, what="seed readings")
+    if single:
+        return rows.reshape(-1)
+    if len(rows) != count:
+        raise InputError(
+            f"{len(rows)} seeds for {count} poses",
+            rule="One for each, or one for the first: the others then follow each other",
+        )
+    return rows
+
+
+def solve(
+    calibration: "Calibration",
+    base_from_tool: ArrayLike,
+    seed: ArrayLike,
+    *,
+    tool: ArrayLike | None,
+    task: Task,
+    features: Mapping[str, float] | None,
+) -> Floats:
+    """Readings for which the calibrated arm puts the tool at poses, see Calibration.solve."""
+    robot = calibration.robot
+    poses, single = as_poses(base_from_tool)
+    seeds = as_seed(robot, seed, len(poses))
+    options = core_options(robot, task, None, Limits())
+    values = feature_values(calibration, features)
+    try:
+        solver = Solver(calibrated_model(calibration), at_tool(robot, tool), options)
+        readings, _, refused = solver.solve(poses, seeds, values)
+    except CoreError as error:
+        raise InputError(str(error)) from None
+    if refused:
+        raise WorkError(
+            f"{list_rows([place + 1 for place, _, _ in refused], 'pose')} cannot be reached: {refused[0][2]}",
+            rule="A solution lies within the joint limits, on the seed's branch and turn",
+            way_out="Give a seed nearer to the solution",
+        )
+    return readings[0] if single else readings
