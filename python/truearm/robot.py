@@ -17,7 +17,7 @@ from truearm.library import library_text
 from truearm.robot_checks import check_sizes
 from truearm.robot_data import Floats, RobotData
 from truearm.robot_file import parse_robot_file
-from truearm.urdf import read_urdf
+from truearm.urdf import UrdfChain, read_urdf, urdf_chain
 
 URDF_ENDINGS: Final = (".urdf", ".xml")
 
@@ -84,10 +84,24 @@ class Robot(RobotData):
         Raises:
             InputError: If the file is no URDF, or the chain is not told, or is not serial.
         """
-        chain = read_urdf(Path(path), base_link, tip_link)
+        return cls._from_chain(read_urdf(Path(path), base_link, tip_link), Path(path).name)
+
+    @classmethod
+    def from_urdf_text(
+        cls, text: str, base_link: str | None = None, tip_link: str | None = None, *, where: str = "URDF"
+    ) -> "Robot":
+        """The same from the text of a URDF; `where` names it in messages.
+
+        Raises:
+            InputError: As :meth:`from_urdf`.
+        """
+        return cls._from_chain(urdf_chain(text, base_link, tip_link, where=where), where)
+
+    @classmethod
+    def _from_chain(cls, chain: UrdfChain, where: str) -> "Robot":
         return cls(
             name=chain.name,
-            source=f"{Path(path).name}, {chain.base_link} to {chain.tip_link}",
+            source=f"{where}, {chain.names.base_link} to {chain.names.tip_link}",
             convention="standard",
             joints=chain.joints,
             table=chain.table,
@@ -97,6 +111,7 @@ class Robot(RobotData):
             base_row=None,
             coupling=np.eye(len(chain.joints)),
             limits=chain.limits,
+            urdf_names=chain.names,
         )
 
     def __eq__(self, other: object) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import frozen
 from truearm.errors import InputError
+from truearm.urdf_names import UrdfNames
 
 Convention = Literal["standard", "modified"]
 Joint = Literal["revolute", "prismatic"]
@@ -49,6 +50,7 @@ class RobotData:
         coupling: Joint values from readings (N, N), directions included.
         limits: Lowest and highest reading (N, 2); infinite where there is none.
         payload: What the arm carried, if stated.
+        urdf_names: Names of its links and joints, if it was read from a URDF.
     """
 
     name: str
@@ -63,6 +65,7 @@ class RobotData:
     coupling: Floats
     limits: Floats
     payload: Payload | None = None
+    urdf_names: UrdfNames | None = None
 
     def __post_init__(self) -> None:
         n = len(self.joints)

@@ -1,6 +1,7 @@
 """A Robot as JSON values, and back, bit for bit."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.robot_data import Payload, RobotData
+from truearm.urdf_names import UrdfNames
 
 TEXTS: Final = ("name", "source", "convention")
 ARRAYS: Final = ("table", "base", "flange", "tool", "coupling")
@@ -28,6 +30,8 @@ def to_dict(robot: RobotData) -> dict[str, Any]:
             "mass_kg": payload.mass_kg,
             "centre_of_gravity_mm": None if centre is None else list(centre),
         }
+    if robot.urdf_names is not None:
+        content["urdf_names"] = asdict(robot.urdf_names)
     return content
 
 
@@ -52,6 +56,10 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
         centre = payload["centre_of_gravity_mm"]
         payload = Payload(payload["mass_kg"], None if centre is None else tuple(centre))
     fields["payload"] = payload
+    names = content.get("urdf_names")
+    if names is not None:
+        listed = {key: tuple(value) if isinstance(value, list) else value for key, value in names.items()}
+        fields["urdf_names"] = UrdfNames(**listed)
     return fields
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from truearm.dh_from_axes import Axis, dh_from_axes
 from truearm.errors import InputError, did_you_mean, list_names
 from truearm.files import read_text
+from truearm.urdf_names import UrdfNames
 
 Floats = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic"]
@@ -32,8 +33,7 @@ class UrdfChain:
 
     Attributes:
         name: Name of the robot in the file.
-        base_link: First link of the chain.
-        tip_link: Last link of the chain.
+        names: Names of the chain's links and joints.
         joints: Kind of each of the N joints that move.
         table: Parameters (N, 5).
         base: Transform (4, 4) from the base link to the first row.
@@ -42,8 +42,7 @@ class UrdfChain:
     """
 
     name: str
-    base_link: str
-    tip_link: str
+    names: UrdfNames
     joints: tuple[Kind, ...]
     table: Floats
     base: Floats
@@ -58,14 +57,23 @@ def read_urdf(path: Path, base_link: str | None = None, tip_link: str | None = N
         InputError: If the file is no URDF, a link is unknown, several leaves leave the tip open, or
             the chain has no joint that moves or one that is neither revolute nor prismatic.
     """
+    return urdf_chain(read_text(path), base_link, tip_link, where=str(path))
+
+
+def urdf_chain(text: str, base_link: str | None, tip_link: str | None, *, where: str) -> UrdfChain:
+    """The same of the text of a URDF; `where` names it in messages.
+
+    Raises:
+        InputError: As :func:`read_urdf`.
+    """
     try:
-        return _read(path, base_link, tip_link)
+        return _read(text, base_link, tip_link)
     except InputError as error:
-        raise error if error.where.startswith(str(path)) else error.at(str(path)) from None
+        raise error.at(where) from None
 
 
-def _read(path: Path, base_link: str | None, tip_link: str | None) -> UrdfChain:
-    robot = _parse(read_text(path))
+def _read(text: str, base_link: str | None, tip_link: str | None) -> UrdfChain:
+    robot = _parse(text)
     joint_to = {joint.child: joint for joint in robot.joints}
     parents = {joint.parent for joint in robot.joints}
     links = [link.name for link in robot.links]
@@ -81,15 +89,20 @@ def _read(path: Path, base_link: str | None, tip_link: str | None) -> UrdfChain:
     if not axes:
         raise InputError(f'no joint moves between "{base}" and "{tip}"')
     base_transform, table, flange = dh_from_axes(axes, base_from_tip)
+    moving = [joint for joint in joints if joint.type in MOVING]
     return UrdfChain(
         name=robot.name,
-        base_link=base,
-        tip_link=tip,
+        names=UrdfNames(
+            base_link=base,
+            joints=tuple(joint.name for joint in moving),
+            links=tuple(joint.child for joint in moving),
+            tip_link=tip,
+        ),
         joints=tuple(axis.kind for axis in axes),
         table=table,
         base=base_transform,
         flange=flange,
-        limits=np.array([_limits(joint) for joint in joints if joint.type in MOVING]),
+        limits=np.array([_limits(joint) for joint in moving]),
     )
 
 

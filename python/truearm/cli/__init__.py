@@ -17,6 +17,7 @@ COMMANDS: Final = (
     Entry("import", "truearm.cli.import_", "Bring in other people's measurement tables."),
     Entry("calibrate", "truearm.cli.calibrate", "Learn an arm's parameters and validate them."),
     Entry("evaluate", "truearm.cli.evaluate", "Errors of a calibration on other measurements."),
+    Entry("export", "truearm.cli.export", "A calibration as URDF, D-H table or samples."),
 )
 
 

@@ -1,0 +1,82 @@
+"""`truearm export`: a calibration for other software."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truearm.calibration import Calibration
+from truearm.cli.console import print_json, say, say_wrapped
+from truearm.exporting import Options, export
+from truearm.exporting.field_grid import features_of
+
+
+def command(
+    calibration: Annotated[
+        Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
+    ],
+    to: Annotated[
+        str,
+        typer.Option("--to", metavar="FORMAT", help="urdf, ur-yaml, dh-toml, dh-json, dh-csv, field-csv."),
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The file to write.")],
+    urdf: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE[#TIP]", help="urdf: correct this URDF's chain and keep the rest of it, meshes too."
+        ),
+    ] = None,
+    kinematics_hash: Annotated[
+        str | None,
+        typer.Option(
+            "--hash",
+            metavar="calib_N",
+            help="ur-yaml: the arm's own hash, so that the driver takes the file.",
+        ),
+    ] = None,
+    grid: Annotated[
+        str | None,
+        typer.Option(
+            metavar="q1=-90:90:7,q4=30",
+            help="field-csv: from, to and count of a joint, or its one reading, deg or mm.  "
+            "[default: five of each joint]",
+        ),
+    ] = None,
+    feature: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=NUMBER", help="field-csv: a feature to sample at.")
+    ] = None,
+    std: Annotated[bool, typer.Option("--std", help="field-csv: add standard deviations.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Write a calibration for other software.
+
+    urdf, ur-yaml and the D-H tables hold the constant part; each is read again and its forward kinematics
+    are compared before it is written. field-csv samples the whole calibration on a grid of readings. What a
+    file cannot hold is said in it and here.
+
+      truearm export result/calibration.calib --to urdf -o arm.urdf
+
+      truearm export result/calibration.calib --to urdf --urdf ur10.urdf#tool0 -o ur10_calibrated.urdf
+
+      truearm export result/calibration.calib --to field-csv --grid q2=-90:0:19,q3=0:90:19 -o field.csv
+    """
+    options = Options(
+        urdf=urdf,
+        kinematics_hash=kinematics_hash,
+        grid=grid,
+        features=features_of(feature or ()) or None,
+        with_std=std,
+    )
+    made = export(Calibration.load(calibration), to, output, options)
+    if as_json:
+        found = {"format": made.format, "file": str(output), "notes": list(made.notes)}
+        print_json(found | {"difference_m": made.difference_m, "rows": made.rows})
+        return
+    for note in made.notes:
+        say_wrapped(f"{note.rstrip('.')}.")
+        say()
+    if made.difference_m is not None:
+        say(f"Read again, its forward kinematics are ours within {made.difference_m:.0e} m.")
+    if made.rows is not None:
+        say(f"{made.rows} samples.")
+    say(f"Written: {output}")

@@ -1,0 +1,41 @@
+"""The constant part of a calibration as a robot of its own."""
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.dh_row import row_transform
+from truearm.models import CONSTANT
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+
+HASH_DIGITS: Final = 12
+
+
+def constant_robot(calibration: Calibration) -> Robot:
+    """The arm with the constants of the constant model in its table.
+
+    These were fitted to serve alone; those under a field were not. Where the base was corrected like a link
+    (`--frame world`), it is in the fixed transform before the first link.
+    """
+    nominal, constants = calibration.robot, calibration.models[CONSTANT].constants
+    source = f"calibrated by truearm {calibration.version}, data {calibration.data_hash[:HASH_DIGITS]}"
+    return replace(
+        nominal,
+        source=f"{source}; nominal: {nominal.source}" if nominal.source else source,
+        table=constants[calibration.arm.links],
+        base=_base(calibration, constants),
+        base_row=None,
+    )
+
+
+def _base(calibration: Calibration, constants: Floats) -> Floats:
+    nominal = calibration.robot
+    if not calibration.arm.world_is_known:
+        return nominal.base
+    row = row_transform(constants[0], nominal.convention)
+    return row if nominal.base_row is not None else nominal.base @ row

@@ -1,0 +1,181 @@
+"""The calibration sampled on a grid of readings, for software that can look up a table."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from truearm.calibration import Calibration
+from truearm.errors import InputError, UsageError, WorkError
+from truearm.exporting.losses import as_comments
+from truearm.exporting.parity import UNLIMITED, flange_poses
+from truearm.parameters import KINDS
+from truearm.units import MM_PER_METRE, to_si
+
+Floats = NDArray[np.float64]
+
+POINTS: Final = 5
+LARGEST: Final = 2_000_000
+AXIS: Final = re.compile(r"q(\d+)=([^:,]+)(?::([^:,]+):(\d+))?")
+SHIFTS: Final = ("dx_mm", "dy_mm", "dz_mm", "rx_mrad", "ry_mrad", "rz_mrad")
+DISPLAYED: Final = {"revolute": "deg", "prismatic": "mm"}
+DIGITS: Final = "%.9g"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Readings of one joint on the grid, in deg or mm: one number, or `count` from `low` to `high`."""
+
+    low: float
+    high: float
+    count: int
+
+    @property
+    def readings(self) -> Floats:
+        """The readings, (count,)."""
+        return np.linspace(self.low, self.high, self.count)
+
+
+def grid_axes(calibration: Calibration, stated: str | None = None) -> list[Axis]:
+    """An axis for each joint.
+
+    Args:
+        calibration: Tells how far the readings went that it was fitted to.
+        stated: "q1=-90:90:7,q4=30": from, to and number of readings, or one; deg, and mm of prismatic
+            joints. Where it is given, a joint that it does not name stays in the middle of its range; without
+            it each joint has five readings over its range.
+
+    Raises:
+        UsageError: If it cannot be read.
+    """
+    ranges = _ranges(calibration)
+    if stated is None:
+        return [Axis(low, high, POINTS) for low, high in ranges]
+    axes = [Axis(0.5 * (low + high), 0.5 * (low + high), 1) for low, high in ranges]
+    for part in stated.replace(" ", "").split(","):
+        number, axis = _axis(part)
+        if not 1 <= number <= len(axes):
+            raise UsageError(f"there is no q{number}", where="--grid", rule=f"The arm has {len(axes)} joints")
+        axes[number - 1] = axis
+    return axes
+
+
+def grid_table(
+    calibration: Calibration,
+    axes: Sequence[Axis],
+    *,
+    features: Mapping[str, ArrayLike] | None = None,
+    with_std: bool = False,
+) -> pd.DataFrame:
+    """A row for each point of the grid, the last joint running fastest.
+
+    Columns: the readings; `dx_mm` to `rz_mrad`, from the nominal flange to the calibrated one in the base
+    frame, translation and rotation vector; `std_mm`, the largest standard deviation of its coordinates;
+    and for each link what is added to its nominal parameters, `theta1_deg`, `d1_mm` and so on.
+
+    Raises:
+        WorkError: If the calibration has no field.
+        UsageError: If features are missing, or the grid has more than two million points.
+    """
+    if calibration.variable is None:
+        raise WorkError(
+            "this calibration has no field: its parameters are constant",
+            way_out="Export them with --to urdf or --to dh-toml",
+        )
+    count = int(np.prod([axis.count for axis in axes]))
+    if count > LARGEST:
+        raise UsageError(f"the grid has {count} points", where="--grid", rule=f"At most {LARGEST}")
+    robot = calibration.robot
+    shown = np.stack(np.meshgrid(*(axis.readings for axis in axes), indexing="ij"), axis=-1).reshape(
+        count, -1
+    )
+    units = [DISPLAYED[kind] for kind in robot.joints]
+    q = np.column_stack([to_si(shown[:, j], unit) for j, unit in enumerate(units)])
+    table = {f"q{j + 1}_{unit}": shown[:, j] for j, unit in enumerate(units)}
+    calibrated = calibration.pose(q, tool=np.eye(4), features=features)
+    table |= dict(zip(SHIFTS, _shifts(flange_poses(robot, q), calibrated).T, strict=True))
+    if with_std:
+        std = calibration.position_std(q, tool=np.eye(4), features=features)
+        table["std_mm"] = std.max(axis=1) * MM_PER_METRE
+    added = calibration.parameters(q, features=features) - robot.table
+    return pd.DataFrame(table | _corrections(added))
+
+
+def grid_text(table: pd.DataFrame, calibration: Calibration) -> str:
+    """The table as CSV with comments on what it is."""
+    notes = [
+        f"{calibration.robot.name}, calibrated by truearm {calibration.version}: samples of what varies",
+        "dx to rz lead from the nominal flange to the calibrated one, in the base frame: mm, and the rotation "
+        "vector in mrad. The other columns are added to the nominal D-H parameters, and hold the constant "
+        "part too",
+        "Between samples the field is not linear; beyond the readings it was learnt at it is a guess",
+    ]
+    return as_comments(notes) + table.to_csv(index=False, float_format=DIGITS, lineterminator="\n")
+
+
+def _axis(text: str) -> tuple[int, Axis]:
+    found = AXIS.fullmatch(text)
+    try:
+        if found is None:
+            raise ValueError(text)
+        number, low = int(found[1]), float(found[2])
+        axis = Axis(low, low, 1) if found[3] is None else Axis(low, float(found[3]), int(found[4]))
+        if axis.count < 1 or not np.isfinite([axis.low, axis.high]).all():
+            raise ValueError(text)
+    except ValueError:
+        raise UsageError(
+            f'"{text}" is no axis of a grid', where="--grid", rule="qJ=FROM:TO:COUNT or qJ=VALUE, deg or mm"
+        ) from None
+    return number, axis
+
+
+def _ranges(calibration: Calibration) -> list[tuple[float, float]]:
+    """Lowest and highest reading of each joint, deg or mm: of the rows, else of the limits."""
+    robot = calibration.robot
+    if calibration.rows is not None:
+        q = calibration.rows.data.readings
+        low, high = q.min(axis=0), q.max(axis=0)
+    else:
+        reach = np.array([UNLIMITED[kind] for kind in robot.joints])
+        low = np.where(np.isfinite(robot.limits[:, 0]), robot.limits[:, 0], -reach)
+        high = np.where(np.isfinite(robot.limits[:, 1]), robot.limits[:, 1], reach)
+    scale = np.array([1.0 / to_si(1.0, DISPLAYED[kind]) for kind in robot.joints])
+    return list(zip((low * scale).tolist(), (high * scale).tolist(), strict=True))
+
+
+def _shifts(nominal: Floats, calibrated: Floats) -> Floats:
+    """Translation in mm and rotation vector in mrad (n, 6), base frame."""
+    turns = Rotation.from_matrix(calibrated[:, :3, :3] @ nominal[:, :3, :3].transpose(0, 2, 1)).as_rotvec()
+    return np.asarray(np.hstack([calibrated[:, :3, 3] - nominal[:, :3, 3], turns]) * MM_PER_METRE)
+
+
+def _corrections(added: Floats) -> dict[str, Floats]:
+    """Columns of corrections (n, N, 5), but for those that are zero everywhere."""
+    units = ("deg", "mm", "mm", "deg", "deg")
+    columns = {
+        f"{kind}{link + 1}_{unit}": added[:, link, k] / to_si(1.0, unit)
+        for link in range(added.shape[1])
+        for k, (kind, unit) in enumerate(zip(KINDS, units, strict=True))
+    }
+    return {name: values for name, values in columns.items() if values.any()}
+
+
+def features_of(stated: Sequence[str]) -> dict[str, float]:
+    """Features by name of ["temperature=21.5", ...].
+
+    Raises:
+        InputError: If one is not NAME=NUMBER.
+    """
+    found: dict[str, float] = {}
+    for text in stated:
+        name, _, value = text.partition("=")
+        try:
+            found[name.strip()] = float(value)
+        except ValueError:
+            raise InputError(f'"{text}" is no feature', where="--feature", rule="NAME=NUMBER") from None
+    return found

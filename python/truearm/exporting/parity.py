@@ -1,0 +1,46 @@
+"""Forward kinematics of a written file against those of the calibration."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import WorkError
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+Poses = Callable[[Floats], Floats]
+
+WITHIN_M: Final = 1e-9
+POSES: Final = 200
+UNLIMITED: Final = {"revolute": np.pi, "prismatic": 1.0}
+
+
+def largest_difference(robot: Robot, first: Poses, second: Poses) -> float:
+    """Largest difference of two models' poses at readings drawn over the limits: m, or rad times a metre."""
+    reach = np.array([UNLIMITED[kind] for kind in robot.joints])
+    low, high = robot.limits.T
+    low, high = np.where(np.isfinite(low), low, -reach), np.where(np.isfinite(high), high, reach)
+    q = np.random.default_rng(0).uniform(low, high, (POSES, robot.joint_count))
+    return float(np.abs(first(q) - second(q)).max())
+
+
+def checked(robot: Robot, reloaded: Poses, what: str) -> float:
+    """The largest difference between the robot's flange and what a written file makes of it.
+
+    Raises:
+        WorkError: If it exceeds 1e-9 m.
+    """
+    difference = largest_difference(robot, lambda q: flange_poses(robot, q), reloaded)
+    if not difference <= WITHIN_M:
+        raise WorkError(
+            f"read again, {what} differs from the calibration by {difference:.1e} m",
+            rule=f"It must be within {WITHIN_M:.0e} m; nothing was written",
+        )
+    return difference
+
+
+def flange_poses(robot: Robot, q: Floats) -> Floats:
+    """base_from_flange (n, 4, 4) at readings (n, N)."""
+    return robot.flange_chain.pose(np.ascontiguousarray(robot.joints_from_readings(q)))
