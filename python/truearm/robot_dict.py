@@ -58,8 +58,8 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
     fields["payload"] = payload
     names = content.get("urdf_names")
     if names is not None:
-        listed = {key: tuple(value) if isinstance(value, list) else value for key, value in names.items()}
-        fields["urdf_names"] = UrdfNames(**listed)
+        joints, links = tuple(names["joints"]), tuple(names["links"])
+        fields["urdf_names"] = UrdfNames(names["base_link"], joints, links, names["tip_link"])
     return fields
 
 

@@ -110,8 +110,8 @@ def grid_text(table: pd.DataFrame, calibration: Calibration) -> str:
     """The table as CSV with comments on what it is."""
     notes = [
         f"{calibration.robot.name}, calibrated by truearm {calibration.version}: samples of what varies",
-        "dx to rz lead from the nominal flange to the calibrated one, in the base frame: mm, and the rotation "
-        "vector in mrad. The other columns are added to the nominal D-H parameters, and hold the constant "
+        "dx to rz lead from the nominal flange to the calibrated one, in the base frame: mm, and "
+        "the rotation vector in mrad. The other columns are added to the nominal D-H parameters, and hold the constant "
         "part too",
         "Between samples the field is not linear; beyond the readings it was learnt at it is a guess",
     ]

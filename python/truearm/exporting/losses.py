@@ -34,8 +34,8 @@ def field_is_lost(calibration: Calibration, export_format: str) -> list[str]:
     constant, variable = (errors[name].position.mean for name in (CONSTANT, VARIABLE))
     return [
         f"The parameters of this calibration vary over the workspace; {FORMAT_WORDS[export_format]} holds "
-        f"the constant part alone. On {calibration.validation.n_holdout} held-out rows the constant part left "
-        f"{constant:.3f} mm in the mean, the whole calibration {variable:.3f} mm. Programs rewritten by "
+        f"the constant part alone. On {calibration.validation.n_holdout} held-out rows the constant part "
+        f"left {constant:.3f} mm in the mean, the whole calibration {variable:.3f} mm. Programs rewritten by "
         "truearm compensate have all of it"
     ]
 
