@@ -84,6 +84,15 @@ def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str) -> Lay
     return layout
 
 
+def read_joint_layout(names: Sequence[str], stated: StatedUnits, *, where: str) -> list[Column]:
+    """The joint columns alone, of a table in which nothing need be measured.
+
+    Raises:
+        InputError: If joints are missing, two columns mean the same, or units are mixed.
+    """
+    return _Finder(names, stated, where).joints()
+
+
 def lookalikes(names: Sequence[str]) -> list[str]:
     """Names that would mean something if case and blanks were written otherwise, such as "Sigma mm"."""
     return [name for name in names if _means_something(name.casefold().replace(" ", "_").replace("-", "_"))]

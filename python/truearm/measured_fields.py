@@ -6,7 +6,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from truearm.columns import QUATERNION, Column, Layout, StatedUnits, lookalikes, read_layout
+from truearm.columns import (
+    QUATERNION,
+    Column,
+    Layout,
+    StatedUnits,
+    lookalikes,
+    read_joint_layout,
+    read_layout,
+)
 from truearm.errors import InputError, Notice, list_names, list_rows
 from truearm.reading import Table, Texts
 from truearm.rotations import UNIT_TOLERANCE
@@ -42,6 +50,16 @@ def read_fields(table: Table, stated: StatedUnits, *, default_group: str) -> dic
         **_ends(table, layout, distance),
         "notices": tuple(notices),
     }
+
+
+def read_joint_columns(table: Table, stated: StatedUnits) -> Floats:
+    """The joint readings (n, N) of a table in which nothing need be measured, rad and m.
+
+    Raises:
+        InputError: If a column is missing or a cell is empty or no number.
+    """
+    layout = Layout(joints=read_joint_layout(table.names, stated, where=table.where), targets=[])
+    return _readings(table, layout)
 
 
 def _si(table: Table, column: Column) -> Floats:

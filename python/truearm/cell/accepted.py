@@ -1,0 +1,86 @@
+"""The accepted measurements of a session, as a table and as Measurements."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from truearm.cell.session import Session
+from truearm.measurements import Measurements
+
+Floats = NDArray[np.float64]
+
+QUERY = """
+SELECT o.step, o.pose, o.purpose, o.approach, o.attempts, o.time_s,
+       r.attempt, r.joints, r.x_m, r.y_m, r.z_m, r.qw, r.qx, r.qy, r.qz, r.sigma_m, r.temperature_c,
+       r.features
+FROM (SELECT * FROM outcomes JOIN steps USING (step)
+      WHERE outcome = 'measured' AND kind = ? ORDER BY step LIMIT ?) o
+JOIN readings r USING (step)
+WHERE r.valid ORDER BY o.step, r.attempt
+"""
+COLUMNS = (
+    "step", "pose", "purpose", "approach", "attempts", "time_s", "attempt", "joints", "x", "y", "z",
+    "qw", "qx", "qy", "qz", "sigma", "temperature_c", "features",
+)  # fmt: skip
+TURN = ["qw", "qx", "qy", "qz"]
+
+
+def accepted_table(session: Session, kind: str = "pose", *, most: int | None = None) -> pd.DataFrame:
+    """A row for each measured step: the mean of its accepted readings, in rad and m.
+
+    Columns: pose (from 1, in the list of poses), q1 ... qN, x, y, z, sigma, qw ... qz where orientation was
+    measured, approach, readings (how many were accepted), temperature_c where there is one, other features.
+    Where there are purposes, purpose too. sigma is that of the mean.
+
+    Args:
+        session: The session.
+        kind: "pose", "registration" or "check".
+        most: Only so many steps, from the first.
+    """
+    grouped: dict[int, list[dict[str, Any]]] = {}
+    for values in session.rows(QUERY, (kind, -1 if most is None else most)):
+        row = dict(zip(COLUMNS, values, strict=True))
+        if row["attempt"] in json.loads(row["attempts"]):
+            grouped.setdefault(row["step"], []).append(row)
+    return pd.DataFrame([_merged(rows) for rows in grouped.values()])
+
+
+def measurements_of(session: Session, *, most: int | None = None, where: str = "session") -> Measurements:
+    """The accepted poses as Measurements of one set-up."""
+    return Measurements.from_dataframe(_kept(accepted_table(session, most=most)), name=where)
+
+
+def points_and_joints(session: Session, kind: str) -> tuple[list[int], Floats, Floats]:
+    """Steps, joints (n, N) and points (n, 3) of the measured steps of a kind."""
+    table = accepted_table(session, kind)
+    if table.empty:
+        return [], np.empty((0, 0)), np.empty((0, 3))
+    joints = table[[name for name in table.columns if name.startswith("q") and name[1:].isdigit()]]
+    return table["step"].tolist(), joints.to_numpy(), table[["x", "y", "z"]].to_numpy()
+
+
+def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    first = rows[0]
+    joints = np.mean([json.loads(row["joints"]) for row in rows], axis=0)
+    merged: dict[str, Any] = {"step": first["step"], "pose": first["pose"] + 1}
+    if first["purpose"]:
+        merged["purpose"] = first["purpose"]
+    merged |= {f"q{j + 1}": value for j, value in enumerate(joints.tolist())}
+    merged |= {axis: float(np.mean([row[axis] for row in rows])) for axis in "xyz"}
+    merged["sigma"] = float(np.mean([row["sigma"] for row in rows]) / np.sqrt(len(rows)))
+    if all(row["qw"] is not None for row in rows):
+        turns = np.mean([[row[name] for name in TURN] for row in rows], axis=0)
+        merged |= dict(zip(TURN, (turns / np.linalg.norm(turns)).tolist(), strict=True))
+    merged |= {"approach": first["approach"], "readings": len(rows)}
+    if all(row["temperature_c"] is not None for row in rows):
+        merged["temperature_c"] = float(np.mean([row["temperature_c"] for row in rows]))
+    features = [json.loads(row["features"]) for row in rows]
+    merged |= {name: float(np.mean([each[name] for each in features])) for name in features[0]}
+    return merged
+
+
+def _kept(table: pd.DataFrame) -> pd.DataFrame:
+    return table.drop(columns=["step", "pose"])

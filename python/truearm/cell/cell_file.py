@@ -1,0 +1,217 @@
+"""The cell file: which arm, which devices at which ports, and how to measure."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, Field, field_validator
+
+from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
+from truearm.cell.protocols import Robot, Sensor
+from truearm.cell.schema import Positive, Quaternion, Section, Share, Vector3, checked
+from truearm.errors import InputError
+from truearm.files import read_text
+from truearm.robot import Robot as Arm
+from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
+from truearm.units import to_si
+
+Floats = NDArray[np.float64]
+
+
+class WorldSection(Section):
+    """Where the base of the robot stands in the sensor's frame, as well as it is known beforehand."""
+
+    xyz_mm: Vector3
+    quaternion_wxyz: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    uncertain_mm: Positive = 10.0
+    uncertain_deg: Positive = 1.0
+
+    @field_validator("quaternion_wxyz")
+    @classmethod
+    def _unit(cls, value: Quaternion) -> Quaternion:
+        length = float(np.linalg.norm(value))
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            raise ValueError(f"length {length:.6g}, must be 1 (order w, x, y, z)")
+        return value
+
+    def transform(self) -> Floats:
+        """world_from_base (4, 4), m."""
+        return transform_from_parts(to_si(np.array(self.xyz_mm), "mm"), self.quaternion_wxyz)
+
+
+class TargetSection(Section):
+    """The measured point on the tool."""
+
+    in_flange_mm: Vector3
+
+
+class ClearanceSection(Section):
+    """Sizes that keep the arm's links and the table's arm apart."""
+
+    link_radius_mm: Positive = 40.0
+    column_radius_mm: Positive = 15.0
+    column_mm: Positive = 600.0
+    margin_mm: Positive = 10.0
+
+
+class ProcessSection(Section):
+    """How to measure."""
+
+    contacts: Annotated[int, Field(ge=1, le=10)] = 2
+    attempts: Annotated[int, Field(ge=1, le=50)] = 8
+    recoveries: Annotated[int, Field(ge=0)] = 5
+    agree_mm: Positive = 0.4
+    suspicious: Positive = 5.0
+    expected_mm: Positive = 4.0
+    registration_poses: Annotated[int, Field(ge=4)] = 8
+    registration_mm: Positive = 3.0
+    check_every: Annotated[int, Field(ge=0)] = 50
+    drift_mm: Positive = 0.4
+    approach_deg: Positive = 3.0
+    together: bool = True
+    stretch: Annotated[int, Field(ge=0)] = 20
+    model: Literal["constant", "variable"] = "variable"
+    target_mm: Positive | None = None
+    seconds_per_pose: Positive = 5.0
+
+
+class FaultsSection(Section):
+    """Share of the messages, or of the contacts, at which a virtual device fails."""
+
+    lost: Share = 0.0
+    delayed: Share = 0.0
+    duplicated: Share = 0.0
+    garbled: Share = 0.0
+    missed: Share = 0.0
+    outlier: Share = 0.0
+    restart: Share = 0.0
+    emergency_stop: Share = 0.0
+    drift_mm_per_contact: float = 0.0
+    delay_s: Positive = 2.0
+    outlier_mm: Positive = 5.0
+
+
+class SimulateSection(Section):
+    """The virtual cell that stands in for the real one."""
+
+    seed: int = 0
+    speed: Positive = 1.0
+    arm: dict[str, Any] | None = None
+    frame_error_mm: Annotated[float, Field(ge=0.0)] = 4.0
+    frame_error_deg: Annotated[float, Field(ge=0.0)] = 0.3
+    table_mm: Annotated[float, Field(ge=0.0)] = 0.02
+    panel_mm: Annotated[float, Field(ge=0.0)] = 0.05
+    tracker_mm: Annotated[float, Field(ge=0.0)] = 0.02
+    answer: str | None = None
+    repeatable: bool = False
+    faults: FaultsSection = FaultsSection()
+
+
+class CellFile(Section):
+    """A cell file as written."""
+
+    name: Annotated[str, Field(min_length=1)]
+    arm: Annotated[str, Field(min_length=1)]
+    robot: dict[str, Any]
+    sensor: dict[str, Any]
+    world: WorldSection | None = None
+    target: TargetSection | None = None
+    process: ProcessSection = ProcessSection()
+    clearance: ClearanceSection = ClearanceSection()
+    simulate: SimulateSection = SimulateSection()
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A cell: its file, the nominal arm, and the devices, not yet connected.
+
+    Attributes:
+        file: The cell file.
+        arm: The nominal arm.
+        flange_from_target: Transform (4, 4) to the measured point; turned like the file's tool.
+        robot: Driver of the robot.
+        sensor: Driver of the sensor.
+        robot_settings: Section of the robot.
+        sensor_settings: Section of the sensor.
+    """
+
+    file: CellFile
+    arm: Arm
+    flange_from_target: Floats
+    robot: Robot
+    sensor: Sensor
+    robot_settings: BaseModel
+    sensor_settings: BaseModel
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Cell":
+        """Read a cell file; files that it names are looked for beside it.
+
+        Raises:
+            InputError: If it is no TOML, a key is unknown or missing, or a value breaks its rule.
+        """
+        return cls.from_toml(read_text(Path(path)), where=str(path), folder=Path(path).parent)
+
+    @classmethod
+    def from_toml(cls, text: str, *, where: str = "cell", folder: Path = Path()) -> "Cell":
+        """A cell from the text of its file.
+
+        Raises:
+            InputError: As for load.
+        """
+        file = checked(CellFile, parsed(text, where=where), where=where)
+        arm = _arm(file, folder)
+        robot, robot_settings = driver_and_settings(file.robot, ROBOTS, where=f"{where}, robot")
+        sensor_section = _beside(file.sensor, folder)
+        sensor, sensor_settings = driver_and_settings(sensor_section, SENSORS, where=f"{where}, sensor")
+        target = arm.tool.copy()
+        if file.target is not None:
+            target[:3, 3] = to_si(np.array(file.target.in_flange_mm), "mm")
+        try:
+            built = robot(robot_settings, arm), sensor(sensor_settings, arm)
+        except InputError as error:
+            raise error.at(where) from None
+        return cls(file, arm, target, *built, robot_settings, sensor_settings)
+
+    def targets_in_base(self, readings: Floats) -> Floats:
+        """Nominal points of the target (n, 3) in the base frame, m, of readings (n, N)."""
+        return np.asarray((self._flange(readings) @ self.flange_from_target)[:, :3, 3])
+
+    def pointing_in_base(self, readings: Floats) -> Floats:
+        """Nominal direction of the tool (3,) in the base frame, from flange to target, of readings (N,)."""
+        lever = self.flange_from_target[:3, 3]
+        length = float(np.linalg.norm(lever))
+        along = lever / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+        return np.asarray(self._flange(readings[None])[0, :3, :3] @ along)
+
+    def _flange(self, readings: Floats) -> Floats:
+        return self.arm.flange_chain.pose(self.arm.joints_from_readings(readings))
+
+
+def parsed(text: str, *, where: str) -> dict[str, Any]:
+    """The values of a TOML text.
+
+    Raises:
+        InputError: If it is none.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where) from None
+
+
+def _arm(file: CellFile, folder: Path) -> Arm:
+    beside = folder / file.arm
+    return Arm.load(beside if beside.is_file() else file.arm)
+
+
+def _beside(section: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The section with its recording looked for beside the cell file."""
+    content = dict(section)
+    if isinstance(content.get("file"), str):
+        content["file"] = str(folder / content["file"])
+    return content

@@ -1,0 +1,147 @@
+"""Robot and sensor as they work together: who moves when, and what is done when one fails."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.cell.cell_file import Cell
+from truearm.cell.device_errors import DeviceError, RefusedError
+from truearm.cell.paths import Paths
+from truearm.cell.reading import Expected
+from truearm.cell.table_panel import TablePanel
+
+Floats = NDArray[np.float64]
+
+LETS_GO_WITHIN_S: Final = 0.7
+
+
+class Crew:
+    """The two devices of a cell.
+
+    A table moves together with the arm where they cannot meet on the way; else it goes out of the way first
+    and comes when the arm is there, and if that does not help either, the arm goes by where it was at first.
+    """
+
+    def __init__(self, cell: Cell, note: Callable[[str, str], None]) -> None:
+        self._cell, self._note = cell, note
+        self._table = cell.sensor if isinstance(cell.sensor, TablePanel) else None
+        self._aside = ThreadPoolExecutor(1, thread_name_prefix="sensor")
+        self._here: Floats | None = None
+        self._refuge = np.clip(np.zeros(cell.arm.joint_count), *cell.arm.limits.T)
+
+    def connect(self) -> None:
+        """Connect the sensor, get it out of the way, then the robot."""
+        self._cell.sensor.connect()
+        self._cell.sensor.release()
+        self._cell.robot.connect()
+        self._refuge = self._where()
+
+    def go(self, way: list[Floats], expected: Expected, world_from_base: Floats | None) -> Floats:
+        """Bring the arm along readings to the last of them, and the sensor before its target.
+
+        Args:
+            way: Readings (N,) one after another.
+            expected: Where the target will be.
+            world_from_base: Where the base stands as far as is known; needed by a sensor that comes close.
+
+        Returns:
+            Where the arm is (N,).
+
+        Raises:
+            RefusedError: If link and table would meet whatever goes first, or a device refuses.
+        """
+        if self._table is None:
+            self._along(way)
+            self._cell.sensor.prepare(expected)
+        else:
+            self._with_table(self._table, way, expected, world_from_base)
+        return self._where()
+
+    def _with_table(
+        self, table: TablePanel, way: list[Floats], expected: Expected, world_from_base: Floats | None
+    ) -> None:
+        carriage, here = table.carriage, self._here
+        if carriage is None or here is None or world_from_base is None:
+            raise RefusedError("where arm and table are is not known", where="the cell")
+        paths = Paths(self._cell, table, world_from_base, expected.radius_m)
+        end = table.carriage_for(expected)
+        if self._cell.file.process.together and paths.free([here, *way], [carriage, end]):
+            self._together(way, expected)
+            return
+        low = table.released(carriage)
+        under = table.released(end)
+        for first, over in ((way, [low]), (way, [low, under]), ([self._refuge, *way], [low])):
+            if (
+                paths.free([here], [carriage, *over])
+                and paths.free([here, *first], [over[-1]])
+                and paths.free([way[-1]], [over[-1], end])
+            ):
+                for place in over:
+                    table.go_to(place)
+                self._along(first)
+                table.prepare(expected)
+                return
+        raise RefusedError("link or tool would meet the table on every way there", where="the arm")
+
+    def _together(self, way: list[Floats], expected: Expected) -> None:
+        coming = self._aside.submit(self._cell.sensor.prepare, expected)
+        try:
+            self._along(way)
+        except BaseException:
+            self._cell.sensor.stop()
+            wait([coming], LETS_GO_WITHIN_S)
+            raise
+        coming.result()
+
+    def _along(self, way: list[Floats]) -> None:
+        for place in way:
+            self._here = None
+            self._cell.robot.move_joints(place)
+            self._here = place
+
+    def _where(self) -> Floats:
+        self._here = self._cell.robot.read_joints()
+        return self._here
+
+    def recover(self) -> None:
+        """Connect both devices anew, as carefully as at the start."""
+        self.quiet()
+        self._here = None
+        self.connect()
+
+    def stop(self) -> None:
+        """Stop both devices at once, from any thread."""
+        together = [
+            threading.Thread(target=self._tried, args=(f"stop {device.name}", device.stop), daemon=True)
+            for device in (self._cell.robot, self._cell.sensor)
+        ]
+        for thread in together:
+            thread.start()
+        for thread in together:
+            thread.join(LETS_GO_WITHIN_S)
+
+    def dismiss(self) -> None:
+        """Get the sensor out of the way and let go of both devices; what fails is noted, nothing is raised.
+
+        The sensor has a second for it; a table then goes on to the end of its way by itself.
+        """
+        away = threading.Thread(target=self._tried, args=("retract", self._cell.sensor.release), daemon=True)
+        away.start()
+        away.join(LETS_GO_WITHIN_S)
+        self.quiet()
+        self._aside.shutdown(wait=False, cancel_futures=True)
+
+    def quiet(self) -> None:
+        """Close both ports; what fails is noted."""
+        self._tried("close robot", self._cell.robot.close)
+        self._tried("close sensor", self._cell.sensor.close)
+
+    def _tried(self, what: str, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except DeviceError as error:
+            self._note("failed", f"{what}: {error}")

@@ -1,0 +1,11 @@
+"""Cell files to begin with."""
+
+from importlib import resources
+from typing import Final
+
+EXAMPLES: Final = ("rv-m2", "ur", "tracker", "playback")
+
+
+def example(name: str) -> str:
+    """The text of an example by name."""
+    return (resources.files(__name__) / f"{name}.toml").read_text(encoding="utf-8")

@@ -1,0 +1,91 @@
+"""Whether the readings of a pose can be believed, from each other and from what was predicted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.cell.session import Stored
+
+Floats = NDArray[np.float64]
+
+REPEATS_WHEN_SUSPICIOUS: Final = 1
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What to do with a pose.
+
+    Attributes:
+        decision: "again", "accept" or "give up".
+        attempts: The accepted readings, by attempt.
+        reason: Why again, or why it is given up.
+        suspicious: Whether the readings agree with each other but not with the prediction.
+    """
+
+    decision: Literal["again", "accept", "give up"]
+    attempts: tuple[int, ...] = ()
+    reason: str = ""
+    suspicious: bool = False
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How readings are judged.
+
+    Attributes:
+        contacts: Readings that have to agree.
+        attempts: How many are made at the most.
+        agree_m: How far apart readings of a pose may be.
+        likely_m: How far a reading may be from the prediction without being suspicious.
+    """
+
+    contacts: int
+    attempts: int
+    agree_m: float
+    likely_m: float
+
+
+def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict:
+    """Judge all readings of a pose so far.
+
+    The largest set of readings that agree with one another is accepted if it is large enough, and larger than
+    all readings that contradict it together. Where it is far from the prediction (3,), it has to have one
+    reading more.
+    """
+    valid = [(reading, reading.point) for reading in readings if reading.valid and reading.point is not None]
+    points = [point for _, point in valid]
+    agreeing = _largest_cluster(points, rules.agree_m)
+    far = (
+        bool(agreeing)
+        and _distance(np.mean([points[k] for k in agreeing], axis=0), expected) > rules.likely_m
+    )
+    needed = rules.contacts + (REPEATS_WHEN_SUSPICIOUS if far else 0)
+    if len(agreeing) >= needed and 2 * len(agreeing) > len(points):
+        return Verdict("accept", tuple(valid[k][0].attempt for k in agreeing), suspicious=far)
+    reason = _reason(len(readings), len(points), len(agreeing), far=far)
+    return Verdict("again" if len(readings) < rules.attempts else "give up", (), reason, far)
+
+
+def _largest_cluster(points: Sequence[Floats], within: float) -> list[int]:
+    """Numbers of the most points that are all within a distance of one of them, the first such."""
+    best: list[int] = []
+    for centre in points:
+        near = [k for k, point in enumerate(points) if _distance(point, centre) <= within]
+        if len(near) > len(best):
+            best = near
+    return best
+
+
+def _reason(made: int, valid: int, agreeing: int, *, far: bool) -> str:
+    if valid == 0:
+        return f"no valid reading in {made}" if made else ""
+    if agreeing < valid:
+        return f"{valid} readings, of which {agreeing} agree"
+    return "far from the prediction" if far else ""
+
+
+def _distance(a: Floats, b: Floats) -> float:
+    return float(np.linalg.norm(a - b))

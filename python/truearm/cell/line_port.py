@@ -1,0 +1,149 @@
+"""Lines to and from a device, with time limits, and a way to end a wait from another thread."""
+
+import threading
+import time
+from collections import deque
+from typing import Final
+
+from truearm.cell.channels import Channel, ConnectionEndedError, open_channel
+from truearm.cell.device_errors import DeviceError, gone, silent, stopped
+
+LONGEST_LINE: Final = 65536
+
+
+class LinePort:
+    """A port of a device that speaks in lines of ASCII.
+
+    Attributes:
+        device: What people call the device.
+        address: Where it is, as in the cell file.
+        limit_s: Time limit of a call that names none.
+    """
+
+    def __init__(
+        self,
+        device: str,
+        address: str,
+        limit_s: float,
+        *,
+        terminator: bytes = b"\n",
+        baud: int = 9600,
+        frame: str = "8N1",
+    ) -> None:
+        self.device, self.address, self.limit_s = device, address, limit_s
+        self._terminator, self._baud, self._frame = terminator, baud, frame
+        self._channel: Channel | None = None
+        self._rest = b""
+        self._lines: deque[str] = deque()
+        self._interrupted = threading.Event()
+        self._writing = threading.Lock()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a connection."""
+        return self._channel is not None
+
+    def open(self) -> None:
+        """Open the port.
+
+        Raises:
+            PortUnavailableError: If it cannot be opened.
+            DeviceError: If it is open already.
+        """
+        if self._channel is not None:
+            raise DeviceError("connected already", where=self.where, way_out="Close it first")
+        self._interrupted.clear()
+        self._channel = open_channel(
+            self.device, self.address, self.limit_s, baud=self._baud, frame=self._frame
+        )
+        self._rest = b""
+        self._lines.clear()
+
+    @property
+    def where(self) -> str:
+        """Device and port, for messages."""
+        return f"{self.device} at {self.address}"
+
+    def close(self) -> None:
+        """Close the port if it is open."""
+        channel, self._channel = self._channel, None
+        if channel is not None:
+            channel.close()
+
+    def interrupt(self) -> None:
+        """End the wait of another thread, which then raises StoppedError."""
+        self._interrupted.set()
+
+    def resume(self) -> None:
+        """Let waits be waits again."""
+        self._interrupted.clear()
+
+    def send(self, text: str) -> None:
+        """Send a line.
+
+        Raises:
+            DeviceGoneError: If the connection has ended, or there is none.
+        """
+        channel = self._open_channel()
+        try:
+            with self._writing:
+                channel.write(text.encode("ascii", "replace") + self._terminator)
+        except ConnectionEndedError as error:
+            raise gone(self.device, self.address, str(error)) from None
+
+    def receive(self, limit_s: float | None = None, *, doing: str = "") -> str:
+        """The next line without its end.
+
+        Args:
+            limit_s: Time limit; that of the port by default.
+            doing: What the device was asked to do, for the message.
+
+        Raises:
+            DeviceSilentError: If none came in time.
+            DeviceGoneError: If the connection has ended.
+            StoppedError: If another thread interrupted.
+        """
+        limit = self.limit_s if limit_s is None else limit_s
+        until = time.monotonic() + limit
+        while not self._lines:
+            if self._interrupted.is_set():
+                raise stopped(self.device, self.address)
+            if time.monotonic() >= until:
+                raise silent(self.device, self.address, limit, doing=doing)
+            self._take()
+        return self._lines.popleft()
+
+    def drain(self) -> None:
+        """Forget what has come and was not asked for."""
+        self._take_waiting()
+        self._lines.clear()
+
+    def newest(self) -> str | None:
+        """The newest of the lines that have come, None where none has."""
+        self._take_waiting()
+        line = self._lines.pop() if self._lines else None
+        self._lines.clear()
+        return line
+
+    def _take_waiting(self) -> None:
+        while self._take(wait=False):
+            pass
+
+    def _take(self, *, wait: bool = True) -> bool:
+        """Split what comes within a slice, or has come, into lines; whether anything came."""
+        channel = self._open_channel()
+        try:
+            data = channel.read(wait=wait)
+        except ConnectionEndedError as error:
+            raise gone(self.device, self.address, str(error)) from None
+        if not data:
+            return False
+        *lines, self._rest = (self._rest + data).split(self._terminator)
+        self._rest = self._rest[-LONGEST_LINE:]
+        self._lines.extend(line.decode("ascii", "replace").strip("\r\n") for line in lines)
+        return True
+
+    def _open_channel(self) -> Channel:
+        if self._channel is None:
+            raise gone(self.device, self.address, "it is not open")
+        return self._channel

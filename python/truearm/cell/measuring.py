@@ -1,0 +1,258 @@
+"""The measurement process: every step of a session, one after another, whatever goes wrong."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.cell.accepted import points_and_joints
+from truearm.cell.cell_file import Cell
+from truearm.cell.crew import Crew
+from truearm.cell.device_errors import DeviceError, RefusedError, StoppedError
+from truearm.cell.judge import Rules, Verdict, judge
+from truearm.cell.prediction import Prediction
+from truearm.cell.reading import Reading
+from truearm.cell.registering import register_cell
+from truearm.cell.session import Session, Step, Stored
+from truearm.cell.stretches import boundaries, calibrate_so_far, good_enough
+from truearm.errors import WorkError
+from truearm.units import MM_PER_METRE, to_si
+
+Floats = NDArray[np.float64]
+
+DONE: Final = "all poses are done"
+ACCURATE: Final = "the target accuracy is met"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the process is.
+
+    Attributes:
+        done: Steps that have an outcome.
+        total: Steps in all.
+        text: What was done last.
+        left_s: Time left at the present pace; None before there is one.
+    """
+
+    done: int
+    total: int
+    text: str
+    left_s: float | None
+
+
+class Process:
+    """Measures the steps of a session that have no outcome yet.
+
+    `run` does the work in the thread that calls it; `halt` ends it from another one: both devices are stopped
+    at once, the sensor is retracted, the ports are closed, and `run` raises StoppedError.
+    """
+
+    def __init__(self, cell: Cell, session: Session, report: Callable[[Progress], None]) -> None:
+        self._cell, self._session, self._report = cell, session, report
+        self._process = cell.file.process
+        self._prediction = Prediction(cell)
+        self._crew = Crew(cell, session.add_event)
+        self._halted = threading.Event()
+        self._recoveries = 0
+        self._total = session.rows("SELECT count(*) FROM steps")[0][0]
+        self._poses = session.rows("SELECT count(*) FROM steps WHERE kind = 'pose'")[0][0]
+        self._boundaries = boundaries(self._process.stretch, self._poses)
+        self._measured = session.measured_poses()
+        self._began, self._done_before = time.monotonic(), self._done()
+
+    def run(self) -> str:
+        """Measure until all is done, or well enough; says which.
+
+        Raises:
+            StoppedError: If `halt` was called.
+            WorkError: If the frame is implausible, the cell drifts, or a device fails for good.
+        """
+        self._resume()
+        if good_enough(self._session, self._process.target_mm):
+            return ACCURATE
+        if self._session.next_step() is None:
+            return DONE
+        try:
+            self._crew.connect()
+            return self._steps()
+        except BaseException as error:
+            self._crew.stop()
+            if not isinstance(error, Exception) or isinstance(error, StoppedError):
+                self._session.add_event("interrupted", "the process was ended")
+            else:
+                self._session.add_event("stopped", str(error))
+            raise
+        finally:
+            self._crew.dismiss()
+
+    def halt(self) -> None:
+        """End `run` from another thread."""
+        self._halted.set()
+        self._crew.stop()
+
+    def _steps(self) -> str:
+        while (step := self._session.next_step()) is not None:
+            if step.kind != "registration" and self._session.registration() is None:
+                self._register()
+            measured = self._do(step)
+            if step.kind == "check":
+                self._check_drift()
+            if step.kind == "pose" and measured and self._after_pose():
+                return ACCURATE
+        return DONE
+
+    def _do(self, step: Step) -> bool:
+        """Measure a step until its readings can be believed, or it is given up; whether it is measured."""
+        expected = self._prediction.expected(step)
+        agree_m = to_si(self._process.agree_mm, "mm")
+        rules = Rules(self._process.contacts, self._process.attempts, agree_m, expected.radius_m)
+        readings, placed, joints = self._session.readings_of(step.step), False, step.readings
+        verdict = judge(readings, expected.point_in_world, rules)
+        self._decide(step, verdict)
+        while verdict.decision == "again":
+            self._raise_if_halted()
+            try:
+                if not placed:
+                    way = self._way(step, anew=verdict.suspicious)
+                    joints = self._crew.go(way, expected, self._prediction.world_from_base)
+                    placed = True
+                reading = self._cell.sensor.measure()
+            except RefusedError as error:
+                self._skip(step, str(error))
+                return False
+            except DeviceError as error:
+                self._recover(error, step)
+                placed = False
+                continue
+            self._recoveries = 0
+            readings.append(_stored(len(readings) + 1, reading))
+            verdict = judge(readings, expected.point_in_world, rules)
+            self._keep(step, reading, joints, expected.point_in_world, verdict, len(readings))
+            placed = reading.valid and not verdict.suspicious
+        self._tell(step, readings, verdict, expected.point_in_world)
+        return verdict.decision == "accept"
+
+    def _keep(
+        self, step: Step, reading: Reading, joints: Floats, expected: Floats, verdict: Verdict, attempt: int
+    ) -> None:
+        """A reading, and the outcome if that is it, on disk together."""
+        with self._session.together():
+            self._session.add_reading(step.step, attempt, reading, joints, expected)
+            self._decide(step, verdict)
+
+    def _decide(self, step: Step, verdict: Verdict) -> None:
+        if verdict.decision == "accept":
+            self._session.add_outcome(step.step, "measured", attempts=verdict.attempts)
+        if verdict.decision == "give up":
+            self._session.add_outcome(step.step, "skipped", reason=verdict.reason)
+
+    def _skip(self, step: Step, reason: str) -> None:
+        self._session.add_outcome(step.step, "skipped", reason=reason)
+        self._session.add_event("skipped", reason, step.step)
+
+    def _way(self, step: Step, *, anew: bool) -> list[Floats]:
+        """Readings to go through, so that every joint comes from the side that is asked for.
+
+        With `anew` the arm leaves a pose that it may already be at, where any side will do.
+        """
+        side = step.approach or int(anew)
+        if side == 0:
+            return [step.readings]
+        away = np.radians(self._process.approach_deg)
+        via = np.clip(step.readings - side * away, *self._cell.arm.limits.T)
+        return [via, step.readings]
+
+    def _recover(self, error: DeviceError, step: Step) -> None:
+        """Connect anew, if that may help and did not fail too often."""
+        self._raise_if_halted()
+        self._recoveries += 1
+        self._session.add_event("device", str(error), step.step)
+        if not error.recoverable or self._recoveries > self._process.recoveries:
+            raise error
+        try:
+            self._crew.recover()
+        except DeviceError as again:
+            self._recover(again, step)
+
+    def _raise_if_halted(self) -> None:
+        if self._halted.is_set():
+            raise StoppedError("the process was ended")
+
+    def _register(self) -> None:
+        _, joints, points = points_and_joints(self._session, "registration")
+        found = register_cell(self._cell, joints, points)
+        self._session.set_registration(found.world_from_base, MM_PER_METRE * found.residual_m, found.poses)
+        self._prediction.register(found.world_from_base, found.residual_m)
+        self._say(f"frame registered from {found.poses} contacts, {1e3 * found.residual_m:.2f} mm RMS")
+
+    def _resume(self) -> None:
+        """Know again what a former process knew."""
+        known = self._session.registration()
+        if known is not None:
+            self._prediction.register(known[0], known[1] / MM_PER_METRE)
+            self._check_drift()
+        past = [count for count in self._boundaries if count <= self._measured]
+        if past:
+            self._learn(past[-1])
+
+    def _after_pose(self) -> bool:
+        """Calibrate at the end of a stretch; whether that is good enough."""
+        self._measured += 1
+        if self._measured not in self._boundaries:
+            return False
+        self._learn(self._measured)
+        return good_enough(self._session, self._process.target_mm)
+
+    def _learn(self, measured: int) -> None:
+        stretch = calibrate_so_far(self._cell, self._session, measured, self._session.add_event)
+        if stretch is None:
+            return
+        self._session.add_stretch(
+            measured, stretch.model, stretch.mean_mm, stretch.p95_mm, stretch.expected_mm
+        )
+        self._prediction.learn(stretch.calibration, stretch.p95_mm / MM_PER_METRE)
+        self._say(
+            f"{measured} poses, {stretch.model} model: {stretch.mean_mm:.3f} mm mean on held-out poses, "
+            f"{stretch.expected_mm:.3f} mm expected"
+        )
+
+    def _check_drift(self) -> None:
+        """Raise if the last check of the first contact shows that something has moved."""
+        _, _, checks = points_and_joints(self._session, "check")
+        _, _, first = points_and_joints(self._session, "registration")
+        if not (len(checks) and len(first)):
+            return
+        off_mm = MM_PER_METRE * float(np.linalg.norm(checks[-1] - first[0]))
+        if off_mm > self._process.drift_mm:
+            raise WorkError(
+                f"the first contact is now {off_mm:.2f} mm from where it was",
+                where="check",
+                rule=f"The cell may drift by {self._process.drift_mm:g} mm (drift_mm)",
+                way_out="Find what moves; then measure the rest as a new session: a set-up of its own",
+            )
+
+    def _tell(self, step: Step, readings: list[Stored], verdict: Verdict, expected: Floats) -> None:
+        if verdict.decision == "give up":
+            self._say(f"{step.kind} {step.pose + 1} skipped: {verdict.reason}")
+            return
+        points = [r.point for r in readings if r.attempt in verdict.attempts and r.point is not None]
+        residual_mm = MM_PER_METRE * float(np.linalg.norm(np.mean(points, axis=0) - expected))
+        self._say(f"{step.kind} {step.pose + 1} stored, {residual_mm:.3f} mm from the prediction")
+
+    def _say(self, text: str) -> None:
+        done = self._done()
+        new = done - self._done_before
+        left_s = (self._total - done) * (time.monotonic() - self._began) / new if new else None
+        self._report(Progress(done, self._total, text, left_s))
+
+    def _done(self) -> int:
+        return int(self._session.rows("SELECT coalesce(max(step), -1) + 1 FROM outcomes")[0][0])
+
+
+def _stored(attempt: int, reading: Reading) -> Stored:
+    return Stored(attempt, reading.valid, reading.point_in_world, reading.sigma_m)

@@ -1,0 +1,104 @@
+"""The Movemaster command set, as far as a calibration needs it, and how its controller rounds.
+
+Commands end with a carriage return and have no answer, but for WH and ER:
+
+    NT                 go to the mechanical origin
+    SP n               speed 0 to 9
+    MJ w,s,e,p,r       turn the joints by so much, deg: the angles are increments
+    MP x,y,z,p,r       move to a position, mm and deg
+    HE n, MO n         keep the present position as number n; move to position n
+    WH                 where: x,y,z,p,r in mm and deg
+    ER                 error: 0 none, 1 hardware, 2 command
+    RS                 reset after an error of kind 2
+
+Commands are done one after another, so the answer to WH comes when the arm stands. All numbers have one
+decimal place: 0.1 mm and 0.1 deg is what the controller rounds to. There is no command that ends a motion.
+
+Source: Movemaster EX instruction manuals, chapter on commands. The angles p and r of a position are here the
+sum of the readings of joints 2 to 4 and the reading of joint 5.
+"""
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.robot import Robot
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+Tenths = NDArray[np.int64]
+
+TERMINATOR: Final = b"\r"
+JOINTS: Final = 5
+NUMBER: Final = r"[+-]?\d{1,4}\.\d"
+NUMBERS: Final = re.compile(rf"\s*{NUMBER}(?:\s*,\s*{NUMBER}){{4}}\s*")
+# Joint speeds for SP 0 to 9, deg/s: the manual gives the share of the greatest, which is 140 here.
+SPEEDS_DEG_S: Final = (4.0, 8.0, 14.0, 24.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
+NO_ERROR, HARDWARE_ERROR, COMMAND_ERROR = "0", "1", "2"
+
+
+def check_arm(arm: Robot) -> None:
+    """Raise InputError unless the arm has the five turning joints that the commands are about."""
+    if arm.joint_count != JOINTS or set(arm.joints) != {"revolute"}:
+        raise InputError(
+            f"{arm.name} has {arm.joint_count} joints",
+            rule="The Movemaster commands are those of an arm with five turning joints",
+        )
+
+
+def tenths(readings: Floats) -> Tenths:
+    """Readings (N,) in rad as whole tenths of a degree, the controller's rounding."""
+    return np.rint(np.asarray(readings) / (0.1 * RADIANS_PER_DEGREE)).astype(np.int64)
+
+
+def readings_of(count: Tenths) -> Floats:
+    """Readings (N,) in rad of whole tenths of a degree."""
+    return np.asarray(count * (0.1 * RADIANS_PER_DEGREE), dtype=np.float64)
+
+
+def listed(values: Sequence[int] | Tenths) -> str:
+    """Whole tenths as the numbers of a command."""
+    return ",".join(f"{value / 10:+.1f}" for value in np.asarray(values).tolist())
+
+
+def parse_numbers(text: str) -> Tenths | None:
+    """Five numbers with one decimal as whole tenths; None if the text is anything else."""
+    if NUMBERS.fullmatch(text) is None:
+        return None
+    return np.rint([10.0 * float(part) for part in text.split(",")]).astype(np.int64)
+
+
+def whereabouts(arm: Robot, readings: Floats) -> Floats:
+    """Position x, y, z in mm and angles p, r in deg (5,) that the controller computes, not yet rounded."""
+    point = arm.position(readings) * MM_PER_METRE
+    degrees = np.asarray(readings) / RADIANS_PER_DEGREE
+    return np.array([*point, degrees[1:4].sum(), degrees[4]])
+
+
+def readings_near(arm: Robot, where: Floats, seed: Floats) -> Floats | None:
+    """Readings (5,) that give a position (5,), by Newton's method from `seed`; None if it leads nowhere.
+
+    Angles p and r are met exactly; the first three unknowns follow from the point.
+    """
+    readings = np.array(seed, dtype=np.float64)
+    readings[4] = where[4] * RADIANS_PER_DEGREE
+    for _ in range(NEWTON_STEPS):
+        readings[3] = where[3] * RADIANS_PER_DEGREE - readings[1] - readings[2]
+        missing = where[:3] / MM_PER_METRE - arm.position(readings)
+        if np.abs(missing).max() < NEWTON_TOLERANCE_M:
+            return readings
+        jacobian = arm.joint_jacobian(readings)
+        reduced = jacobian[:, :3].copy()
+        reduced[:, 1:] -= jacobian[:, 3:4]
+        step, *_ = np.linalg.lstsq(reduced, missing, rcond=None)
+        readings[:3] += np.clip(step, -LONGEST_STEP_RAD, LONGEST_STEP_RAD)
+    return None
+
+
+NEWTON_STEPS: Final = 30
+NEWTON_TOLERANCE_M: Final = 1e-9
+LONGEST_STEP_RAD: Final = 0.3

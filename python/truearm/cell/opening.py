@@ -1,0 +1,45 @@
+"""Beginning a session, or going on with it."""
+
+from pathlib import Path
+from typing import Final
+
+from truearm.cell.cell_file import Cell
+from truearm.cell.poses_file import Poses
+from truearm.cell.sequence import fingerprint, steps_of
+from truearm.cell.session import Session
+from truearm.errors import InputError
+
+SAME: Final = {
+    "poses": "another list of poses",
+    "arm": "another arm",
+    "target": "another target on the tool",
+}
+
+
+def open_session(path: Path, cell: Cell, poses: Poses) -> Session:
+    """The session at `path`: a new one, or the one that is there, if it is of the same arm and poses.
+
+    Raises:
+        InputError: If the file that is there belongs to something else.
+        WorkError: If another process is writing to it.
+    """
+    identity = {
+        "poses": fingerprint(poses),
+        "arm": cell.arm.to_dict(),
+        "target": cell.flange_from_target.tolist(),
+    }
+    if not path.exists():
+        if not path.parent.is_dir():
+            raise InputError("there is no such directory", where=str(path.parent))
+        return Session.create(path, steps_of(poses, cell.file.process), {"cell": cell.file.name, **identity})
+    session = Session(path, writing=True)
+    for key, words in SAME.items():
+        if session.meta(key) != identity[key]:
+            session.close()
+            raise InputError(
+                f"this session is of {words}",
+                where=str(path),
+                rule="A session is continued with the arm, target and poses that it was begun with",
+                way_out="Name a new file with -o",
+            )
+    return session

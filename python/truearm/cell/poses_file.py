@@ -1,0 +1,73 @@
+"""The poses to measure: a CSV file with joint columns, and how each pose is approached."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.columns import StatedUnits
+from truearm.errors import InputError, list_rows
+from truearm.measured_fields import read_joint_columns
+from truearm.reading import read_csv_table
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+
+APPROACH: Final = "approach"
+PURPOSE: Final = "purpose"
+DIRECTIONS: Final = (-1.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """n poses to measure, in their order.
+
+    Attributes:
+        readings: Joint readings (n, N), rad or m.
+        approach: From which side joints come (n,): 1 from lower readings, -1 from higher, 0 from anywhere.
+        purpose: What each is for (n,), such as "train", "validate" or "repeat".
+    """
+
+    readings: Floats
+    approach: NDArray[np.int64]
+    purpose: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.readings)
+
+    @classmethod
+    def read_csv(cls, path: str | Path, arm: Robot) -> "Poses":
+        """Read a file with columns q1 ... qN, units in their names or rad and m, and maybe approach, purpose.
+
+        Raises:
+            InputError: If a column is missing, a value breaks a rule, or a pose is beyond the joint limits.
+        """
+        table = read_csv_table(Path(path))
+        readings = read_joint_columns(table, StatedUnits(joints=arm.joints))
+        if readings.shape[1] != arm.joint_count:
+            raise InputError(
+                f"there are {readings.shape[1]} joint columns",
+                where=str(path),
+                rule=f"{arm.name} has {arm.joint_count} joints",
+            )
+        low, high = arm.limits.T
+        beyond = ((readings < low) | (readings > high)).any(axis=1)
+        if beyond.any():
+            rows = list_rows((np.flatnonzero(beyond) + 1).tolist())
+            raise InputError(
+                f"{rows} beyond the joint limits of {arm.name}",
+                where=str(path),
+                way_out="Correct them, or state units in the column names: q1_deg",
+            )
+        approach = table.numbers(APPROACH) if APPROACH in table.names else np.zeros(len(readings))
+        wrong = np.flatnonzero(~np.isin(approach, DIRECTIONS))
+        if wrong.size:
+            raise InputError(
+                f'column "{APPROACH}" holds {approach[wrong[0]]:g} in row {wrong[0] + 1}',
+                where=str(path),
+                rule="1 from lower readings, -1 from higher ones, 0 from anywhere",
+            )
+        purpose = tuple(table.texts(PURPOSE).tolist()) if PURPOSE in table.names else ("",) * len(readings)
+        return cls(readings, approach.astype(np.int64), purpose)

@@ -1,0 +1,76 @@
+"""Running a process so that Ctrl-C, or a request to end, stops the devices at once and ends it within 2 s."""
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from truearm.cell.measuring import Process
+
+LOOKS_EVERY_S: Final = 0.05
+ENDS_WITHIN_S: Final = 1.6
+INTERRUPTED: Final = 130
+
+
+def run(process: Process) -> str:
+    """What the process returns; it works in a thread of its own, so that nothing delays a stop.
+
+    Raises:
+        KeyboardInterrupt: After Ctrl-C or a request to end, when devices are stopped and the file is closed.
+        Exception: What the process raises.
+    """
+    outcome: list[str] = []
+    failure: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            outcome.append(process.run())
+        except BaseException as error:  # noqa: BLE001 - raised in the thread that asked
+            failure.append(error)
+
+    worker = threading.Thread(target=work, daemon=True)
+    with _interrupts() as interrupted:
+        worker.start()
+        while worker.is_alive() and not interrupted.is_set():
+            worker.join(LOOKS_EVERY_S)
+        if interrupted.is_set():
+            _end(process, worker)
+            raise KeyboardInterrupt
+    if failure:
+        raise failure[0]
+    return outcome[0]
+
+
+def _end(process: Process, worker: threading.Thread) -> None:
+    """Halt; what has not ended in time, such as a long factorisation, ends with the process."""
+    until = time.monotonic() + ENDS_WITHIN_S
+    halting = threading.Thread(target=process.halt, daemon=True)
+    halting.start()
+    for thread in (worker, halting):
+        thread.join(max(0.0, until - time.monotonic()))
+    if worker.is_alive():
+        sys.stderr.write("Interrupted.\n")
+        sys.stderr.flush()
+        os._exit(INTERRUPTED)
+
+
+@contextmanager
+def _interrupts() -> Iterator[threading.Event]:
+    """An event that Ctrl-C and a request to end set, where this is the main thread."""
+    event = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+    before = {
+        number: signal.signal(number, lambda _number, _frame: event.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield event
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,270 @@
+"""Driver of the Mitsubishi RV-M2 (and RV-M1): Movemaster commands over RS-232.
+
+The controller moves joints by increments and tells where it is as a Cartesian position only. So the driver
+goes to the mechanical origin when it connects and counts from there, in tenths of a degree as the controller
+does. It carries the nominal kinematics of the arm: after every increment it asks the controller where it is
+and compares with what the nominal arm would be at the count. A command that was lost, damaged or done twice
+shows there and is put right. Joint readings are therefore exact, as long as the nominal kinematics are those
+the controller computes with.
+
+The command set has no way to end a motion. Increments are kept short, so that a stop takes hold within
+`leg_deg` degrees.
+"""
+
+import threading
+import time
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from truearm.cell import movemaster
+from truearm.cell.device_errors import (
+    DeviceError,
+    DeviceSilentError,
+    EmergencyStopError,
+    RefusedError,
+)
+from truearm.cell.line_port import LinePort
+from truearm.cell.movemaster import readings_of, tenths
+from truearm.cell.nearest_pose import readings_for_pose
+from truearm.cell.schema import Positive, Section
+from truearm.robot import Robot
+from truearm.units import RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+Tenths = NDArray[np.int64]
+
+# The read-out may be off by its rounding, half a unit, and by the rounding of what is added up in it.
+READOUT_TOLERANCE: Final = 0.11
+TRIES: Final = 8
+MOTION_MARGIN: Final = 1.5
+
+
+class RvM2:
+    """A Movemaster robot; see the module."""
+
+    class Settings(Section):
+        """Keys of [robot] with driver "rv-m2"."""
+
+        driver: str = "rv-m2"
+        port: str
+        baud: int = 9600
+        frame: str = Field(default="8E2", pattern="[78][NEO][12]")
+        timeout_s: Positive = 3.0
+        speed: int = Field(default=5, ge=0, le=9)
+        leg_deg: Positive = 20.0
+        origin_deg: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+        origin_timeout_s: Positive = 60.0
+
+    def __init__(self, settings: Settings, arm: Robot) -> None:
+        movemaster.check_arm(arm)
+        self._settings, self._arm = settings, arm
+        self._port = LinePort(
+            self.name,
+            settings.port,
+            settings.timeout_s,
+            terminator=movemaster.TERMINATOR,
+            baud=settings.baud,
+            frame=settings.frame,
+        )
+        self._count: Tenths | None = None
+        self._leg = round(10.0 * settings.leg_deg)
+        self._busy = threading.RLock()
+        self._still_at = 0.0
+        self._silences = 0
+
+    @property
+    def name(self) -> str:
+        """See Device."""
+        return "RV-M2"
+
+    @property
+    def address(self) -> str:
+        """See Device."""
+        return self._settings.port
+
+    def connect(self) -> None:
+        """Open the port, clear a command error, and go to the mechanical origin."""
+        with self._busy:
+            self._port.open()
+            self._silences = 0
+            try:
+                self._go_to_origin()
+            except BaseException:
+                self._port.close()
+                raise
+
+    def move_joints(self, readings: Floats) -> None:
+        """See Robot. The arm ends at whole tenths of a degree."""
+        target = tenths(readings)
+        self._check_limits(target)
+        with self._busy:
+            done = self._known_count()
+            legs = int(np.ceil(np.abs(target - done).max() / self._leg))
+            for _ in range(legs + TRIES):
+                if np.array_equal(self._known_count(), target):
+                    return
+                self._move_leg(target)
+            raise DeviceError(
+                f"the arm did not get to its place in {legs + TRIES} motions", where=self._port.where
+            )
+
+    def move_pose(self, base_from_tool: Floats) -> None:
+        """See Robot. Position and the angles p and r are met; the arm has no sixth joint.
+
+        The readings come from the nominal kinematics, nearest to the present ones.
+        """
+        self.move_joints(readings_for_pose(self._arm, base_from_tool, self.read_joints()))
+
+    def read_joints(self) -> Floats:
+        """See Robot. Counted from the origin and checked against the controller's Cartesian read-out."""
+        with self._busy:
+            count = self._known_count()
+            self._locate([count], self._port.limit_s)
+            return readings_of(self._known_count())
+
+    def stop(self) -> None:
+        """See Device. No further increment is sent; the one under way ends by itself, and is waited for."""
+        self._port.interrupt()
+        with self._busy:
+            self._port.resume()
+        time.sleep(max(0.0, self._still_at - time.monotonic()))
+
+    def close(self) -> None:
+        """See Device."""
+        self._port.close()
+        self._count = None
+
+    def _go_to_origin(self) -> None:
+        self._check_error()
+        origin = tenths(np.array(self._settings.origin_deg) * RADIANS_PER_DEGREE)
+        for _ in range(TRIES):
+            self._port.send("NT")
+            self._port.send(f"SP {self._settings.speed}")
+            if self._locate([origin], self._settings.origin_timeout_s, strict=False):
+                return
+        raise DeviceError(
+            "the origin is not where the nominal arm has it",
+            where=self._port.where,
+            rule="After NT the read-out must be that of origin_deg under the nominal kinematics",
+            way_out="Correct origin_deg, or the arm of the cell file",
+        )
+
+    def _known_count(self) -> Tenths:
+        if self._count is None:
+            raise DeviceError("where the arm is, is not known", where=self._port.where, way_out="Connect it")
+        return self._count
+
+    def _check_limits(self, target: Tenths) -> None:
+        low, high = np.rint(self._arm.limits.T / (0.1 * RADIANS_PER_DEGREE))
+        beyond = np.flatnonzero((target < low) | (target > high))
+        if beyond.size:
+            joint = int(beyond[0])
+            raise RefusedError(
+                f"joint {joint + 1} at {target[joint] / 10:.1f} deg",
+                where=self._port.where,
+                rule=f"Its limits are {low[joint] / 10:g} to {high[joint] / 10:g} deg",
+            )
+
+    def _move_leg(self, target: Tenths) -> None:
+        """One increment straight towards the target, and a look at where that led."""
+        before = self._known_count()
+        share = min(1.0, self._leg / float(np.abs(target - before).max()))
+        step = np.rint(share * (target - before)).astype(np.int64)
+        self._port.drain()
+        self._port.send(f"MJ {movemaster.listed(step)}")
+        self._count = None
+        seconds = MOTION_MARGIN * self._seconds(step)
+        self._still_at = time.monotonic() + seconds
+        self._locate([before + step, before, before + 2 * step], self._port.limit_s + seconds)
+        self._still_at = 0.0
+
+    def _seconds(self, step: Tenths) -> float:
+        return float(np.abs(step).max()) / 10.0 / movemaster.SPEEDS_DEG_S[self._settings.speed]
+
+    def _locate(self, guesses: list[Tenths], limit_s: float, *, strict: bool = True) -> bool:
+        """Ask where the arm is until the answer fits, and take the count that it fits.
+
+        An answer that fits the first guess is believed at once. Any other must come twice in a row, as it may
+        be damaged or late; then the other guesses count, and then the nominal inverse kinematics.
+        """
+        last: Tenths | None = None
+        for attempt in range(TRIES):
+            seen = self._where(limit_s)
+            if seen is not None and self._fits(seen, guesses[0]):
+                self._count = guesses[0]
+                return True
+            if seen is not None and last is not None and np.array_equal(seen, last):
+                found = self._recognised(seen, guesses) if strict else None
+                if found is not None:
+                    self._count = found
+                    return True
+                if attempt > TRIES // 2:
+                    break
+            last = seen
+            self._check_error()
+        if not strict:
+            return False
+        raise DeviceError(
+            "its read-out belongs to no place that the arm can be at, or changes from one to the next",
+            where=self._port.where,
+            rule="The nominal arm must give the same position as the controller, to 0.1 mm and 0.1 deg",
+        )
+
+    def _where(self, limit_s: float) -> Tenths | None:
+        """What WH answers, in tenths; None if nothing, or nothing readable, came."""
+        self._port.drain()
+        self._port.send("WH")
+        try:
+            return movemaster.parse_numbers(self._port.receive(limit_s, doing="say where it is"))
+        except DeviceSilentError:
+            self._silences += 1
+            if self._silences >= TRIES // 2:
+                raise
+            return None
+
+    def _recognised(self, seen: Tenths, guesses: list[Tenths]) -> Tenths | None:
+        for guess in guesses:
+            if self._fits(seen, guess):
+                return guess
+        for seed in guesses:
+            found = movemaster.readings_near(self._arm, np.asarray(0.1 * seen), readings_of(seed))
+            if found is not None and self._fits(seen, tenths(found)):
+                return tenths(found)
+        return None
+
+    def _fits(self, seen: Tenths, count: Tenths) -> bool:
+        nominal = movemaster.whereabouts(self._arm, readings_of(count))
+        fits = bool(np.abs(nominal - 0.1 * seen).max() <= READOUT_TOLERANCE)
+        if fits:
+            self._silences = 0
+        return fits
+
+    def _check_error(self) -> None:
+        """Ask for the error; reset one of a command, raise one of the hardware."""
+        self._port.drain()
+        self._port.send("ER")
+        try:
+            answer = self._port.receive(doing="say its error").strip()
+        except DeviceSilentError:
+            self._silences += 1
+            if self._silences >= TRIES // 2:
+                raise
+            return
+        if answer == movemaster.HARDWARE_ERROR:
+            self._confirm_hardware_error()
+        elif answer != movemaster.NO_ERROR:
+            self._port.send("RS")
+
+    def _confirm_hardware_error(self) -> None:
+        """Raise if a second answer says so too: one alone may be damaged."""
+        self._port.drain()
+        self._port.send("ER")
+        if self._port.receive(doing="say its error").strip() == movemaster.HARDWARE_ERROR:
+            raise EmergencyStopError(
+                "the controller reports a hardware error or an emergency stop",
+                where=self._port.where,
+                way_out="Release the button, reset the controller, and start again: the session continues",
+            )

@@ -1,0 +1,249 @@
+"""The session file: everything a measurement process has found out, on disk before the next motion starts.
+
+SQLite in write-ahead mode with full synchronisation: what was committed outlives process and power.
+"""
+
+import json
+import sqlite3
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+import numpy as np
+from filelock import FileLock, Timeout
+from numpy.typing import NDArray
+
+from truearm.cell.reading import Reading
+from truearm.cell.session_schema import SCHEMA, VERSION
+from truearm.errors import InputError, WorkError
+from truearm.rotations import quaternion_from_matrix
+
+Floats = NDArray[np.float64]
+
+MAGIC: Final = b"SQLite format 3\x00"
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One thing to do: a pose to measure, for the frame ("registration"), for itself, or as a "check"."""
+
+    step: int
+    kind: str
+    pose: int
+    purpose: str
+    approach: int
+    readings: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """A reading of a step as it is in the file: the attempt, from 1, and its point (3,) if there is one."""
+
+    attempt: int
+    valid: bool
+    point: Floats | None
+    sigma_m: float
+
+
+class Session:
+    """A session file, open for writing by one process at a time, or for reading by any."""
+
+    def __init__(self, path: Path, *, writing: bool) -> None:
+        """Open a file that exists.
+
+        Raises:
+            InputError: If there is none, or it is no session of this layout.
+            WorkError: If another process is writing to it.
+        """
+        if not path.is_file():
+            raise InputError("there is no such file", where=str(path))
+        with path.open("rb") as file:
+            if file.read(len(MAGIC)) != MAGIC:
+                raise InputError(
+                    "this is no session file", where=str(path), rule="truearm measure makes them"
+                )
+        self.path = path
+        self._lock = FileLock(f"{path}.lock") if writing else None
+        self._acquire()
+        mode = "rwc" if writing else "ro"
+        self._db = sqlite3.connect(
+            f"file:{path.resolve()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
+        )
+        try:
+            if writing:
+                self._db.execute("PRAGMA journal_mode=WAL")
+                self._db.execute("PRAGMA synchronous=FULL")
+            self._check_version()
+        except BaseException:
+            self.close()
+            raise
+
+    @classmethod
+    def create(cls, path: Path, steps: Sequence[Step], meta: dict[str, Any]) -> "Session":
+        """Make a new file; it is complete, or not there."""
+        neighbour = path.with_name(f".{path.name}.new")
+        neighbour.unlink(missing_ok=True)
+        try:
+            with sqlite3.connect(neighbour, isolation_level=None) as database:
+                database.executescript(SCHEMA)
+                database.execute("BEGIN")
+                values = {"version": VERSION, "created_s": time.time(), **meta}
+                rows = [(key, json.dumps(value)) for key, value in values.items()]
+                database.executemany("INSERT INTO meta VALUES (?, ?)", rows)
+                database.executemany("INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?)", map(_step_row, steps))
+                database.execute("COMMIT")
+            database.close()
+        except sqlite3.OperationalError as error:
+            raise InputError(f"cannot be written: {error}", where=str(path)) from None
+        neighbour.replace(path)
+        return cls(path, writing=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file and let others write to it."""
+        if hasattr(self, "_db"):
+            self._db.close()
+        if self._lock is not None:
+            self._lock.release()
+
+    def meta(self, key: str) -> Any:  # noqa: ANN401 - a JSON value
+        """A value of the head of the file."""
+        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        return None if row is None else json.loads(row[0])
+
+    def next_step(self) -> Step | None:
+        """The first step that has no outcome."""
+        row = self._db.execute(
+            "SELECT * FROM steps WHERE step > coalesce((SELECT max(step) FROM outcomes), -1) "
+            "ORDER BY step LIMIT 1"
+        ).fetchone()
+        return None if row is None else _step(row)
+
+    def steps(self, kind: str) -> list[Step]:
+        """All steps of a kind."""
+        return [
+            _step(row)
+            for row in self._db.execute("SELECT * FROM steps WHERE kind = ? ORDER BY step", (kind,))
+        ]
+
+    def readings_of(self, step: int) -> list[Stored]:
+        """All readings of a step, in the order of their attempts."""
+        rows = self._db.execute(
+            "SELECT attempt, valid, x_m, y_m, z_m, sigma_m FROM readings WHERE step = ? ORDER BY attempt",
+            (step,),
+        )
+        return [Stored(row[0], bool(row[1]), _point(row[2:5]), row[5]) for row in rows]
+
+    def add_reading(
+        self, step: int, attempt: int, reading: Reading, joints: Floats, expected: Floats
+    ) -> None:
+        """Keep a reading for good: when this returns it is on disk."""
+        point = [None] * 3 if reading.point_in_world is None else reading.point_in_world.tolist()
+        turn: list[float | None] = [None] * 4
+        if reading.pose_in_world is not None:
+            turn = quaternion_from_matrix(reading.pose_in_world[:3, :3]).tolist()
+        head = (step, attempt, reading.time_s, _listed(joints))
+        quality = (reading.sigma_m, int(reading.valid), reading.reason)
+        tail = (reading.temperature_c, json.dumps(reading.features), reading.raw)
+        values = (*head, *point, *turn, *quality, *expected.tolist(), *tail)
+        self._db.execute(f"INSERT INTO readings VALUES ({','.join('?' * len(values))})", values)  # noqa: S608
+
+    def add_outcome(self, step: int, outcome: str, *, reason: str = "", attempts: Sequence[int] = ()) -> None:
+        """Keep what became of a step, and which of its readings are the accepted ones."""
+        row = (step, outcome, reason, json.dumps(list(attempts)), time.time())
+        self._db.execute("INSERT INTO outcomes VALUES (?, ?, ?, ?, ?)", row)
+
+    def add_event(self, kind: str, message: str, step: int | None = None) -> None:
+        """Keep a remark about the process."""
+        self._db.execute(
+            "INSERT INTO events (time_s, step, kind, message) VALUES (?, ?, ?, ?)",
+            (time.time(), step, kind, message),
+        )
+
+    def registration(self) -> tuple[Floats, float] | None:
+        """world_from_base (4, 4) and its residual in mm; None before it is found."""
+        row = self._db.execute("SELECT world_from_base, residual_mm FROM registration").fetchone()
+        return None if row is None else (np.array(json.loads(row[0])), row[1])
+
+    def set_registration(self, world_from_base: Floats, residual_mm: float, poses: int) -> None:
+        """Keep where the base stands."""
+        row = (json.dumps(world_from_base.tolist()), residual_mm, poses, time.time())
+        self._db.execute("INSERT INTO registration VALUES (1, ?, ?, ?, ?)", row)
+
+    def add_stretch(
+        self, measured: int, model: str, mean_mm: float, p95_mm: float, expected_mm: float
+    ) -> None:
+        """Keep what the calibration so far is worth."""
+        row = (measured, model, mean_mm, p95_mm, expected_mm, time.time())
+        self._db.execute("INSERT OR REPLACE INTO stretches VALUES (?, ?, ?, ?, ?, ?)", row)
+
+    def rows(self, query: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
+        """Rows of a query that reads."""
+        return self._db.execute(query, values).fetchall()
+
+    def measured_poses(self) -> int:
+        """How many poses of the list are measured."""
+        return int(
+            self.rows("SELECT count(*) FROM outcomes JOIN steps USING (step) "
+                      "WHERE kind = 'pose' AND outcome = 'measured'")[0][0]
+        )  # fmt: skip
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """What is added inside is committed together."""
+        self._db.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self._db.execute("ROLLBACK")
+            raise
+        self._db.execute("COMMIT")
+
+    def _acquire(self) -> None:
+        if self._lock is None:
+            return
+        try:
+            self._lock.acquire(timeout=0.0)
+        except Timeout:
+            raise WorkError(
+                "another process is measuring into this session", where=str(self.path), way_out="Wait for it"
+            ) from None
+
+    def _check_version(self) -> None:
+        try:
+            version = self.meta("version")
+        except sqlite3.DatabaseError as error:
+            raise InputError(f"this is no session file: {error}", where=str(self.path)) from None
+        if version != VERSION:
+            raise InputError(
+                f"layout {version}",
+                where=str(self.path),
+                rule=f"This version of truearm knows layout {VERSION}",
+            )
+
+
+def _point(values: Sequence[float | None]) -> Floats | None:
+    return None if values[0] is None else np.array(values)
+
+
+def _listed(values: Floats) -> str:
+    return json.dumps(np.asarray(values).tolist())
+
+
+def _step_row(step: Step) -> tuple[Any, ...]:
+    return (step.step, step.kind, step.pose, step.purpose, step.approach, _listed(step.readings))
+
+
+def _step(row: Sequence[Any]) -> Step:
+    return Step(row[0], row[1], row[2], row[3], row[4], np.array(json.loads(row[5])))

@@ -1,0 +1,244 @@
+"""Driver of Universal Robots arms: URScript to the secondary port, joints from the real-time port.
+
+Targets are absolute, so that a line that was lost is simply sent again, and one that came twice does nothing.
+"""
+
+import threading
+import time
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from truearm.cell import ur_packets
+from truearm.cell.channels import Channel, ConnectionEndedError, TcpChannel
+from truearm.cell.device_errors import (
+    DeviceError,
+    DeviceRestartedError,
+    EmergencyStopError,
+    RefusedError,
+    gone,
+    silent,
+    stopped,
+)
+from truearm.cell.line_port import LinePort
+from truearm.cell.schema import Positive, Section
+from truearm.errors import InputError
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+
+JOINTS: Final = 6
+THERE_RAD: Final = 2e-4
+STILL_RAD_S: Final = 1e-3
+SENDINGS: Final = 8
+STOP_RAD_S2: Final = 4.0
+MOTION_MARGIN: Final = 2.0
+STARTS_WITHIN_S: Final = 0.5
+
+
+class UniversalRobots:
+    """An arm of Universal Robots; see the module."""
+
+    class Settings(Section):
+        """Keys of [robot] with driver "ur"."""
+
+        driver: str = "ur"
+        host: str
+        script_port: int = 30002
+        realtime_port: int = 30003
+        timeout_s: Positive = 2.0
+        speed_rad_s: Positive = 1.0
+        acceleration_rad_s2: Positive = 1.4
+        settle_s: Positive = 0.2
+
+    def __init__(self, settings: Settings, arm: Robot) -> None:
+        if arm.joint_count != JOINTS:
+            raise InputError(f"{arm.name} has {arm.joint_count} joints", rule="These arms have six")
+        self._settings, self._arm = settings, arm
+        address = f"tcp://{settings.host}:{settings.script_port}"
+        self._script = LinePort(self.name, address, settings.timeout_s)
+        self._stream: _Stream | None = None
+        self._interrupted = threading.Event()
+        self._busy = threading.RLock()
+
+    @property
+    def name(self) -> str:
+        """See Device."""
+        return "UR"
+
+    @property
+    def address(self) -> str:
+        """See Device."""
+        return f"tcp://{self._settings.host}:{self._settings.realtime_port}"
+
+    def connect(self) -> None:
+        """Open both ports and wait for the first state."""
+        self._script.open()
+        try:
+            host, port, limit = self._settings.host, self._settings.realtime_port, self._settings.timeout_s
+            self._stream = _Stream(self.name, self.address, TcpChannel(self.name, host, port, limit), limit)
+            self._state()
+        except BaseException:
+            self.close()
+            raise
+
+    def move_joints(self, readings: Floats) -> None:
+        """See Robot."""
+        target = np.asarray(readings, dtype=np.float64)
+        low, high = self._arm.limits.T
+        beyond = np.flatnonzero((target < low) | (target > high))
+        if beyond.size:
+            joint = int(beyond[0])
+            raise RefusedError(
+                f"joint {joint + 1} at {np.degrees(target[joint]):.1f} deg",
+                where=self._script.where,
+                rule=f"Its limits are {np.degrees(low[joint]):g} to {np.degrees(high[joint]):g} deg",
+            )
+        self._move(f"[{','.join(f'{value:.6f}' for value in target)}]", target)
+
+    def move_pose(self, base_from_tool: Floats) -> None:
+        """See Robot. The controller's own inverse kinematics and tool centre point are used."""
+        turn = Rotation.from_matrix(base_from_tool[:3, :3]).as_rotvec()
+        numbers = [*base_from_tool[:3, 3], *turn]
+        self._move(f"p[{','.join(f'{value:.6f}' for value in numbers)}]", None)
+
+    def read_joints(self) -> Floats:
+        """See Robot."""
+        return self._state().readings
+
+    def stop(self) -> None:
+        """See Device."""
+        self._interrupted.set()
+        if self._script.is_open:
+            self._script.send(f"stopj({STOP_RAD_S2:g})")
+        with self._busy:
+            self._interrupted.clear()
+
+    def close(self) -> None:
+        """See Device."""
+        stream, self._stream = self._stream, None
+        if stream is not None:
+            stream.close()
+        self._script.close()
+
+    def _move(self, place: str, target: Floats | None) -> None:
+        """Send a motion until the arm gets there; without a target, until it moved and stands."""
+        options = f"a={self._settings.acceleration_rad_s2:g}, v={self._settings.speed_rad_s:g}"
+        with self._busy:
+            for _ in range(SENDINGS):
+                self._script.send(f"movej({place}, {options})")
+                if self._arrives(target):
+                    return
+        raise silent(self.name, self.address, self._settings.timeout_s, doing=f"move ({SENDINGS} times)")
+
+    def _arrives(self, target: Floats | None) -> bool:
+        """Wait for the end of a motion; False if it never began, or ended elsewhere."""
+        begin = self._state()
+        limit = self._limit(begin.readings, target)
+        until, last_moved, moved = time.monotonic() + limit, time.monotonic(), False
+        while time.monotonic() < until:
+            state = self._state()
+            if np.abs(state.speeds).max() > STILL_RAD_S or not np.array_equal(state.readings, begin.readings):
+                moved = True
+            if np.abs(state.speeds).max() > STILL_RAD_S:
+                last_moved = time.monotonic()
+            still_s = time.monotonic() - last_moved
+            if target is not None and still_s > 0.0 and np.abs(state.readings - target).max() < THERE_RAD:
+                return True
+            if still_s > self._settings.settle_s + (0.0 if moved else STARTS_WITHIN_S):
+                return moved and target is None
+            self._wait_for_next(state)
+        raise silent(self.name, self.address, limit, doing="move")
+
+    def _limit(self, here: Floats, target: Floats | None) -> float:
+        way = np.pi if target is None else float(np.abs(target - here).max())
+        ramp = self._settings.speed_rad_s / self._settings.acceleration_rad_s2
+        return self._settings.timeout_s + MOTION_MARGIN * (way / self._settings.speed_rad_s + ramp)
+
+    def _wait_for_next(self, state: ur_packets.State) -> None:
+        stream = self._connected()
+        until = time.monotonic() + self._settings.timeout_s
+        while stream.newest(self._settings.timeout_s) is state:
+            if self._interrupted.is_set():
+                raise stopped(self.name, self.address)
+            if time.monotonic() > until:
+                raise silent(self.name, self.address, self._settings.timeout_s, doing="send its state")
+            stream.wait()
+        if self._interrupted.is_set():
+            raise stopped(self.name, self.address)
+
+    def _state(self) -> ur_packets.State:
+        state = self._connected().newest(self._settings.timeout_s)
+        if state.safety_mode not in ur_packets.MOVING_ALLOWED:
+            words = ur_packets.SAFETY_MODES.get(int(state.safety_mode), f"safety mode {state.safety_mode:g}")
+            raise EmergencyStopError(
+                f"the arm is in {words}",
+                where=f"{self.name} at {self.address}",
+                way_out="Clear it at the teach pendant and start again: the session continues",
+            )
+        return state
+
+    def _connected(self) -> "_Stream":
+        if self._stream is None:
+            raise DeviceError("not connected", where=f"{self.name} at {self.address}")
+        return self._stream
+
+
+class _Stream:
+    """A thread that keeps the newest state, so that none grows old in a buffer."""
+
+    def __init__(self, device: str, address: str, channel: Channel, limit_s: float) -> None:
+        self._device, self._address, self._channel = device, address, channel
+        self._state: ur_packets.State | None = None
+        self._came = time.monotonic()
+        self._limit_s = limit_s
+        self._fault = ""
+        self._restarted = False
+        self._ended = threading.Event()
+        self._news = threading.Condition()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def newest(self, limit_s: float) -> ur_packets.State:
+        """The newest state, not older than the limit."""
+        until = time.monotonic() + limit_s
+        while True:
+            if self._restarted:
+                raise DeviceRestartedError(
+                    "the controller was started anew", where=f"{self._device} at {self._address}"
+                )
+            if self._fault:
+                raise gone(self._device, self._address, self._fault)
+            state = self._state
+            if state is not None and time.monotonic() - self._came < limit_s:
+                return state
+            if time.monotonic() >= until:
+                raise silent(self._device, self._address, limit_s, doing="send its state")
+            self.wait()
+
+    def wait(self) -> None:
+        """Wait a little for news."""
+        with self._news:
+            self._news.wait(0.05)
+
+    def close(self) -> None:
+        """End the thread and the connection."""
+        self._ended.set()
+        self._thread.join(self._limit_s)
+        self._channel.close()
+
+    def _run(self) -> None:
+        rest = b""
+        while not (self._ended.is_set() or self._fault):
+            try:
+                packet, rest = ur_packets.last_whole(rest + self._channel.read())
+            except (ConnectionEndedError, ValueError) as error:
+                packet, self._fault = None, str(error)
+            if packet is not None:
+                state = ur_packets.parse(packet)
+                self._restarted |= self._state is not None and state.time_s < self._state.time_s
+                self._state, self._came = state, time.monotonic()
+            with self._news:
+                self._news.notify_all()

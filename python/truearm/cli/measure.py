@@ -1,0 +1,94 @@
+"""`truearm measure`: the automatic measurement process, resumable."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from truearm.cli.console import print_json, say, say_wrapped, tell
+from truearm.cli.measure_progress import Teller
+
+if TYPE_CHECKING:
+    from truearm.cell.rehearsal import Rehearsal
+
+
+def command(
+    cell: Annotated[Path, typer.Argument(metavar="CELL", help="A cell file: arm, devices and their ports.")],
+    poses: Annotated[
+        Path, typer.Argument(metavar="POSES", help="CSV file of joint readings to measure, in their order.")
+    ],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="SESSION", help="Session file; continued if it is there."),
+    ] = Path("session.db"),
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be done; nothing moves.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Measure poses with the robot and the sensor of a cell.
+
+    First the frame is registered from a few contacts, then all poses are measured. Every reading is on disk
+    before the next motion starts: after Ctrl-C, a fault or a loss of power the same command goes on where it
+    was. Ctrl-C stops the robot, retracts the sensor and ends within 2 s.
+
+    Example: truearm measure cell.toml poses.csv -o session.db
+    """
+    from truearm.cell.cell_file import Cell  # noqa: PLC0415
+    from truearm.cell.measuring import Process  # noqa: PLC0415
+    from truearm.cell.opening import open_session  # noqa: PLC0415
+    from truearm.cell.poses_file import Poses  # noqa: PLC0415
+    from truearm.cell.rehearsal import rehearse  # noqa: PLC0415
+    from truearm.cell.running import run  # noqa: PLC0415
+    from truearm.cell.summary import summary_of  # noqa: PLC0415
+
+    known = Cell.load(cell)
+    wanted = Poses.read_csv(poses, known.arm)
+    if dry_run:
+        _print_rehearsal(rehearse(known, wanted), as_json=as_json)
+        return
+    with open_session(output, known, wanted) as session:
+        try:
+            with Teller() as teller:
+                end = run(Process(known, session, teller.tell))
+        except KeyboardInterrupt:
+            tell(f"The session is in {output}; the same command goes on with it.")
+            raise
+        found = summary_of(session)
+    if as_json:
+        print_json({"end": end, "session": str(output), **found})
+        return
+    say_wrapped(f"{end[0].upper()}{end[1:]}: {found['measured']} of {found['poses']} poses measured.")
+    say(f"Try next: truearm session export {output} -o measurements.csv")
+
+
+def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:
+    if as_json:
+        rows = [
+            {
+                "step": each.step.step,
+                "kind": each.step.kind,
+                "pose": each.step.pose + 1,
+                "readings": each.step.readings.tolist(),
+                "point_in_world_mm": None
+                if each.point_in_world is None
+                else (1e3 * each.point_in_world).tolist(),
+                "problem": each.problem,
+            }
+            for each in plan.steps
+        ]
+        print_json({"seconds": plan.seconds, "steps": rows})
+        return
+    kinds = [each.step.kind for each in plan.steps]
+    say_wrapped(
+        f"{kinds.count('registration')} contacts for the frame, {kinds.count('pose')} poses, "
+        f"{kinds.count('check')} checks: about {plan.seconds / 60:.0f} min."
+    )
+    for each in plan.steps:
+        place = (
+            "" if each.point_in_world is None else " ".join(f"{1e3 * x:7.1f}" for x in each.point_in_world)
+        )
+        problem = f"  cannot be measured: {each.problem}" if each.problem else ""
+        say(f"{each.step.kind:>12} {each.step.pose + 1:5d}  {place}{problem}")
+    if plan.refused:
+        say_wrapped(f"{len(plan.refused)} of {len(plan.steps)} cannot be measured and would be skipped.")
