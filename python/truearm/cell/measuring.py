@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from truearm.cell.accepted import points_and_joints
 from truearm.cell.cell_file import Cell
 from truearm.cell.crew import Crew
-from truearm.cell.device_errors import DeviceError, RefusedError, StoppedError
+from truearm.cell.device_errors import DeviceError, PortUnavailableError, RefusedError, StoppedError
 from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Reading
@@ -78,7 +78,7 @@ class Process:
         if self._session.next_step() is None:
             return DONE
         try:
-            self._crew.connect()
+            self._connect()
             return self._steps()
         except BaseException as error:
             self._crew.stop()
@@ -167,17 +167,29 @@ class Process:
         via = np.clip(step.readings - side * away, *self._cell.arm.limits.T)
         return [via, step.readings]
 
-    def _recover(self, error: DeviceError, step: Step) -> None:
-        """Connect anew, if that may help and did not fail too often."""
-        self._raise_if_halted()
-        self._recoveries += 1
-        self._session.add_event("device", str(error), step.step)
-        if not error.recoverable or self._recoveries > self._process.recoveries:
-            raise error
+    def _connect(self) -> None:
+        """Connect for the first time; a port that cannot be opened then is not tried again."""
         try:
-            self._crew.recover()
-        except DeviceError as again:
-            self._recover(again, step)
+            self._crew.connect()
+        except PortUnavailableError:
+            raise
+        except DeviceError as error:
+            self._recover(error, None)
+
+    def _recover(self, error: DeviceError, step: Step | None) -> None:
+        """Connect anew, if that may help and did not fail too often."""
+        while True:
+            self._raise_if_halted()
+            self._recoveries += 1
+            self._session.add_event("device", str(error), None if step is None else step.step)
+            if not error.recoverable or self._recoveries > self._process.recoveries:
+                raise error
+            try:
+                self._crew.recover()
+            except DeviceError as again:
+                error = again
+            else:
+                return
 
     def _raise_if_halted(self) -> None:
         if self._halted.is_set():

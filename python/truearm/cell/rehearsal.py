@@ -50,13 +50,13 @@ def rehearse(cell: Cell, poses: Poses) -> Rehearsal:
     for step in steps_of(poses, cell.file.process):
         expected = prediction.expected(step)
         known = np.isfinite(expected.radius_m) and prediction.world_from_base is not None
-        problem = _problem(cell, prediction, step) if known else ""
+        problem = problem_of(cell, prediction, step) if known else ""
         planned.append(Planned(step, expected.point_in_world if known else None, problem))
     possible = len(planned) - len([each for each in planned if each.problem])
     return Rehearsal(planned, cell.file.process.seconds_per_pose * possible)
 
 
-def _problem(cell: Cell, prediction: Prediction, step: Step) -> str:
+def problem_of(cell: Cell, prediction: Prediction, step: Step) -> str:
     """Why the table cannot measure a step; empty where it can, and for sensors that stay away."""
     if not isinstance(cell.sensor, TablePanel) or prediction.world_from_base is None:
         return ""

@@ -28,9 +28,10 @@ from truearm.cell.device_errors import (
 )
 from truearm.cell.line_port import LinePort
 from truearm.cell.movemaster import readings_of, tenths
-from truearm.cell.nearest_pose import readings_for_pose
 from truearm.cell.schema import Positive, Section
+from truearm.inverse import Inverse
 from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
 from truearm.units import RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
@@ -70,6 +71,7 @@ class RvM2:
             frame=settings.frame,
         )
         self._count: Tenths | None = None
+        self._guesses: list[Tenths] = []
         self._leg = round(10.0 * settings.leg_deg)
         self._busy = threading.RLock()
         self._still_at = 0.0
@@ -112,11 +114,9 @@ class RvM2:
             )
 
     def move_pose(self, base_from_tool: Floats) -> None:
-        """See Robot. Position and the angles p and r are met; the arm has no sixth joint.
-
-        The readings come from the nominal kinematics, nearest to the present ones.
-        """
-        self.move_joints(readings_for_pose(self._arm, base_from_tool, self.read_joints()))
+        """See Robot. The readings come from the nominal kinematics, nearest to the present ones."""
+        base_from_flange = base_from_tool @ rigid_inverse(self._arm.tool)
+        self.move_joints(Inverse(self._arm).near(base_from_flange, self.read_joints()))
 
     def read_joints(self) -> Floats:
         """See Robot. Counted from the origin and checked against the controller's Cartesian read-out."""
@@ -135,7 +135,7 @@ class RvM2:
     def close(self) -> None:
         """See Device."""
         self._port.close()
-        self._count = None
+        self._count, self._guesses = None, []
 
     def _go_to_origin(self) -> None:
         self._check_error()
@@ -153,6 +153,9 @@ class RvM2:
         )
 
     def _known_count(self) -> Tenths:
+        """Where the arm is, found out anew where a stop or a failure left that open."""
+        if self._count is None and self._guesses:
+            self._locate(self._guesses, self._port.limit_s)
         if self._count is None:
             raise DeviceError("where the arm is, is not known", where=self._port.where, way_out="Connect it")
         return self._count
@@ -175,10 +178,10 @@ class RvM2:
         step = np.rint(share * (target - before)).astype(np.int64)
         self._port.drain()
         self._port.send(f"MJ {movemaster.listed(step)}")
-        self._count = None
+        self._count, self._guesses = None, [before + step, before, before + 2 * step]
         seconds = MOTION_MARGIN * self._seconds(step)
         self._still_at = time.monotonic() + seconds
-        self._locate([before + step, before, before + 2 * step], self._port.limit_s + seconds)
+        self._locate(self._guesses, self._port.limit_s + seconds)
         self._still_at = 0.0
 
     def _seconds(self, step: Tenths) -> float:

@@ -106,7 +106,7 @@ class UniversalRobots:
 
     def read_joints(self) -> Floats:
         """See Robot."""
-        return self._state().readings
+        return self._state().readings.copy()
 
     def stop(self) -> None:
         """See Device."""

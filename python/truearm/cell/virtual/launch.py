@@ -15,6 +15,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 import tomli_w
+from pydantic import BaseModel
 
 from truearm.cell.cell_file import Cell, parsed
 from truearm.cell.line_robot import LineRobot
@@ -36,18 +37,16 @@ from truearm.units import RADIANS_PER_DEGREE
 
 DEVICES: Final = ("robot", "sensor")
 STARTS_WITHIN_S: Final = 60.0
-SHORTEST_TIMEOUT_S: Final = 0.2
-SHORTEST_SETTLING_S: Final = 0.02
-# Keys of devices that are times or speeds of their own, which follow the virtual clock.
+# Keys of devices that are times, each with the shortest that makes sense, or speeds: they follow the clock.
 TIMES: Final = {
-    "timeout_s": (SHORTEST_TIMEOUT_S, 3.0),
-    "motion_timeout_s": (SHORTEST_TIMEOUT_S, 60.0),
-    "origin_timeout_s": (1.0, 60.0),
-    "settle_s": (SHORTEST_SETTLING_S, 0.2),
+    "timeout_s": 0.2,
+    "motion_timeout_s": 0.2,
+    "origin_timeout_s": 1.0,
+    "settle_s": 0.02,
 }
+SPEEDS: Final = ("speed_mm_s", "touch_speed_mm_s")
 # Pseudo-terminals have no parity bits.
 PTY_FRAME: Final = "8N1"
-SPEEDS: Final = {"speed_mm_s": 100.0, "touch_speed_mm_s": 20.0}
 
 
 class VirtualCell:
@@ -89,7 +88,8 @@ class VirtualCell:
             stack.callback(self._ending.set)
             for device in DEVICES:
                 address = self._started(device, state, stack)
-                self.content[device] = _at(self.content[device], address, self.shared.speed)
+                settings = getattr(self._cell, f"{device}_settings")
+                self.content[device] = _at(self.content[device], address, settings, self.shared.speed)
             self._stack = stack.pop_all()
         return self
 
@@ -214,17 +214,18 @@ def _wire(port: str) -> Wire:
     return TcpWire() if port.startswith("tcp://") else PtyWire()
 
 
-def _at(section: Mapping[str, Any], address: Mapping[str, Any], speed: float) -> dict[str, Any]:
+def _at(
+    section: Mapping[str, Any], address: Mapping[str, Any], settings: BaseModel, speed: float
+) -> dict[str, Any]:
     """A device's section with another address, and times and speeds that follow the virtual clock."""
     changed = {**section, **address}
-    if "frame" in section or section.get("driver") == "rv-m2":
+    known = type(settings).model_fields
+    if "frame" in known:
         changed["frame"] = PTY_FRAME
-    for key, (least, usual) in TIMES.items():
-        if key in section or key == "timeout_s":
-            changed[key] = max(least, float(section.get(key, usual)) / speed)
-    if section.get("driver") == "table-panel":
-        changed |= {key: speed * float(section.get(key, usual)) for key, usual in SPEEDS.items()}
-    return changed
+    for key, least in TIMES.items():
+        if key in known:
+            changed[key] = max(least, float(getattr(settings, key)) / speed)
+    return changed | {key: float(getattr(settings, key)) * speed for key in SPEEDS if key in known}
 
 
 def release_emergency_stop(shared: Shared) -> None:

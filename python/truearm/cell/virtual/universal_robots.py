@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell import ur_packets
-from truearm.cell.nearest_pose import readings_for_pose
 from truearm.cell.virtual.faults import Faults
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.wires import Wire
 from truearm.cell.virtual.world import ROOM_C, World
-from truearm.errors import TruearmError
-from truearm.rotations import quaternion_from_rotation_vector, transform_from_parts
+from truearm.inverse import Inverse
+from truearm.rotations import quaternion_from_rotation_vector, rigid_inverse, transform_from_parts
 
 Floats = NDArray[np.float64]
 
@@ -70,10 +69,9 @@ class VirtualUr:
 
     def _readings(self, numbers: Floats, here: Floats) -> Floats | None:
         pose = transform_from_parts(numbers[:3], quaternion_from_rotation_vector(numbers[None, 3:])[0])
-        try:
-            return readings_for_pose(self._world.cell.arm, pose, here)
-        except TruearmError:
-            return None
+        arm = self._world.cell.arm
+        found = Inverse(arm).near_or_nan(pose @ rigid_inverse(arm.tool), here)
+        return None if np.isnan(found).any() else found
 
 
 class VirtualUrStream:

@@ -1,0 +1,37 @@
+"""`truearm cell example`: cell files to begin with."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truearm.cli.console import print_json, say
+from truearm.errors import InputError, UsageError, did_you_mean
+
+
+def command(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="rv-m2, ur, tracker or playback.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Where the cell file goes.")
+    ] = Path("cell.toml"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Write a cell file to begin with, all keys of which docs/reference/cell-file.md explains.
+
+    Example: truearm cell example rv-m2 -o cell.toml
+    """
+    from truearm.cell.examples import EXAMPLES, example  # noqa: PLC0415
+    from truearm.files import write_whole  # noqa: PLC0415
+
+    if name not in EXAMPLES:
+        way_out = did_you_mean(name, EXAMPLES)
+        raise UsageError(
+            f'there is no example "{name}"', rule=f"One of {', '.join(EXAMPLES)}", way_out=way_out
+        )
+    if output.exists():
+        raise InputError("there is such a file already", where=str(output), way_out="Name another with -o")
+    write_whole(output, example(name))
+    if as_json:
+        print_json({"cell": str(output)})
+    else:
+        say(f"Cell file: {output}")

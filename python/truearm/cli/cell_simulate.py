@@ -1,0 +1,83 @@
+"""`truearm cell simulate`: the devices of a cell file as virtual ones that speak the real protocols."""
+
+import sys
+import threading
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from truearm.cli.console import print_json, say, tell
+from truearm.errors import UsageError
+
+FAULTS: Final = "lost, delayed, duplicated, garbled, missed, outlier, restart, emergency_stop"
+
+
+def command(
+    cell: Annotated[Path, typer.Argument(metavar="CELL", help="A cell file.")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Where the cell file goes.  [default: CELL.virtual.toml]"
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None, typer.Option(metavar="X", help="Run the virtual clock X times as fast.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the virtual arm, its noise and faults.")] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND=SHARE", help="Make a share of the messages or contacts fail, as lost=0.05."
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Start the devices of a cell file as virtual ones, each a process behind a pseudo-terminal or TCP port.
+
+    A cell file with their addresses is written; the devices are served until Ctrl-C.
+
+    Example: truearm cell simulate cell.toml --speed 20 --fault lost=0.05 -o virtual.toml
+    """
+    target = output or cell.with_suffix(".virtual.toml")
+    changes = _changes(speed, seed, fault or [])
+    import tomli_w  # noqa: PLC0415
+
+    from truearm.cell.cell_file import parsed  # noqa: PLC0415
+    from truearm.cell.virtual.launch import VirtualCell  # noqa: PLC0415
+    from truearm.cli.until_interrupted import until_interrupted  # noqa: PLC0415
+    from truearm.files import read_text, write_whole  # noqa: PLC0415
+
+    if target.resolve() == cell.resolve():
+        raise UsageError("this is the cell file itself", where=str(target), way_out="Name another with -o")
+    content = parsed(read_text(cell), where=str(cell))
+    section = dict(content.get("simulate", {}))
+    faults = {**section.get("faults", {}), **changes.pop("faults", {})}  # type: ignore[dict-item]
+    content["simulate"] = {**section, **changes, **({"faults": faults} if faults else {})}
+    with VirtualCell(tomli_w.dumps(content), where=str(cell), folder=cell.parent) as virtual:
+        write_whole(target, virtual.cell_toml())
+        if as_json:
+            print_json({"cell": str(target)})
+        else:
+            say(f"The virtual cell is ready. Its cell file: {target}")
+            say(f"Try next, in another terminal: truearm measure {target} poses.csv -o session.db")
+        sys.stdout.flush()
+        until_interrupted(threading.Event())
+    tell("The virtual cell has ended.")
+
+
+def _changes(speed: float | None, seed: int | None, faults: list[str]) -> dict[str, object]:
+    """What options say of the section [simulate]."""
+    changes: dict[str, object] = {} if speed is None else {"speed": speed}
+    if seed is not None:
+        changes["seed"] = seed
+    shares = {}
+    for given in faults:
+        kind, _, share = given.partition("=")
+        try:
+            shares[kind] = float(share)
+        except ValueError:
+            raise UsageError(
+                f'"{given}" is no fault', where="--fault", rule=f"KIND=SHARE: {FAULTS}"
+            ) from None
+    return changes | ({"faults": shares} if shares else {})

@@ -1,0 +1,36 @@
+"""`truearm session export`: the accepted measurements of a session as a measurement file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truearm.cli.console import print_json, say
+
+
+def command(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", help="A file that truearm measure wrote.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="CSV", help="Where the measurements go.")
+    ] = Path("measurements.csv"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Write the accepted measurements of a session, one row a pose; it may be under way.
+
+    Example: truearm session export session.db -o measurements.csv
+    """
+    from truearm.cell.accepted import accepted_table  # noqa: PLC0415
+    from truearm.cell.session import Session  # noqa: PLC0415
+    from truearm.errors import WorkError  # noqa: PLC0415
+    from truearm.files import write_whole  # noqa: PLC0415
+
+    with Session(session, writing=False) as known:
+        table, arm = accepted_table(known), str(known.meta("arm")["name"]).lower()
+    if table.empty:
+        raise WorkError("no pose is measured yet", where=str(session))
+    write_whole(output, table.drop(columns="step").to_csv(index=False, lineterminator="\n"))
+    if as_json:
+        print_json({"measurements": str(output), "rows": len(table)})
+        return
+    say(f"{len(table)} measurements: {output}")
+    say(f"Try next: truearm calibrate {arm} {output} -o calibrated")

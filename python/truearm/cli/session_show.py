@@ -1,0 +1,101 @@
+"""`truearm session show`: what a session file holds."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from truearm.cli.console import print_json, print_table, say, say_wrapped
+from truearm.errors import UsageError
+
+if TYPE_CHECKING:
+    from truearm.cell.session import Session
+
+MOST_SHOWN: Final = 20
+
+
+def command(
+    session: Annotated[Path, typer.Argument(metavar="SESSION", help="A file that truearm measure wrote.")],
+    pose: Annotated[
+        int | None, typer.Option(metavar="K", help="Show all readings of pose K, with their history.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Show what a session holds; it may be under way.
+
+    Example: truearm session show session.db --pose 17
+    """
+    from truearm.cell.session import Session  # noqa: PLC0415
+
+    with Session(session, writing=False) as known:
+        if pose is not None:
+            _show_pose(known, pose, as_json=as_json)
+        else:
+            _show(known, as_json=as_json)
+
+
+def _show(session: "Session", *, as_json: bool) -> None:
+    from truearm.cell.summary import summary_of  # noqa: PLC0415
+
+    found = summary_of(session)
+    if as_json:
+        print_json(found)
+        return
+    say(f"{found['cell']}, {found['arm']}")
+    say(
+        f"{found['measured']} of {found['poses']} poses measured, {len(found['skipped'])} skipped, "
+        f"{found['open']} open; {found['readings']} readings, {found['invalid_readings']} not valid."
+    )
+    frame = found["registration"]
+    if frame is not None:
+        say(f"Frame from {frame['contacts']} contacts, {frame['residual_mm']:.2f} mm RMS.")
+    if found["stretches"]:
+        print_table(
+            ("poses", "model", "held out mm", "95 % mm", "expected mm"),
+            [_stretch(row) for row in found["stretches"]],
+            left=(1,),
+        )
+    for skipped in found["skipped"][:MOST_SHOWN]:
+        say_wrapped(f"Pose {skipped['pose']} skipped: {skipped['reason']}")
+    if found["events"]:
+        counts = ", ".join(f"{count} {kind}" for kind, count in found["events"].items())
+        say_wrapped(f"Events: {counts}. The last: {found['last_event']}")
+
+
+def _stretch(row: dict[str, Any]) -> list[str]:
+    figures = [f"{row[key]:.3f}" for key in ("mean_mm", "p95_mm", "expected_mm")]
+    return [str(row["measured"]), row["model"], *figures]
+
+
+def _show_pose(session: "Session", pose: int, *, as_json: bool) -> None:
+    rows = session.rows(
+        "SELECT s.kind, r.attempt, r.x_m, r.y_m, r.z_m, r.valid, r.reason, o.attempts, o.outcome, r.raw "
+        "FROM readings r JOIN steps s USING (step) LEFT JOIN outcomes o USING (step) "
+        "WHERE s.pose = ? ORDER BY s.step, r.attempt",
+        (pose - 1,),
+    )
+    if not rows:
+        raise UsageError(f"there are no readings of pose {pose}", where=str(session.path))
+    names = ("kind", "attempt", "x_m", "y_m", "z_m", "valid", "reason", "attempts", "outcome", "raw")
+    readings = [dict(zip(names, row, strict=True)) for row in rows]
+    if as_json:
+        print_json(readings)
+        return
+    print_table(
+        ("kind", "attempt", "x mm", "y mm", "z mm", "state"),
+        [_reading(each) for each in readings],
+        left=(0, 5),
+    )
+
+
+def _reading(row: dict[str, Any]) -> list[str]:
+    import json  # noqa: PLC0415
+
+    point = ["" if row[key] is None else f"{1e3 * row[key]:.3f}" for key in ("x_m", "y_m", "z_m")]
+    if not row["valid"]:
+        state = row["reason"]
+    elif row["outcome"] is None:
+        state = "open"
+    else:
+        state = "accepted" if row["attempt"] in json.loads(row["attempts"]) else "contradicted"
+    return [row["kind"], str(row["attempt"]), *point, state]
