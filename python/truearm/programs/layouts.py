@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +68,16 @@ class PoseLayout(Protocol):
 
 
 Layout = JointLayout | PoseLayout
+
+
+def of_pose(layout: Layout) -> TypeGuard[PoseLayout]:
+    """Whether the numbers of a layout stand for a pose."""
+    return hasattr(layout, "configuration")
+
+
+def of_joints(layout: Layout) -> TypeGuard[JointLayout]:
+    """Whether the numbers of a layout stand for joint readings."""
+    return not hasattr(layout, "configuration")
 
 
 @dataclass(frozen=True)

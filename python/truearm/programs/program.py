@@ -1,7 +1,7 @@
 """A program as a language's reader found it, and what a language has to know for that."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -46,6 +46,7 @@ class Program:
         environments: Tools, objects and offsets; moves name one by number.
         listed: What the reader could not take for a target with certainty.
         configuration: How poses tell their branch; None in a language that does not.
+        fixed: Why targets cannot be changed with certainty whatever they are used for, by number.
         accurate: Why the controller is known to compute with a model of its own, where the program says so.
     """
 
@@ -58,6 +59,7 @@ class Program:
     listed: tuple[Listed, ...] = ()
     configuration: Configuration | None = None
     accurate: str = ""
+    fixed: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,206 @@
+"""From corrected readings q^c to the numbers that the program is to say, checked by reading them again."""
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.programs.configuration import ANY, with_turns
+from truearm.programs.environment import Environment
+from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
+from truearm.programs.program import Program
+from truearm.programs.solving import Inverse, is_singular, numbers_of
+from truearm.programs.uses import Uses
+from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+STEPS: Final = 4
+AGREES_RAD: Final = 1e-3
+NOT_UNIQUE: Final = "no configuration data says its corrected readings and no others"
+CORRECTED_SINGULAR: Final = "its correction ends at a singularity, where a pose does not determine the joints"
+
+
+class Controller(Protocol):
+    """The model that the controller computes with."""
+
+    @property
+    def robot(self) -> Robot:
+        """Its arm."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """Numbers to write.
+
+    Attributes:
+        places: Places of the numbers among all numbers of the program, (m,), ascending.
+        values: What to write, in the text's units, (m,).
+        decimals: With how many digits behind the point, (m,).
+        reasons: Why a target cannot be written, by its number.
+    """
+
+    places: Integers
+    values: Floats
+    decimals: Integers
+    reasons: dict[int, str]
+
+
+def encode_targets(
+    program: Program, uses: Uses, q: Floats, which: Integers, controller: Controller, inverse: Inverse
+) -> Written:
+    """The numbers of targets `which` (n,) that say the readings `q` (t, N).
+
+    Args:
+        program: The program.
+        uses: How its targets are used.
+        q: Corrected readings of all targets.
+        which: Targets to write.
+        controller: The controller's model.
+        inverse: Its inverse kinematics.
+    """
+    encoder = _Encoder(program, uses, controller.robot, inverse)
+    for number, layout in enumerate(program.layouts):
+        chosen = which[program.targets.layout[which] == number]
+        if len(chosen) == 0:
+            continue
+        if of_pose(layout):
+            for environment in np.unique(uses.environment[chosen]):
+                here = chosen[uses.environment[chosen] == environment]
+                encoder.poses(here, layout, program.environments[int(environment)], q[here])
+        if of_joints(layout):
+            encoder.joints(chosen, layout, q[chosen])
+    return encoder.written()
+
+
+class _Encoder:
+    """Gathers numbers and reasons."""
+
+    def __init__(self, program: Program, uses: Uses, robot: Robot, inverse: Inverse) -> None:
+        self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
+        self.reasons: dict[int, str] = {}
+        self._found: list[tuple[Integers, Floats, Integers]] = []
+
+    def joints(self, which: Integers, layout: JointLayout, q: Floats) -> None:
+        """Joint targets say q^c itself."""
+        near = numbers_of(self.program, which, layout)
+        values, decimals = self._rounded(which, layout, layout.from_readings(q, near))
+        self._keep(which, layout, values, decimals)
+
+    def poses(self, which: Integers, layout: PoseLayout, environment: Environment, q: Floats) -> None:
+        """Cartesian targets say where the controller's model puts the tool at q^c."""
+        pose_width = layout.width - layout.configuration
+        near = numbers_of(self.program, which, layout)
+        base_from_tool = self.robot.flange_chain.pose(
+            np.ascontiguousarray(self.robot.joints_from_readings(q))
+        )
+        base_from_tool = base_from_tool @ environment.tool.controller
+        outer = rigid_inverse(environment.work_object.controller @ environment.before)
+        stored = outer @ base_from_tool @ rigid_inverse(environment.after)
+        values = np.array(near)
+        values[:, :pose_width] = layout.from_poses(stored, near[:, :pose_width])
+        values, decimals = self._rounded(which, layout, values)
+        inner = environment.after @ rigid_inverse(environment.tool.controller)
+        again = layout.to_poses((values * self._factors(which, layout))[:, :pose_width])
+        flange = environment.work_object.controller @ environment.before @ again @ inner
+        said, steady = joints_of(self.robot, flange, q)
+        for target in which[~steady]:
+            self.reasons[int(target)] = CORRECTED_SINGULAR
+        if layout.configuration and self.program.configuration is not None:
+            stated = numbers_of(self.program, which, layout)[:, pose_width:]
+            values[:, pose_width:] = self._configured(which, stated, said, flange)
+        self._keep(which, layout, values, decimals)
+
+    def _configured(self, which: Integers, stated: Floats, said: Floats, flange: Floats) -> Floats:
+        """Configuration data (n, C) that tells the readings `said` from all others of the same pose."""
+        configuration = self.program.configuration
+        if configuration is None:
+            return stated
+        digits = configuration.digits(said)
+        text = configuration.text_of_digits(digits, stated)
+        absent = np.isnan(stated)
+        for row in np.flatnonzero(~absent.all(axis=1)):
+            wanted = configuration.digits_of_text(text[row : row + 1])
+            if not self._only(said[row], flange[row], wanted):
+                self.reasons[int(which[row])] = NOT_UNIQUE
+        return np.where(absent, np.nan, text)
+
+    def _only(self, said: Floats, flange: Floats, wanted: Integers) -> bool:
+        """Whether the configuration data `wanted` leaves the controller no readings but `said`."""
+        configuration = self.program.configuration
+        if configuration is None:
+            return True
+        try:
+            candidates = with_turns(np.asarray(self.inverse.solutions(flange)), self.robot)
+        except InputError:
+            return False
+        if len(candidates) == 0:
+            return False
+        agrees = ((configuration.digits(candidates) == wanted) | (wanted == ANY)).all(axis=1)
+        apart = np.abs(candidates[agrees] - said).max(axis=1)
+        return bool(len(apart) > 0 and (apart < AGREES_RAD).all())
+
+    def _rounded(
+        self, which: Integers, layout: JointLayout | PoseLayout, values: Floats
+    ) -> tuple[Floats, Integers]:
+        """Numbers in the text's units, rounded as they are written, and their decimals, (n, width) each."""
+        places = self.program.targets.numbers(which, layout.width)
+        factors = self.program.targets.factors[places]
+        least = np.array(layout.least_decimals) + np.ceil(np.log10(np.abs(factors)) - 1e-9)
+        decimals = np.maximum(self.program.targets.decimals[places], np.maximum(least, 0.0)).astype(np.int64)
+        scale = 10.0**decimals
+        rounded: Floats = np.round(values / factors * scale) / scale
+        return rounded, decimals
+
+    def _factors(self, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
+        factors: Floats = self.program.targets.factors[self.program.targets.numbers(which, layout.width)]
+        return factors
+
+    def _keep(
+        self, which: Integers, layout: JointLayout | PoseLayout, values: Floats, decimals: Integers
+    ) -> None:
+        places = self.program.targets.numbers(which, layout.width)
+        kept = np.array([int(target) not in self.reasons for target in which], dtype=bool)
+        present = (self.program.targets.starts[places] >= 0) & kept[:, None]
+        self._found.append((places[present], values[present], decimals[present]))
+
+    def written(self) -> Written:
+        """All that was found, in the order of the numbers."""
+        if not self._found:
+            nothing = np.empty(0, dtype=np.int64)
+            return Written(nothing, np.empty(0), nothing, self.reasons)
+        places, values, decimals = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
+        order = np.argsort(places, kind="stable")
+        return Written(places[order], values[order], decimals[order], self.reasons)
+
+
+def joints_of(robot: Robot, base_from_flange: Floats, near: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Readings (n, N) close to `near` that put the flange at poses (n, 4, 4), and where that is well defined.
+
+    The poses are those of `near` but for the rounding of their numbers, so that a few steps of Newton's
+    method are exact.
+    """
+    q = np.array(near)
+    steady = np.ones(len(q), dtype=bool)
+    for _ in range(STEPS):
+        reached = robot.flange_chain.pose(np.ascontiguousarray(robot.joints_from_readings(q)))
+        error = np.empty((len(q), 6))
+        error[:, :3] = base_from_flange[:, :3, 3] - reached[:, :3, 3]
+        turn = base_from_flange[:, :3, :3] @ np.swapaxes(reached[:, :3, :3], 1, 2)
+        error[:, 3:] = 0.5 * np.stack(
+            [turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]],
+            axis=1,
+        )
+        jacobian = robot.flange_chain.joint_jacobian(
+            np.ascontiguousarray(robot.joints_from_readings(q)), pose=True
+        )
+        step = (np.linalg.pinv(jacobian @ robot.coupling) @ error[:, :, None])[:, :, 0]
+        steady &= np.abs(step).max(axis=1) < AGREES_RAD * 10
+        q += np.where(steady[:, None], step, 0.0)
+    steady &= np.array([not is_singular(robot, row) for row in q], dtype=bool)
+    return q, steady

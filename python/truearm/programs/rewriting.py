@@ -1,0 +1,320 @@
+"""From a program and a calibration to the program that hits: the whole way, whatever the language."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import Notice, WorkError
+from truearm.programs.editing import Words, edited
+from truearm.programs.encoding import Controller, encode_targets
+from truearm.programs.frames import Frames
+from truearm.programs.marks import refuse_marked
+from truearm.programs.program import Language, Listed, Program
+from truearm.programs.solving import Inverse, solve_targets
+from truearm.programs.source import Source
+from truearm.programs.uses import Uses
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+NAMED: Final = 10
+Tell = Callable[[str, int, int], None]
+
+
+class Refusal(Protocol):
+    """Why a row was refused."""
+
+    @property
+    def number(self) -> int:
+        """Row, from 1."""
+        ...
+
+    @property
+    def reason(self) -> str:
+        """Why, in words that end a sentence."""
+        ...
+
+
+class Corrected(Protocol):
+    """What a compensator gives for rows."""
+
+    q: Floats
+    correction_mm: Floats
+    correction_mrad: Floats
+    residual_mm: Floats
+    std_mm: Floats
+    refused: Bools
+    refusals: tuple[Any, ...]
+
+
+class Compensator(Protocol):
+    """What turns readings into corrected ones."""
+
+    def joints(self, q: Floats, *, tool: Floats | None = None) -> Any:  # noqa: ANN401
+        """Corrected readings of rows (n, N), at a tool."""
+        ...
+
+
+@dataclass(frozen=True)
+class Models:
+    """The arms that a program is rewritten between.
+
+    Attributes:
+        programming: What the program's author used.
+        inverse: Its inverse kinematics.
+        controller: What the controller computes with.
+        controller_inverse: Its inverse kinematics.
+        compensator: From programming to calibrated.
+    """
+
+    programming: Robot
+    inverse: Inverse
+    controller: Controller
+    controller_inverse: Inverse
+    compensator: Compensator
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user decides.
+
+    Attributes:
+        on_refusal: "stop", or "keep-nominal" to leave refused targets as they are where that makes no step.
+        force: Rewrite a program that bears a mark.
+    """
+
+    on_refusal: Literal["stop", "keep-nominal"] = "stop"
+    force: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Rewritten:
+    """A program with corrected targets.
+
+    Attributes:
+        program: The program as it was.
+        contents: The bytes of its files now.
+        nominal: Readings that the author meant, (t, N); NaN where they are not known.
+        corrected: Readings that the program says now, (t, N); the nominal ones where it was left as it was.
+        changed: Targets that were changed, (t,).
+        correction_mm: How far the tool's target moved, (t,); NaN where it was not changed.
+        correction_mrad: How far it turned, (t,).
+        std_mm: Standard deviation of the calibration there, (t,).
+        kept: Targets that were refused and kept as they were, with the reason.
+        listed: What was left as it was because it cannot be changed with certainty.
+        notices: What the user should know.
+    """
+
+    program: Program
+    contents: tuple[bytes, ...]
+    nominal: Floats
+    corrected: Floats
+    changed: Bools
+    correction_mm: Floats
+    correction_mrad: Floats
+    std_mm: Floats
+    kept: tuple[Listed, ...]
+    listed: tuple[Listed, ...]
+    notices: tuple[Notice, ...] = ()
+
+
+def read_program(path: Path, language: Language, robot: Robot, frames: Frames) -> Program:
+    """The program at `path`, with the files that belong to it."""
+    sources = [Source.load(file) for file in (path, *language.companions(path))]
+    return language.read(sources, robot, frames)
+
+
+def rewrite(
+    program: Program,
+    models: Models,
+    choices: Choices,
+    *,
+    mark: str = "",
+    inserted: Mapping[int, tuple[Words, ...]] | None = None,
+    tell: Tell = lambda _what, _done, _all: None,
+) -> Rewritten:
+    """Correct the targets of a program.
+
+    Args:
+        program: The program.
+        models: The arms it is rewritten between.
+        choices: What the user decides.
+        mark: What the mark in the program says; none without.
+        inserted: Further words by file.
+        tell: Called now and then with what is going on, how much is done, and of how much.
+
+    Raises:
+        WorkError: If the program bears a mark, or targets were refused and may not be kept as they are.
+    """
+    if not choices.force:
+        refuse_marked(program)
+    uses = Uses.of(program)
+    solved = solve_targets(
+        program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
+    )
+    known = ~np.isnan(solved.q).any(axis=1)
+    known[list(solved.reasons)] = False
+    state = _State(program, uses, models, solved.q, known)
+    state.reasons.update(solved.reasons)
+    state.compensate()
+    kept = state.settle(choices)
+    return state.finish(mark, inserted or {}, kept)
+
+
+@dataclass(eq=False)
+class _State:
+    """What is known of the targets while they are corrected."""
+
+    program: Program
+    uses: Uses
+    models: Models
+    nominal: Floats
+    known: Bools
+    reasons: dict[int, str] = field(default_factory=dict)
+    refused: dict[int, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.corrected = np.array(self.nominal)
+        self.correction_mm, self.correction_mrad, self.std_mm = (
+            np.full(len(self.nominal), np.nan) for _ in range(3)
+        )
+
+    def compensate(self) -> None:
+        """Corrected readings of all known targets, tool by tool, in the order of the text."""
+        for number, example in enumerate(self.uses.tools):
+            which = np.flatnonzero(self.known & (self.uses.tool == number))
+            if len(which) == 0:
+                continue
+            tool = self.program.environments[example].tool
+            found = self.models.compensator.joints(
+                np.ascontiguousarray(self.nominal[which]), tool=None if tool.unknown else tool.true
+            )
+            refused = np.asarray(found.refused, dtype=bool)
+            self.corrected[which] = np.where(refused[:, None], self.nominal[which], found.q)
+            self.correction_mm[which], self.correction_mrad[which] = (
+                found.correction_mm,
+                found.correction_mrad,
+            )
+            if found.std_mm is not None:
+                self.std_mm[which] = found.std_mm
+            for refusal in found.refusals:
+                self.refused[int(which[refusal.number - 1])] = refusal.reason
+
+    def settle(self, choices: Choices) -> tuple[Listed, ...]:
+        """Refused targets that are kept as they are, or an error."""
+        if not self.refused:
+            return ()
+        listed = [self._listed(target, reason) for target, reason in sorted(self.refused.items())]
+        if choices.on_refusal == "stop":
+            raise WorkError(
+                f"{len(listed)} of {len(self.program.targets)} targets cannot be corrected:\n"
+                + describe(self.program, listed),
+                way_out="Change them or the limits; --on-refusal keep-nominal leaves such targets as they are "
+                "where that makes no step",
+            )
+        steps = [target for target in sorted(self.refused) if self._makes_a_step(target)]
+        if steps:
+            raise WorkError(
+                f"{len(steps)} targets cannot be corrected and cannot be kept as they are:\n"
+                + describe(self.program, [self._listed(target, self.refused[target]) for target in steps]),
+                rule="Within linear, circular or blended motion an uncorrected target among corrected ones "
+                "makes a step",
+                way_out="Change these targets or the limits",
+            )
+        return tuple(listed)
+
+    def _makes_a_step(self, target: int) -> bool:
+        return bool(self.uses.straight[target] or self.uses.blended[target])
+
+    def finish(
+        self, mark: str, inserted: Mapping[int, tuple[Words, ...]], kept: tuple[Listed, ...]
+    ) -> Rewritten:
+        """The texts, and what is told of them."""
+        changed = np.array(self.known)
+        changed[list(self.refused)] = False
+        written = encode_targets(
+            self.program,
+            self.uses,
+            self.corrected,
+            np.flatnonzero(changed),
+            self.models.controller,
+            self.models.controller_inverse,
+        )
+        self.reasons.update(written.reasons)
+        changed[list(written.reasons)] = False
+        words = {number: list(more) for number, more in inserted.items()}
+        if mark:
+            for number, source in enumerate(self.program.sources):
+                at, line = self.program.language.mark(source, mark)
+                words.setdefault(number, []).append((at, at, line.encode("latin-1", "replace")))
+        contents = edited(self.program, written, words)
+        self._forget(~changed)
+        listed = sorted(
+            [*self.program.listed, *(self._listed(target, why) for target, why in self.reasons.items())]
+        )
+        return Rewritten(
+            self.program,
+            tuple(contents),
+            self.nominal,
+            self.corrected,
+            changed,
+            self.correction_mm,
+            self.correction_mrad,
+            self.std_mm,
+            kept,
+            tuple(listed),
+            self._notices(changed),
+        )
+
+    def _forget(self, unchanged: Bools) -> None:
+        self.corrected[unchanged] = self.nominal[unchanged]
+        for column in (self.correction_mm, self.correction_mrad, self.std_mm):
+            column[unchanged] = np.nan
+
+    def _notices(self, changed: Bools) -> tuple[Notice, ...]:
+        along = self.uses.moved & (self.uses.straight | self.uses.blended)
+        left = np.flatnonzero(along & ~changed)
+        if len(left) == 0 or not changed.any():
+            return ()
+        lines = sorted({self._listed(int(target), "").line for target in left})
+        return (
+            Notice(
+                "steps",
+                f"{len(left)} targets of linear, circular or blended motion are left as they are between "
+                "corrected ones: the path steps there by the correction, see the listing",
+                tuple(lines),
+            ),
+        )
+
+    def _listed(self, target: int, reason: str) -> Listed:
+        return listed_target(self.program, target, reason)
+
+
+def listed_target(program: Program, target: int, reason: str) -> Listed:
+    """A target in a listing."""
+    file = int(program.targets.source[target])
+    source = program.sources[file]
+    line, column = source.place(int(program.targets.at[target]))
+    name = program.targets.names.get(target) or source.line_text(line).strip()
+    return Listed(file, line, column, name, reason)
+
+
+def describe(program: Program, listed: list[Listed], most: int = NAMED) -> str:
+    """Lines of text about the first of `listed`."""
+    lines = [
+        f"  {program.sources[one.file].path.name}, line {one.line}, {shortened(one.name)}: {one.reason}"
+        for one in listed[:most]
+    ]
+    if len(listed) > most:
+        lines.append(f"  and {len(listed) - most} more")
+    return "\n".join(lines)
+
+
+def shortened(name: str, most: int = 40) -> str:
+    """A name or statement in at most `most` characters."""
+    return name if len(name) <= most else f"{name[: most - 3]}..."

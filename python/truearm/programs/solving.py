@@ -1,0 +1,239 @@
+"""From the targets of a program to the joint readings its author meant, q^n."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.programs.configuration import meant, with_turns
+from truearm.programs.environment import Environment
+from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
+from truearm.programs.program import Program, motion_is_straight
+from truearm.programs.uses import SEVERAL, UNUSED, Uses
+from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+OUT_OF_REACH: Final = "the nominal arm does not reach it"
+NO_BRANCH: Final = "the nominal arm does not reach it in the configuration that it states"
+AMBIGUOUS: Final = "several configurations of the arm reach it, and the program does not tell which is meant"
+CONTRADICTS: Final = "its configuration data is another than a line from the target before arrives in"
+SINGULAR: Final = "it lies at a singularity, where a pose does not determine the joints"
+DIFFERENT: Final = "it is reached in several configurations of the arm, and one change cannot suit them all"
+
+SAME_RAD: Final = 1e-6
+NEARER: Final = 0.8
+LEAST_GAIN: Final = 2e-3
+TELL_EVERY: Final = 200
+
+
+class Inverse(Protocol):
+    """Inverse kinematics of a plain arm."""
+
+    def solutions(self, base_from_flange: Floats) -> Floats:
+        """All readings (k, N) that put the flange at a pose (4, 4)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What a program means.
+
+    Attributes:
+        q: Readings of each target, (t, N), rad and m; NaN where they are not known.
+        reasons: Why a target cannot be changed, by its number.
+    """
+
+    q: Floats
+    reasons: dict[int, str]
+
+
+def solve_targets(
+    program: Program, uses: Uses, robot: Robot, inverse: Inverse, tell: Callable[[int, int], None]
+) -> Solved:
+    """The readings of all targets.
+
+    Args:
+        program: The program.
+        uses: How its targets are used.
+        robot: The programming model.
+        inverse: Its inverse kinematics.
+        tell: Called now and then with how many Cartesian targets are solved, and how many there are.
+    """
+    solver = _Solver(program, uses, robot, inverse)
+    solver.take_joints()
+    solver.take_poses(tell)
+    return Solved(solver.q, solver.reasons)
+
+
+def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
+    """Numbers (n, width) of targets of one layout, in the layout's units."""
+    places = program.targets.numbers(which, layout.width)
+    numbers: Floats = program.targets.values[places] * program.targets.factors[places]
+    return numbers
+
+
+def flange_poses(stored: Floats, environment: Environment) -> Floats:
+    """base_from_flange (n, 4, 4) of stored poses, as they truly are meant."""
+    outer = environment.work_object.true @ environment.before
+    inner = environment.after @ rigid_inverse(environment.tool.true)
+    poses: Floats = outer @ stored @ inner
+    return poses
+
+
+class _Solver:
+    """Gathers readings and reasons."""
+
+    def __init__(self, program: Program, uses: Uses, robot: Robot, inverse: Inverse) -> None:
+        self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
+        self.q = np.full((len(program.targets), robot.joint_count), np.nan)
+        self.reasons: dict[int, str] = {}
+
+    def take_joints(self) -> None:
+        """Joint targets say their readings; all that cannot be changed whatever they say are named."""
+        for number, layout in enumerate(self.program.layouts):
+            which = np.flatnonzero(self.program.targets.layout == number)
+            if of_joints(layout):
+                self.q[which] = layout.to_readings(numbers_of(self.program, which, layout))
+        self.reasons.update(self.program.fixed)
+        for target in np.flatnonzero(~self.uses.moved):
+            self.reasons.setdefault(int(target), UNUSED)
+        for target in np.flatnonzero(self.uses.several):
+            self.reasons.setdefault(int(target), SEVERAL)
+        for number, environment in enumerate(self.program.environments):
+            here = self.uses.environment == number
+            self._refuse(here & self.uses.of_joints, environment.problem)
+            self._refuse(here & ~self.uses.of_joints, environment.why_not_poses)
+
+    def _refuse(self, which: Bools, reason: str) -> None:
+        if reason:
+            for target in np.flatnonzero(which & ~self.uses.several):
+                self.reasons.setdefault(int(target), reason)
+
+    def take_poses(self, tell: Callable[[int, int], None]) -> None:
+        """Cartesian targets, in the order of the moves, each with the one before for a seed."""
+        flange = self._flange_poses()
+        todo, done = len(flange), 0
+        before: Floats | None = None
+        moves = self.program.moves
+        columns = (moves.target.tolist(), moves.follows.tolist(), moves.motion.tolist())
+        for target, follows, motion in zip(*columns, strict=True):
+            if not follows:
+                before = None
+            if target in flange:
+                fresh = np.isnan(self.q[target, 0]) and target not in self.reasons
+                self._take(target, flange[target], before, straight=motion_is_straight(motion))
+                done += fresh
+                if fresh and done % TELL_EVERY == 0:
+                    tell(done, todo)
+            known = not np.isnan(self.q[target, 0])
+            before = self.q[target] if known else None
+
+    def _flange_poses(self) -> dict[int, Floats]:
+        """Poses of the flange for every Cartesian target that may be changed."""
+        found: dict[int, Floats] = {}
+        usable = ~self.uses.of_joints & (self.uses.environment >= 0)
+        usable[list(self.reasons)] = False
+        for number, layout in enumerate(self.program.layouts):
+            for environment in np.unique(self.uses.environment[usable]):
+                here = usable & (self.uses.environment == environment)
+                which = np.flatnonzero(here & (self.program.targets.layout == number))
+                if len(which) == 0 or not of_pose(layout):
+                    continue
+                values = numbers_of(self.program, which, layout)[:, : layout.width - layout.configuration]
+                stored = layout.to_poses(values)
+                poses = flange_poses(stored, self.program.environments[int(environment)])
+                found.update(zip(which.tolist(), poses, strict=True))
+        return found
+
+    def _take(self, target: int, base_from_flange: Floats, before: Floats | None, *, straight: bool) -> None:
+        if target in self.reasons:
+            return
+        known = None if np.isnan(self.q[target, 0]) else self.q[target]
+        if known is not None and self._stated(target) is not None:
+            return
+        found = self._solve(target, base_from_flange, before, straight=straight)
+        if isinstance(found, str):
+            self.reasons[target] = found
+            self.q[target] = np.nan
+        elif known is not None and np.abs(known - found).max() > SAME_RAD:
+            self.reasons[target] = DIFFERENT
+            self.q[target] = np.nan
+        else:
+            self.q[target] = found
+
+    def _solve(
+        self, target: int, base_from_flange: Floats, before: Floats | None, *, straight: bool
+    ) -> Floats | str:
+        """The readings of one pose, or why they are not known."""
+        try:
+            branches = self.inverse.solutions(base_from_flange)
+        except InputError:
+            return OUT_OF_REACH
+        candidates = with_turns(np.asarray(branches), self.robot)
+        if len(candidates) == 0:
+            return OUT_OF_REACH
+        stated = self._stated(target)
+        possible = candidates
+        if stated is not None and self.program.configuration is not None:
+            possible = candidates[meant(self.program.configuration, stated, candidates)]
+            if len(possible) == 0:
+                return NO_BRANCH
+        found = the_nearest(possible, before)
+        if found is None:
+            return AMBIGUOUS
+        if straight and before is not None and not is_nearest(found, candidates, before):
+            return CONTRADICTS
+        return SINGULAR if is_singular(self.robot, found) else found
+
+    def _stated(self, target: int) -> Floats | None:
+        """The configuration data of a target; None where there is none."""
+        layout = self.program.layouts[int(self.program.targets.layout[target])]
+        count = getattr(layout, "configuration", 0)
+        if count == 0:
+            return None
+        first = self.program.targets.first[target]
+        values = self.program.targets.values[first : first + layout.width][-count:]
+        return None if np.isnan(values).all() else values
+
+
+def the_nearest(candidates: Floats, before: Floats | None) -> Floats | None:
+    """The one of the candidates (k, N) that is meant: the only one, or clearly the nearest to `before`."""
+    distinct = _distinct(candidates)
+    if len(distinct) == 1:
+        return np.asarray(distinct[0])
+    if before is None:
+        return None
+    distances = np.abs(distinct - before).max(axis=1)
+    order = np.argsort(distances, kind="stable")
+    if distances[order[0]] > NEARER * distances[order[1]]:
+        return None
+    return np.asarray(distinct[order[0]])
+
+
+def is_nearest(found: Floats, candidates: Floats, before: Floats) -> bool:
+    """Whether none of the candidates (k, N) is nearer to `before` than `found`."""
+    nearest = np.abs(candidates - before).max(axis=1).min()
+    return bool(np.abs(found - before).max() <= nearest + SAME_RAD)
+
+
+def _distinct(candidates: Floats) -> Floats:
+    kept: list[Floats] = []
+    for candidate in candidates:
+        if all(np.abs(candidate - other).max() > SAME_RAD for other in kept):
+            kept.append(candidate)
+    return np.array(kept)
+
+
+def is_singular(robot: Robot, q: Floats) -> bool:
+    """Whether a small change of the pose asks for a large one of the joints (six axes or more)."""
+    if robot.joint_count < 6:
+        return False
+    jacobian = robot.joint_jacobian(q, pose=True)
+    return bool(np.linalg.svd(jacobian, compute_uv=False)[5] < LEAST_GAIN)

@@ -1,0 +1,104 @@
+"""What each target is used for: by which moves, with one tool, object and offset or with several."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.programs.layouts import of_joints
+from truearm.programs.program import Program
+from truearm.programs.tables import Motion
+
+Integers = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+UNUSED: Final = "no motion goes there"
+SEVERAL: Final = "it is used with several tools, objects or offsets, and one change cannot suit them all"
+
+
+@dataclass(frozen=True, eq=False)
+class Uses:
+    """Uses of the targets of a program.
+
+    Attributes:
+        moved: Targets that a motion goes to, (t,).
+        environment: Number of the environment of each, (t,); -1 where there is none.
+        tool: Number of its tool among `tools`, (t,); -1 where there is none.
+        tools: Number of an environment with each of the different tools.
+        several: Targets that are used in environments that contradict each other, (t,).
+        of_joints: Targets that are joint readings, (t,).
+        straight: Targets that a move along a line or an arc goes to, or comes from, (t,).
+        blended: Targets that are passed without a stop, or next to one that is, (t,).
+    """
+
+    moved: Bools
+    environment: Integers
+    tool: Integers
+    tools: tuple[int, ...]
+    several: Bools
+    of_joints: Bools
+    straight: Bools
+    blended: Bools
+
+    @classmethod
+    def of(cls, program: Program) -> "Uses":
+        """Those of `program`."""
+        targets, moves = program.targets, program.moves
+        joints = np.array([of_joints(layout) for layout in program.layouts], dtype=bool)
+        joint_targets = joints[targets.layout] if len(targets) else np.zeros(0, dtype=bool)
+        real = moves.motion != Motion.NONE
+        moved = np.zeros(len(targets), dtype=bool)
+        moved[moves.target[real]] = True
+        tool_of, tools = _tools(program)
+        environment, several = _single(moves.environment[real], moves.target[real], len(targets))
+        tool, several_tools = _single(tool_of[moves.environment[real]], moves.target[real], len(targets))
+        straight, blended = _along(program, real)
+        return cls(
+            moved,
+            environment,
+            tool,
+            tools,
+            np.where(joint_targets, several_tools, several),
+            joint_targets,
+            straight,
+            blended,
+        )
+
+
+def _tools(program: Program) -> tuple[Integers, tuple[int, ...]]:
+    """For each environment the number of its tool, and an environment of each tool."""
+    known: dict[object, int] = {}
+    examples: list[int] = []
+    numbers = []
+    for place, environment in enumerate(program.environments):
+        key = (*environment.tool.key, environment.problem)
+        if key not in known:
+            known[key] = len(known)
+            examples.append(place)
+        numbers.append(known[key])
+    return np.array(numbers, dtype=np.int64), tuple(examples)
+
+
+def _single(values: Integers, targets: Integers, count: int) -> tuple[Integers, Bools]:
+    """For each target the value of its uses, -1 without any, and whether they differ."""
+    last = np.full(count, -1, dtype=np.int64)
+    last[targets] = values
+    several = np.zeros(count, dtype=bool)
+    several[targets[last[targets] != values]] = True
+    return last, several
+
+
+def _along(program: Program, real: Bools) -> tuple[Bools, Bools]:
+    """Targets at either end of a straight move, and targets at or next to one that is passed."""
+    moves, count = program.moves, len(program.targets)
+    target = moves.target[real]
+    curved = np.isin(moves.motion[real], (Motion.LINEAR, Motion.VIA, Motion.CIRCULAR))
+    passed = moves.blended[real]
+    straight, blended = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    straight[target[curved]] = True
+    straight[target[:-1][curved[1:]]] = True
+    blended[target[passed]] = True
+    blended[target[:-1][passed[1:]]] = True
+    blended[target[1:][passed[:-1]]] = True
+    return straight, blended
