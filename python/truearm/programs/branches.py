@@ -77,7 +77,7 @@ class Branches:
         return reach
 
     def elbow(self, q: Floats) -> Floats:
-        """How far axis 3 is turned from the stretched arm, rad, (n,), within half a turn, in its own sense."""
+        """How far axis 3 is turned from the stretched arm, rad, (n,), in its own sense."""
         bent = self.robot.joints_from_readings(q)[:, 2] - self._stretched
         return self._sense * _half_turn(bent)
 

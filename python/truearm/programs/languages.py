@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Final
 
 from truearm.errors import UsageError, list_names
+from truearm.programs.krl import KRL
 from truearm.programs.program import Language
 
-LANGUAGES: Final[tuple[Language, ...]] = ()
+LANGUAGES: Final[tuple[Language, ...]] = (KRL(),)
 
 
 def language_of(path: Path, name: str | None = None, known: Sequence[Language] = LANGUAGES) -> Language:

@@ -157,7 +157,7 @@ def rewrite(
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
     )
-    known = ~np.isnan(solved.q).any(axis=1)
+    known: Bools = np.asarray(np.isfinite(solved.q.sum(axis=1)))
     known[list(solved.reasons)] = False
     state = _State(program, uses, models, solved.q, known)
     state.reasons.update(solved.reasons)
@@ -214,8 +214,8 @@ class _State:
             raise WorkError(
                 f"{len(listed)} of {len(self.program.targets)} targets cannot be corrected:\n"
                 + describe(self.program, listed),
-                way_out="Change them or the limits; --on-refusal keep-nominal leaves such targets as they are "
-                "where that makes no step",
+                way_out="Change them or the limits; --on-refusal keep-nominal leaves such targets as "
+                "they are where that makes no step",
             )
         steps = [target for target in sorted(self.refused) if self._makes_a_step(target)]
         if steps:
