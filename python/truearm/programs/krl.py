@@ -20,8 +20,7 @@ class KRL:
     name = "KRL"
     endings = ENDINGS
     controller_differs = (
-        "KUKA arms with an accuracy option (absolutely accurate robot) compute with a model of their own, and "
-        "a program does not say so"
+        "KUKA arms with an accuracy option (absolutely accurate robot) compute with a model of their own"
     )
 
     def companions(self, path: Path) -> tuple[Path, ...]:
@@ -81,10 +80,5 @@ def _in_fold(source: Source, line: int) -> bool:
         if text.startswith(";endfold"):
             return False
         if text.startswith(";fold"):
-            return text[5:].split(maxsplit=1)[:1] != [] and text[5:].split()[0] in {
-                "lin",
-                "slin",
-                "ptp",
-                "sptp",
-            }
+            return text[5:].lstrip().startswith(("lin", "slin", "ptp", "sptp"))
     return False

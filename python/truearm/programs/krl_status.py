@@ -1,8 +1,8 @@
 """KUKA's Status and Turn: which of its postures an arm is in, and the signs of its axes.
 
 Status bit 0: the wrist centre is behind axis 1 (overhead area). Bit 1: axis 3 is bent beyond the stretched
-arm, which for arms whose axes 3 and 4 meet is A3 >= 0. Bit 2: A5 is negative. Further bits of Status (bit 3
-tells of an absolutely accurate robot) are kept. Turn bits 0 to 5: the axis is negative; further bits are kept.
+arm, which for arms whose axes 3 and 4 meet is A3 >= 0. Bit 2: A5 is negative. Further bits of Status are
+kept; bit 3 tells of an absolutely accurate robot. Turn bits 0 to 5: the axis is negative; others are kept.
 Source: docs/reference/programs.md.
 """
 

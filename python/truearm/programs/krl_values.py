@@ -22,7 +22,6 @@ POSE: Final = ("x", "y", "z", "a", "b", "c")
 AXES: Final = ("a1", "a2", "a3", "a4", "a5", "a6")
 STATE: Final = ("s", "t")
 EXTERNAL: Final = ("e1", "e2", "e3", "e4", "e5", "e6")
-KINDS: Final = frozenset({"pos", "e6pos", "frame", "axis", "e6axis"})
 
 
 @dataclass(frozen=True)

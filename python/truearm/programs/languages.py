@@ -7,8 +7,9 @@ from typing import Final
 from truearm.errors import UsageError, list_names
 from truearm.programs.krl import KRL
 from truearm.programs.program import Language
+from truearm.programs.rapid import RAPID
 
-LANGUAGES: Final[tuple[Language, ...]] = (KRL(),)
+LANGUAGES: Final[tuple[Language, ...]] = (KRL(), RAPID())
 
 
 def language_of(path: Path, name: str | None = None, known: Sequence[Language] = LANGUAGES) -> Language:

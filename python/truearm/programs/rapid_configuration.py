@@ -1,4 +1,4 @@
-"""ABB's confdata: the quarter of a turn that axes 1, 4 and 6 are in, and which of eight postures the arm is in.
+"""ABB's confdata: the quarter of a turn that axes 1, 4 and 6 are in, and which of eight postures the arm has.
 
 cf = floor(angle / 90 deg). cfx counts the postures: 4 for a wrist centre behind axis 1, 2 for one behind the
 lower arm, 1 for a negative axis 5. Arms whose axis 3 is driven through a parallelogram do not use it.

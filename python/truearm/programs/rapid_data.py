@@ -110,7 +110,7 @@ def _assigned(found: list[Token]) -> set[str]:
         if token.text != ":=":
             continue
         first = place - 1
-        while first > 0 and found[first].text in "}.{" or (first > 0 and found[first - 1].text in ".{"):
+        while (first > 0 and found[first].text in "}.{") or (first > 0 and found[first - 1].text in ".{"):
             first -= 1
         if found[first].kind == "name" and (first == 0 or found[first - 1].text != "\\"):
             names.add(found[first].text.lower())

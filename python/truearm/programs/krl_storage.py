@@ -1,0 +1,112 @@
+"""What KRL stores under which name: points, frames, data of inline forms."""
+
+import re
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Final
+
+from truearm.programs.krl_values import Named, Structure, line_reader, named, names_in, structure
+from truearm.programs.lexing import Reader
+from truearm.programs.source import Source
+
+DECLARED: Final = re.compile(
+    r"[ \t]*(?:(?:decl|global|const)[ \t]+)*(pos|e6pos|axis|e6axis|frame|fdat|struc|int|real|bool|char)"
+    r"[ \t]+(?=[A-Za-z_$])",
+    re.IGNORECASE,
+)
+DECLARING: Final = re.compile(r"[ \t]*(?:(?:decl|global|const)[ \t]+)+(\w+[ \t]+)?", re.IGNORECASE)
+ASSIGNING: Final = re.compile(r"[ \t]*[A-Za-z_$][\w$]*(?:[ \t]*\[[^\]\r\n]*\])?(?:\.\w+)*[ \t]*=(?!=)")
+TARGET_KINDS: Final = frozenset({"pos", "e6pos", "axis", "e6axis"})
+PREPARED: Final = frozenset({"fdat_act", "pdat_act", "ldat_act"})
+COMPUTED: Final = "it is assigned at run time"
+TWICE: Final = "it is assigned more than once"
+NOT_HERE: Final = "it is not stored in this program"
+
+Stored = tuple[int, Structure | None]
+
+
+def lines(source: Source) -> Iterator[tuple[int, int]]:
+    """Where each line begins and ends."""
+    yield from pairwise([*source.line_starts, len(source.text)])
+
+
+class KrlStorage:
+    """All values that are written out, by name.
+
+    Attributes:
+        values: File and structure (None for one that is computed) of every assignment to a name.
+        kinds: Types of declared names.
+        read: Names that the program computes with.
+    """
+
+    def __init__(self) -> None:
+        self.values: dict[str, list[Stored]] = {}
+        self.kinds: dict[str, str] = {}
+        self.read: set[str] = set()
+
+    def gather(self, file: int, source: Source) -> None:
+        """Take what a file stores.
+
+        Raises:
+            InputError: If a structure is not closed; names line and column.
+        """
+        for start, end in lines(source):
+            begins = DECLARED.match(source.text, start, end)
+            if begins is not None:
+                reader = line_reader(source, begins.end(), end)
+                self._declared(file, begins.group(1).lower(), reader)
+                continue
+            declaring = DECLARING.match(source.text, start, end)
+            first = start if declaring is None else declaring.end()
+            if ASSIGNING.match(source.text, first, end):
+                self._assigned(file, line_reader(source, first, end))
+
+    def only(self, key: str) -> Stored:
+        """File and value of a name that is assigned once; no value for any other."""
+        found = self.values.get(key.lower(), [])
+        return found[0] if len(found) == 1 else (0, None)
+
+    def why_not(self, key: str) -> str:
+        """Why the target under a name cannot be changed; empty if it can."""
+        found = self.values.get(key)
+        if not found:
+            return NOT_HERE
+        if len(found) > 1:
+            return TWICE
+        value = found[0][1]
+        return COMPUTED if value is None else value.problem()
+
+    def elements(self, variable: Named) -> list[str]:
+        """The names that a variable may stand for: several where an array is indexed at run time."""
+        if variable.index == "?":
+            return [key for key in self.values if key.startswith(f"{variable.name}[") and key[-2] != "?"]
+        return [variable.key] if variable.key in self.values else []
+
+    def _declared(self, file: int, kind: str, reader: Reader) -> None:
+        while not reader.done:
+            variable = named(reader)
+            if variable is None:
+                return
+            self.kinds.setdefault(variable.name, kind)
+            if reader.accept("="):
+                self._keep(file, variable, reader)
+            if not reader.accept(","):
+                return
+
+    def _assigned(self, file: int, reader: Reader) -> None:
+        variable = named(reader)
+        if variable is None:
+            return
+        if reader.accept("="):
+            self._keep(file, variable, reader)
+            return
+        self.values.setdefault(variable.key, []).append((file, None))
+        self.read |= names_in(reader.rest())
+
+    def _keep(self, file: int, variable: Named, reader: Reader) -> None:
+        value = structure(reader) if reader.peek() == "{" else None
+        if value is None or reader.peek() == ":":
+            if variable.name not in PREPARED and not variable.name.startswith("$"):
+                self.read |= names_in(reader.rest())
+            value = None
+        self.values.setdefault(variable.key, []).append((file, value))

@@ -1,0 +1,384 @@
+"""Reading RAPID: first what is declared, then the motions in their order."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.programs.branches import Branches
+from truearm.programs.environment import Environment, Environments, Transform
+from truearm.programs.flow import Flow
+from truearm.programs.frames import Frames
+from truearm.programs.layouts import Joints, QuaternionPose
+from truearm.programs.lexing import Reader, Token
+from truearm.programs.program import Listed, Program
+from truearm.programs.rapid_configuration import Confdata
+from truearm.programs.rapid_data import Declarations
+from truearm.programs.rapid_frames import RapidFrames
+from truearm.programs.rapid_targets import Meant, RapidTargets
+from truearm.programs.rapid_values import Argument, arguments, pose_of, statement_reader, statements
+from truearm.programs.source import Source
+from truearm.programs.tables import Motion, MoveTable, TargetTable
+from truearm.robot import Robot
+
+if TYPE_CHECKING:
+    from truearm.programs.rapid import RAPID
+
+STRAIGHT: Final = (Motion.LINEAR,)
+ARC: Final = (Motion.VIA, Motion.CIRCULAR)
+
+
+@dataclass(frozen=True)
+class _Instruction:
+    """A motion: how it goes, and where among its arguments zone and tool stand."""
+
+    motions: tuple[Motion, ...]
+    zone: int
+    tool: int
+
+
+def _kinds() -> Mapping[str, _Instruction]:
+    found = {"moveabsj": _Instruction((Motion.JOINT,), 2, 3)}
+    for ending in ("", "do", "ao", "go", "sync"):
+        found[f"movej{ending}"] = _Instruction((Motion.JOINT,), 2, 3)
+        found[f"movel{ending}"] = _Instruction(STRAIGHT, 2, 3)
+        found[f"movec{ending}"] = _Instruction(ARC, 3, 4)
+    found |= {
+        "triggj": _Instruction((Motion.JOINT,), 3, 4),
+        "triggl": _Instruction(STRAIGHT, 3, 4),
+        "triggc": _Instruction(ARC, 4, 5),
+    }
+    for ending in ("", "start", "end"):
+        found[f"arcl{ending}"] = _Instruction(STRAIGHT, 4, 5)
+        found[f"arcc{ending}"] = _Instruction(ARC, 5, 6)
+    return found
+
+
+INSTRUCTIONS: Final = _kinds()
+HARMLESS: Final = frozenset(
+    {
+        "set",
+        "reset",
+        "setdo",
+        "setgo",
+        "setao",
+        "pulsedo",
+        "waittime",
+        "waitdi",
+        "waituntil",
+        "waitrob",
+        "tpwrite",
+        "tperase",
+        "accset",
+        "velset",
+        "singarea",
+        "confj",
+        "confl",
+        "incr",
+        "decr",
+        "add",
+        "clear",
+        "clkstart",
+        "clkstop",
+        "clkreset",
+        "motionsup",
+        "gripload",
+    }
+)
+BEGINS: Final = frozenset({"proc", "func", "trap", "module"})
+ENDS: Final = frozenset({"endproc", "endfunc", "endtrap", "endmodule", "error", "undo", "backward", "goto"})
+JUMPS: Final = frozenset({"return", "raise", "exit", "exitcycle", "stop", "retry", "trynext", "goto"})
+DISPLACING: Final = frozenset({"pdispon", "pdispset", "pdispoff", "eoffson", "eoffsset", "eoffsoff"})
+INSTRUCTION_WORDS: Final = frozenset(INSTRUCTIONS) | JUMPS | HARMLESS | DISPLACING
+CLOSING: Final = frozenset({"endif", "endfor", "endwhile", "endtest"})
+READ: Final = "the program computes with it"
+PASSED: Final = "it is given to an instruction or routine that is not known here"
+DISPLACED: Final = "a program displacement (PDispOn, PDispSet, EOffs) may be active"
+
+
+@dataclass(frozen=True, eq=False)
+class _Modal:
+    """Displacement and load that are active."""
+
+    displacement: Transform
+    problem: str = ""
+    load_kg: float | None = None
+
+
+class RapidReading:
+    """One reading of a module."""
+
+    def __init__(self, language: "RAPID", sources: tuple[Source, ...], robot: Robot, frames: Frames) -> None:
+        if robot.joints != ("revolute",) * 6:
+            raise InputError(
+                f"{robot.name} has {robot.joint_count} joints",
+                where=str(sources[0].path),
+                rule="RAPID programs are compensated for arms with six revolute axes",
+            )
+        self._language, self._source, self._robot = language, sources[0], robot
+        self._declarations = Declarations()
+        self._declarations.gather(self._source)
+        self._table, self._moves, self._environments = TargetTable(), MoveTable(), Environments()
+        self._targets = RapidTargets(self._declarations, self._source, self._table)
+        self._frames = RapidFrames(self._declarations, frames)
+        self._listed: list[Listed] = []
+        self._fixed: dict[int, str] = {}
+        self._read: dict[str, str] = {}
+        displaces = "pdisp" in self._source.text.lower() or "eoffs" in self._source.text.lower()
+        start = _Modal(np.eye(4), DISPLACED if displaces else "")
+        self._flow = Flow(start, _joined, _same)
+        self._used: list[int] = []
+
+    def program(self) -> Program:
+        """The program."""
+        for start, end in statements(self._source.text):
+            reader = statement_reader(self._source, start, end)
+            self._blocks(reader)
+            if not reader.done:
+                self._statement(reader)
+        self._settle()
+        try:
+            configuration = Confdata(Branches.of(self._robot))
+        except InputError:
+            configuration = None
+        return Program(
+            self._language,
+            (self._source,),
+            (Joints.of(self._robot.joints), QuaternionPose(configuration=4)),
+            self._table.freeze(),
+            self._moves.freeze(),
+            tuple(self._environments.all),
+            tuple(sorted(self._listed)),
+            configuration,
+            fixed=self._fixed,
+        )
+
+    # Blocks.
+
+    def _blocks(self, reader: Reader) -> None:
+        """Take what begins and ends blocks, which no semicolon ends, from the front of a statement."""
+        while not reader.done and self._block(reader):
+            pass
+
+    def _block(self, reader: Reader) -> bool:
+        word, flow = reader.peek(), self._flow
+        if word in {"local", "task"} and reader.peek(1) in BEGINS | {"record"}:
+            reader.take()
+        elif word in BEGINS:
+            self._begin(reader)
+        elif word in ENDS:
+            reader.take()
+            flow.jump()
+        elif word in CLOSING:
+            reader.take()
+            flow.close()
+        elif word in {"if", "elseif", "while", "for", "test", "case", "default", "else"}:
+            return self._branch(reader, word)
+        elif word == "%" or (word in {"version", "language"} and reader.peek(1) == ":"):
+            self._header(reader)
+        elif reader.kind() == "name" and reader.peek(1) == ":":
+            reader.take()
+            reader.take()
+            flow.jump()
+        else:
+            return False
+        return True
+
+    def _header(self, reader: Reader) -> None:
+        if reader.take().text != "%":
+            reader.take()
+            if not reader.done:
+                reader.take()
+
+    def _begin(self, reader: Reader) -> None:
+        word = reader.take().text.lower()
+        self._flow.restart()
+        while not reader.done and reader.peek() != "(" and reader.kind() == "name":
+            reader.take()
+            if word in {"proc", "trap", "module"}:
+                break
+        if reader.peek() == "(":
+            _skip(reader, "(", ")")
+
+    def _branch(self, reader: Reader, word: str) -> bool:
+        flow = self._flow
+        if word == "if" and not any(token.text.lower() == "then" for token in reader.rest()):
+            self._short_if(reader)
+            return False
+        reader.take()
+        stop = {"if": "then", "elseif": "then", "while": "do", "for": "do", "case": ":", "default": ":"}
+        if word == "test":
+            while not reader.done and reader.peek() not in {"case", "default"}:
+                self._read.setdefault(reader.take().text.lower(), READ)
+        while word in stop and not reader.done:
+            token = reader.take()
+            if token.text.lower() == stop[word]:
+                break
+            self._read.setdefault(token.text.lower(), READ)
+        if word in {"elseif", "else", "case", "default"}:
+            flow.otherwise(last=word in {"else", "default"})
+        else:
+            flow.open(loop=word in {"while", "for"})
+        return True
+
+    def _short_if(self, reader: Reader) -> None:
+        """IF condition instruction; the instruction may or may not be executed."""
+        while not reader.done and reader.peek() not in INSTRUCTION_WORDS:
+            self._read.setdefault(reader.take().text.lower(), READ)
+        state = self._flow.state
+        self._flow.jump()
+        if not reader.done:
+            self._statement(reader)
+        self._flow.state = _joined(state, self._flow.state)
+        self._flow.jump()
+        while not reader.done:
+            reader.take()
+
+    # Statements.
+
+    def _statement(self, reader: Reader) -> None:
+        at, word = reader.offset, reader.peek()
+        found = reader.rest()
+        if word in INSTRUCTIONS:
+            self._motion(at, INSTRUCTIONS[word], arguments(found[1:]))
+        elif word.startswith(("pdisp", "eoffs")):
+            self._displace(word, found)
+        elif word == "gripload":
+            self._flow.state = replace(self._flow.state, load_kg=self._frames.load_kg(found[1:]))
+        elif any(token.text.lower() in {"const", "pers", "var"} for token in found[:3]):
+            self._mention(found[3:], READ)
+        elif any(token.text == ":=" for token in found[1:]) and word not in HARMLESS:
+            self._mention(found, READ)
+        else:
+            self._call(at, word, found)
+
+    def _call(self, at: int, word: str, found: Sequence[Token]) -> None:
+        self._mention(found[1:], PASSED)
+        if word in JUMPS:
+            self._flow.jump()
+        elif word not in HARMLESS:
+            if word.startswith(("move", "search", "trigg", "arc", "spot", "disp", "paint")):
+                self._list(at, "an instruction that is not known here")
+            self._flow.jump()
+
+    def _mention(self, found: Sequence[Token], reason: str) -> None:
+        for token in found:
+            if token.kind == "name":
+                self._read.setdefault(token.text.lower(), reason)
+
+    def _displace(self, word: str, found: Sequence[Token]) -> None:
+        state = self._flow.state
+        if word in {"pdispoff", "eoffsoff"}:
+            self._flow.state = replace(state, displacement=np.eye(4), problem="")
+            return
+        datum = self._declarations.data.get(found[1].text.lower()) if len(found) == 2 else None
+        pose = pose_of(datum.value) if datum is not None and datum.fixed else None
+        if word == "pdispset" and pose is not None:
+            self._flow.state = replace(state, displacement=pose[1], problem="")
+        else:
+            self._flow.state = replace(state, problem=DISPLACED)
+        self._mention(found[1:], READ)
+
+    def _motion(self, at: int, instruction: _Instruction, given: list[Argument]) -> None:
+        """A motion: its targets, with the tool and the work object of the statement."""
+        plain = [argument for argument in given if argument.tokens]
+        count = len(instruction.motions)
+        if len(plain) <= instruction.tool:
+            self._list(at, "it has fewer arguments than this instruction needs")
+            self._flow.jump()
+            return
+        zone = plain[instruction.zone].tokens
+        blended = not (len(zone) == 1 and zone[0].text.lower() == "fine")
+        for motion, argument in zip(instruction.motions, plain[:count], strict=True):
+            passed = blended or motion == Motion.VIA
+            self._go(at, motion, self._targets.meant(argument.tokens), plain[instruction.tool], passed=passed)
+
+    def _go(self, at: int, motion: Motion, meant: Meant | str, tool: Argument, *, passed: bool) -> None:
+        if isinstance(meant, str):
+            self._list(at, meant)
+            self._flow.jump()
+            return
+        environment = self._environments.number(self._environment(meant, tool))
+        for number in meant.targets:
+            follows = self._flow.certain and len(meant.targets) == 1
+            self._moves.add(number, (0, at), motion, environment=environment, blended=passed, follows=follows)
+            self._used.append(number)
+            self._flow.use(len(self._used) - 1)
+        if len(meant.targets) > 1:
+            self._flow.jump()
+
+    def _environment(self, meant: Meant, tool: Argument) -> Environment:
+        state = self._flow.state
+        held = self._frames.tool(tool.tokens)
+        placed = self._frames.work_object(tool.options.get("wobj", ()))
+        mass = self._frames.payload_kg(tool.tokens, tool.options.get("tload", ()))
+        return Environment(
+            held.frame,
+            placed.frame,
+            state.displacement @ meant.before,
+            meant.after,
+            problem=held.problem or placed.problem,
+            cartesian_problem=meant.problem or state.problem,
+            payload_kg=mass if state.load_kg is None or mass is None else mass + state.load_kg,
+        )
+
+    def _list(self, at: int, reason: str) -> None:
+        line, column = self._source.place(at)
+        self._listed.append(Listed(0, line, column, self._source.line_text(line).strip(), reason))
+
+    # At the end.
+
+    def _settle(self) -> None:
+        """Targets that are assigned to or computed with, and those that nothing goes to."""
+        for name, kind in self._declarations.kinds.items():
+            if kind not in {"robtarget", "jointtarget"}:
+                continue
+            for key in self._declarations.data:
+                if key == name or key.startswith(f"{name}{{"):
+                    self._settle_one(name, key)
+        for use in self._flow.overruled:
+            self._fixed.setdefault(self._used[use], DISPLACED)
+
+    def _settle_one(self, name: str, key: str) -> None:
+        found = self._targets.stored(key)
+        if isinstance(found, str):
+            value = self._declarations.data[key].value
+            at = getattr(value, "at", None)
+            if at is not None:
+                line, column = self._source.place(at)
+                self._listed.append(Listed(0, line, column, key, found))
+        elif name in self._declarations.assigned:
+            self._fixed.setdefault(found, "it is assigned at run time")
+        elif name in self._declarations.twice:
+            self._fixed.setdefault(found, "it is declared more than once")
+        elif name in self._read:
+            self._fixed.setdefault(found, self._read[name])
+
+
+def _skip(reader: Reader, opening: str, closing: str) -> None:
+    level = 0
+    while not reader.done:
+        text = reader.take().text
+        level += (text == opening) - (text == closing)
+        if level == 0:
+            return
+
+
+def _same(one: _Modal, other: _Modal) -> bool:
+    return (
+        np.array_equal(one.displacement, other.displacement)
+        and one.problem == other.problem
+        and one.load_kg == other.load_kg
+    )
+
+
+def _joined(one: _Modal, other: _Modal) -> _Modal:
+    """What is known where two branches meet."""
+    agree = np.array_equal(one.displacement, other.displacement)
+    return _Modal(
+        one.displacement,
+        (one.problem or other.problem) if agree else DISPLACED,
+        one.load_kg if one.load_kg == other.load_kg else None,
+    )
