@@ -64,6 +64,19 @@ def with_turns(branches: Floats, robot: RobotData) -> Floats:
     return np.array(found).reshape(-1, robot.joint_count)
 
 
+def nearest_turns(branches: Floats, robot: RobotData, before: Floats) -> Floats:
+    """Readings (k, N) of branches (b, N), each joint at the turn nearest to `before` that its limits allow."""
+    limits = _limits(robot)
+    turning = np.array([joint == "revolute" for joint in robot.joints])
+    turned = np.where(turning, branches + FULL_TURN * np.round((before - branches) / FULL_TURN), branches)
+    for _ in range(2):
+        turned = np.where(turning & (turned < limits[:, 0] - EDGE_RAD), turned + FULL_TURN, turned)
+        turned = np.where(turning & (turned > limits[:, 1] + EDGE_RAD), turned - FULL_TURN, turned)
+    inside = ((turned >= limits[:, 0] - EDGE_RAD) & (turned <= limits[:, 1] + EDGE_RAD)).all(axis=1)
+    found: Floats = turned[inside]
+    return found
+
+
 def _turned(branch: Floats, robot: RobotData) -> list[tuple[float, ...]]:
     choices = []
     for value, joint, (low, high) in zip(branch, robot.joints, _limits(robot), strict=True):

@@ -7,7 +7,6 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
 from truearm.programs.configuration import meant, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
@@ -30,14 +29,14 @@ DIFFERENT: Final = "it is reached in several configurations of the arm, and one 
 SAME_RAD: Final = 1e-6
 NEARER: Final = 0.8
 LEAST_GAIN: Final = 2e-3
-TELL_EVERY: Final = 200
+AT_ONCE: Final = 1000
 
 
 class Inverse(Protocol):
     """Inverse kinematics of a plain arm."""
 
-    def solutions(self, base_from_flange: Floats) -> Floats:
-        """All readings (k, N) that put the flange at a pose (4, 4)."""
+    def branches(self, base_from_flange: Floats) -> Floats:
+        """Readings (n, K, N) that put the flange at poses (n, 4, 4), one turn of each; NaN beyond the last."""
         ...
 
 
@@ -118,22 +117,30 @@ class _Solver:
 
     def take_poses(self, tell: Callable[[int, int], None]) -> None:
         """Cartesian targets, in the order of the moves, each with the one before for a seed."""
-        flange = self._flange_poses()
-        todo, done = len(flange), 0
+        branches = self._branches(tell)
         before: Floats | None = None
         moves = self.program.moves
         columns = (moves.target.tolist(), moves.follows.tolist(), moves.motion.tolist())
         for target, follows, motion in zip(*columns, strict=True):
             if not follows:
                 before = None
-            if target in flange:
-                fresh = np.isnan(self.q[target, 0]) and target not in self.reasons
-                self._take(target, flange[target], before, straight=motion_is_straight(motion))
-                done += fresh
-                if fresh and done % TELL_EVERY == 0:
-                    tell(done, todo)
+            if target in branches:
+                self._take(target, branches[target], before, straight=motion_is_straight(motion))
             known = not np.isnan(self.q[target, 0])
             before = self.q[target] if known else None
+
+    def _branches(self, tell: Callable[[int, int], None]) -> dict[int, Floats]:
+        """The readings (k, N) of each Cartesian target in all branches, one turn of each."""
+        poses = self._flange_poses()
+        numbers = list(poses)
+        found: dict[int, Floats] = {}
+        for start in range(0, len(numbers), AT_ONCE):
+            tell(start, len(numbers))
+            some = numbers[start : start + AT_ONCE]
+            reached = self.inverse.branches(np.stack([poses[number] for number in some]))
+            for number, rows in zip(some, reached, strict=True):
+                found[number] = rows[np.isfinite(rows).all(axis=1)]
+        return found
 
     def _flange_poses(self) -> dict[int, Floats]:
         """Poses of the flange for every Cartesian target that may be changed."""
