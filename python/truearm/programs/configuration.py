@@ -65,7 +65,7 @@ def with_turns(branches: Floats, robot: RobotData) -> Floats:
 
 
 def nearest_turns(branches: Floats, robot: RobotData, before: Floats) -> Floats:
-    """Readings (k, N) of branches (b, N), each joint at the turn nearest to `before` that its limits allow."""
+    """Readings (k, N) of branches (b, N), each joint at the allowed turn nearest to `before`."""
     limits = _limits(robot)
     turning = np.array([joint == "revolute" for joint in robot.joints])
     turned = np.where(turning, branches + FULL_TURN * np.round((before - branches) / FULL_TURN), branches)

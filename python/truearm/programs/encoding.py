@@ -6,12 +6,11 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError
 from truearm.programs.configuration import ANY, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program
-from truearm.programs.solving import Inverse, is_singular, numbers_of
+from truearm.programs.solving import AT_ONCE, Inverse, is_singular, numbers_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -124,21 +123,21 @@ class _Encoder:
         digits = configuration.digits(said)
         text = configuration.text_of_digits(digits, stated)
         absent = np.isnan(stated)
-        for row in np.flatnonzero(~absent.all(axis=1)):
-            wanted = configuration.digits_of_text(text[row : row + 1])
-            if not self._only(said[row], flange[row], wanted):
-                self.reasons[int(which[row])] = NOT_UNIQUE
+        rows = np.flatnonzero(~absent.all(axis=1))
+        for start in range(0, len(rows), AT_ONCE):
+            some = rows[start : start + AT_ONCE]
+            for row, branches in zip(some, self.inverse.branches(flange[some]), strict=True):
+                wanted = configuration.digits_of_text(text[row : row + 1])
+                if np.isnan(text[row, ~absent[row]]).any() or not self._only(said[row], branches, wanted):
+                    self.reasons[int(which[row])] = NOT_UNIQUE
         return np.where(absent, np.nan, text)
 
-    def _only(self, said: Floats, flange: Floats, wanted: Integers) -> bool:
+    def _only(self, said: Floats, branches: Floats, wanted: Integers) -> bool:
         """Whether the configuration data `wanted` leaves the controller no readings but `said`."""
         configuration = self.program.configuration
         if configuration is None:
             return True
-        try:
-            candidates = with_turns(np.asarray(self.inverse.solutions(flange)), self.robot)
-        except InputError:
-            return False
+        candidates = with_turns(branches[np.isfinite(branches).all(axis=1)], self.robot)
         if len(candidates) == 0:
             return False
         agrees = ((configuration.digits(candidates) == wanted) | (wanted == ANY)).all(axis=1)

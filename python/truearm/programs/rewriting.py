@@ -16,6 +16,7 @@ from truearm.programs.marks import refuse_marked
 from truearm.programs.program import Language, Listed, Program
 from truearm.programs.solving import Inverse, solve_targets
 from truearm.programs.source import Source
+from truearm.programs.tables import Motion
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 
@@ -185,9 +186,10 @@ class _State:
         )
 
     def compensate(self) -> None:
-        """Corrected readings of all known targets, tool by tool, in the order of the text."""
+        """Corrected readings of all known targets, tool by tool, in the order of the moves."""
         for number, example in enumerate(self.uses.tools):
-            which = np.flatnonzero(self.known & (self.uses.tool == number))
+            along = self.program.moves.target[self.program.moves.motion != Motion.NONE]
+            which = along[self.known[along] & (self.uses.tool[along] == number)]
             if len(which) == 0:
                 continue
             tool = self.program.environments[example].tool

@@ -36,7 +36,7 @@ class Inverse(Protocol):
     """Inverse kinematics of a plain arm."""
 
     def branches(self, base_from_flange: Floats) -> Floats:
-        """Readings (n, K, N) that put the flange at poses (n, 4, 4), one turn of each; NaN beyond the last."""
+        """Readings (n, K, N) that put the flange at poses (n, 4, 4), one turn of each; NaN behind."""
         ...
 
 
@@ -159,13 +159,14 @@ class _Solver:
                 found.update(zip(which.tolist(), poses, strict=True))
         return found
 
-    def _take(self, target: int, base_from_flange: Floats, before: Floats | None, *, straight: bool) -> None:
+    def _take(self, target: int, branches: Floats, before: Floats | None, *, straight: bool) -> None:
         if target in self.reasons:
             return
         known = None if np.isnan(self.q[target, 0]) else self.q[target]
-        if known is not None and self._stated(target) is not None:
+        stated = self._stated(target)
+        if known is not None and stated is not None:
             return
-        found = self._solve(target, base_from_flange, before, straight=straight)
+        found = self._chosen(branches, stated, before, straight=straight)
         if isinstance(found, str):
             self.reasons[target] = found
             self.q[target] = np.nan
@@ -175,28 +176,28 @@ class _Solver:
         else:
             self.q[target] = found
 
-    def _solve(
-        self, target: int, base_from_flange: Floats, before: Floats | None, *, straight: bool
+    def _chosen(
+        self, branches: Floats, stated: Floats | None, before: Floats | None, *, straight: bool
     ) -> Floats | str:
-        """The readings of one pose, or why they are not known."""
-        try:
-            branches = self.inverse.solutions(base_from_flange)
-        except InputError:
+        """The readings that are meant, or why they are not known."""
+        if len(branches) == 0:
             return OUT_OF_REACH
-        candidates = with_turns(np.asarray(branches), self.robot)
-        if len(candidates) == 0:
-            return OUT_OF_REACH
-        stated = self._stated(target)
-        possible = candidates
-        if stated is not None and self.program.configuration is not None:
-            possible = candidates[meant(self.program.configuration, stated, candidates)]
-            if len(possible) == 0:
+        if stated is None or self.program.configuration is None:
+            if before is None:
+                return AMBIGUOUS
+            candidates = nearest_turns(branches, self.robot, before)
+            found = the_nearest(candidates, before) if len(candidates) else None
+        else:
+            candidates = with_turns(branches, self.robot)
+            candidates = candidates[meant(self.program.configuration, stated, candidates)]
+            if len(candidates) == 0:
                 return NO_BRANCH
-        found = the_nearest(possible, before)
+            found = the_nearest(candidates, before)
+            if found is not None and straight and before is not None:
+                every = nearest_turns(branches, self.robot, before)
+                found = found if is_nearest(found, every, before) else None
         if found is None:
-            return AMBIGUOUS
-        if straight and before is not None and not is_nearest(found, candidates, before):
-            return CONTRADICTS
+            return AMBIGUOUS if stated is None else CONTRADICTS
         return SINGULAR if is_singular(self.robot, found) else found
 
     def _stated(self, target: int) -> Floats | None:
