@@ -1,16 +1,18 @@
 """From corrected readings q^c to the numbers that the program is to say, checked by reading them again."""
 
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.controller import Controller
+from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program
-from truearm.programs.solving import AT_ONCE, Inverse, is_singular, numbers_of
+from truearm.programs.solving import AT_ONCE, is_singular, numbers_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -22,15 +24,6 @@ STEPS: Final = 4
 AGREES_RAD: Final = 1e-3
 NOT_UNIQUE: Final = "no configuration data says its corrected readings and no others"
 CORRECTED_SINGULAR: Final = "its correction ends at a singularity, where a pose does not determine the joints"
-
-
-class Controller(Protocol):
-    """The model that the controller computes with."""
-
-    @property
-    def robot(self) -> Robot:
-        """Its arm."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +44,7 @@ class Written:
 
 
 def encode_targets(
-    program: Program, uses: Uses, q: Floats, which: Integers, controller: Controller, inverse: Inverse
+    program: Program, uses: Uses, q: Floats, which: Integers, controller: Controller
 ) -> Written:
     """The numbers of targets `which` (n,) that say the readings `q` (t, N).
 
@@ -61,9 +54,8 @@ def encode_targets(
         q: Corrected readings of all targets.
         which: Targets to write.
         controller: The controller's model.
-        inverse: Its inverse kinematics.
     """
-    encoder = _Encoder(program, uses, controller.robot, inverse)
+    encoder = _Encoder(program, uses, controller.robot, controller.inverse)
     for number, layout in enumerate(program.layouts):
         chosen = which[program.targets.layout[which] == number]
         if len(chosen) == 0:

@@ -1,5 +1,6 @@
 """Reading RAPID: first what is declared, then the motions in their order."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
@@ -26,6 +27,7 @@ from truearm.robot import Robot
 if TYPE_CHECKING:
     from truearm.programs.rapid import RAPID
 
+DISPLACEMENT: Final = re.compile(r"\b(?:pdisp|eoffs)(?:set|on)\b", re.IGNORECASE)
 STRAIGHT: Final = (Motion.LINEAR,)
 ARC: Final = (Motion.VIA, Motion.CIRCULAR)
 
@@ -126,7 +128,7 @@ class RapidReading:
         self._listed: list[Listed] = []
         self._fixed: dict[int, str] = {}
         self._read: dict[str, str] = {}
-        displaces = "pdisp" in self._source.text.lower() or "eoffs" in self._source.text.lower()
+        displaces = DISPLACEMENT.search(self._source.text) is not None
         start = _Modal(np.eye(4), DISPLACED if displaces else "")
         self._flow = Flow(start, _joined, _same)
         self._used: list[int] = []

@@ -8,13 +8,15 @@ from typing import Any, Final, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.controller import Controller
 from truearm.errors import Notice, WorkError
+from truearm.inverse import Inverse
 from truearm.programs.editing import Words, edited
-from truearm.programs.encoding import Controller, encode_targets
+from truearm.programs.encoding import encode_targets
 from truearm.programs.frames import Frames
 from truearm.programs.marks import refuse_marked
 from truearm.programs.program import Language, Listed, Program
-from truearm.programs.solving import Inverse, solve_targets
+from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion
 from truearm.programs.uses import Uses
@@ -69,14 +71,12 @@ class Models:
         programming: What the program's author used.
         inverse: Its inverse kinematics.
         controller: What the controller computes with.
-        controller_inverse: Its inverse kinematics.
         compensator: From programming to calibrated.
     """
 
     programming: Robot
     inverse: Inverse
     controller: Controller
-    controller_inverse: Inverse
     compensator: Compensator
 
 
@@ -245,7 +245,6 @@ class _State:
             self.corrected,
             np.flatnonzero(changed),
             self.models.controller,
-            self.models.controller_inverse,
         )
         self.reasons.update(written.reasons)
         changed[list(written.reasons)] = False

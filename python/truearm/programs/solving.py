@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.programs.configuration import meant, with_turns
+from truearm.inverse import Inverse
+from truearm.programs.configuration import meant, nearest_turns, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight
@@ -30,14 +31,6 @@ SAME_RAD: Final = 1e-6
 NEARER: Final = 0.8
 LEAST_GAIN: Final = 2e-3
 AT_ONCE: Final = 1000
-
-
-class Inverse(Protocol):
-    """Inverse kinematics of a plain arm."""
-
-    def branches(self, base_from_flange: Floats) -> Floats:
-        """Readings (n, K, N) that put the flange at poses (n, 4, 4), one turn of each; NaN behind."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,209 @@
+"""`truearm compensate`: rewrite a program so that the calibrated arm goes where its author meant."""
+
+import json
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+import typer
+
+from truearm.calibration import Calibration
+from truearm.cli.console import print_json, print_table, say, say_wrapped, warn
+from truearm.cli.interrupt import ends_promptly
+from truearm.cli.progress import told_progress, told_stages
+from truearm.compensation import Compensator
+from truearm.errors import UsageError
+from truearm.files import write_whole
+from truearm.inverse import Inverse
+from truearm.limits import Limits
+from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
+from truearm.programs.densify import Spacing
+from truearm.programs.frames import Frames
+from truearm.programs.languages import language_of
+from truearm.programs.marks import mark_text
+from truearm.programs.outputs import output_paths, write_outputs
+from truearm.programs.report import counts, report_of, table_rows, unified_diff
+from truearm.programs.rewriting import Choices, Models, Rewritten, describe, read_program, rewrite
+from truearm.robot import Robot
+
+OnRefusal = Literal["stop", "keep-nominal"]
+ROWS_SHOWN = 100
+LISTED_SHOWN = 30
+
+
+def command(
+    calibration: Annotated[Path, typer.Argument(metavar="CALIB", help="A calibration file.")],
+    program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="The program, or one of its files.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="OUT", help="Where it goes: a file or directory.")
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="FILE", help="Write a report in JSON.")
+    ] = None,
+    controller: Annotated[
+        str | None,
+        typer.Option(
+            "--controller",
+            metavar="nominal|FILE",
+            help="The model that the controller computes with: a robot file, a URDF, UR's calibration.",
+        ),
+    ] = None,
+    frames: Annotated[
+        Path | None, typer.Option("--frames", metavar="FILE", help="Tools and work objects (TOML).")
+    ] = None,
+    programming: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="The model of the author.  [default: the calibration's nominal arm]"),
+    ] = None,
+    language: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Language.  [default: by the ending]")
+    ] = None,
+    task: Annotated[
+        str, typer.Option(metavar="pose|axis|position", help="What of the tool is to be met.")
+    ] = "pose",
+    moving: Annotated[
+        str | None, typer.Option(metavar="1,2,3", help="Joints that may change.  [default: all]")
+    ] = None,
+    feature: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A feature that the calibration needs.")
+    ] = None,
+    on_refusal: Annotated[
+        str,
+        typer.Option(metavar="stop|keep-nominal", help="What becomes of targets that cannot be corrected."),
+    ] = "stop",
+    largest_mm: Annotated[float, typer.Option("--largest-mm", help="Largest shift of the tool.")] = 5.0,
+    largest_deg: Annotated[float, typer.Option("--largest-deg", help="Largest turn of the tool.")] = 1.0,
+    largest_joint_deg: Annotated[
+        float, typer.Option("--largest-joint-deg", help="Largest change of a joint.")
+    ] = 3.0,
+    largest_std_mm: Annotated[
+        float, typer.Option("--largest-std-mm", help="Largest standard deviation of the calibration.")
+    ] = 1.0,
+    densify_mm: Annotated[
+        float | None,
+        typer.Option("--densify-mm", metavar="MM", help="Insert waypoints on lines that deviate by more."),
+    ] = None,
+    least_spacing_mm: Annotated[
+        float, typer.Option("--least-spacing-mm", metavar="MM", help="Least way between inserted waypoints.")
+    ] = 10.0,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show a table and a unified diff; write nothing.")
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Go on with a program that was compensated already.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+) -> None:
+    """Rewrite a robot program so that the calibrated arm's tool goes where the author meant it to go.
+
+    Only numbers of targets change; what cannot be changed with certainty is left as it is and listed.
+
+    Example: truearm compensate arm.calib weld.src -o out/ --controller nominal --frames frames.toml
+    """
+    if output is None and not dry_run:
+        raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
+    limits = Limits(
+        largest_mm=largest_mm,
+        largest_deg=largest_deg,
+        largest_joint_deg=largest_joint_deg,
+        largest_std_mm=largest_std_mm,
+    )
+    written_in = language_of(program, language)
+    choices = Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, _spacing(densify_mm, least_spacing_mm))
+    known = Calibration.load(calibration)
+    author = known.robot if programming is None else Robot.load(programming)
+    declared = declared_controller(controller, written_in, known.robot)
+    compensator = Compensator(
+        known,
+        programming=author,
+        task=_one_of("--task", task, Literal["pose", "axis", "position"]),
+        moving=_joints(moving),
+        limits=limits,
+        features=_features(feature),
+    )
+    models = Models(author, Inverse(author), declared, compensator)
+    with ends_promptly(), told_stages()("compensation"):
+        text = read_program(program, written_in, author, Frames() if frames is None else Frames.load(frames))
+        refuse_contradiction(text, declared, force=force)
+        paths = [] if output is None else output_paths(text, output)
+        mark = mark_text(version("truearm"), known.data_hash)
+        done = rewrite(text, models, choices, mark=mark, tell=told_progress())
+    warn([*payload_notices(text, known.robot), *done.notices])
+    facts = {
+        "outputs": [] if dry_run else [str(path) for path in paths],
+        "calibration": {"file": str(calibration), "data_hash": known.data_hash, "robot": known.robot.name},
+        "controller": {"kind": declared.kind, "source": declared.source},
+        "task": task,
+    }
+    if not dry_run:
+        write_outputs(paths, done.contents)
+    if report is not None:
+        write_whole(report, json.dumps(report_of(done, facts), indent=1, ensure_ascii=False) + "\n")
+    if as_json:
+        print_json(report_of(done, facts))
+    else:
+        _print(done, dry_run=dry_run)
+        for path in [] if dry_run else paths:
+            say(f"Written: {path}")
+
+
+def _print(done: Rewritten, *, dry_run: bool) -> None:
+    """Say what was changed and what was not."""
+    found = counts(done)
+    if dry_run:
+        _print_dry(done)
+    verb = "would be changed" if dry_run else "changed"
+    say_wrapped(
+        f"{done.program.language.name}: {found['changed']} of {found['targets']} targets {verb}, "
+        f"{found['kept']} kept as they were after a refusal, {found['listed']} left as they are."
+    )
+    if done.changed.any():
+        moved = done.correction_mm[done.changed]
+        say_wrapped(f"Corrections: {moved.mean():.3f} mm mean, {moved.max():.3f} mm at most.")
+    for title, lines in (("Kept after a refusal:", done.kept), ("Left as they are:", done.listed)):
+        if lines:
+            say(title)
+            say(describe(done.program, list(lines), LISTED_SHOWN))
+
+
+def _print_dry(done: Rewritten) -> None:
+    columns = ("where", "target", "shift mm", "turn mrad", "std mm")
+    print_table(columns, table_rows(done, ROWS_SHOWN), left=(0, 1))
+    hidden = int(done.changed.sum()) - ROWS_SHOWN
+    if hidden > 0:
+        say(f"... and {hidden} more; --report has all")
+    for line in unified_diff(done):
+        say(line)
+
+
+def _one_of(option: str, given: str, choices: Any) -> Any:  # noqa: ANN401
+    allowed = get_args(choices)
+    if given not in allowed:
+        raise UsageError(f'"{given}"', where=option, rule=f"It must be {' or '.join(allowed)}")
+    return given
+
+
+def _spacing(densify_mm: float | None, least_spacing_mm: float) -> Spacing | None:
+    return None if densify_mm is None else Spacing.of(densify_mm, least_spacing_mm)
+
+
+def _joints(given: str | None) -> list[int] | None:
+    if given is None:
+        return None
+    try:
+        return [int(part) for part in given.split(",")]
+    except ValueError:
+        raise UsageError(
+            f'"{given}"', where="--moving", rule="It must be numbers of joints with commas, such as 1,2,3"
+        ) from None
+
+
+def _features(given: list[str] | None) -> dict[str, float] | None:
+    if not given:
+        return None
+    try:
+        return {name.strip(): float(value) for name, value in (one.split("=", 1) for one in given)}
+    except ValueError:
+        raise UsageError(
+            f'"{" ".join(given)}"', where="--feature", rule="It must be NAME=VALUE with a number"
+        ) from None

@@ -1,0 +1,73 @@
+"""Which model the controller computes with: declared wherever it may be another than the nominal one."""
+
+from typing import Final
+
+from truearm.controller import Controller
+from truearm.errors import Notice, UsageError, WorkError
+from truearm.programs.program import Language, Program
+from truearm.robot import Robot
+
+UNIVERSAL: Final = (
+    "Controllers of Universal Robots compute with the factory kinematics of the very arm (calibration.conf)"
+)
+SAME_PAYLOAD_KG: Final = 0.05
+
+
+def declared_controller(declaration: str | None, language: Language, robot: Robot) -> Controller:
+    """The controller that was declared.
+
+    Raises:
+        UsageError: If none was, and controllers of such arms may compute with another model.
+        InputError: If the file is no model of this arm.
+    """
+    if declaration is not None:
+        return Controller.declared(declaration, robot)
+    differs = UNIVERSAL if _is_universal(robot) else language.controller_differs
+    if differs:
+        raise UsageError(
+            f"which model the controller of {robot.name} computes with was not declared",
+            rule=differs,
+            way_out="Give --controller FILE with the arm's own kinematics, or --controller nominal "
+            "if it has none",
+        )
+    return Controller.nominal(robot)
+
+
+def refuse_contradiction(program: Program, controller: Controller, *, force: bool) -> None:
+    """Refuse a nominal controller where the program says that it was taught with an accurate one.
+
+    Raises:
+        WorkError: If so, unless forced.
+    """
+    if program.accurate and controller.kind == "nominal" and not force:
+        raise WorkError(
+            f"the controller was declared nominal, but {program.accurate}",
+            where=str(program.sources[0].path),
+            rule="A controller that corrects by itself would correct twice",
+            way_out="Switch its accuracy option off or give its model with --controller FILE; --force goes on",
+        )
+
+
+def payload_notices(program: Program, robot: Robot) -> list[Notice]:
+    """What differs between the payload that was calibrated with and those that the program states."""
+    stated = sorted({e.payload_kg for e in program.environments if e.payload_kg is not None})
+    if robot.payload is None or not stated:
+        return []
+    calibrated = robot.payload.mass_kg
+    others = [mass for mass in stated if abs(mass - calibrated) > SAME_PAYLOAD_KG]
+    if not others:
+        return []
+    masses = ", ".join(f"{mass:g} kg" for mass in others)
+    return [
+        Notice(
+            "payload",
+            f"the program states a payload of {masses}, the calibration was made with {calibrated:g} kg: "
+            "what the arm yields under the difference is not corrected",
+        )
+    ]
+
+
+def _is_universal(robot: Robot) -> bool:
+    words = robot.name.lower().replace("-", " ").split()
+    return "universal" in words or any(word in {"ur3", "ur5", "ur10", "ur16", "ur20", "ur30", "ur15", "ur7e",
+                                               "ur12e", "ur3e", "ur5e", "ur10e", "ur16e"} for word in words)

@@ -1,0 +1,43 @@
+"""Where the files of a rewritten program go, and writing them all or none."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from truearm.errors import UsageError
+from truearm.files import write_whole
+from truearm.programs.program import Program
+
+
+def output_paths(program: Program, output: Path) -> list[Path]:
+    """The path of each file: `output` for the first, the same with the others' endings for them.
+
+    An output that is a directory gets files of the same names.
+
+    Raises:
+        UsageError: If a file would be written over the program itself.
+    """
+    if output.is_dir():
+        paths = [output / source.path.name for source in program.sources]
+    else:
+        paths = [output, *(output.with_suffix(source.path.suffix) for source in program.sources[1:])]
+    for path, source in zip(paths, program.sources, strict=True):
+        if path.resolve() == source.path.resolve():
+            raise UsageError(
+                "the output is the program itself",
+                where=str(path),
+                rule="The program as it was is needed whenever the calibration is renewed",
+                way_out="Name another file, or a directory",
+            )
+    if len(set(paths)) < len(paths):
+        raise UsageError("two files of the program would get the same name", where=str(output))
+    return paths
+
+
+def write_outputs(paths: Sequence[Path], contents: Sequence[bytes]) -> None:
+    """Write all files, each beside its place and then moved there, the named one last.
+
+    Raises:
+        InputError: If a directory does not exist or may not be written to.
+    """
+    for path, content in reversed(list(zip(paths, contents, strict=True))):
+        write_whole(path, content)

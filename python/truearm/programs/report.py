@@ -1,0 +1,138 @@
+"""What a rewriting did, for programs that read it and for people."""
+
+import difflib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from truearm.programs.program import Listed, Program
+from truearm.programs.rewriting import Rewritten, listed_target
+
+FORMAT = 1
+
+
+def report_of(done: Rewritten, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """The report as JSON values.
+
+    Args:
+        done: The rewriting.
+        facts: Further keys: calibration, controller, options.
+    """
+    return {
+        "format": FORMAT,
+        "language": done.program.language.name,
+        "files": [str(source.path) for source in done.program.sources],
+        **facts,
+        "counts": counts(done),
+        "correction_mm": _spread(done.correction_mm[done.changed]),
+        "correction_mrad": _spread(done.correction_mrad[done.changed]),
+        "std_mm": _spread(done.std_mm[done.changed]),
+        "inserted": sum(done.inserted.values()),
+        "targets": [_target(done, int(number)) for number in np.flatnonzero(done.changed)],
+        "kept": [_line(done.program, one) for one in done.kept],
+        "listed": [_line(done.program, one) for one in done.listed],
+        "notices": [{"kind": notice.kind, "message": notice.message} for notice in done.notices],
+    }
+
+
+def counts(done: Rewritten) -> dict[str, int]:
+    """How many targets were changed, kept and listed."""
+    return {
+        "targets": len(done.program.targets),
+        "moves": len(done.program.moves),
+        "changed": int(done.changed.sum()),
+        "kept": len(done.kept),
+        "listed": len(done.listed),
+    }
+
+
+def table_rows(done: Rewritten, most: int) -> Iterator[tuple[str, ...]]:
+    """Rows of a table of at most `most` changed targets: place, name, correction in mm and mrad, std in mm."""
+    for number in np.flatnonzero(done.changed)[:most]:
+        place = listed_target(done.program, int(number), "")
+        yield (
+            f"{done.program.sources[place.file].path.suffix[1:]}:{place.line}",
+            place.name if len(place.name) <= 30 else f"{place.name[:27]}...",
+            f"{done.correction_mm[number]:.3f}",
+            f"{done.correction_mrad[number]:.3f}",
+            f"{done.std_mm[number]:.3f}",
+        )
+
+
+def unified_diff(done: Rewritten) -> Iterator[str]:
+    """The lines of a unified diff of all files, without their ends."""
+    for source, content in zip(done.program.sources, done.contents, strict=True):
+        before, after = source.text.splitlines(), content.decode("latin-1").splitlines()
+        name = source.path.name
+        for line in _diff(before, after, name):
+            yield line.rstrip("\r\n")
+
+
+def _diff(before: list[str], after: list[str], name: str) -> Iterator[str]:
+    """A diff that costs no more than the lines, where no line was inserted but the mark's."""
+    if len(before) > 2000:
+        yield from _quick_diff(before, after, name)
+        return
+    yield from difflib.unified_diff(before, after, name, f"{name} (compensated)", lineterm="", n=1)
+
+
+def _quick_diff(before: list[str], after: list[str], name: str) -> Iterator[str]:
+    """Lines that differ, one hunk each, lines inserted told apart by what follows them."""
+    yield from (f"--- {name}", f"+++ {name} (compensated)")
+    old, new = 0, 0
+    extra = len(after) - len(before)
+    while old < len(before) or new < len(after):
+        if old < len(before) and new < len(after) and before[old] == after[new]:
+            old, new = old + 1, new + 1
+            continue
+        inserted = _inserted(before, after, old, new, extra)
+        yield f"@@ -{old + 1} +{new + 1} @@"
+        yield from (f"+{line}" for line in after[new : new + inserted])
+        new, extra = new + inserted, extra - inserted
+        if inserted == 0:
+            yield from (f"-{before[old]}", f"+{after[new]}")
+            old, new = old + 1, new + 1
+
+
+def _inserted(before: list[str], after: list[str], old: int, new: int, extra: int) -> int:
+    """How many lines stand in `after` before the next one that both have, if lines were inserted here."""
+    if old >= len(before):
+        return len(after) - new
+    for count in range(1, extra + 1):
+        if new + count < len(after) and after[new + count] == before[old]:
+            return count
+    return 0
+
+
+def _target(done: Rewritten, number: int) -> dict[str, Any]:
+    place = listed_target(done.program, number, "")
+    return {
+        "file": place.file,
+        "line": place.line,
+        "column": place.column,
+        "name": done.program.targets.names.get(number, ""),
+        "nominal": done.nominal[number].tolist(),
+        "corrected": done.corrected[number].tolist(),
+        "correction_mm": float(done.correction_mm[number]),
+        "correction_mrad": float(done.correction_mrad[number]),
+        "std_mm": None if np.isnan(done.std_mm[number]) else float(done.std_mm[number]),
+    }
+
+
+def _line(program: Program, one: Listed) -> dict[str, Any]:
+    return {
+        "file": str(program.sources[one.file].path),
+        "line": one.line,
+        "column": one.column,
+        "name": one.name,
+        "reason": one.reason,
+    }
+
+
+def _spread(values: Any) -> dict[str, float] | None:  # noqa: ANN401
+    found = np.asarray(values, dtype=np.float64)
+    found = found[np.isfinite(found)]
+    if len(found) == 0:
+        return None
+    return {"mean": float(found.mean()), "largest": float(found.max())}
