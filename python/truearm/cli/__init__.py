@@ -21,6 +21,7 @@ COMMANDS: Final = (
     Entry("cell", "truearm.cli.cell", "A virtual cell; check a cell; cell files to begin with."),
     Entry("evaluate", "truearm.cli.evaluate", "Errors of a calibration on other measurements."),
     Entry("export", "truearm.cli.export", "A calibration as URDF, D-H table or samples."),
+    Entry("compensate", "truearm.cli.compensate", "Rewrite a robot program for the calibrated arm."),
 )
 
 

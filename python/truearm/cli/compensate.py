@@ -17,7 +17,6 @@ from truearm.files import write_whole
 from truearm.inverse import Inverse
 from truearm.limits import Limits
 from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
-from truearm.programs.densify import Spacing
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
@@ -53,7 +52,7 @@ def command(
     ] = None,
     programming: Annotated[
         str | None,
-        typer.Option(metavar="ROBOT", help="The model of the author.  [default: the calibration's nominal arm]"),
+        typer.Option(metavar="ROBOT", help="The model of the author.  [default: the nominal arm]"),
     ] = None,
     language: Annotated[
         str | None, typer.Option(metavar="NAME", help="Language.  [default: by the ending]")
@@ -109,7 +108,8 @@ def command(
         largest_std_mm=largest_std_mm,
     )
     written_in = language_of(program, language)
-    choices = Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, _spacing(densify_mm, least_spacing_mm))
+    spacing = None if densify_mm is None else Spacing.of(densify_mm, least_spacing_mm)
+    choices = Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing)
     known = Calibration.load(calibration)
     author = known.robot if programming is None else Robot.load(programming)
     declared = declared_controller(controller, written_in, known.robot)
@@ -181,10 +181,6 @@ def _one_of(option: str, given: str, choices: Any) -> Any:  # noqa: ANN401
     if given not in allowed:
         raise UsageError(f'"{given}"', where=option, rule=f"It must be {' or '.join(allowed)}")
     return given
-
-
-def _spacing(densify_mm: float | None, least_spacing_mm: float) -> Spacing | None:
-    return None if densify_mm is None else Spacing.of(densify_mm, least_spacing_mm)
 
 
 def _joints(given: str | None) -> list[int] | None:

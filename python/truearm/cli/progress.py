@@ -19,6 +19,19 @@ def told_stages() -> Callable[[str], AbstractContextManager[None]]:
     return _stage
 
 
+def told_progress() -> Callable[[str, int, int], None]:
+    """Takes what is counted, how many are done and of how many; says so once a second at most."""
+    last = time.monotonic()
+
+    def tell_progress(what: str, done: int, of: int) -> None:
+        nonlocal last
+        if time.monotonic() - last > PATIENCE_S:
+            tell(f"{what[0].upper()}{what[1:]}: {done} of {of}")
+            last = time.monotonic()
+
+    return tell_progress
+
+
 @contextmanager
 def _stage(name: str) -> Iterator[None]:
     ended = threading.Event()

@@ -1,5 +1,6 @@
 """Which model the controller computes with: declared wherever it may be another than the nominal one."""
 
+import re
 from typing import Final
 
 from truearm.controller import Controller
@@ -10,6 +11,7 @@ from truearm.robot import Robot
 UNIVERSAL: Final = (
     "Controllers of Universal Robots compute with the factory kinematics of the very arm (calibration.conf)"
 )
+UR_MODEL: Final = re.compile(r"\bur-?\d{1,2}e?\b")
 SAME_PAYLOAD_KG: Final = 0.05
 
 
@@ -44,7 +46,7 @@ def refuse_contradiction(program: Program, controller: Controller, *, force: boo
             f"the controller was declared nominal, but {program.accurate}",
             where=str(program.sources[0].path),
             rule="A controller that corrects by itself would correct twice",
-            way_out="Switch its accuracy option off or give its model with --controller FILE; --force goes on",
+            way_out="Switch that off, or give its model with --controller FILE; --force goes on",
         )
 
 
@@ -68,6 +70,5 @@ def payload_notices(program: Program, robot: Robot) -> list[Notice]:
 
 
 def _is_universal(robot: Robot) -> bool:
-    words = robot.name.lower().replace("-", " ").split()
-    return "universal" in words or any(word in {"ur3", "ur5", "ur10", "ur16", "ur20", "ur30", "ur15", "ur7e",
-                                               "ur12e", "ur3e", "ur5e", "ur10e", "ur16e"} for word in words)
+    name = robot.name.lower()
+    return "universal robots" in name or UR_MODEL.search(name) is not None

@@ -55,7 +55,7 @@ def encode_targets(
         which: Targets to write.
         controller: The controller's model.
     """
-    encoder = _Encoder(program, uses, controller.robot, controller.inverse)
+    encoder = Encoder(program, uses, controller.robot, controller.inverse)
     for number, layout in enumerate(program.layouts):
         chosen = which[program.targets.layout[which] == number]
         if len(chosen) == 0:
@@ -69,7 +69,7 @@ def encode_targets(
     return encoder.written()
 
 
-class _Encoder:
+class Encoder:
     """Gathers numbers and reasons."""
 
     def __init__(self, program: Program, uses: Uses, robot: Robot, inverse: Inverse) -> None:
@@ -79,12 +79,16 @@ class _Encoder:
 
     def joints(self, which: Integers, layout: JointLayout, q: Floats) -> None:
         """Joint targets say q^c itself."""
-        near = numbers_of(self.program, which, layout)
-        values, decimals = self._rounded(which, layout, layout.from_readings(q, near))
-        self._keep(which, layout, values, decimals)
+        self._keep(which, layout, *self.joint_numbers(which, layout, q))
 
     def poses(self, which: Integers, layout: PoseLayout, environment: Environment, q: Floats) -> None:
         """Cartesian targets say where the controller's model puts the tool at q^c."""
+        self._keep(which, layout, *self.pose_numbers(which, layout, environment, q))
+
+    def pose_numbers(
+        self, which: Integers, layout: PoseLayout, environment: Environment, q: Floats
+    ) -> tuple[Floats, Integers]:
+        """Numbers and decimals (n, width) that say readings `q` (n, N) in the manner of targets `which`."""
         pose_width = layout.width - layout.configuration
         near = numbers_of(self.program, which, layout)
         base_from_tool = self.robot.flange_chain.pose(
@@ -105,7 +109,12 @@ class _Encoder:
         if layout.configuration and self.program.configuration is not None:
             stated = numbers_of(self.program, which, layout)[:, pose_width:]
             values[:, pose_width:] = self._configured(which, stated, said, flange)
-        self._keep(which, layout, values, decimals)
+        return values, decimals
+
+    def joint_numbers(self, which: Integers, layout: JointLayout, q: Floats) -> tuple[Floats, Integers]:
+        """The same for joint targets."""
+        near = numbers_of(self.program, which, layout)
+        return self._rounded(which, layout, layout.from_readings(q, near))
 
     def _configured(self, which: Integers, stated: Floats, said: Floats, flange: Floats) -> Floats:
         """Configuration data (n, C) that tells the readings `said` from all others of the same pose."""

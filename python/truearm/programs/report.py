@@ -28,7 +28,7 @@ def report_of(done: Rewritten, facts: Mapping[str, Any]) -> dict[str, Any]:
         "correction_mm": _spread(done.correction_mm[done.changed]),
         "correction_mrad": _spread(done.correction_mrad[done.changed]),
         "std_mm": _spread(done.std_mm[done.changed]),
-        "inserted": sum(done.inserted.values()),
+        "inserted": done.inserted,
         "targets": [_target(done, int(number)) for number in np.flatnonzero(done.changed)],
         "kept": [_line(done.program, one) for one in done.kept],
         "listed": [_line(done.program, one) for one in done.listed],
@@ -48,7 +48,7 @@ def counts(done: Rewritten) -> dict[str, int]:
 
 
 def table_rows(done: Rewritten, most: int) -> Iterator[tuple[str, ...]]:
-    """Rows of a table of at most `most` changed targets: place, name, correction in mm and mrad, std in mm."""
+    """Rows about the first `most` changed targets: place, name, shift in mm, turn in mrad, std in mm."""
     for number in np.flatnonzero(done.changed)[:most]:
         place = listed_target(done.program, int(number), "")
         yield (

@@ -1,6 +1,6 @@
 """From a program and a calibration to the program that hits: the whole way, whatever the language."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from truearm.controller import Controller
 from truearm.errors import Notice, WorkError
 from truearm.inverse import Inverse
+from truearm.programs.densify import Densifier, Inserted, Spacing
 from truearm.programs.editing import Words, edited
-from truearm.programs.encoding import encode_targets
+from truearm.programs.encoding import Encoder, encode_targets
 from truearm.programs.frames import Frames
 from truearm.programs.marks import refuse_marked
 from truearm.programs.program import Language, Listed, Program
@@ -87,10 +88,12 @@ class Choices:
     Attributes:
         on_refusal: "stop", or "keep-nominal" to leave refused targets as they are where that makes no step.
         force: Rewrite a program that bears a mark.
+        spacing: How waypoints are inserted on long lines; None inserts none.
     """
 
     on_refusal: Literal["stop", "keep-nominal"] = "stop"
     force: bool = False
+    spacing: Spacing | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +111,7 @@ class Rewritten:
         std_mm: Standard deviation of the calibration there, (t,).
         kept: Targets that were refused and kept as they were, with the reason.
         listed: What was left as it was because it cannot be changed with certainty.
+        inserted: How many waypoints were inserted.
         notices: What the user should know.
     """
 
@@ -121,6 +125,7 @@ class Rewritten:
     std_mm: Floats
     kept: tuple[Listed, ...]
     listed: tuple[Listed, ...]
+    inserted: int = 0
     notices: tuple[Notice, ...] = ()
 
 
@@ -136,7 +141,6 @@ def rewrite(
     choices: Choices,
     *,
     mark: str = "",
-    inserted: Mapping[int, tuple[Words, ...]] | None = None,
     tell: Tell = lambda _what, _done, _all: None,
 ) -> Rewritten:
     """Correct the targets of a program.
@@ -146,7 +150,6 @@ def rewrite(
         models: The arms it is rewritten between.
         choices: What the user decides.
         mark: What the mark in the program says; none without.
-        inserted: Further words by file.
         tell: Called now and then with what is going on, how much is done, and of how much.
 
     Raises:
@@ -164,7 +167,7 @@ def rewrite(
     state.reasons.update(solved.reasons)
     state.compensate()
     kept = state.settle(choices)
-    return state.finish(mark, inserted or {}, kept)
+    return state.finish(mark, choices, kept)
 
 
 @dataclass(eq=False)
@@ -233,9 +236,7 @@ class _State:
     def _makes_a_step(self, target: int) -> bool:
         return bool(self.uses.straight[target] or self.uses.blended[target])
 
-    def finish(
-        self, mark: str, inserted: Mapping[int, tuple[Words, ...]], kept: tuple[Listed, ...]
-    ) -> Rewritten:
+    def finish(self, mark: str, choices: Choices, kept: tuple[Listed, ...]) -> Rewritten:
         """The texts, and what is told of them."""
         changed = np.array(self.known)
         changed[list(self.refused)] = False
@@ -248,7 +249,10 @@ class _State:
         )
         self.reasons.update(written.reasons)
         changed[list(written.reasons)] = False
-        words = {number: list(more) for number, more in inserted.items()}
+        steps = self._inserted(changed, choices.spacing)
+        words: dict[int, list[Words]] = {}
+        for file, offset, line in steps.lines:
+            words.setdefault(file, []).append((offset, offset, line.encode("latin-1")))
         if mark:
             for number, source in enumerate(self.program.sources):
                 at, line = self.program.language.mark(source, mark)
@@ -269,7 +273,30 @@ class _State:
             self.std_mm,
             kept,
             tuple(listed),
-            self._notices(changed),
+            steps.waypoints,
+            (*self._notices(changed), *self._deviating(steps)),
+        )
+
+    def _inserted(self, changed: Bools, spacing: Spacing | None) -> Inserted:
+        if spacing is None:
+            return Inserted((), 0, ())
+        models, controller = self.models, self.models.controller
+        encoder = Encoder(self.program, self.uses, controller.robot, controller.inverse)
+        of_models = (models.programming, models.inverse, models.compensator)
+        return Densifier(self.program, of_models, encoder, spacing).insert(self.nominal, changed)
+
+    def _deviating(self, steps: Inserted) -> tuple[Notice, ...]:
+        if not steps.impossible:
+            return ()
+        targets = self.program.moves.target[list(steps.impossible)]
+        lines = sorted({self._listed(int(target), "").line for target in targets})
+        return (
+            Notice(
+                "deviation",
+                f"{len(steps.impossible)} linear moves deviate by more than was allowed, and waypoints could "
+                "not be inserted there: the statement is not a plain one, or the least spacing is too wide",
+                tuple(lines),
+            ),
         )
 
     def _forget(self, unchanged: Bools) -> None:

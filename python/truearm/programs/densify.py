@@ -1,0 +1,198 @@
+"""Waypoints on long straight moves, where the arm's error varies between the ends."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from truearm.errors import UsageError
+from truearm.inverse import Inverse
+from truearm.programs.encoding import Encoder
+from truearm.programs.environment import Environment
+from truearm.programs.layouts import of_joints, of_pose
+from truearm.programs.program import LinearStep, Program
+from truearm.programs.tables import Motion
+from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+MOST_SAMPLES: Final = 4000
+WITHIN: Final = 4
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """How waypoints are inserted.
+
+    Attributes:
+        deviation_m: Largest deviation between two waypoints, as predicted.
+        least_m: Least way between two of them, so that blending has room.
+    """
+
+    deviation_m: float
+    least_m: float
+
+    @classmethod
+    def of(cls, deviation_mm: float, least_mm: float) -> "Spacing":
+        """From millimetres.
+
+        Raises:
+            UsageError: If one of them is not positive.
+        """
+        for option, value in (("--densify-mm", deviation_mm), ("--least-spacing-mm", least_mm)):
+            if not value > 0.0 or not np.isfinite(value):
+                raise UsageError(f"{value}", where=option, rule="It must be positive")
+        return cls(deviation_mm / MM_PER_METRE, least_mm / MM_PER_METRE)
+
+
+@dataclass(frozen=True, eq=False)
+class Inserted:
+    """What densification found.
+
+    Attributes:
+        lines: File, offset and text of what is inserted.
+        waypoints: How many waypoints that is.
+        impossible: Moves, by number, that deviate by more and got no waypoints, or too few.
+    """
+
+    lines: tuple[tuple[int, int, str], ...]
+    waypoints: int
+    impossible: tuple[int, ...]
+
+
+class Densifier:
+    """Inserts waypoints before linear moves."""
+
+    def __init__(
+        self,
+        program: Program,
+        models: tuple[Robot, Inverse, Any],
+        encoder: Encoder,
+        spacing: Spacing,
+    ) -> None:
+        self._program, self._encoder, self._spacing = program, encoder, spacing
+        self._robot, self._inverse, self._compensator = models
+
+    def insert(self, nominal: Floats, changed: Bools) -> Inserted:
+        """Waypoints for every linear move between two changed targets, (t, N) readings and (t,)."""
+        moves = self._program.moves
+        lines: list[tuple[int, int, str]] = []
+        impossible: list[int] = []
+        for move in np.flatnonzero((moves.motion == Motion.LINEAR) & moves.follows):
+            ends = moves.target[move - 1 : move + 1]
+            if move == 0 or not changed[ends].all():
+                continue
+            found = self._between(int(move), nominal[ends])
+            if found is None:
+                impossible.append(int(move))
+            else:
+                lines.extend(found)
+        return Inserted(tuple(lines), len(lines), tuple(impossible))
+
+    def _between(self, move: int, ends: Floats) -> list[tuple[int, int, str]] | None:
+        """Lines to insert before a move; None where it deviates by more and that cannot be helped."""
+        environment = self._program.environments[int(self._program.moves.environment[move])]
+        tool = environment.tool.true
+        poses = self._robot.flange_chain.pose(np.ascontiguousarray(self._robot.joints_from_readings(ends)))
+        line = _line(poses @ tool, self._spacing.least_m)
+        if line is None:
+            return []
+        seeds = ends[0] + np.linspace(0.0, 1.0, len(line))[:, None] * (ends[1] - ends[0])
+        nominal = self._inverse.near_or_nan(line @ rigid_inverse(tool), seeds)
+        nominal[[0, -1]] = ends
+        if np.isnan(nominal).any():
+            return None
+        found = self._compensator.joints(np.ascontiguousarray(nominal), tool=tool)
+        if np.asarray(found.refused).any():
+            return None
+        chosen, enough = _needed(self._written(found.q, environment), self._spacing.deviation_m)
+        if not enough:
+            return None
+        return self._lines(move, environment, found.q[chosen]) if chosen else []
+
+    def _written(self, q: Floats, environment: Environment) -> Floats:
+        """Where the controller believes the tool, (n, 3)."""
+        robot = self._encoder.robot
+        poses = robot.flange_chain.pose(np.ascontiguousarray(robot.joints_from_readings(q)))
+        points: Floats = (poses @ environment.tool.controller)[:, :3, 3]
+        return points
+
+    def _lines(self, move: int, environment: Environment, q: Floats) -> list[tuple[int, int, str]] | None:
+        program, moves = self._program, self._program.moves
+        target, file = int(moves.target[move]), int(moves.source[move])
+        layout = program.layouts[int(program.targets.layout[target])]
+        which = np.full(len(q), target)
+        if of_pose(layout):
+            values, decimals = self._encoder.pose_numbers(which, layout, environment, q)
+        elif of_joints(layout):
+            values, decimals = self._encoder.joint_numbers(which, layout, q)
+        source = program.sources[file]
+        line, _ = source.place(int(moves.at[move]))
+        offset = source.line_starts[line - 1]
+        lines = []
+        for row, digits in zip(values, decimals, strict=True):
+            step = LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()))
+            text = program.language.linear_step(program, step)
+            if text is None:
+                return None
+            lines.append((file, offset, text))
+        return lines
+
+
+def _line(ends: Floats, least_m: float) -> Floats | None:
+    """Poses (n, 4, 4) on the straight line between two, both ends included; None for a short one."""
+    length = float(np.linalg.norm(ends[1, :3, 3] - ends[0, :3, 3]))
+    count = min(int(length / least_m) * WITHIN, MOST_SAMPLES)
+    if count < 2 * WITHIN:
+        return None
+    along = np.linspace(0.0, 1.0, count + 1)
+    poses = np.tile(np.eye(4), (count + 1, 1, 1))
+    poses[:, :3, 3] = ends[0, :3, 3] + along[:, None] * (ends[1, :3, 3] - ends[0, :3, 3])
+    poses[:, :3, :3] = Slerp([0.0, 1.0], Rotation.from_matrix(ends[:, :3, :3]))(along).as_matrix()
+    return poses
+
+
+def _needed(points: Floats, deviation_m: float) -> tuple[list[int], bool]:
+    """Which of the points (n, 3), the ends apart, a chain of straight lines needs, and whether they suffice.
+
+    Equal steps lie between the points, WITHIN of them in the least spacing, so a line from point i to point j
+    passes each point between at an equal share of its way.
+    """
+    chosen: list[int] = []
+    start, last = 0, len(points) - 1
+    while True:
+        end = _farthest(points, start, deviation_m)
+        if end is None:
+            return chosen, False
+        if end == last:
+            return chosen, True
+        chosen.append(end)
+        start = end
+
+
+def _farthest(points: Floats, start: int, deviation_m: float) -> int | None:
+    """The last point to which a straight line from `start` stays within the deviation; None without one."""
+    last = len(points) - 1
+    if _deviation(points[start:]) <= deviation_m:
+        return last
+    low, high = start + WITHIN, last - WITHIN
+    if high < low or _deviation(points[start : low + 1]) > deviation_m:
+        return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _deviation(points[start : middle + 1]) <= deviation_m:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _deviation(points: Floats) -> float:
+    share = np.linspace(0.0, 1.0, len(points))[:, None]
+    straight = points[0] + share * (points[-1] - points[0])
+    return float(np.linalg.norm(points - straight, axis=1).max())
