@@ -17,6 +17,7 @@ from truearm.files import write_whole
 from truearm.inverse import Inverse
 from truearm.limits import Limits
 from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
+from truearm.programs.densify import Spacing
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text

@@ -1,7 +1,7 @@
 """Waypoints on long straight moves, where the arm's error varies between the ends."""
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
