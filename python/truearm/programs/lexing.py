@@ -58,7 +58,9 @@ class Reader:
     @property
     def offset(self) -> int:
         """Where the next token begins, or the statement ends."""
-        return self._end if self.done else self._tokens[self._at].start
+        if not self.done:
+            return self._tokens[self._at].start
+        return self._tokens[-1].end if self._tokens else self._end
 
     def peek(self, ahead: int = 0) -> str:
         """The next token in small letters; empty at the end."""
