@@ -93,7 +93,7 @@ def test_stored_and_written_out_targets_with_their_frames():
     assert done.changed.sum() == 5
     by_name = {name: number for number, name in program.targets.names.items()}
     for name, q_deg in POINTS.items():
-        np.testing.assert_allclose(np.rad2deg(done.nominal[by_name[name]]), q_deg, atol=0.01)
+        assert np.abs(np.rad2deg(done.nominal[by_name[name]]) - np.array(q_deg)).max() < 0.01, name
     written = again(done, KUKA, TOOL)
     said = obeyed(written, KUKA, done.corrected)
     np.testing.assert_allclose(said, done.corrected, atol=3e-5)
