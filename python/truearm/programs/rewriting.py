@@ -163,6 +163,7 @@ def rewrite(
     )
     known: Bools = np.asarray(np.isfinite(solved.q.sum(axis=1)))
     known[list(solved.reasons)] = False
+    known &= uses.moved
     state = _State(program, uses, models, solved.q, known)
     state.reasons.update(solved.reasons)
     state.compensate()

@@ -94,7 +94,7 @@ class _Solver:
             if of_joints(layout):
                 self.q[which] = layout.to_readings(numbers_of(self.program, which, layout))
         self.reasons.update(self.program.fixed)
-        for target in np.flatnonzero(~self.uses.moved):
+        for target in np.flatnonzero(~self.uses.mentioned):
             self.reasons.setdefault(int(target), UNUSED)
         for target in np.flatnonzero(self.uses.several):
             self.reasons.setdefault(int(target), SEVERAL)

@@ -23,6 +23,7 @@ class Uses:
 
     Attributes:
         moved: Targets that a motion goes to, (t,).
+        mentioned: These, and those that a motion starts its search for joints from, (t,).
         environment: Number of the environment of each, (t,); -1 where there is none.
         tool: Number of its tool among `tools`, (t,); -1 where there is none.
         tools: Number of an environment with each of the different tools.
@@ -33,6 +34,7 @@ class Uses:
     """
 
     moved: Bools
+    mentioned: Bools
     environment: Integers
     tool: Integers
     tools: tuple[int, ...]
@@ -50,12 +52,15 @@ class Uses:
         real = moves.motion != Motion.NONE
         moved = np.zeros(len(targets), dtype=bool)
         moved[moves.target[real]] = True
+        mentioned = np.zeros(len(targets), dtype=bool)
+        mentioned[moves.target] = True
         tool_of, tools = _tools(program)
         environment, several = _single(moves.environment[real], moves.target[real], len(targets))
         tool, several_tools = _single(tool_of[moves.environment[real]], moves.target[real], len(targets))
         straight, blended = _along(program, real)
         return cls(
             moved,
+            mentioned,
             environment,
             tool,
             tools,
