@@ -66,8 +66,8 @@ class StatedUnits:
                 raise UsageError(f'"{value}" is no unit here', rule=f"Known are {list_names(known)}")
 
 
-def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str) -> Layout:
-    """Find out what the columns mean.
+def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str, measured: bool = True) -> Layout:
+    """Find out what the columns mean; unless `measured`, joints alone will do.
 
     Raises:
         InputError: If joints or a coordinate are missing, two columns mean the same, or units are mixed.
@@ -78,7 +78,7 @@ def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str) -> Lay
     layout.sigma = finder.single(SIGMA)
     layout.distance = finder.single(DISTANCE)
     layout.words = tuple(word for word in WORDS if word in names)
-    if not layout.targets and layout.distance is None:
+    if measured and not layout.targets and layout.distance is None:
         raise finder.missing("z" if {"x", "y"} & set(names) else "x", "No position x, y, z and no distance")
     layout.others = [name for name in names if name not in finder.used and name not in layout.words]
     return layout

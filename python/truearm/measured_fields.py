@@ -24,17 +24,20 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def read_fields(table: Table, stated: StatedUnits, *, default_group: str) -> dict[str, Any]:
-    """Arguments of Measurements.
+def read_fields(
+    table: Table, stated: StatedUnits, *, default_group: str, measured: bool = True
+) -> dict[str, Any]:
+    """Arguments of Measurements; unless `measured`, rows of joints alone will do.
 
     Raises:
         InputError: If a column is missing or a value breaks a rule; names the rows.
     """
-    layout = read_layout(table.names, stated, where=table.where)
+    layout = read_layout(table.names, stated, where=table.where, measured=measured)
     readings = _readings(table, layout)
     targets = _targets(table, layout)
     distance = _distances(table, layout)
-    _check_measured(table, targets, distance)
+    if measured or layout.targets:
+        _check_measured(table, targets, distance)
     features, notices = _features(table, layout)
     return {
         "readings": readings,

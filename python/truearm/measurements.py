@@ -131,6 +131,26 @@ class Measurements:
         return read
 
     @classmethod
+    def read_touches(
+        cls,
+        path: str | Path,
+        *,
+        length_unit: str | None = None,
+        angle_unit: str | None = None,
+        joints: Sequence[str] | None = None,
+    ) -> "Measurements":
+        """As read_csv, of a file that may hold readings alone: what was touched is the same in all rows.
+
+        Raises:
+            InputError: As for read_csv.
+        """
+        stated = StatedUnits(length_unit, angle_unit, joints)
+        table = read_csv_table(Path(path))
+        read = cls(**read_fields(table, stated, default_group=Path(path).stem, measured=False))
+        read.require_joint_count(None if joints is None else len(joints))
+        return read
+
+    @classmethod
     def read_files(
         cls,
         paths: Sequence[str | Path],

@@ -20,6 +20,7 @@ COMMANDS: Final = (
     Entry("session", "truearm.cli.session", "Look into a measurement session, export it."),
     Entry("cell", "truearm.cli.cell", "A virtual cell; check a cell; cell files to begin with."),
     Entry("evaluate", "truearm.cli.evaluate", "Errors of a calibration on other measurements."),
+    Entry("frame", "truearm.cli.frame", "Teach a tool or a work object again."),
     Entry("export", "truearm.cli.export", "A calibration as URDF, D-H table or samples."),
     Entry("compensate", "truearm.cli.compensate", "Rewrite a robot program for the calibrated arm."),
 )

@@ -111,8 +111,8 @@ def grid_text(table: pd.DataFrame, calibration: Calibration) -> str:
     notes = [
         f"{calibration.robot.name}, calibrated by truearm {calibration.version}: samples of what varies",
         "dx to rz lead from the nominal flange to the calibrated one, in the base frame: mm, and "
-        "the rotation vector in mrad. The other columns are added to the nominal D-H parameters, and hold the constant "
-        "part too",
+        "the rotation vector in mrad. The other columns are added to the nominal D-H parameters, and "
+        "hold the constant part too",
         "Between samples the field is not linear; beyond the readings it was learnt at it is a guess",
     ]
     return as_comments(notes) + table.to_csv(index=False, float_format=DIGITS, lineterminator="\n")

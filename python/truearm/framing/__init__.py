@@ -1,0 +1,104 @@
+"""Tools and work objects taught again, through the calibrated arm instead of the controller's model of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.calibration import Calibration
+from truearm.errors import InputError, UsageError
+from truearm.fitting import feature_values
+from truearm.framing.frames_toml import former_entry, tip_covariance, write_frame
+from truearm.framing.identified_frame import IdentifiedFrame
+from truearm.framing.measuring import tool_from_measurements
+from truearm.framing.placing import object_from_points
+from truearm.framing.touching import tool_from_touches
+from truearm.measurements import Measurements
+
+Floats = NDArray[np.float64]
+
+__all__ = ["IdentifiedFrame", "find_object", "find_tool", "former_entry", "tip_covariance", "write_frame"]
+
+
+def find_tool(
+    calibration: Calibration,
+    data: Measurements,
+    *,
+    orientation: ArrayLike | None = None,
+    points: Sequence[str] | None = None,
+) -> IdentifiedFrame:
+    """A tool, from touches of a point or from what a device measured of it.
+
+    Args:
+        calibration: The arm.
+        data: Readings alone: touches of one point, four or more. With positions, or poses, of target 1: those
+            of the tool, in the frame of a device that stands anywhere; seven or more.
+        orientation: Orientation of the tool, flange_from_tool (3, 3), unless poses were measured.
+        points: Name of the point of each touch; one point by default.
+
+    Raises:
+        UsageError: If an orientation is needed and missing, or given and measured.
+        InputError: If the data is of another arm.
+        WorkError: If the data determines too little.
+    """
+    data.require_joint_count(calibration.robot.joint_count)
+    turned = None if orientation is None else _rotation(orientation)
+    if data.target_count and np.isfinite(data.targets).any():
+        if data.orientations is not None and turned is not None:
+            raise UsageError("the orientation of the tool was measured", way_out="Leave it out")
+        return tool_from_measurements(calibration, data, turned)
+    if turned is None:
+        raise UsageError(
+            "touches of a point do not tell how the tool is turned", way_out="Give its orientation"
+        )
+    poses = _poses(calibration, data, np.eye(4))
+    return tool_from_touches(poses, points or ["point"] * len(data), turned, data.rows)
+
+
+def find_object(
+    calibration: Calibration,
+    data: Measurements,
+    flange_from_tool: ArrayLike,
+    covariance: ArrayLike | None = None,
+) -> IdentifiedFrame:
+    """A work object, from points of it that a tool's tip touched.
+
+    Args:
+        calibration: The arm.
+        data: Readings, and as target 1 where the touched points are in the object's own frame; three or more.
+        flange_from_tool: The tool (4, 4), or its tip (3,).
+        covariance: Covariance of its tip along the flange's axes (3, 3), m^2.
+
+    Raises:
+        InputError: If the data is of another arm, or has no positions.
+        WorkError: If the points do not tell where the object is.
+    """
+    data.require_joint_count(calibration.robot.joint_count)
+    if not data.target_count or not np.isfinite(data.targets[:, 0]).all():
+        raise InputError(
+            "there is no place x, y, z of every touched point",
+            where=", ".join(data.files),
+            rule="Each row needs where the point truly is, in the object's own frame",
+        )
+    given = np.asarray(flange_from_tool, dtype=np.float64)
+    tool = np.eye(4)
+    if given.shape == (3,):
+        tool[:3, 3] = given
+    else:
+        tool = given
+    in_tool = None if covariance is None else tool[:3, :3].T @ np.asarray(covariance) @ tool[:3, :3]
+    return object_from_points(_poses(calibration, data, tool), data.targets[:, 0], data.rows, in_tool)
+
+
+def _poses(calibration: Calibration, data: Measurements, tool: Floats) -> Floats:
+    """base_from_tool (n, 4, 4) of the calibrated arm."""
+    names = calibration.options.features
+    features = dict(zip(names, feature_values(data, names).T, strict=True))
+    return calibration.pose(data.readings, tool=tool, features=features or None)
+
+
+def _rotation(orientation: ArrayLike) -> Floats:
+    given = np.asarray(orientation, dtype=np.float64)
+    if given.shape != (3, 3) or np.abs(given.T @ given - np.eye(3)).max() > 1e-8 or np.linalg.det(given) < 0:
+        raise InputError("the orientation is no rotation matrix (3, 3)")
+    return given

@@ -1,0 +1,112 @@
+"""Frames that were found, written into a frames file beside what it holds already."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from truearm.errors import Notice
+from truearm.files import read_text, write_whole
+from truearm.framing.identified_frame import IdentifiedFrame
+from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, FrameEntry, Frames
+from truearm.rotations import quaternion_from_matrix
+
+Floats = NDArray[np.float64]
+
+PLACEMENT: Final = ("xyz", *ORIENTATIONS)
+FORMAT: Final = 1
+
+
+def former_entry(path: Path, kind: str, name: str) -> tuple[FrameEntry, float] | None:
+    """What a frames file, if it is there, says of a tool or object, and its length unit in m.
+
+    Raises:
+        InputError: If the file breaks a rule.
+    """
+    content = _content(path)
+    key = _key(content, kind, name)
+    if key is None:
+        return None
+    unit = LENGTHS_M[content.get("length_unit", "mm")]
+    return FrameEntry.model_validate(content[kind][key]), unit
+
+
+def tip_covariance(entry: FrameEntry) -> Floats | None:
+    """Covariance of a tool's tip along the flange's axes (3, 3), m^2, if the entry was identified."""
+    stated = (entry.identified or {}).get("covariance")
+    if stated is None or np.shape(stated) != (6, 6):
+        return None
+    return np.asarray(stated, dtype=np.float64)[:3, :3] * 1e-6
+
+
+def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -> list[Notice]:
+    """Write a frame into a file, which is made if it is not there; other frames stay.
+
+    Where the file held the frame already, what it held becomes what the controller has, unless it said
+    what the controller has. Comments of the file are not kept.
+
+    Raises:
+        InputError: If the file breaks a rule or cannot be written.
+    """
+    content = _content(path)
+    key = _key(content, found.kind, name)
+    entry = dict(content.get(found.kind, {}).get(key, {})) if key is not None else {}
+    former = {part: entry.pop(part) for part in PLACEMENT if part in entry}
+    if former:
+        entry.setdefault("controller", former)
+    unit = LENGTHS_M[content.setdefault("length_unit", "mm")]
+    written = (
+        _placement(found.transform, unit)
+        | {"identified": _identified(found, data_hash)}
+        | {part: value for part, value in entry.items() if part != "identified"}
+    )
+    content.setdefault("format", FORMAT)
+    content.setdefault(found.kind, {})[key or name] = written
+    write_whole(path, tomli_w.dumps(content))
+    Frames.load(path)
+    if not former:
+        return []
+    return [
+        Notice(
+            "former_frame",
+            f'{path} held {found.kind} "{name}" already; what it held stands under "controller" now, as what '
+            "the controller computes with. Take it out when the new numbers are in the controller",
+        )
+    ]
+
+
+def _content(path: Path) -> dict[str, Any]:
+    if not path.exists():
+        return {"format": FORMAT, "length_unit": "mm"}
+    Frames.load(path)
+    return tomllib.loads(read_text(path))
+
+
+def _key(content: Mapping[str, Any], kind: str, name: str) -> str | None:
+    """The file's own spelling of a name."""
+    return next((key for key in content.get(kind, {}) if key.casefold() == name.casefold()), None)
+
+
+def _placement(transform: Floats, unit_m: float) -> dict[str, Any]:
+    return {
+        "xyz": (transform[:3, 3] / unit_m).tolist(),
+        "quaternion_wxyz": quaternion_from_matrix(transform[:3, :3]).tolist(),
+    }
+
+
+def _identified(found: IdentifiedFrame, data_hash: str) -> dict[str, Any]:
+    return {
+        "how": found.how,
+        "residual_mm": float(np.sqrt(np.square(found.distances_mm).mean())),
+        "largest_mm": float(found.distances_mm.max()),
+        "std_mm": found.std_mm.tolist(),
+        "std_mrad": found.std_mrad.tolist(),
+        "covariance": (found.covariance * 1e6).tolist(),
+        "covariance_of": "x, y, z in mm and rotation vector in mrad, along the axes of "
+        + ("the flange" if found.kind == "tool" else "the base"),
+        "calibration": data_hash,
+    }

@@ -1,0 +1,73 @@
+"""A work object from points of it that were touched, and where they are on it."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import WorkError
+from truearm.framing.identified_frame import IdentifiedFrame, far_rows
+from truearm.registration import register
+
+Floats = NDArray[np.float64]
+
+FEWEST: Final = 3
+LEAST_SPREAD_M: Final = 1e-3
+
+
+def object_from_points(
+    base_from_tool: Floats,
+    point_in_object: Floats,
+    rows: NDArray[np.int64],
+    tip_covariance: Floats | None = None,
+) -> IdentifiedFrame:
+    """The object whose points the tool's tip touched.
+
+    Args:
+        base_from_tool: Poses of the calibrated tool (n, 4, 4).
+        point_in_object: Where the touched points truly are (n, 3), m.
+        rows: Number of each touch in its file (n,).
+        tip_covariance: Covariance of the tool's tip in its own axes (3, 3). It moves all points together,
+            so the residuals do not show it.
+
+    Raises:
+        WorkError: If there are fewer than three points, or they lie on a line.
+    """
+    _check_spread(point_in_object)
+    touched = base_from_tool[:, :3, 3]
+    none = np.empty((0, 3, 3))
+    transform = register(point_in_object, touched, none, none, 0.0)
+    residuals = touched - point_in_object @ transform[:3, :3].T - transform[:3, 3]
+    freedom = residuals.size - 6
+    noise = float(np.sqrt(np.square(residuals).sum() / freedom))
+    jacobian = _jacobian(point_in_object @ transform[:3, :3].T).reshape(-1, 6)
+    pseudo_inverse = np.linalg.pinv(jacobian)
+    covariance = noise**2 * pseudo_inverse @ pseudo_inverse.T
+    if tip_covariance is not None:
+        gain = pseudo_inverse @ base_from_tool[:, :3, :3].reshape(-1, 3)
+        covariance = covariance + gain @ tip_covariance @ gain.T
+    what = f"{len(touched)} points of it"
+    notices = tuple(far_rows(residuals, rows, noise, freedom))
+    return IdentifiedFrame("object", transform, covariance, residuals, rows, noise, freedom, what, notices)
+
+
+def _check_spread(points: Floats) -> None:
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) / np.sqrt(len(points))
+    if len(points) < FEWEST or spread[1] < LEAST_SPREAD_M:
+        what = f"{len(points)} points" if len(points) < FEWEST else f"the {len(points)} points lie on a line"
+        raise WorkError(
+            what,
+            rule="Three points that span a plane tell where an object is",
+            way_out="Touch points far from each other, some more than three",
+        )
+
+
+def _jacobian(arm: Floats) -> Floats:
+    """Change (n, 3, 6) of points that are at `arm` (n, 3) from the origin, with translation and rotation."""
+    jacobian = np.zeros((len(arm), 3, 6))
+    jacobian[:, :, :3] = np.eye(3)
+    x, y, z = arm.T
+    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+    return jacobian

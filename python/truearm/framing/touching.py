@@ -1,0 +1,84 @@
+"""A tool's point from touches: with the tip on one fixed point, the flange goes around it.
+
+For each touch, base_from_flange applied to the tool's point is the touched point. Both are unknown and the
+equations are linear in them, so least squares have one solution and need no start.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import WorkError
+from truearm.framing.identified_frame import IdentifiedFrame, far_rows
+
+Floats = NDArray[np.float64]
+
+FEWEST: Final = 4
+LEAST_TURN_DEG: Final = 3.0
+
+
+def tool_from_touches(
+    base_from_flange: Floats,
+    point: Sequence[str],
+    orientation: Floats,
+    rows: NDArray[np.int64],
+) -> IdentifiedFrame:
+    """The tool whose tip touched one fixed point, or several.
+
+    Args:
+        base_from_flange: Poses of the calibrated flange (n, 4, 4).
+        point: Name of the point that each touch was at (n,).
+        orientation: Orientation of the tool, flange_from_tool (3, 3): touches do not tell it.
+        rows: Number of each touch in its file (n,).
+
+    Raises:
+        WorkError: If there are fewer than four touches at any one point, or the tool was turned too little
+            between them to tell its point in all directions.
+    """
+    names = sorted(set(point))
+    number = np.array([names.index(name) for name in point])
+    counts = np.bincount(number)
+    if counts.max() < FEWEST or counts.min() < 2:
+        raise WorkError(
+            f"{len(point)} touches at {len(names)} points",
+            rule=f"One point is touched at least {FEWEST} times, and no point once",
+            way_out='Name the point of each touch in a column "point" where several were touched',
+        )
+    turns, origins = base_from_flange[:, :3, :3], base_from_flange[:, :3, 3]
+    apart, shifts = _without_points(turns, number), _without_points(origins, number)
+    _check_turned(apart)
+    stacked = apart.reshape(-1, 3)
+    tip, *_ = np.linalg.lstsq(stacked, -shifts.reshape(-1), rcond=None)
+    residuals = np.einsum("nij,j->ni", apart, tip) + shifts
+    freedom = residuals.size - 3 - 3 * len(names)
+    noise = float(np.sqrt(np.square(residuals).sum() / freedom))
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3] = noise**2 * np.linalg.inv(stacked.T @ stacked)
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = orientation, tip
+    what = f"{len(point)} touches of {'one point' if len(names) == 1 else f'{len(names)} points'}"
+    notices = tuple(far_rows(residuals, rows, noise, freedom))
+    return IdentifiedFrame("tool", transform, covariance, residuals, rows, noise, freedom, what, notices)
+
+
+def _without_points(values: Floats, number: NDArray[np.int64]) -> Floats:
+    """What each touch differs in from the mean of the touches at its point: the point itself drops out."""
+    left = values.copy()
+    for k in range(int(number.max()) + 1):
+        left[number == k] -= values[number == k].mean(axis=0)
+    return left
+
+
+def _check_turned(apart: Floats) -> None:
+    """Raise WorkError unless the touches turn every direction of the flange."""
+    mean = np.einsum("nij,nik->jk", apart, apart) / len(apart)
+    sizes, directions = np.linalg.eigh(mean)
+    if np.sqrt(max(sizes[0], 0.0)) < np.radians(LEAST_TURN_DEG):
+        x, y, z = directions[:, 0] * np.sign(directions[np.abs(directions[:, 0]).argmax(), 0])
+        raise WorkError(
+            f"the touches hardly turn the flange's direction [{x:.2f}, {y:.2f}, {z:.2f}]",
+            rule="Where that direction does not move, neither is the tool's length along it told",
+            way_out="Tilt the tool by 20 deg or more about two axes between touches",
+        )

@@ -1,0 +1,133 @@
+"""`truearm frame` as people run it."""
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+import truearm as ta
+from truearm.cli import main
+from truearm.exporting import constant_robot
+from truearm.inverse import Inverse
+from truearm.programs.frames import Frames
+from truearm.simulation import VirtualArm
+
+PROGRAM = str(Path(sys.executable).parent / "truearm")
+TIP = np.array([0.02, -0.05, 0.18])
+PLACES = np.array([[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0.3, 0.2, 0.05]], dtype=float)
+ORIGIN = np.array([0.5, 0.2, 0.1])
+
+
+def touches_of(robot, points, seed):
+    turns = Rotation.from_rotvec(np.random.default_rng(seed).uniform(-0.5, 0.5, (len(points), 3)))
+    poses = np.tile(np.eye(4), (len(points), 1, 1))
+    poses[:, :3, :3] = (turns * Rotation.from_euler("x", 180.0, degrees=True)).as_matrix()
+    poses[:, :3, 3] = points - poses[:, :3, :3] @ TIP
+    q = Inverse(robot).near(poses, np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0]))
+    return pd.DataFrame({f"q{j + 1}_deg": np.degrees(q[:, j]) for j in range(6)})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("frame")
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=2)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
+    calibration.save(place / "arm.calib")
+    robot = constant_robot(calibration)
+    touches_of(robot, np.tile([0.6, 0.1, 0.2], (6, 1)), 0).round(3).to_csv(place / "touches.csv", index=False)
+    mm = dict(zip(["x_mm", "y_mm", "z_mm"], 1e3 * PLACES.T, strict=True))
+    touches_of(robot, PLACES + ORIGIN, 1).assign(**mm).to_csv(place / "points.csv", index=False)
+    return place
+
+
+@pytest.fixture(autouse=True)
+def inside(folder, monkeypatch, tmp_path):
+    for name in ("arm.calib", "touches.csv", "points.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    monkeypatch.chdir(tmp_path)
+
+
+def test_a_tool_and_then_an_object_as_people_teach_them():
+    words = ["frame", "arm.calib", "touches.csv", "--tool", "tGripper", "--orientation", "0,0,0"]
+    done = subprocess.run([PROGRAM, *words, "-o", "cell.toml"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert 'Tool "tGripper" of UR10, from 6 touches of one point.' in done.stdout
+    assert "mm RMS" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    words = ["frame", "arm.calib", "points.csv", "--object", "wTable", "--with-tool", "tgripper"]
+    done = subprocess.run([PROGRAM, *words, "-o", "cell.toml"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    frames = Frames.load(Path("cell.toml"))
+    assert np.abs(frames.tool("tGripper").true[:3, 3] - TIP).max() < 1e-4
+    assert np.abs(frames.work_object("wTable").true[:3, 3] - ORIGIN).max() < 1e-4
+    entries = tomllib.loads(Path("cell.toml").read_text())
+    known = entries["tool"]["tGripper"]["identified"]
+    assert np.shape(known["covariance"]) == (6, 6)
+    assert known["calibration"] == ta.Calibration.load("arm.calib").data_hash
+    # The touches were rounded to a thousandth of a degree; the tool's covariance is in the object's.
+    assert min(entries["object"]["wTable"]["identified"]["std_mm"]) > 0.5 * min(known["std_mm"])
+
+
+def test_what_the_file_held_becomes_what_the_controller_has(capsys):
+    former = '[tool."tGripper"]\nxyz = [20, -50, 179]\neuler_zyx_deg = [10, 0, 0]\npayload_kg = 2.5\n'
+    other = "[object.wWall]\nxyz = [1, 2, 3]\n"
+    Path("cell.toml").write_text(former + other)
+    assert main(["frame", "arm.calib", "touches.csv", "--tool", "TGRIPPER", "-o", "cell.toml"]) == 0
+    assert "Take it out when the new numbers are in the controller" in capsys.readouterr().err
+    frames = Frames.load(Path("cell.toml"))
+    tool = frames.tool("tGripper")
+    assert np.abs(tool.true[:3, 3] - TIP).max() < 1e-4
+    assert np.allclose(tool.controller[:3, 3], [0.02, -0.05, 0.179])
+    assert np.allclose(tool.true[:3, :3], tool.controller[:3, :3], atol=1e-9)
+    assert frames.payloads_kg == {"tgripper": 2.5}
+    assert np.allclose(frames.work_object("wWall").true[:3, 3], [1e-3, 2e-3, 3e-3])
+    assert main(["frame", "arm.calib", "touches.csv", "--tool", "tGripper", "-o", "cell.toml"]) == 0
+    again = Frames.load(Path("cell.toml")).tool("tGripper")
+    assert np.allclose(again.controller[:3, 3], [0.02, -0.05, 0.179]), "the controller still has the first"
+
+
+def test_json_is_all_that_is_printed(capsys):
+    words = ["points.csv", "--object", "wTable", "--with-tool=20,-50,180", "-o", "cell.toml", "--json"]
+    assert main(["frame", "arm.calib", *words]) == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert printed.err == ""
+    assert np.allclose(found["xyz_mm"], 1e3 * ORIGIN, atol=1e-6)
+    assert len(found["residuals_mm"]) == 4
+    assert found["rows"] == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["touches.csv"], 2, "give --tool NAME or --object NAME"),
+        (["touches.csv", "--tool", "a", "--object", "b"], 2, "One frame is found at a time"),
+        (["touches.csv", "--tool", "a"], 2, "Give --orientation Z,Y,X"),
+        (["touches.csv", "--tool", "a", "--orientation", "1,2"], 1, "It must be Z,Y,X in deg"),
+        (["touches.csv", "--tool", "a", "--with-tool", "b"], 2, "It belongs to --object"),
+        (["points.csv", "--object", "a", "--orientation", "0,0,0"], 2, "It belongs to --tool"),
+        (["points.csv", "--object", "a", "--with-tool", "b"], 1, "a tool of cell.toml, or X,Y,Z in mm"),
+        (["touches.csv", "--object", "a"], 1, "no place x, y, z of every touched point"),
+        (["missing.csv", "--tool", "a", "--orientation", "0,0,0"], 1, "missing.csv: there is no such file"),
+    ],
+)
+def test_what_cannot_be_done_is_said(words, status, message, capsys):
+    assert main(["frame", "arm.calib", *words, "-o", "cell.toml"]) == status
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert message in printed.err
+    assert not Path("cell.toml").exists()
+
+
+def test_a_frames_file_that_is_none_stays_as_it_is(capsys):
+    Path("cell.toml").write_text("[tool.a]\nxyz = [1, 2]\n")
+    words = ["touches.csv", "--tool", "a", "--orientation", "0,0,0", "-o", "cell.toml"]
+    assert main(["frame", "arm.calib", *words]) == 1
+    assert '"tool.a.xyz' in capsys.readouterr().err
+    assert Path("cell.toml").read_text() == "[tool.a]\nxyz = [1, 2]\n"

@@ -1,0 +1,226 @@
+"""Tools and work objects taught again: known ones come back, within what is said of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import f as f_distribution
+
+import truearm as ta
+from truearm.errors import InputError, UsageError, WorkError
+from truearm.exporting import constant_robot
+from truearm.framing import find_object, find_tool
+from truearm.inverse import Inverse
+from truearm.measurements import Measurements
+from truearm.rotations import quaternion_from_matrix
+from truearm.simulation import VirtualArm
+
+TIP_NOISE_M = 5e-5
+TOOL = np.eye(4)
+TOOL[:3, :3] = Rotation.from_euler("ZYX", [30.0, 20.0, -10.0], degrees=True).as_matrix()
+TOOL[:3, 3] = [0.02, -0.05, 0.18]
+OBJECT = np.eye(4)
+OBJECT[:3, :3] = Rotation.from_euler("ZYX", [80.0, 2.0, 1.0], degrees=True).as_matrix()
+OBJECT[:3, 3] = [0.55, 0.25, 0.1]
+PLACES = np.array(
+    [[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0.3, 0.2, 0.05], [0.15, 0.1, 0.02], [0.1, 0.2, 0.03]], dtype=float
+)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return VirtualArm(ta.Robot.load("ur10"), seed=4)
+
+
+@pytest.fixture(scope="module")
+def calibration(arm):
+    return ta.calibrate(arm.robot, arm.measure(arm.poses(120)))
+
+
+@pytest.fixture(scope="module")
+def exact(calibration):
+    """The arm that the calibration's constant part describes: what it does is known exactly."""
+    models = {name: model for name, model in calibration.models.items() if name != "variable"}
+    model = replace(calibration, variable=None, models=models)
+    return model, constant_robot(calibration)
+
+
+def tilted(rng, count, angle_deg=40.0):
+    """Orientations of the flange around one that looks down, tilted about all axes."""
+    down = Rotation.from_euler("x", 180.0, degrees=True)
+    return (Rotation.from_rotvec(rng.uniform(-1, 1, (count, 3)) * np.radians(angle_deg)) * down).as_matrix()
+
+
+def readings_at(robot, points, turns, tool=TOOL):
+    """Readings at which the tool's tip is at points of the base frame and the flange is turned so."""
+    poses = np.tile(np.eye(4), (len(points), 1, 1))
+    poses[:, :3, :3] = turns
+    poses[:, :3, 3] = points - turns @ tool[:3, 3]
+    return Inverse(robot).near(poses, np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0]))
+
+
+def at_touch(arm, points, turns, tool=TOOL):
+    """Readings at which the real tip is at points: where the nominal arm misses is stepped towards."""
+    aimed = points.copy()
+    for _ in range(6):
+        q = readings_at(arm.robot, aimed, turns, tool)
+        aimed += points - arm.true_pose(q, tool=tool)[:, :3, 3]
+    return q
+
+
+def readings(q, **columns):
+    table = pd.DataFrame({f"q{j + 1}_rad": q[:, j] for j in range(q.shape[1])})
+    return table.assign(**columns)
+
+
+def as_data(table, path):
+    table.to_csv(path, index=False)
+    return Measurements.read_touches(path)
+
+
+def touched(robot, seed, tmp_path, count=8, noise=TIP_NOISE_M):
+    rng = np.random.default_rng(seed)
+    points = np.tile([0.6, 0.1, 0.2], (count, 1)) + rng.normal(scale=noise, size=(count, 3))
+    return as_data(readings(readings_at(robot, points, tilted(rng, count))), tmp_path / "touches.csv")
+
+
+def scaled_square(error, covariance):
+    return float(error @ np.linalg.solve(covariance, error)) / len(error)
+
+
+def test_a_touched_tool_is_within_its_covariance(exact, tmp_path):
+    model, robot = exact
+    squares, freedoms = [], set()
+    for seed in range(40):
+        found = find_tool(model, touched(robot, seed, tmp_path), orientation=TOOL[:3, :3])
+        squares.append(scaled_square(found.transform[:3, 3] - TOOL[:3, 3], found.covariance[:3, :3]))
+        freedoms.add(found.freedom)
+        assert np.array_equal(found.transform[:3, :3], TOOL[:3, :3])
+    assert freedoms == {18}
+    law = f_distribution(3, 18)
+    assert max(squares) < law.ppf(1.0 - 1e-4)
+    assert law.ppf(1e-3) < np.median(squares) < 2.0 * law.median()
+
+
+def test_an_object_is_within_its_covariance_which_holds_the_tools(exact, tmp_path):
+    model, robot = exact
+    tip = np.diag([1e-4, 2e-4, 1e-4]) ** 2
+    squares = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        wrong = TOOL.copy()
+        wrong[:3, 3] += rng.multivariate_normal(np.zeros(3), tip)
+        points = PLACES @ OBJECT[:3, :3].T + OBJECT[:3, 3] + rng.normal(scale=TIP_NOISE_M, size=(6, 3))
+        q = readings_at(robot, points, tilted(rng, 6, 15.0))
+        data = as_data(
+            readings(q, **dict(zip(["x_m", "y_m", "z_m"], PLACES.T, strict=True))), tmp_path / "o.csv"
+        )
+        found = find_object(model, data, wrong, tip)
+        turn = Rotation.from_matrix(found.transform[:3, :3] @ OBJECT[:3, :3].T).as_rotvec()
+        error = np.concatenate([found.transform[:3, 3] - OBJECT[:3, 3], turn])
+        squares.append(scaled_square(error, found.covariance))
+    law = f_distribution(6, 12)
+    assert max(squares) < law.ppf(1.0 - 1e-4)
+    assert law.ppf(1e-2) < np.median(squares) < 2.0 * law.median()
+
+
+def test_measured_poses_give_tool_and_orientation_within_their_covariance(exact, tmp_path):
+    model, robot = exact
+    world = np.eye(4)
+    world[:3, :3] = Rotation.from_euler("ZYX", [100.0, 5.0, -3.0], degrees=True).as_matrix()
+    world[:3, 3] = [2.0, -1.0, 0.5]
+    squares = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        q = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0]) + rng.uniform(-0.6, 0.6, (20, 6))
+        poses = world @ robot.pose(q) @ TOOL
+        noise = Rotation.from_rotvec(rng.normal(scale=2e-4, size=(20, 3))).as_matrix()
+        quaternions = quaternion_from_matrix(noise @ poses[:, :3, :3])
+        xyz = poses[:, :3, 3] + rng.normal(scale=TIP_NOISE_M, size=(20, 3))
+        columns = dict(zip(["x_m", "y_m", "z_m"], xyz.T, strict=True))
+        columns |= dict(zip(["qw", "qx", "qy", "qz"], quaternions.T, strict=True))
+        found = find_tool(model, as_data(readings(q, **columns), tmp_path / "poses.csv"))
+        turn = Rotation.from_matrix(found.transform[:3, :3] @ TOOL[:3, :3].T).as_rotvec()
+        error = np.concatenate([found.transform[:3, 3] - TOOL[:3, 3], turn])
+        squares.append(scaled_square(error, found.covariance))
+    assert max(squares) < f_distribution(6, 100).ppf(1.0 - 1e-4)
+    assert 0.4 < np.median(squares) < 2.0
+
+
+def test_measured_points_give_the_tip(exact, tmp_path):
+    model, robot = exact
+    rng = np.random.default_rng(0)
+    q = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0]) + rng.uniform(-0.6, 0.6, (20, 6))
+    columns = dict(zip(["x_m", "y_m", "z_m"], (robot.pose(q) @ TOOL)[:, :3, 3].T, strict=True))
+    data = as_data(readings(q, **columns), tmp_path / "points.csv")
+    found = find_tool(model, data, orientation=TOOL[:3, :3])
+    assert np.abs(found.transform - TOOL).max() < 1e-9
+    assert not found.covariance[3:].any()
+    with pytest.raises(WorkError, match="only points of the tool were measured"):
+        find_tool(model, data)
+
+
+def test_through_the_calibrated_arm_the_real_tool_is_found_better(arm, calibration, tmp_path):
+    rng = np.random.default_rng(1)
+    points = np.tile([0.6, 0.1, 0.2], (12, 1)) + rng.normal(scale=TIP_NOISE_M, size=(12, 3))
+    q = at_touch(arm, points, tilted(rng, 12))
+    data = as_data(readings(q), tmp_path / "touches.csv")
+    found = find_tool(calibration, data, orientation=TOOL[:3, :3])
+    nominal = replace(calibration, variable=None, models={"constant": calibration.models["nominal"]})
+    believed = find_tool(nominal, data, orientation=TOOL[:3, :3])
+    error, former = (np.linalg.norm(f.transform[:3, 3] - TOOL[:3, 3]) for f in (found, believed))
+    assert error < 0.5 * former
+    assert found.noise_m < 0.5 * believed.noise_m
+
+
+def test_several_points_share_one_tool(exact, tmp_path):
+    model, robot = exact
+    rng = np.random.default_rng(2)
+    where = np.repeat([[0.6, 0.1, 0.2], [0.5, -0.2, 0.3]], 5, axis=0)
+    q = readings_at(robot, where, tilted(rng, 10))
+    data = as_data(readings(q, group=["left"] * 5 + ["right"] * 5), tmp_path / "two.csv")
+    found = find_tool(model, data, orientation=np.eye(3), points=data.group.tolist())
+    assert np.abs(found.transform[:3, 3] - TOOL[:3, 3]).max() < 1e-9
+    assert found.freedom == 30 - 9
+    assert found.how == "10 touches of 2 points"
+
+
+def test_a_row_that_lies_far_off_is_named(exact, tmp_path):
+    model, robot = exact
+    rng = np.random.default_rng(3)
+    points = np.tile([0.6, 0.1, 0.2], (12, 1)) + rng.normal(scale=1e-5, size=(12, 3))
+    points[6] += 2e-3
+    data = as_data(readings(readings_at(robot, points, tilted(rng, 12))), tmp_path / "one_off.csv")
+    found = find_tool(model, data, orientation=np.eye(3))
+    assert [notice.rows for notice in found.notices] == [(7,)]
+
+
+def test_touches_that_are_turned_about_one_axis_are_refused(exact, tmp_path):
+    model, robot = exact
+    rng = np.random.default_rng(4)
+    spins = Rotation.from_euler("z", rng.uniform(-60, 60, (8, 1)), degrees=True)
+    turns = (spins * Rotation.from_euler("x", 180.0, degrees=True)).as_matrix()
+    q = readings_at(robot, np.tile([0.6, 0.1, 0.2], (8, 1)), turns)
+    with pytest.raises(WorkError, match=r"direction \[-?0.00, -?0.00, 1.00\].*Tilt the tool"):
+        find_tool(model, as_data(readings(q), tmp_path / "spun.csv"), orientation=np.eye(3))
+
+
+def test_too_little_is_refused(exact, tmp_path):
+    model, robot = exact
+    data = touched(robot, 0, tmp_path, count=8)
+    with pytest.raises(WorkError, match="at least 4 times"):
+        find_tool(model, data.select(range(3)), orientation=np.eye(3))
+    with pytest.raises(UsageError, match="do not tell how the tool is turned"):
+        find_tool(model, data)
+    with pytest.raises(InputError, match="no rotation matrix"):
+        find_tool(model, data, orientation=np.ones((3, 3)))
+    with pytest.raises(InputError, match="no place x, y, z of every touched point"):
+        find_object(model, data, TOOL)
+    places = dict(zip(["x_m", "y_m", "z_m"], np.outer([1, 2, 3, 4, 5, 6, 7, 8], [0.1, 0, 0]).T, strict=True))
+    line = as_data(readings(data.readings, **places), tmp_path / "line.csv")
+    with pytest.raises(WorkError, match="the 8 points lie on a line"):
+        find_object(model, line, TOOL)
+    with pytest.raises(WorkError, match="2 points"):
+        find_object(model, line.select(range(2)), TOOL)
