@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from truearm.calibrating import calibrate
     from truearm.calibration import Calibration
     from truearm.compensation import Compensated, Compensator, Refusal
+    from truearm.controller import Controller
     from truearm.errors import InputError, Notice, TruearmError, UsageError, WorkError
     from truearm.evaluation import Evaluation, EvaluationOptions, evaluate
     from truearm.limits import Limits
@@ -28,6 +29,7 @@ __all__ = [
     "Calibration",
     "Compensated",
     "Compensator",
+    "Controller",
     "Evaluation",
     "EvaluationOptions",
     "HoldoutRange",
@@ -51,6 +53,7 @@ _HOME: Final = {
     "Calibration": "calibration",
     "Compensated": "compensation",
     "Compensator": "compensation",
+    "Controller": "controller",
     "Refusal": "compensation",
     "InputError": "errors",
     "Notice": "errors",
