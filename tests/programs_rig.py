@@ -80,6 +80,8 @@ def obeyed(program, robot, before):
         if not hasattr(layout, "configuration"):
             found[target] = layout.to_readings(values)[0]
             continue
+        if uses.environment[target] < 0:
+            continue
         environment = program.environments[uses.environment[target]]
         width = layout.width - layout.configuration
         base_from_tool = (

@@ -251,7 +251,7 @@ class RapidReading:
             self._flow.state = replace(self._flow.state, load_kg=self._frames.load_kg(found[1:]))
         elif any(token.text.lower() in {"const", "pers", "var"} for token in found[:3]):
             self._mention(found[3:], READ)
-        elif any(token.text == ":=" for token in found[1:]) and word not in HARMLESS:
+        elif reader.peek(1) in {":=", ".", "{"}:
             self._mention(found, READ)
         else:
             self._call(at, word, found)

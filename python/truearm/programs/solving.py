@@ -111,6 +111,8 @@ class _Solver:
     def take_poses(self, tell: Callable[[int, int], None]) -> None:
         """Cartesian targets, in the order of the moves, each with the one before for a seed."""
         branches = self._branches(tell)
+        if not branches:
+            return
         before: Floats | None = None
         moves = self.program.moves
         columns = (moves.target.tolist(), moves.follows.tolist(), moves.motion.tolist())

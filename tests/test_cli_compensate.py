@@ -1,0 +1,177 @@
+"""`truearm compensate` as people run it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.programs_rig import ABB, obeyed, read
+from tests.test_programs_rapid import GO, SEEN, TABLE, TOOL, module, points
+from truearm.cli import main
+from truearm.simulation import VirtualArm
+
+PROGRAM = str(Path(sys.executable).parent / "truearm")
+BODY = f"MoveAbsJ jHome,v100,fine,tG;\nMoveJ pA,{GO}\nMoveL pB,{GO}\nMoveL pNowhere,{GO}\nMoveJ pD,{GO}"
+FAR = f"MoveAbsJ jHome,v100,fine,tG;\nMoveJ pA,{GO}"
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return VirtualArm(ABB, seed=3)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, arm):
+    place = tmp_path_factory.mktemp("compensate")
+    measured = arm.measure(arm.poses(60, seed=1), orientation=True)
+    ta.calibrate(ABB, measured, ta.Options.of(model="constant")).save(place / "arm.calib")
+    (place / "demo.mod").write_bytes(module(BODY, points()).encode("latin-1"))
+    return place
+
+
+@pytest.fixture(autouse=True)
+def inside(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def run(*options):
+    return main(["compensate", "arm.calib", "demo.mod", "--controller", "nominal", *options])
+
+
+def test_a_program_as_people_rewrite_it():
+    command = [PROGRAM, "compensate", "arm.calib", "demo.mod", "-o", "out.mod", "--controller", "nominal"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "RAPID: 4 of 6 targets changed" in done.stdout
+    assert "Left as they are:" in done.stdout
+    assert "MoveL pNowhere" in done.stdout
+    assert "not declared in this module" in done.stdout
+    assert "Written: out.mod" in done.stdout
+    assert sorted(path.name for path in Path().iterdir() if "out" in path.name) == ["out.mod"]
+
+
+def test_the_true_tool_goes_where_the_author_meant(arm, folder):
+    """Before and after, the truth of the virtual arm at the program's own tool."""
+    assert run("-o", "hit.mod", "--report", "hit.json") == 0
+    report = json.loads(Path("hit.json").read_text())
+    calibration = ta.Calibration.load(folder / "arm.calib")
+    written = read("hit.mod", Path("hit.mod").read_bytes().decode("latin-1"), ABB)
+    by_name = {name: number for number, name in written.targets.names.items()}
+    said = obeyed(written, ABB, np.zeros((len(written.targets), 6)))
+    for name in ("pA", "pB", "pD"):
+        wanted = ABB.pose(np.deg2rad(SEEN[name])) @ TOOL
+        before = calibration.pose(np.deg2rad(SEEN[name])) @ TOOL
+        after = calibration.pose(said[by_name[name.lower()]]) @ TOOL
+        assert np.linalg.norm(before[:3, 3] - wanted[:3, 3]) > 2e-4
+        assert np.linalg.norm(after[:3, 3] - wanted[:3, 3]) < 3e-6, "numbers are rounded to a micrometre"
+        truth = arm.true_pose(said[by_name[name.lower()]][None], tool=TOOL)[0]
+        missed = np.linalg.norm(
+            arm.true_pose(np.deg2rad(SEEN[name])[None], tool=TOOL)[0][:3, 3] - wanted[:3, 3]
+        )
+        assert np.linalg.norm(truth[:3, 3] - wanted[:3, 3]) < 0.5 * missed
+    assert report["counts"]["changed"] == 4
+    assert report["controller"] == {"kind": "nominal", "source": ""}
+    assert TABLE[0, 3] == 0.3
+
+
+def test_json_is_all_that_is_printed(capsys):
+    assert run("-o", "json.mod", "--json") == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert found["counts"]["targets"] == 6
+    assert found["outputs"] == ["json.mod"]
+    assert {"line", "column", "name", "nominal", "corrected", "correction_mm"} <= found["targets"][0].keys()
+
+
+def test_a_dry_run_shows_a_table_and_a_diff_and_writes_nothing(capsys):
+    before = sorted(Path().iterdir())
+    assert run("--dry-run") == 0
+    printed = capsys.readouterr().out
+    assert "shift mm" in printed
+    assert "--- demo.mod" in printed
+    assert "+++ demo.mod (compensated)" in printed
+    assert "4 of 6 targets would be changed" in " ".join(printed.split())
+    table = printed.split("--- demo.mod")[0]
+    assert max(map(len, table.splitlines())) <= 80
+    assert sorted(Path().iterdir()) == before
+
+
+def test_what_was_rewritten_is_not_rewritten_again(capsys):
+    assert run("-o", "once.mod") == 0
+    again = ["compensate", "arm.calib", "once.mod", "-o", "twice.mod", "--controller", "nominal"]
+    assert main(again) == 1
+    assert "compensated already" in capsys.readouterr().err
+    assert not Path("twice.mod").exists()
+    assert main([*again, "--force"]) == 0
+
+
+TO_X = ["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "nominal"]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "told"),
+    [
+        (["arm.calib", "demo.mod", "-o", "x.mod"], 2, "--controller"),
+        (["arm.calib", "demo.mod", "--controller", "nominal"], 2, "no output"),
+        (["arm.calib", "demo.mod", "-o", "demo.mod", "--controller", "nominal"], 2, "the program itself"),
+        (["arm.calib", "none.mod", "-o", "x.mod", "--controller", "nominal"], 1, "no such file"),
+        (["arm.calib", "demo.xyz", "-o", "x.mod", "--controller", "nominal"], 2, "--language"),
+        (["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "none.toml"], 1, "none.toml"),
+        (["arm.calib", "demo.mod", "-o", "no/x.mod", "--controller", "nominal"], 1, "no such directory"),
+        (
+            ["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "nominal", "--task", "pos"],
+            2,
+            "pose or axis",
+        ),
+        ([*TO_X, "--moving", "a"], 2, "1,2,3"),
+        (
+            ["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "nominal", "--feature", "t"],
+            2,
+            "NAME=VALUE",
+        ),
+        (
+            ["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "nominal", "--densify-mm", "0"],
+            2,
+            "positive",
+        ),
+        (
+            ["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "nominal", "--largest-mm", "0.001"],
+            1,
+            "keep-nominal",
+        ),
+        (
+            ["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "nominal", "--frames", "f.toml"],
+            1,
+            "f.toml",
+        ),
+    ],
+)
+def test_errors_say_the_way_out_and_nothing_is_written(words, status, told, capsys):
+    assert main(["compensate", *words]) == status
+    assert told in " ".join(capsys.readouterr().err.split())
+    assert not Path("x.mod").exists()
+
+
+def test_a_broken_program_names_line_and_column(capsys):
+    Path("broken.mod").write_text("MODULE B\nCONST robtarget p:=[[1,2,3;\nENDMODULE\n")
+    assert main(["compensate", "arm.calib", "broken.mod", "-o", "x.mod", "--controller", "nominal"]) == 1
+    assert "broken.mod, line 2, column" in capsys.readouterr().err
+
+
+def test_keep_nominal_where_that_makes_no_step(capsys):
+    Path("far.mod").write_bytes(module(FAR, points()).encode("latin-1"))
+    words = ["compensate", "arm.calib", "far.mod", "-o", "kept.mod", "--controller", "nominal"]
+    assert main([*words, "--largest-mm", "0.001", "--on-refusal", "keep-nominal"]) == 0
+    assert "Kept after a refusal:" in capsys.readouterr().out
+    changed = Path("kept.mod").read_bytes().decode("latin-1").splitlines()
+    assert len(changed) == len(module(FAR, points()).splitlines()) + 1, "only the mark is new"
+
+
+def test_a_directory_takes_files_of_the_same_names():
+    Path("out").mkdir(exist_ok=True)
+    assert run("-o", "out") == 0
+    assert Path("out/demo.mod").exists()

@@ -1,0 +1,278 @@
+"""What is the same in every language: marks, refusals, frames files, declarations, inserted waypoints."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.programs_rig import ABB, KUKA, Shift, again, models, obeyed, read, rewritten
+from tests.test_programs_rapid import GO, NOTHING, SEEN, module, numbers, points
+from truearm.controller import Controller
+from truearm.errors import InputError, UsageError, WorkError
+from truearm.programs.configuration import nearest_turns, with_turns
+from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
+from truearm.programs.densify import Spacing
+from truearm.programs.folding import constant
+from truearm.programs.frames import Frames
+from truearm.programs.languages import LANGUAGES, language_of
+from truearm.programs.layouts import EulerPose, Joints, QuaternionPose, RotationVectorPose
+from truearm.programs.lexing import Token
+from truearm.programs.marks import MARK, mark_text
+from truearm.programs.report import report_of, unified_diff
+from truearm.programs.rewriting import Choices, rewrite
+from truearm.programs.source import Source
+from truearm.robot import Robot
+from truearm.robot_data import Payload
+
+TWO = f"MoveJ pA,{GO}\nMoveJ pB,{GO}"
+
+
+def but(robot, **others):
+    return Robot(**{name: getattr(robot, name) for name in robot.__dataclass_fields__} | others)
+
+
+def program_of(body, data=None):
+    return read("demo.mod", module(body, points() if data is None else data), ABB)
+
+
+def test_a_rewritten_program_bears_a_mark_and_is_refused_next_time():
+    done = rewrite(program_of(TWO), models(ABB), Choices(), mark=mark_text("0.1.0", "abcdef0123456789"))
+    assert done.contents[0].count(MARK.encode()) == 1
+    written = again(done, ABB)
+    with pytest.raises(WorkError, match=r"demo.mod, line 6: this program was compensated already"):
+        rewritten(written, models(ABB))
+    assert rewritten(written, models(ABB), force=True).changed.sum() == 2
+
+
+def test_refused_targets_stop_with_their_lines():
+    with pytest.raises(WorkError, match=r"(?s)1 of 6 targets.*line 12, pb: too far") as caught:
+        rewritten(program_of(TWO), models(ABB, refuse=(1,)))
+    assert "keep-nominal" in str(caught.value)
+
+
+def test_refused_targets_are_kept_where_that_makes_no_step():
+    program = program_of(TWO)
+    done = rewritten(program, models(ABB, refuse=(1,)), on_refusal="keep-nominal")
+    assert [(one.name, one.reason) for one in done.kept] == [("pb", "too far")]
+    assert done.changed.sum() == 1
+    kept = program.targets.names
+    number = next(n for n, name in kept.items() if name == "pb")
+    np.testing.assert_array_equal(done.corrected[number], done.nominal[number])
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"MoveJ pA,{GO}\nMoveL pB,{GO}",
+        f"MoveJ pA,{GO}\nMoveJ pB,v100,z10,tG\\WObj:=wT;",
+        f"MoveJ pA,v100,z10,tG\\WObj:=wT;\nMoveJ pB,{GO}",
+        f"MoveJ pA,{GO}\nMoveJ pB,{GO}\nMoveL pA,{GO}",
+    ],
+)
+def test_within_straight_or_blended_motion_nothing_is_kept(body):
+    with pytest.raises(WorkError, match="makes a step"):
+        rewritten(program_of(body), models(ABB, refuse=(1,)), on_refusal="keep-nominal")
+
+
+def test_targets_left_between_corrected_ones_are_warned_of():
+    done = rewritten(program_of(f"MoveJ pA,{GO}\nMoveL pC,{GO}\npC.trans.x:=1;"), models(ABB))
+    assert [notice.kind for notice in done.notices] == ["steps"]
+
+
+def test_a_controller_with_factory_kinematics_gets_what_it_computes_with():
+    table = ABB.table.copy()
+    table[1, 2] += 0.001
+    table[2, 3] += 0.002
+    own = but(ABB, table=table)
+    given = models(ABB, by_rad=0.0, controller=Controller(own, "factory", "arm.toml"))
+    done = rewritten(program_of(TWO), given)
+    said = obeyed(again(done, ABB), own, done.corrected)
+    assert np.abs(said - done.corrected)[done.changed].max() < 3e-5
+    nominal = obeyed(again(done, ABB), ABB, done.corrected)
+    assert np.abs(nominal - done.corrected)[done.changed].max() > 1e-4
+
+
+def test_controllers_that_may_differ_must_be_declared():
+    for name, language in (("kuka-kr-6-r900", "KRL"), ("abb-irb-120", "RAPID"), ("ur10e", "KRL")):
+        with pytest.raises(UsageError, match="not declared.*--controller"):
+            declared_controller(None, language_of(Path("p"), language), Robot.load(name))
+        assert (
+            declared_controller("nominal", language_of(Path("p"), language), Robot.load(name)).kind
+            == "nominal"
+        )
+
+
+def test_a_nominal_controller_contradicts_points_of_an_accurate_one():
+    text = "DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {X 500,Y 0,Z 500,A 0,B 90,C 0,S 10,T 2}\nEND\n"
+    program = read("a.src", text, KUKA)
+    with pytest.raises(WorkError, match="absolutely accurate"):
+        refuse_contradiction(program, Controller.nominal(KUKA), force=False)
+    refuse_contradiction(program, Controller.nominal(KUKA), force=True)
+    refuse_contradiction(program, Controller(KUKA, "factory", "f"), force=False)
+
+
+def test_payloads_are_compared():
+    loaded = Robot(
+        **{**{name: getattr(ABB, name) for name in ABB.__dataclass_fields__}, "payload": Payload(0.5)}
+    )
+    program = program_of(TWO)
+    rewritten(program, models(ABB))
+    assert "1.5 kg" in payload_notices(program, loaded)[0].message
+    assert payload_notices(program, ABB) == []
+
+
+class Wavy(Shift):
+    """A correction that varies along the way, as arms do."""
+
+    def joints(self, q, *, tool=None):
+        found = super().joints(q, tool=tool)
+        found.q = q + 4e-3 * np.sin(6.0 * q[:, :1]) * np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+        return found
+
+
+def long_line():
+    ends = [[-40, 20, 15, 5, 50, 0], [40, 20, 15, -5, 50, 0]]
+    data = "\n".join(f"CONST robtarget p{n}:={numbers(q, placed=NOTHING)};" for n, q in enumerate(ends))
+    return program_of("MoveJ p0,v100,fine,tG;\n    MoveL p1,v100,fine,tG;", data)
+
+
+def test_waypoints_are_inserted_until_the_line_is_straight_enough():
+    given = models(ABB)
+    given = type(given)(given.programming, given.inverse, given.controller, Wavy(np.zeros(6)))
+    program = long_line()
+    plain = rewritten(program, given)
+    assert plain.inserted == 0
+    dense = rewritten(program, given, spacing=Spacing.of(0.1, 10.0))
+    assert 2 <= dense.inserted <= 60
+    assert rewritten(program, given, spacing=Spacing.of(0.02, 10.0)).inserted > dense.inserted
+    text = dense.contents[0].decode("latin-1")
+    lines = [line for line in text.splitlines() if "MoveL [[" in line]
+    assert len(lines) == dense.inserted
+    assert all(",z1,tG;" in line for line in lines)
+    assert text.index("MoveJ p0") < text.index("MoveL [[") < text.index("MoveL p1")
+    written = again(dense, ABB)
+    order = written.moves.target
+    said = obeyed(written, ABB, np.zeros((len(written.targets), 6)))[order]
+    points_said = (ABB.pose(said) @ tool_of_module())[:, :3, 3]
+    steps = np.linalg.norm(np.diff(points_said, axis=0), axis=1)
+    assert steps.min() > 0.0095
+    bent = rewritten(program, given, spacing=Spacing.of(0.001, 100.0))
+    assert [notice.kind for notice in bent.notices] == ["deviation"]
+
+
+def tool_of_module():
+    tool = np.eye(4)
+    tool[2, 3] = 0.12
+    return tool
+
+
+def test_frames_files_say_what_is_wrong_in_them():
+    frames = Frames.parse('length_unit = "m"\n[object.Table]\nxyz = [1, 2, 3]\neuler_zyx_deg = [90, 0, 0]\n')
+    np.testing.assert_allclose(frames.objects["table"].true[:3, 3], [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(frames.objects["table"].true[:3, 0], [0.0, 1.0, 0.0], atol=1e-12)
+    for text, words in {
+        "[tool.a]\nxyz = [1, 2]\n": "tool.a.xyz",
+        "[tool.a]\nxyz = [1, 2, 3]\nquaternion_wxyz = [1, 1, 0, 0]\n": "must be 1",
+        "[tool.a]\nxyz = [1, 2, 3]\nquaternion_wxyz = [1, 0, 0, 0]\neuler_zyx_deg = [0, 0, 0]\n": "give one",
+        "[tools.a]\nxyz = [1, 2, 3]\n": "tools",
+        "tool = [": "no TOML",
+    }.items():
+        with pytest.raises(InputError, match=words):
+            Frames.parse(text, where="f.toml")
+
+
+def test_the_report_and_the_diff():
+    done = rewritten(program_of(TWO), models(ABB))
+    report = report_of(done, {"controller": {"kind": "nominal"}})
+    assert report["counts"] == {"targets": 6, "moves": 2, "changed": 2, "kept": 0, "listed": 4}
+    assert report["targets"][0]["name"] == "pa"
+    assert (report["targets"][0]["line"], report["targets"][0]["column"]) == (11, 23)
+    np.testing.assert_allclose(np.rad2deg(report["targets"][0]["nominal"]), SEEN["pA"], atol=0.01)
+    diff = list(unified_diff(done))
+    assert sum(line.startswith("+  CONST robtarget") for line in diff) == 2
+    assert sum(line.startswith("-  CONST robtarget") for line in diff) == 2
+
+
+def test_a_large_programs_diff_is_told_line_by_line():
+    body = "\n".join(
+        f"MoveAbsJ [[{n % 50},10,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,fine,tG;" for n in range(2500)
+    )
+    done = rewrite(program_of(body, ""), models(ABB), Choices(), mark="compensated by truearm")
+    diff = list(unified_diff(done))
+    assert sum(line.startswith("+") for line in diff[2:]) == 2501
+    assert sum(line.startswith("-") for line in diff[2:]) == 2500
+
+
+def test_layouts_come_back():
+    rng = np.random.default_rng(3)
+    for layout, near in (
+        (EulerPose(), rng.uniform(-170.0, 170.0, (20, 6))),
+        (EulerPose((2, 1, 0)), rng.uniform(-400.0, 400.0, (20, 6))),
+        (RotationVectorPose(), rng.uniform(-3.0, 3.0, (20, 6))),
+        (QuaternionPose(), np.hstack([rng.uniform(-900, 900, (20, 3)), unit_quaternions(rng)])),
+    ):
+        back = layout.from_poses(layout.to_poses(near), near)
+        np.testing.assert_allclose(back, near, atol=1e-9)
+    joints = Joints.of(("revolute", "prismatic"))
+    values = np.array([[90.0, 120.0]])
+    np.testing.assert_allclose(joints.to_readings(values), [[np.pi / 2, 0.12]])
+    np.testing.assert_allclose(joints.from_readings(joints.to_readings(values), values), values)
+
+
+def unit_quaternions(rng):
+    q = rng.normal(size=(20, 4))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
+
+
+def test_euler_angles_at_the_pole_keep_the_third():
+    layout = EulerPose()
+    near = np.array([[1.0, 2.0, 3.0, 40.0, 90.0, 25.0]])
+    np.testing.assert_allclose(layout.from_poses(layout.to_poses(near), near), near, atol=1e-5)
+
+
+def test_turns_stay_within_limits():
+    branch = np.array([[0.1, -1.0, 0.5, 3.1, 0.5, -3.0]])
+    turned = with_turns(branch, KUKA)
+    assert ((turned >= KUKA.limits[:, 0]) & (turned <= KUKA.limits[:, 1])).all()
+    assert len(turned) == 4
+    near = nearest_turns(branch, KUKA, np.array([0.0, 0.0, 0.0, -3.1, 0.0, 5.9]))
+    np.testing.assert_allclose(near[0, [3, 5]], [3.1 - 2 * np.pi, -3.0 + 2 * np.pi])
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("2*(3-1)", 4.0),
+        ("-a/4", -2.5),
+        ("1/0", None),
+        ("b", None),
+        ("2 3", None),
+        ("f(2)+1", 5.0),
+        ("(1", None),
+    ],
+)
+def test_constants_are_folded(text, value):
+    import re
+
+    kinds = re.finditer(r"(?P<name>[a-z])|(?P<number>\d+)|(?P<mark>\S)", text)
+    tokens = [Token(found.lastgroup or "", found.group(), found.start(), found.end()) for found in kinds]
+    assert constant(tokens, {"a": 10.0}, {"f": lambda x: 2 * x}) == value
+
+
+def test_places_and_line_ends(tmp_path):
+    for text, newline in (("a\r\nbc\r\n", "\r\n"), ("a\nbc", "\n"), ("a\rbc\r", "\r")):
+        (tmp_path / "t").write_bytes(text.encode())
+        source = Source.load(tmp_path / "t")
+        assert source.newline == newline
+        assert source.place(text.index("c")) == (2, 2)
+        assert source.line_text(2) == "bc"
+    (tmp_path / "t").write_bytes(b"a\x00b")
+    with pytest.raises(InputError, match="binary"):
+        Source.load(tmp_path / "t")
+
+
+def test_languages_by_ending(tmp_path):
+    assert language_of(tmp_path / "A.SRC").name == "KRL"
+    assert len({language.name for language in LANGUAGES}) == len(LANGUAGES)
+    with pytest.raises(UsageError, match="no known language"):
+        language_of(tmp_path / "a.xyz")
