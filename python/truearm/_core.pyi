@@ -1,7 +1,7 @@
 """The compiled core. Private: the package's modules wrap it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, final
+from typing import Any, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -783,4 +783,198 @@ def observability(jacobian: NDArray[np.float64], columns: Sequence[int]) -> dict
         kappa, the condition number of M; kappa_normal, that of M^t M, equation (4) as meant; o1 (Borm and
         Menq), o2 (Driels and Pathre), o3 (Nahvi, Hollerbach and Hayward), o4 (Nahvi and Hollerbach), o5 (Sun
         and Hollerbach); log_det of M^t M.
+    """
+
+@final
+class Regions:
+    """A tree of boxes in F features: the divided workspace. Region 0 is the whole; halves follow their whole.
+
+    A tree does not change: what divides it further makes a new one. Points outside the workspace count as
+    the nearest ones of it.
+    """
+
+    def __init__(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+        """One region between two corners (F,)."""
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Regions:
+        """The tree that `arrays` was asked of."""
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What to save.
+
+        low and high (F,), axis (N,), along which a region is halved, and child (N,), the number of its lower
+        half; -1 for leaves.
+        """
+
+    @property
+    def count(self) -> int:
+        """N, regions of all sizes."""
+
+    @property
+    def leaves(self) -> NDArray[np.int64]:
+        """Numbers of the regions that are not halved, ascending."""
+
+    @property
+    def parents(self) -> NDArray[np.int64]:
+        """Of which region each is a half, (N,); -1 for the whole."""
+
+    @property
+    def depths(self) -> NDArray[np.int64]:
+        """How many times the workspace was halved to get each, (N,)."""
+
+    @property
+    def low(self) -> NDArray[np.float64]:
+        """Lower corners, (N, F)."""
+
+    @property
+    def high(self) -> NDArray[np.float64]:
+        """Upper corners, (N, F)."""
+
+    def find(self, features: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Numbers of the leaves (n,) of points (n, F)."""
+
+    def neighbours(self, leaf: int) -> list[int]:
+        """Leaves that share a face with a leaf."""
+
+    def halve(self, leaf: int, axis: int) -> Regions:
+        """The tree with a leaf halved along an axis."""
+
+    def evenly(self, leaves: int) -> Regions:
+        """The tree halved to so many leaves, the largest first along their longest side."""
+
+@final
+class RegionalFit:
+    """CEPs of all regions of a tree."""
+
+    @property
+    def ceps(self) -> NDArray[np.float64]:
+        """What is added to the parameters, (N, P); NaN where there are none."""
+
+    @property
+    def kappa(self) -> NDArray[np.float64]:
+        """Condition number of the rows in each region, (N,)."""
+
+    @property
+    def poses(self) -> NDArray[np.int64]:
+        """Poses in each region, (N,)."""
+
+    @property
+    def noise(self) -> float | None:
+        """Noise in m that shrinking found."""
+
+    @property
+    def prior(self) -> NDArray[np.float64]:
+        """Standard deviation in m of a half's CEPs about its whole's, by depth from 1 on, where they were shrunk."""
+
+def regional_ceps(
+    regions: Regions,
+    problem: Problem,
+    parameters: NDArray[np.float64],
+    setup: Setup,
+    features: NDArray[np.float64],
+    options: Mapping[str, Any],
+) -> RegionalFit:
+    """Estimate the CEPs of every region, of all sizes, from the measurements in it; the set-up is held.
+
+    Args:
+        regions: The tree.
+        problem: The measurements and the CEPs' columns.
+        parameters: Those that CEPs are added to, (L, 5).
+        setup: Frames and targets.
+        features: Of each measurement, (n, F).
+        options: method "least_squares", in each region alone, or "shrunk", towards the region it is half of;
+            prior, the standard deviation in m of that step, or None to find it from the measurements.
+    """
+
+def fill_without_data(regions: Regions, ceps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """CEPs (N, P) with the mean of the neighbours' in leaves where they are NaN."""
+
+@final
+class Division:
+    """A divided workspace."""
+
+    @property
+    def regions(self) -> Regions:
+        """The tree."""
+
+    @property
+    def ceps(self) -> NDArray[np.float64]:
+        """Least-squares CEPs of every region, (N, P); NaN where it is inaccessible."""
+
+    @property
+    def kappa(self) -> NDArray[np.float64]:
+        """Condition number of the poses they were identified from, (N,)."""
+
+    @property
+    def error(self) -> NDArray[np.float64]:
+        """Largest error at a test point, (N,), m; NaN where there is none."""
+
+    @property
+    def ended(self) -> list[str | None]:
+        """Why each leaf is one; None for regions that are halved."""
+
+    @property
+    def batches(self) -> list[tuple[int, int, bool]]:
+        """Region, number of poses and whether they are test points, in the order of measuring."""
+
+    @property
+    def measurements(self) -> int:
+        """Poses that were measured, test points and those of halved regions included."""
+
+class Workspace(Protocol):
+    """An arm and its instrument, as a division sees them."""
+
+    def candidates(
+        self, low: NDArray[np.float64], high: NDArray[np.float64], count: int, seed: int, /
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Joint values (k, J) and features (k, F) of up to `count` poses of a box that can be measured."""
+
+    def measure(self, q: NDArray[np.float64], /) -> MeasurementSet:
+        """Measure poses with joint values (k, J), all of one group."""
+
+def divide(
+    chain: Chain,
+    columns: Sequence[int],
+    parameters: NDArray[np.float64],
+    setup: Setup,
+    workspace: Workspace,
+    options: Mapping[str, Any],
+    measuring: Mapping[str, Any],
+) -> Division:
+    """Divide a workspace that is measured on demand, steps 1 to 4 of section 4.2 of the paper.
+
+    Args:
+        chain: It ends at the flange.
+        columns: Parameters that CEPs belong to.
+        parameters: Those that CEPs are added to, (L, 5).
+        setup: Frame and target of the one set-up.
+        workspace: Called on the calling thread; what it raises ends the division.
+        options: low and high (F,), corners of the workspace; accuracy, the demanded one in m; regions, leaves
+            at most; halving "longest" side or "best" axis; order "worst" or "breadth" first; poses a region;
+            limit of kappa(M); seed.
+        measuring: candidates and tests, poses to choose from and to judge by in each region; criterion and
+            passes as for `choose_poses`; orientation, whether it is measured.
+
+    Raises:
+        CoreError: The whole workspace has too few or ill-conditioned poses, or a number is out of range.
+    """
+
+def divide_rows(
+    problem: Problem,
+    parameters: NDArray[np.float64],
+    setup: Setup,
+    features: NDArray[np.float64],
+    judges: NDArray[np.bool_],
+    options: Mapping[str, Any],
+) -> Division:
+    """Divide a workspace by measurements that were made already.
+
+    Args:
+        problem: The measurements and the CEPs' columns.
+        parameters: Those that CEPs are added to, (L, 5).
+        setup: Frames and targets.
+        features: Of each measurement, (n, F).
+        judges: Which of them judge and take no part in any fit, (n,).
+        options: As for `divide`; poses is the least number that a region needs.
     """

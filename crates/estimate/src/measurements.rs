@@ -87,6 +87,25 @@ impl MeasurementSet {
         self.has_rotations() && !self.rotations[9 * pose].is_nan()
     }
 
+    /// The measurements of some poses, in the given order; groups keep their numbers. Distances are left out.
+    pub fn subset(&self, poses: &[usize]) -> MeasurementSet {
+        let take = |values: &[f64], width: usize| -> Vec<f64> {
+            poses.iter().flat_map(|&pose| &values[pose * width..(pose + 1) * width]).copied().collect()
+        };
+        let rotations = if self.has_rotations() { take(&self.rotations, 9) } else { Vec::new() };
+        MeasurementSet {
+            joints: take(&self.joints, self.joint_count),
+            group: poses.iter().map(|&pose| self.group[pose]).collect(),
+            targets: take(&self.targets, 3 * self.target_count),
+            rotations,
+            sigma: take(&self.sigma, 1),
+            weight: take(&self.weight, 1),
+            distances: Vec::new(),
+            anchor_count: 0,
+            ..*self
+        }
+    }
+
     /// Checks lengths and values once, at the door.
     ///
     /// # Errors

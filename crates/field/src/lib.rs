@@ -15,6 +15,7 @@ extern crate self as truearm_field;
 mod bank;
 mod cells;
 pub mod cmac;
+mod compass;
 mod compiled;
 mod compiled_axis;
 mod compiled_table;
@@ -34,6 +35,7 @@ mod posterior;
 mod predict;
 mod product;
 mod refine;
+pub mod regions;
 mod select;
 #[cfg(test)]
 mod tests;

@@ -6,11 +6,13 @@ mod chain;
 mod choice;
 mod cmac;
 mod compensate;
+mod division;
 mod door;
 mod estimate;
 mod field;
 mod inverse;
 mod measured;
+mod regions;
 mod text;
 
 /// The compiled core of truearm: private, wrapped by the Python package.
@@ -25,6 +27,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<estimate::IdentificationProblem>()?;
     module.add_class::<estimate::ConstantFit>()?;
     module.add_class::<choice::Choice>()?;
+    module.add_class::<regions::Regions>()?;
+    module.add_class::<regions::RegionalFit>()?;
+    module.add_class::<division::Division>()?;
     module.add_class::<cmac::Network>()?;
     module.add_class::<cmac::TrainedNetwork>()?;
     module.add_class::<cmac::NetworkFit>()?;
@@ -33,6 +38,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::Posterior>()?;
     module.add_class::<inverse::Inverse>()?;
     module.add_function(wrap_pyfunction!(choice::choose_poses, module)?)?;
+    module.add_function(wrap_pyfunction!(regions::regional_ceps, module)?)?;
+    module.add_function(wrap_pyfunction!(regions::fill_without_data, module)?)?;
+    module.add_function(wrap_pyfunction!(division::divide, module)?)?;
+    module.add_function(wrap_pyfunction!(division::divide_rows, module)?)?;
     module.add_function(wrap_pyfunction!(choice::observability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::linearise, module)?)?;
     module.add_class::<compensate::ArmModel>()?;

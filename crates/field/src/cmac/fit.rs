@@ -13,6 +13,7 @@ use crate::FieldError;
 use crate::cmac::gain::Rows;
 use crate::cmac::network::Network;
 use crate::cmac::roughness::Modes;
+use crate::compass::Compass;
 use crate::product::{product, times};
 
 /// Standard deviations, m; angles of weights and rows count at 0.3 m.
@@ -52,11 +53,9 @@ const MOST_ROWS: usize = 12_000;
 const MOST_CELLS: u64 = 20_000;
 /// Poses that the scales are found from; more take the cube of their number and hardly change the scales.
 const SCALE_POSES: usize = 300;
-/// Natural logarithms of roughness and level over noise: where the search starts, its first and last step, its ends.
-/// Beyond the upper end rounding would make the equations indefinite.
-const START: [f64; 2] = [2.0, 4.0];
-const STEPS: (f64, f64) = (2.0, 0.2);
-const ENDS: (f64, f64) = (-7.0, 12.0);
+/// Natural logarithms of roughness and level over noise. Beyond the upper end rounding would make the equations
+/// indefinite.
+const RATIOS: Compass = Compass { start: [2.0, 4.0], steps: (2.0, 0.2), ends: (-7.0, 12.0) };
 
 impl Network {
     /// Fit the weights to linearised measurements.
@@ -214,30 +213,11 @@ impl Equations<'_> {
         Some((-0.5 * (rows * variance.ln() + factor.log_determinant()), variance.sqrt()))
     }
 
-    /// Scales of maximum evidence, by a search along both logarithms with steps that halve.
+    /// Scales of maximum evidence.
     fn scales(&self, cancel: &Cancel) -> Result<Scales, FieldError> {
-        let indefinite = FieldError::NotPositiveDefinite { rows: self.rows.len() };
-        let mut best = START;
-        let (mut evidence, mut noise) = self.evidence(best).ok_or(indefinite)?;
-        let mut step = STEPS.0;
-        while step >= STEPS.1 {
-            let mut moved = false;
-            for (which, sign) in [(0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0)] {
-                cancel.check()?;
-                let mut trial = best;
-                trial[which] = f64::clamp(trial[which] + sign * step, ENDS.0, ENDS.1);
-                let found = if trial == best { None } else { self.evidence(trial) };
-                if let Some((value, its_noise)) = found
-                    && value > evidence
-                {
-                    (best, evidence, noise, moved) = (trial, value, its_noise, true);
-                }
-            }
-            if !moved {
-                step *= 0.5;
-            }
-        }
-        let [roughness, level] = best.map(|ratio| noise * ratio.exp());
+        let found = RATIOS.search(|ratios| cancel.check().map(|()| self.evidence(ratios)))?;
+        let (ratios, _, noise) = found.ok_or(FieldError::NotPositiveDefinite { rows: self.rows.len() })?;
+        let [roughness, level] = ratios.map(|ratio| noise * ratio.exp());
         Ok(Scales { noise, roughness, level })
     }
 

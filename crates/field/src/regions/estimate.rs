@@ -1,0 +1,78 @@
+//! Representative CEPs of one region by least squares, with the set-up held (section 3.1 of the paper).
+
+use faer::Mat;
+use faer::linalg::solvers::SolveLstsq;
+use truearm_estimate::{Linearised, Point, Problem, Setup, column_unit, linearise, row_unit};
+
+/// What is held in every region.
+#[derive(Clone, Copy)]
+pub struct Held<'a> {
+    /// Link parameters that CEPs are added to, (5 L,).
+    pub parameters: &'a [f64],
+    /// Frames and targets.
+    pub setup: &'a Setup,
+}
+
+/// Gauss-Newton steps at most, and the step (m) below which no further one is made.
+const STEPS: usize = 6;
+const SMALLEST_STEP: f64 = 1e-13;
+
+impl Held<'_> {
+    /// Parameters with CEPs (P,) of the problem's columns added.
+    pub fn with(&self, columns: &[usize], ceps: &[f64]) -> Vec<f64> {
+        let mut parameters = self.parameters.to_vec();
+        columns.iter().zip(ceps).for_each(|(&column, cep)| parameters[column] += cep);
+        parameters
+    }
+
+    /// Rows at parameters with CEPs (P,) added.
+    pub fn rows(&self, problem: &Problem<'_>, ceps: &[f64]) -> Linearised {
+        let parameters = self.with(problem.columns, ceps);
+        linearise(problem, Point { parameters: &parameters, setup: self.setup })
+    }
+
+    /// CEPs (P,) that leave the least squares, positions in metres and orientations at 0.3 m, by Gauss-Newton from
+    /// `start`; `None` where there are fewer measured values than CEPs.
+    pub fn least_squares(&self, problem: &Problem<'_>, start: &[f64]) -> Option<Vec<f64>> {
+        let mut ceps = start.to_vec();
+        if problem.measurements.measured_values() < ceps.len() {
+            return None;
+        }
+        for _ in 0..STEPS {
+            let (matrix, residual) = scaled(problem, &self.rows(problem, &ceps));
+            let step = matrix.qr().solve_lstsq(residual);
+            let mut largest = 0.0_f64;
+            for (k, &column) in problem.columns.iter().enumerate() {
+                ceps[k] += step[(k, 0)] / column_unit(column);
+                largest = largest.max(step[(k, 0)].abs());
+            }
+            if !largest.is_finite() {
+                return None;
+            }
+            if largest < SMALLEST_STEP {
+                break;
+            }
+        }
+        Some(ceps)
+    }
+
+    /// Lengths of the residuals at the first target, (n,), m.
+    pub fn errors(&self, problem: &Problem<'_>, ceps: &[f64]) -> Vec<f64> {
+        let rows = self.rows(problem, ceps);
+        let length = |pose: &[f64]| pose.iter().take(3).map(|r| r * r).sum::<f64>().sqrt();
+        rows.residual.chunks_exact(rows.rows.max(1)).map(length).collect()
+    }
+}
+
+/// Weighted rows in metres: matrix (n m, P) and residual (n m, 1).
+pub fn scaled(problem: &Problem<'_>, rows: &Linearised) -> (Mat<f64>, Mat<f64>) {
+    let width = problem.columns.len();
+    let weight = |row: usize| {
+        let weight = problem.measurements.weight[row / rows.rows];
+        row_unit(if row % rows.rows < 3 * problem.measurements.target_count { 0 } else { 3 }) * weight.sqrt()
+    };
+    let matrix = Mat::from_fn(rows.residual.len(), width, |row, k| {
+        rows.arm[row * width + k] * weight(row) / column_unit(problem.columns[k])
+    });
+    (matrix, Mat::from_fn(rows.residual.len(), 1, |row, _| rows.residual[row] * weight(row)))
+}

@@ -1,0 +1,116 @@
+//! CEPs of regions shrunk towards those of the region that they are halves of.
+//!
+//! The CEPs of a half differ from those of the whole by a Gaussian of zero mean, alike for lengths and angles at 0.3 m;
+//! its standard deviation is `halving` for the halves of the workspace and changes by the factor `finer` from one
+//! halving to the next. Both, and the noise, are found by maximum marginal likelihood. Messages of means and
+//! precisions run up the tree and down again, which is exact inference.
+
+use faer::{Mat, Par};
+use truearm_estimate::dense::Cholesky;
+
+use crate::compass::Compass;
+use crate::regions::tree::Regions;
+
+/// Normal equations of a region's own rows, in metres.
+#[derive(Debug, Clone)]
+pub struct Own {
+    /// (P, P).
+    pub normal: Mat<f64>,
+    /// (P,).
+    pub right: Vec<f64>,
+    pub squares: f64,
+    pub rows: usize,
+}
+
+/// Standard deviations, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    pub noise: f64,
+    pub halving: f64,
+    pub finer: f64,
+}
+
+/// Natural logarithms of `halving` over the noise, and of `finer`.
+const RATIOS: Compass = Compass { start: [1.0, 0.0], steps: (1.0, 0.1), ends: (-6.0, 10.0) };
+/// Standard deviation of the whole workspace's CEPs over the noise: flat, the data alone decides.
+const FLAT: f64 = 1e6;
+
+impl Spread {
+    fn of(&self, depth: usize) -> f64 {
+        match depth {
+            0 => FLAT * self.noise,
+            _ => self.halving * self.finer.powi(depth as i32 - 1),
+        }
+    }
+}
+
+/// What a region and its halves know of its CEPs, in units of the noise.
+struct Message {
+    /// Factor of the precision and of the prior's.
+    factor: Cholesky,
+    information: Vec<f64>,
+    /// Variance of the step from the whole to this half.
+    variance: f64,
+}
+
+/// Messages from the leaves up, with the logarithm of the evidence (noise one) and the squares that are explained.
+fn upwards(regions: &Regions, own: &[Own], spread: Spread) -> Option<(Vec<Message>, f64, f64)> {
+    let width = own[0].right.len();
+    let mut precision: Vec<Mat<f64>> = own.iter().map(|o| o.normal.clone()).collect();
+    let mut information: Vec<Vec<f64>> = own.iter().map(|o| o.right.clone()).collect();
+    let (mut messages, mut evidence, mut explained) = (Vec::new(), 0.0, 0.0);
+    for region in (0..regions.count()).rev() {
+        let variance = spread.of(regions.depth(region)).powi(2);
+        let mut sum = precision[region].clone();
+        (0..width).for_each(|k| sum[(k, k)] += variance.recip());
+        let factor = Cholesky::new(sum, Par::Seq)?;
+        let own_information = std::mem::take(&mut information[region]);
+        let mean = factor.solve_vector(&own_information);
+        evidence -= 0.5 * (factor.log_determinant() + width as f64 * variance.ln());
+        explained += own_information.iter().zip(&mean).map(|(a, b)| a * b).sum::<f64>();
+        if let Some(parent) = regions.parent(region) {
+            let mut inner = precision[region].clone();
+            factor.solve(inner.as_mut());
+            let passed = &precision[region] - &precision[region] * &inner;
+            for i in 0..width {
+                information[parent][i] += mean[i] / variance;
+                for j in 0..width {
+                    precision[parent][(i, j)] += 0.5 * (passed[(i, j)] + passed[(j, i)]);
+                }
+            }
+        }
+        messages.push(Message { factor, information: own_information, variance });
+    }
+    messages.reverse();
+    Some((messages, evidence, explained))
+}
+
+/// Evidence at its best noise, and that noise.
+fn evidence(regions: &Regions, own: &[Own], [halving, finer]: [f64; 2]) -> Option<(f64, f64)> {
+    let spread = Spread { noise: 1.0, halving: halving.exp(), finer: finer.exp() };
+    let (_, evidence, explained) = upwards(regions, own, spread)?;
+    let (squares, rows) = own.iter().fold((0.0, 0), |sum, o| (sum.0 + o.squares, sum.1 + o.rows));
+    let variance = ((squares - explained) / rows as f64).max(f64::MIN_POSITIVE);
+    Some((evidence - 0.5 * rows as f64 * variance.ln(), variance.sqrt()))
+}
+
+/// CEPs of all regions in metres, (N, P), and the spread: found from the rows, or with the given deviation of every half.
+pub fn shrunk(regions: &Regions, own: &[Own], halving: Option<f64>) -> Option<(Vec<Vec<f64>>, Spread)> {
+    let found = RATIOS.search(|ratios| Ok::<_, ()>(evidence(regions, own, ratios))).ok()??;
+    let ([ratio, finer], _, noise) = found;
+    let spread = match halving {
+        Some(halving) => Spread { noise, halving, finer: 1.0 },
+        None => Spread { noise, halving: noise * ratio.exp(), finer: finer.exp() },
+    };
+    let in_noise = Spread { noise: 1.0, halving: spread.halving / noise, ..spread };
+    let (messages, _, _) = upwards(regions, own, in_noise)?;
+    let mut ceps: Vec<Vec<f64>> = Vec::with_capacity(regions.count());
+    for (region, message) in messages.iter().enumerate() {
+        let mut right = message.information.clone();
+        if let Some(parent) = regions.parent(region) {
+            right.iter_mut().zip(&ceps[parent]).for_each(|(r, c)| *r += c / message.variance);
+        }
+        ceps.push(message.factor.solve_vector(&right));
+    }
+    Some((ceps, spread))
+}
