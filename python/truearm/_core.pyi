@@ -865,7 +865,7 @@ class RegionalFit:
 
     @property
     def prior(self) -> NDArray[np.float64]:
-        """Standard deviation in m of a half's CEPs about its whole's, by depth from 1 on, where they were shrunk."""
+        """Standard deviation in m of a half's CEPs about its whole's, by depth from 1 on."""
 
 def regional_ceps(
     regions: Regions,

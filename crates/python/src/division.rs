@@ -219,6 +219,10 @@ pub fn divide_rows(
             judges.len()
         )));
     }
+    if let Some(at) = features.iter().position(|value| !value.is_finite()) {
+        let text = format!("a feature of row {} (counted from 0) is not finite", at / low.len());
+        return Err(CoreError::new_err(text));
+    }
     let arm =
         Arm { chain: problem.chain, columns: problem.columns, parameters: &parameters, setup: setup.core() };
     let mut source = Recorded {

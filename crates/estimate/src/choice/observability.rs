@@ -47,7 +47,7 @@ impl Criterion {
         }
     }
 
-    /// The least eigenvalue that a better choice has, given that its largest one is no less than `largest`.
+    /// The least eigenvalue that a better choice has at least, given that its largest one is no less than `largest`.
     pub(super) fn least_for(self, best: f64, largest: f64) -> Option<f64> {
         match self {
             Criterion::Condition | Criterion::O2 => Some(best * best * largest),

@@ -48,18 +48,22 @@ impl Spectrum {
         (0..=last).map(|k| (weight(k), k)).filter(|(w, _)| *w != 0.0).map(|(w, k)| (w, vector(k))).collect()
     }
 
-    /// Whether adding a pose's rows (m, P) leaves no eigenvalue below `bound` (Haynsworth 1968: inertia is additive
-    /// over a Schur complement).
-    fn can_reach(&self, jacobian: &Mat<f64>, bound: f64) -> bool {
+    /// Whether a pose's rows (m, P) can make the criterion better than `best`.
+    ///
+    /// The largest eigenvalue becomes no smaller than the Rayleigh quotient of the present one's vector; whether any stays
+    /// below the least one needed then is told by inertia, which is additive over a Schur complement (Haynsworth 1968).
+    fn can_reach(&self, jacobian: &Mat<f64>, criterion: Criterion, best: f64) -> bool {
+        let (rows, last) = (jacobian.nrows(), self.values.len() - 1);
+        let turned = jacobian * &self.vectors;
+        let largest = self.values[last] + (0..rows).map(|i| turned[(i, last)].powi(2)).sum::<f64>();
+        let Some(bound) = criterion.least_for(best, largest) else { return true };
         let below = self.values.iter().take_while(|&&value| value < bound).count();
         if below == 0 {
             return true;
         }
-        let rows = jacobian.nrows();
         if below > rows {
             return false;
         }
-        let turned = jacobian * &self.vectors;
         let inverse: Vec<f64> = self.values.iter().map(|value| (value - bound).recip()).collect();
         let entry = |i: usize, j: usize| {
             let sum: f64 = inverse.iter().enumerate().map(|(k, x)| turned[(i, k)] * x * turned[(j, k)]).sum();
@@ -136,11 +140,10 @@ fn better<const M: usize>(
         order.truncate(TRIED);
     }
     order.sort_unstable_by(by_score);
-    let largest = spectrum.values[spectrum.values.len() - 1];
     let (mut found, mut best) = (None, best * (1.0 + BETTER));
     for pose in order {
         let jacobian = pool.jacobian(pose);
-        if criterion.least_for(best, largest).is_some_and(|bound| !spectrum.can_reach(&jacobian, bound)) {
+        if !spectrum.can_reach(&jacobian, criterion, best) {
             continue;
         }
         let mut with = without.clone();
