@@ -67,9 +67,9 @@ impl Axis {
         Self { input, origin, spacing, count, closed: false, degree }
     }
 
-    /// The cells that a raw value excites.
+    /// First cell, beyond the axis where it may be, and grades of the cells that a raw value excites.
     #[inline]
-    pub fn active(&self, value: f64) -> Active {
+    fn unbounded(&self, value: f64) -> (i64, [f64; MOST_ACTIVE]) {
         let mut offset = self.input.scale * value - self.origin;
         if self.input.kind == InputKind::Angle {
             // Folded to the turn whose middle is the axis's middle, so that the seam lies where no cells are.
@@ -77,7 +77,13 @@ impl Axis {
             offset -= TAU * ((offset - half) / TAU).round();
         }
         let position = offset / self.spacing;
-        let (first, grades) = if self.degree == 2 { quadratic(position) } else { cubic(position) };
+        if self.degree == 2 { quadratic(position) } else { cubic(position) }
+    }
+
+    /// The cells that a raw value excites.
+    #[inline]
+    pub fn active(&self, value: f64) -> Active {
+        let (first, grades) = self.unbounded(value);
         let mut active = Active::default();
         for (k, grade) in grades.into_iter().enumerate() {
             let cell = first + k as i64;
@@ -228,6 +234,13 @@ impl CellKernel {
         sum
     }
 
+    /// Prior variance at a value, as if the axis went on beyond its last cells.
+    pub fn variance(&self, value: f64) -> f64 {
+        let (_, grades) = self.axis.unbounded(value);
+        let pairs = (0..MOST_ACTIVE).flat_map(|i| (0..MOST_ACTIVE).map(move |j| (i, j)));
+        pairs.map(|(i, j)| grades[i] * grades[j] * self.correlation[i.abs_diff(j)]).sum()
+    }
+
     /// Multiplies cell values (outer, count, inner) with the prior correlation along the axis.
     pub fn spread(&self, values: &[f64], inner: usize) -> Vec<f64> {
         let count = self.axis.count;
@@ -284,6 +297,17 @@ mod tests {
             let implied = cells.implied(&cells.axis.active(a), &cells.axis.active(b));
             let exact = squared_exponential(Input::ANGLE.distance(a, b), 0.3).kernel;
             prop_assert!((implied - exact).abs() < 0.06, "{implied} {exact}");
+        }
+    }
+
+    #[test]
+    fn prior_variance_goes_on_where_there_are_no_cells() {
+        for degree in [2, 3] {
+            let cells = CellKernel::new(open(degree), |d| matern(d, 0.2));
+            let inside = cells.axis.active(3.4);
+            assert!((cells.variance(3.4) - cells.implied(&inside, &inside)).abs() < 1e-12);
+            let outside = 3.4 + 10.0 * cells.axis.spacing - TAU;
+            assert!((cells.variance(outside) - cells.variance(3.4)).abs() < 1e-9);
         }
     }
 

@@ -136,12 +136,12 @@ impl DataSpace {
         Ok(out)
     }
 
-    /// Residuals of whole blocks of poses that would have taken no part, with their variances.
+    /// Residuals of whole blocks of poses that would have taken no part, with their variances, block by block.
     pub fn leave_blocks_out(
         &self,
         residual: &[f64],
         blocks: &[Vec<usize>],
-    ) -> Result<Vec<LeftOut>, FieldError> {
+    ) -> Result<Vec<Vec<LeftOut>>, FieldError> {
         let model = &self.model;
         let training = &model.training;
         let alpha = self.alpha(residual, &self.setup_step(residual));
@@ -160,20 +160,21 @@ impl DataSpace {
             let local: Vec<f64> = rows.iter().map(|&row| alpha[row]).collect();
             let left_out = factor.solve_vector(&local);
             let covariance = factor.inverse();
-            let mut at = 0;
+            let (mut at, mut left) = (0, Vec::with_capacity(rows.len()));
             for &pose in block {
                 let range = training.rows(pose);
                 let anew = model.noise_covariance(&training.jacobian, range.clone());
                 let noise =
                     |i: usize| training.noise_variance(range.start + i, model.hyper.noise) + anew[(i, i)];
                 let known = |i: usize| (covariance[(at + i, at + i)] - noise(i)).max(0.0);
-                out.extend((0..range.len()).map(|i| LeftOut {
+                left.extend((0..range.len()).map(|i| LeftOut {
                     residual: left_out[at + i],
                     noise: noise(i),
                     known: known(i),
                 }));
                 at += range.len();
             }
+            out.push(left);
         }
         Ok(out)
     }

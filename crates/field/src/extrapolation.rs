@@ -2,7 +2,8 @@
 //!
 //! Leave-one-out residuals say nothing of whole parts of the space without data, where stationary kernels learned elsewhere
 //! are too sure of themselves. The tails of every input are left out in turn and predicted from the rest; the arm's
-//! standard deviation is scaled until 95 % of those predictions hold. Where data is dense noise outweighs it.
+//! standard deviation is scaled until 95 % of the predictions hold in every tail. The errors of one tail are nearly one draw,
+//! so that a mean over tails would leave every other one too narrow. Where data is dense noise outweighs it.
 
 use truearm_estimate::Cancel;
 
@@ -34,21 +35,26 @@ pub fn extrapolation_factor(
     if training.pose_count() < FEWEST_POSES {
         return Ok(1.0);
     }
-    let space = DataSpace::new(Model::new(training.clone(), hyper.clone(), degree), cancel)?;
-    let rows = space.leave_blocks_out(&training.residual, &tails(training))?;
+    let space = DataSpace::new(Model::new(training.clone(), hyper.widened(), degree), cancel)?;
+    let tails = space.leave_blocks_out(&training.residual, &tails(training))?;
+    Ok(tails.iter().map(|rows| factor(rows)).fold(1.0, f64::max))
+}
+
+/// The least factor with which 95 % of a tail's predictions hold.
+fn factor(rows: &[LeftOut]) -> f64 {
     let holds = |factor: f64| {
         let within = rows.iter().filter(|row| is_within(row, factor)).count();
         within as f64 >= 0.95 * rows.len() as f64
     };
     let (mut low, mut high) = (1.0, LARGEST);
     if holds(low) {
-        return Ok(low);
+        return low;
     }
     while high - low > 0.01 {
         let middle = 0.5 * (low + high);
         if holds(middle) { high = middle } else { low = middle }
     }
-    Ok(high)
+    high
 }
 
 fn is_within(row: &LeftOut, factor: f64) -> bool {

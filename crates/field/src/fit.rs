@@ -15,6 +15,7 @@ use crate::posterior::{Posterior, Solution};
 use crate::refine::relinearised;
 use crate::select::{Found, contest_major, prune_major, refine, select_major};
 use crate::training::Training;
+use crate::widening::with_widenings;
 
 /// How the field is fitted.
 #[derive(Debug, Clone)]
@@ -55,8 +56,17 @@ pub struct FieldFit {
     pub residuals: Vec<f64>,
     /// Judgement of every pose by the others.
     pub judgement: Judgement,
-    /// For standard deviations.
+    /// The posterior that the field was taken from.
     pub posterior: Posterior,
+    /// The posterior under widened amplitudes, where it is another one.
+    pub wide: Option<Posterior>,
+}
+
+impl FieldFit {
+    /// For standard deviations.
+    pub fn spread(&self) -> &Posterior {
+        self.wide.as_ref().unwrap_or(&self.posterior)
+    }
 }
 
 /// Rows that hyper-parameters are chosen on: the evidence costs their cube.
@@ -106,6 +116,7 @@ pub fn fit_field(
     }
     let Judged { posterior, solution, judgement } = judged;
     let refined = relinearised(problem, point, &posterior, solution)?;
+    let wide = posterior.widened(options.degree, &options.cancel)?;
     Ok(FieldFit {
         parameters: refined.parameters,
         bank: refined.bank,
@@ -116,6 +127,7 @@ pub fn fit_field(
         residuals: refined.residuals,
         judgement,
         posterior,
+        wide,
     })
 }
 
@@ -129,7 +141,9 @@ pub fn restore(
     options: &FieldOptions,
     hyper: Hyper,
 ) -> Result<Posterior, FieldError> {
-    Posterior::new(training(problem, point, options)?, hyper, options.degree, &options.cancel)
+    let posterior =
+        Posterior::new(training(problem, point, options)?, hyper, options.degree, &options.cancel)?;
+    Ok(posterior.widened(options.degree, &options.cancel)?.unwrap_or(posterior))
 }
 
 struct Judged {
@@ -170,6 +184,7 @@ impl Search<'_> {
         let found = contest_major(&evidence, found, joints)?;
         let mut found = prune_major(&evidence, found)?;
         found = refine_more(&evidence, found, POLISH)?;
+        found.hyper = with_widenings(&evidence, &found.hyper)?;
         self.note(&found);
         if training.row_count() > middle.row_count() {
             return self.again(training, found.hyper);

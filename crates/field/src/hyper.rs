@@ -14,6 +14,8 @@ pub struct Product {
     pub joints: Vec<usize>,
     /// Their length scales, rad (scaled input units).
     pub lengths: Vec<f64>,
+    /// Root mean square of each amplitude under its posterior, over the amplitude itself.
+    pub widening: [f64; 3],
 }
 
 /// Hyper-parameters; amplitudes in rad or m, lengths in scaled input units (rad).
@@ -35,6 +37,10 @@ pub struct Hyper {
     pub products: Vec<Product>,
     /// Noise of positions (m) and of orientations (rad).
     pub noise: [f64; 2],
+    /// Root mean square under the posterior of the `own` amplitude, over the amplitude itself.
+    pub own_widening: f64,
+    /// The same of the `smooth` amplitudes.
+    pub smooth_widening: [f64; 3],
     /// Factor on the standard deviation of the arm's part, at least one; found by leaving out whole parts of the space, not
     /// by the evidence.
     pub extrapolation: f64,
@@ -94,7 +100,7 @@ impl Product {
     pub fn start(name: &str, joints: Vec<usize>) -> Self {
         let amplitudes = Self::amplitude_ranges(name).map(|r| r.start);
         let lengths = vec![PRODUCT_LENGTH.start; joints.len()];
-        Self { name: name.to_owned(), amplitudes, joints, lengths }
+        Self { name: name.to_owned(), amplitudes, joints, lengths, widening: [1.0; 3] }
     }
 
     fn amplitude_ranges(name: &str) -> [Range; 3] {
@@ -130,6 +136,8 @@ impl Hyper {
             repeatability: REPEATABILITY.start,
             products,
             noise,
+            own_widening: 1.0,
+            smooth_widening: [1.0; 3],
             extrapolation: 1.0,
         }
     }
@@ -192,8 +200,41 @@ impl Hyper {
             repeatability: at(AT_REPEATABILITY),
             products,
             noise: [at(first), at(first + 1)],
-            extrapolation: self.extrapolation,
+            ..self.clone()
         }
+    }
+
+    /// Positions of the amplitudes among the logarithms: `own`, `smooth`, then each product's.
+    pub fn amplitude_positions(&self) -> Vec<usize> {
+        let mut positions = vec![AT_OWN, AT_SMOOTH, AT_SMOOTH + 1, AT_SMOOTH + 2];
+        let mut first = AT_PRODUCTS;
+        for product in &self.products {
+            positions.extend(first..first + 3);
+            first += product.len();
+        }
+        positions
+    }
+
+    /// The same hyper-parameters with other widenings, in the order of [`Hyper::amplitude_positions`].
+    pub fn with_widenings(&self, widenings: &[f64]) -> Self {
+        let three = |first: usize| std::array::from_fn(|k| widenings[first + k]);
+        let mut other = Self { own_widening: widenings[0], smooth_widening: three(1), ..self.clone() };
+        for (k, product) in other.products.iter_mut().enumerate() {
+            product.widening = three(4 + 3 * k);
+        }
+        other
+    }
+
+    /// Amplitudes as wide as what the evidence leaves open makes them.
+    pub fn widened(&self) -> Self {
+        let times = |a: &[f64; 3], b: &[f64; 3]| std::array::from_fn(|k| a[k] * b[k]);
+        let mut wide = self.clone();
+        wide.own *= self.own_widening;
+        wide.smooth = times(&self.smooth, &self.smooth_widening);
+        for product in &mut wide.products {
+            product.amplitudes = times(&product.amplitudes, &product.widening);
+        }
+        wide
     }
 
     /// Bounds and priors in the order of the logarithms.

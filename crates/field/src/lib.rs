@@ -42,6 +42,7 @@ mod tests;
 mod training;
 mod unknowns;
 mod weight_space;
+mod widening;
 
 pub use bank::{Bank, Block};
 pub use cells::{Axis, Grid};

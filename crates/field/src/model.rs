@@ -83,6 +83,20 @@ impl Cells {
     }
 }
 
+impl Cells {
+    /// Prior variances of the blocks at one configuration, cells beyond the axes included.
+    fn unbounded(&self, values: &[f64]) -> Correlations {
+        let of = |k: usize, cells: &CellKernel| cells.variance(values[k]);
+        let own = |(k, cells): (usize, &Option<CellKernel>)| cells.as_ref().map_or(0.0, |cells| of(k, cells));
+        let product = |axes: &Vec<(usize, CellKernel)>| axes.iter().map(|(k, cells)| of(*k, cells)).product();
+        Correlations {
+            own: self.own.iter().enumerate().map(own).collect(),
+            smooth: self.smooth.iter().enumerate().map(|(k, cells)| of(k, cells)).sum(),
+            products: self.products.iter().map(product).collect(),
+        }
+    }
+}
+
 /// Prior correlations of two configurations, by block.
 struct Correlations {
     own: Vec<f64>,
@@ -188,7 +202,23 @@ impl Model {
 
     /// Prior covariance of each column's CEP at two configurations, (P,).
     pub fn variances(&self, a: &Excited, b: &Excited) -> Vec<f64> {
-        let kernels = self.cells.kernels(a, b);
+        self.combined(&self.cells.kernels(a, b))
+    }
+
+    /// What the cells leave out of each column's prior variance at a configuration beyond their axes, (P,).
+    ///
+    /// No row excites the cells that would be there: their share of the posterior variance is the prior's.
+    pub fn beyond(&self, values: &[f64]) -> Vec<f64> {
+        let excited = self.cells.excite(values);
+        let whole = self.combined(&self.cells.unbounded(values));
+        whole
+            .iter()
+            .zip(self.variances(&excited, &excited))
+            .map(|(all, held)| (all - held).max(0.0))
+            .collect()
+    }
+
+    fn combined(&self, kernels: &Correlations) -> Vec<f64> {
         let mut variances: Vec<f64> = self
             .training
             .columns

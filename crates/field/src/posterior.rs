@@ -119,6 +119,18 @@ impl Posterior {
         }
     }
 
+    /// The posterior under amplitudes as wide as the evidence leaves them, for standard deviations.
+    ///
+    /// None in weight space: there rows outnumber weights, amplitudes hardly matter and a second solution costs much.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
+    pub fn widened(&self, degree: usize, cancel: &Cancel) -> Result<Option<Self>, FieldError> {
+        let Self::Data(space) = self else { return Ok(None) };
+        let model = Model::new(space.model.training.clone(), space.model.hyper.widened(), degree);
+        Ok(Some(Self::Data(Box::new(DataSpace::new(model, cancel)?))))
+    }
+
     /// The prior model.
     pub fn model(&self) -> &Model {
         match self {
@@ -180,6 +192,13 @@ impl Posterior {
             Self::Data(space) => space.covariance(&query),
             Self::Weight(space) => space.covariance(&query),
         };
+        for (pose, block) in covariance.chunks_exact_mut(rows * rows).enumerate() {
+            let beyond = self.model().beyond(query.values_of(pose));
+            if beyond.iter().any(|&variance| variance > 0.0) {
+                let entry = |k: usize| query.prior(pose, (k / rows, k % rows), &beyond);
+                block.iter_mut().enumerate().for_each(|(k, value)| *value += entry(k));
+            }
+        }
         let scale = self.model().hyper.extrapolation.powi(2);
         covariance.iter_mut().for_each(|value| *value *= scale);
         Ok(covariance)

@@ -79,6 +79,7 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
             amplitudes: three(&format!("{name}_amplitudes"))?,
             joints: get(&format!("{name}_joints"))?.iter().map(|&joint| joint as usize).collect(),
             lengths: get(&format!("{name}_lengths"))?,
+            widening: three(&format!("{name}_widening"))?,
         })
     };
     let names = [MAJOR_NAME, WRIST_NAME];
@@ -92,6 +93,8 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         repeatability: one("repeatability")?,
         products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
         noise: [one("noise_position")?, one("noise_orientation")?],
+        own_widening: one("own_widening")?,
+        smooth_widening: three("smooth_widening")?,
         extrapolation: one("extrapolation")?,
     })
 }
@@ -106,6 +109,8 @@ fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         ("repeatability".to_owned(), vec![hyper.repeatability]),
         ("noise_position".to_owned(), vec![hyper.noise[0]]),
         ("noise_orientation".to_owned(), vec![hyper.noise[1]]),
+        ("own_widening".to_owned(), vec![hyper.own_widening]),
+        ("smooth_widening".to_owned(), hyper.smooth_widening.to_vec()),
         ("extrapolation".to_owned(), vec![hyper.extrapolation]),
     ]);
     for product in &hyper.products {
@@ -114,6 +119,7 @@ fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         values.insert(format!("{name}_amplitudes"), product.amplitudes.to_vec());
         values.insert(format!("{name}_joints"), joints);
         values.insert(format!("{name}_lengths"), product.lengths.clone());
+        values.insert(format!("{name}_widening"), product.widening.to_vec());
     }
     values
 }
@@ -374,7 +380,7 @@ impl Posterior {
     fn core(&self) -> &CorePosterior {
         match &self.held {
             Held::Alone(core) => core,
-            Held::Fitted(fit) => &fit.posterior,
+            Held::Fitted(fit) => fit.spread(),
         }
     }
 }
@@ -390,12 +396,13 @@ impl Posterior {
         options: Options<'_>,
     ) -> PyResult<Self> {
         let values: Vec<f64> = parameters.as_array().iter().copied().collect();
-        let known = options.core(Cancel::default())?;
+        let mut known = options.core(Cancel::default())?;
         let Some(hyper) = known.hyper.clone() else {
             return Err(CoreError::new_err("a posterior needs the fitted hyper-parameters"));
         };
         let threads = options.threads;
-        let core = quick(py, || {
+        let core = long(py, move |cancel| {
+            known.cancel = cancel.clone();
             let point = Point { parameters: &values, setup: setup.core() };
             with_threads(threads, || restore(&problem.core(), point, &known, hyper))
         })?;

@@ -7,3 +7,4 @@ mod oracle;
 mod posterior;
 mod sets;
 mod spaces;
+mod widening;

@@ -1,5 +1,7 @@
 //! The slow and obvious way: every covariance written out, set-up unknowns as further unknowns with unit priors.
 
+use std::f64::consts::TAU;
+
 use faer::{Mat, Par};
 use truearm_estimate::dense::{Cholesky, column};
 
@@ -50,6 +52,17 @@ impl Kernels for Exact<'_> {
     }
 }
 
+/// A value as many whole cells away as bring it among the cells: its own variance does not end with them.
+fn inside(cells: &CellKernel, value: f64) -> f64 {
+    let axis = &cells.axis;
+    let middle = 0.5 * (axis.centre(0) + axis.centre(axis.count - 1));
+    let mut offset = axis.input.scale * value - middle;
+    if axis.input.kind == InputKind::Angle {
+        offset -= TAU * (offset / TAU).round();
+    }
+    (middle + offset.rem_euclid(axis.spacing)) / axis.input.scale
+}
+
 /// What cells imply.
 pub struct OfCells<'a>(pub &'a Model);
 
@@ -59,6 +72,7 @@ fn implied(cells: &CellKernel, a: f64, b: f64) -> f64 {
         cells.axis.active(value).nonzero().for_each(|(cell, grade)| grades[cell] += grade);
         grades
     };
+    let (a, b) = if a == b { (inside(cells, a), inside(cells, b)) } else { (a, b) };
     let (a, b) = (grades(a), grades(b));
     let pairs = (0..a.len()).flat_map(|i| (0..b.len()).map(move |j| (i, j)));
     pairs.map(|(i, j)| a[i] * cells.correlation[i.abs_diff(j)] * b[j]).sum()

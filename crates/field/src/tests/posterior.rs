@@ -5,7 +5,7 @@ use truearm_estimate::Cancel;
 use super::common::Random;
 use super::oracle::{OfCells, Oracle, dot, squared};
 use super::sets::{line_inputs, long, poses_in_two_groups, positions};
-use crate::data_space::DataSpace;
+use crate::data_space::{DataSpace, LeftOut};
 use crate::model::Model;
 use crate::posterior::{LeaveOneOut, Posterior, Solution};
 use crate::training::Training;
@@ -169,9 +169,10 @@ fn leaving_blocks_out_is_refitting_without_them() {
     let alone: Vec<Vec<usize>> = (0..3).map(|pose| vec![pose]).collect();
     let each = space.leave_blocks_out(&training.residual, &alone).unwrap();
     let left_out = space.leave_one_out(&training.residual).unwrap();
+    let each: Vec<LeftOut> = each.into_iter().flatten().collect();
     let found: Vec<f64> = each.iter().map(|row| row.residual).collect();
     close(&found, &left_out.residual[..9], 1e-9, "blocks of one");
-    let together = space.leave_blocks_out(&training.residual, &[vec![0, 1, 2]]).unwrap();
+    let together = &space.leave_blocks_out(&training.residual, &[vec![0, 1, 2]]).unwrap()[0];
     let pair =
         |k: usize| together[k].known >= each[k].known * (1.0 - 1e-9) && together[k].noise == each[k].noise;
     assert!((0..9).all(pair), "what is left out together is known less: {together:?} {each:?}");

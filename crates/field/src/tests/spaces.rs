@@ -59,9 +59,11 @@ fn covariance_grows_away_from_the_data_up_to_the_prior() {
         assert!(sums[0] < sums[1] && sums[1] < sums[2], "{sums:?}");
         let far = at(1.3);
         let excited = prior.cells.excite(&far);
-        let most = prior.variances(&excited, &excited);
-        for (found, most) in variances(&posterior, &far).iter().zip(&most) {
-            assert!(*found <= most * (1.0 + 1e-9), "{found} {most}");
+        let held = prior.variances(&excited, &excited);
+        let beyond = prior.beyond(&far);
+        for (p, found) in variances(&posterior, &far).iter().enumerate() {
+            let most = held[p] + beyond[p];
+            assert!((beyond[p]..=most * (1.0 + 1e-9)).contains(found), "{found} {most}");
         }
     }
 }
@@ -85,6 +87,13 @@ fn beyond_the_cells_nothing_is_left_but_the_constants() {
         };
         assert!((0..6).all(|k| !closed(k)), "the test needs data on a part of the turn");
         assert_eq!(ceps, vec![0.0; training.parameter_count]);
+        let (near, beyond) =
+            (posterior.model().beyond(training.values_of(0)), posterior.model().beyond(&far));
+        assert!(near.iter().all(|&variance| variance < 1e-20));
+        for (variance, field) in variances(&posterior, &far).iter().zip(&beyond) {
+            assert!(variance >= field, "what the field may be there stays in the standard deviation");
+        }
+        assert!(beyond.iter().filter(|&&variance| variance > 0.0).count() == 4);
         assert!(solution.constant.iter().any(|constant| *constant != 0.0));
     }
 }

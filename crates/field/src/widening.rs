@@ -1,0 +1,34 @@
+//! What amplitudes that the evidence leaves open mean for standard deviations.
+//!
+//! The field is the one under the most probable amplitudes. Where data hardly tells an amplitude, its posterior is wide and the
+//! variance it stands for is larger than the most probable amplitude's square: with a log-normal posterior of
+//! standard deviation s about the mode a, `E[amplitude^2] = a^2 exp(2 s^2)`. s comes from the curvature of evidence and
+//! prior at the mode (Laplace; Rasmussen and Williams 2006, sec. 3.4), each amplitude by itself.
+
+use crate::FieldError;
+use crate::evidence::Evidence;
+use crate::hyper::Hyper;
+
+/// Step of the finite difference, in the logarithm: large against the evidence's rounding, small against a factor of two.
+const STEP: f64 = 0.1;
+
+/// The same hyper-parameters with the widening of each amplitude.
+///
+/// # Errors
+/// [`FieldError`] of the evidence.
+pub fn with_widenings(evidence: &Evidence, hyper: &Hyper) -> Result<Hyper, FieldError> {
+    let (logs, ranges) = (hyper.to_logs(), hyper.ranges());
+    let mut widenings = Vec::new();
+    for k in hyper.amplitude_positions() {
+        let slope = |step: f64| {
+            let mut moved = logs.clone();
+            moved[k] += step;
+            Ok::<f64, FieldError>(evidence.score(&hyper.with_logs(&moved))?.gradient[k])
+        };
+        let curvature = (slope(-STEP)? - slope(STEP)?) / (2.0 * STEP);
+        // The evidence never widens what the prior says.
+        let least = ranges[k].spread.powi(-2);
+        widenings.push(curvature.max(least).recip().exp());
+    }
+    Ok(hyper.with_widenings(&widenings))
+}
