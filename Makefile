@@ -34,12 +34,13 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help setup demo test check bench docs figures rust-test py-test clean
+.PHONY: help setup demo test trials check bench docs figures rust-test py-test clean
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
 	@echo 'make demo   calibrate a virtual RV-M2 and show what it gained'
 	@echo 'make test   Rust and Python tests'
+	@echo 'make trials the measurement cell killed and with faults, in full (TRIALS="-k kill")'
 	@echo 'make check  formatting, lint, types and layers'
 	@echo 'make bench  speed against peers, with the ratio to reach beside each (BENCH=--write keeps them in docs/)'
 	@echo 'make figures  errors on public measurements, into docs/reference/results.md'
@@ -55,6 +56,10 @@ rust-test: $(STAMPS)/tools
 
 py-test: $(STAMPS)/built
 	$(BIN)/python -m pytest
+
+# The measurement cell killed, interrupted and with faults, in full; takes half an hour or more.
+trials: $(STAMPS)/built
+	TRUEARM_TRIALS=full $(BIN)/python -m pytest tests/test_cell_trials.py -s $(TRIALS)
 
 check: $(STAMPS)/built
 	$(BIN)/ruff check $(PY_PATHS)

@@ -54,6 +54,7 @@ class VirtualCell:
 
     Attributes:
         content: The cell file's values with the addresses at which the virtual devices are.
+        world: What is true in it, once it runs.
     """
 
     def __init__(
@@ -83,8 +84,11 @@ class VirtualCell:
                 tempfile.TemporaryDirectory(prefix="truearm-", dir=memory if memory.is_dir() else None)
             )
             state = Path(folder) / "state"
-            self.shared = Shared.create(state, self._cell.file.simulate.speed)
-            self._rest(World(self._cell, state))
+            Shared.create(state, self._cell.file.simulate.speed).close()
+            self.world = World(self._cell, state)
+            self.shared = self.world.shared
+            stack.callback(self.shared.close)
+            self._rest(self.world)
             stack.callback(self._ending.set)
             for device in DEVICES:
                 address = self._started(device, state, stack)
@@ -128,7 +132,8 @@ class VirtualCell:
             stack.callback(self._ending.set)
         if not here.poll(STARTS_WITHIN_S):
             raise WorkError(f"the virtual {device} did not start within {STARTS_WITHIN_S:g} s")
-        address: Mapping[str, Any] = here.recv()
+        with here:
+            address: Mapping[str, Any] = here.recv()
         return address
 
 
@@ -162,7 +167,14 @@ def _run(job: _Job, ended: Callable[[], bool]) -> None:
         build(world, settings, faults) for kind, build in MACHINES.items() if isinstance(settings, kind)
     )
     job.report.send(address)
-    serve(machine, wire, world, faults, ended, stream)
+    job.report.close()
+    try:
+        serve(machine, wire, world, faults, ended, stream)
+    finally:
+        wire.close()
+        if stream is not None:
+            stream.wire.close()
+        world.shared.close()
 
 
 Built = tuple[Machine, Wire, Stream | None, dict[str, Any]]

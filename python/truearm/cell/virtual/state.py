@@ -40,6 +40,12 @@ class Shared:
         shared._values[BEGAN], shared._values[SPEED] = time.monotonic(), speed
         return shared
 
+    def close(self) -> None:
+        """Let go of the file."""
+        self._values = np.empty(0)
+        self._map.close()
+        self._file.close()
+
     @property
     def speed(self) -> float:
         """How much faster than a real clock."""

@@ -28,6 +28,9 @@ class Wire(Protocol):
     def drop(self) -> None:
         """End the connection, as a device does that loses its power."""
 
+    def close(self) -> None:
+        """Be no more."""
+
 
 class PtyWire:
     """A pseudo-terminal; the client opens its other end like a serial port."""
@@ -59,6 +62,11 @@ class PtyWire:
 
     def drop(self) -> None:
         """See Wire. A serial line has no connection to end."""
+
+    def close(self) -> None:
+        """See Wire."""
+        os.close(self._own)
+        os.close(self._other)
 
 
 class TcpWire:
@@ -104,6 +112,11 @@ class TcpWire:
         client, self._client = self._client, None
         if client is not None:
             client.close()
+
+    def close(self) -> None:
+        """See Wire."""
+        self.drop()
+        self._server.close()
 
     def _accept(self) -> None:
         try:
