@@ -1,6 +1,7 @@
 """Driver of any robot that takes commands in lines, by templates and patterns of the cell file."""
 
 import threading
+import time
 from typing import Final, Literal
 
 import numpy as np
@@ -154,8 +155,8 @@ class LineRobot:
     def _arrives(self, target: Floats | None) -> bool:
         """Ask until the robot is there; False once it stands elsewhere."""
         still, last = 0, self._where()
-        asked = int(self._settings.motion_timeout_s / 0.01)
-        for _ in range(asked):
+        until = time.monotonic() + self._settings.motion_timeout_s
+        while time.monotonic() < until:
             if target is not None and np.abs(last - target).max() <= np.radians(self._settings.tolerance_deg):
                 return True
             now = self._where()

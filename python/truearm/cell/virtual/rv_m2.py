@@ -55,12 +55,16 @@ class VirtualRvM2:
 
     def _do(self, line: str, now: float) -> str | None:
         word, numbers = line[:2], line[2:].strip()
+        if self._world.shared.flag(STOPPED):
+            self._at = None
         if word == "WH":
             return self._where()
         if word == "ER" and not numbers:
             return movemaster.HARDWARE_ERROR if self._world.shared.flag(STOPPED) else self._error
         if word == "RS" and not numbers:
             self._error = movemaster.NO_ERROR
+        elif self._world.shared.flag(STOPPED):
+            return None
         elif self._error == movemaster.NO_ERROR and not self._move(word, numbers, now):
             self._error = movemaster.COMMAND_ERROR
         return None

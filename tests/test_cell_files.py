@@ -1,0 +1,143 @@
+"""Cell files, lists of poses and session files: what is wrong with them is said in words."""
+
+import sqlite3
+
+import numpy as np
+import pytest
+
+from tests.cell_support import cell_text, poses_of, write_poses
+from truearm.cell import Cell
+from truearm.cell.examples import EXAMPLES, example
+from truearm.cell.opening import open_session
+from truearm.cell.poses_file import Poses
+from truearm.cell.sequence import steps_of
+from truearm.cell.session import Session
+from truearm.errors import InputError, WorkError
+from truearm.robot import Robot
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return Cell.from_toml(cell_text())
+
+
+@pytest.fixture(scope="module")
+def poses(cell):
+    return poses_of(cell, 8)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_are_cells(name):
+    assert Cell.from_toml(example(name)).file.name
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("[robot]", "[robt]", 'unknown key "robt". Did you mean "robot"'),
+        ('driver = "rv-m2"', 'driver = "rvm2"', 'there is no driver "rvm2".*Did you mean "rv-m2"'),
+        ('driver = "rv-m2"', "", 'key "driver" is missing'),
+        ('driver = "rv-m2"', 'driver = "nowhere.to:Find"', "cannot be imported"),
+        ('driver = "rv-m2"', 'driver = "truearm.robot:Robot"', "has no class Settings"),
+        ('port = "/dev/ttyS0"', "", 'robot: key "port" is missing'),
+        ('port = "/dev/ttyS0"', 'port = "/dev/ttyS0"\nspeed = 12', "robot, speed: 12 cannot be used"),
+        ('port = "/dev/ttyS0"', 'prt = "/dev/ttyS0"', 'unknown key "prt". Did you mean "port"'),
+        ("expected_mm = 4", "expected_mm = -4", "process, expected_mm: -4 cannot be used"),
+        ("expected_mm = 4", 'expected_mm = "four"', "Must be a number"),
+        ("expected_mm = 4", "contacs = 4", 'Did you mean "contacts"'),
+        ("xyz_mm = [400, -250, -100]", "xyz_mm = [400, -250]", "world, xyz_mm, 3"),
+        ("uncertain_mm = 6", "quaternion_wxyz = [1, 1, 0, 0]", "length 1.41421, must be 1"),
+        ('arm = "rv-m2"', 'arm = "rv-m3"', "rv-m2"),
+        ('arm = "rv-m2"', 'arm = "ur10"', "five turning joints"),
+        ("[world]", "[world", "not TOML"),
+        ("seed = 1", "seed = 1\n[simulate.faults]\nlost = 2", "faults, lost: 2"),
+        ('port = "/dev/ttyS1"', 'port = "/dev/ttyS1"\npanel = { u = "+z" }', "along the same axis"),
+    ],
+)
+def test_a_wrong_cell_file_is_told(before, after, message):
+    text = example("rv-m2")
+    assert before in text
+    with pytest.raises(InputError, match=message):
+        Cell.from_toml(text.replace(before, after, 1), where="cell.toml")
+
+
+def test_patterns_need_their_groups():
+    text = example("tracker").replace("(?P<z>", "(?P<h>")
+    with pytest.raises(InputError, match=r"no group \(\?P<z>"):
+        Cell.from_toml(text)
+
+
+def test_poses_read_back(tmp_path, poses):
+    write_poses(tmp_path / "poses.csv", poses)
+    read = Poses.read_csv(tmp_path / "poses.csv", Robot.load("rv-m2"))
+    np.testing.assert_allclose(read.readings, poses.readings, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("q1_deg,q2_deg\n1,2\n", "there are 2 joint columns"),
+        ("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg\n0,0,20,0,0\n", "row 1 beyond the joint limits"),
+        (
+            "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,approach\n0,0,-20,0,0,2\n",
+            'column "approach" holds 2 in row 1',
+        ),
+        ("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg\n0,0,x,0,0\n", 'holds "x" in row 1'),
+        ("a,b\n1,2\n", "no joint columns"),
+    ],
+)
+def test_a_wrong_list_of_poses_is_told(text, message, tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        Poses.read_csv(path, Robot.load("rv-m2"))
+
+
+def test_registration_comes_first_and_checks_repeat_its_first_contact(cell, poses):
+    process = cell.file.process.model_copy(update={"check_every": 3, "registration_poses": 4})
+    steps = steps_of(poses, process)
+    assert [step.kind for step in steps[:4]] == ["registration"] * 4
+    assert [step.pose for step in steps if step.kind == "pose"] == list(range(8))
+    assert {step.pose for step in steps if step.kind == "check"} == {steps[0].pose}
+    assert [step.kind for step in steps].count("check") == 3
+    with pytest.raises(InputError, match="Registration needs 9"):
+        steps_of(poses, process.model_copy(update={"registration_poses": 9}))
+
+
+def test_a_session_belongs_to_its_arm_and_poses(cell, poses, tmp_path):
+    path = tmp_path / "session.db"
+    open_session(path, cell, poses).close()
+    other = Poses(poses.readings[::-1].copy(), poses.approach, poses.purpose)
+    with pytest.raises(InputError, match="another list of poses"):
+        open_session(path, cell, other)
+    moved = Cell.from_toml(cell_text(target={"in_flange_mm": [1, 2, 3]}))
+    with pytest.raises(InputError, match="another target"):
+        open_session(path, moved, poses)
+    open_session(path, cell, poses).close()
+
+
+def test_one_process_writes_and_any_reads(cell, poses, tmp_path):
+    path = tmp_path / "session.db"
+    with open_session(path, cell, poses):
+        with pytest.raises(WorkError, match="another process"):
+            open_session(path, cell, poses)
+        with Session(path, writing=False) as reader:
+            assert reader.next_step().step == 0
+    open_session(path, cell, poses).close()
+
+
+def test_what_is_no_session_is_told(tmp_path):
+    with pytest.raises(InputError, match="there is no such file"):
+        Session(tmp_path / "none.db", writing=False)
+    (tmp_path / "text.db").write_text("hello")
+    with pytest.raises(InputError, match="this is no session file"):
+        Session(tmp_path / "text.db", writing=False)
+    with sqlite3.connect(tmp_path / "other.db") as other:
+        other.execute("CREATE TABLE things (a)")
+    other.close()
+    with pytest.raises(InputError, match="no session file"):
+        Session(tmp_path / "other.db", writing=False)
+    with pytest.raises(InputError, match="no such directory"):
+        open_session(
+            tmp_path / "none" / "s.db", Cell.from_toml(cell_text()), poses_of(Cell.from_toml(cell_text()), 8)
+        )

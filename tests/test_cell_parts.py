@@ -1,0 +1,150 @@
+"""Parts of the cell alone: frames of lines, the panel, patterns, packets, verdicts, clearance."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from truearm.cell import ur_packets
+from truearm.cell.cell_file import ClearanceSection
+from truearm.cell.clearance import Clearance
+from truearm.cell.framing import framed, unframed
+from truearm.cell.judge import Rules, judge
+from truearm.cell.patterns import expression_for, filled, numbers_in
+from truearm.cell.session import Stored
+from truearm.cell.stretches import boundaries
+from truearm.cell.table_panel import PanelSection
+from truearm.cell.virtual.line_devices import answer_for
+from truearm.errors import InputError
+from truearm.robot import Robot
+
+TEXTS = st.text("ABCXYZ 0123456789.-", min_size=1).map(str.strip).filter(bool)
+
+
+@given(st.integers(0, 10**8), TEXTS)
+def test_framed_lines_read_back(number, text):
+    assert unframed(framed(number, text)) == (number, text)
+
+
+@given(st.integers(0, 10**8), TEXTS, st.data())
+def test_a_line_with_one_other_character_is_not_believed(number, text, data):
+    line = framed(number, text)
+    place = data.draw(st.integers(0, len(line) - 1))
+    other = data.draw(st.characters(min_codepoint=33, max_codepoint=126).filter(lambda c: c != line[place]))
+    assert unframed(line[:place] + other + line[place + 1 :]) is None
+
+
+@given(st.sampled_from(["+z", "-z", "+y", "-x"]), st.tuples(*[st.floats(-0.3, 0.3)] * 3))
+def test_what_the_panel_sees_leads_back_to_the_point(normal, point):
+    u = "+x" if normal[1] != "x" else "+y"
+    panel = PanelSection(normal=normal, u=u, offset_mm=(10.0, -5.0, 30.0)).geometry()
+    carriage = panel.carriage_under(np.array(point), 0.02)
+    seen = panel.seen(carriage, np.array(point))
+    assert panel.holds(seen)
+    assert seen[2] == pytest.approx(0.02)
+    touched = panel.point(carriage + 0.02 * panel.normal, panel.counts_of(seen))
+    np.testing.assert_allclose(touched, point, atol=1e-12)
+
+
+def test_the_panel_counts_a_quarter_of_a_millimetre():
+    panel = PanelSection().geometry()
+    step = panel.point(np.zeros(3), np.ones(2)) - panel.point(np.zeros(3), np.zeros(2))
+    np.testing.assert_allclose(1e3 * step, [0.2598, 0.3125, 0.0], atol=1e-4)
+
+
+def test_templates_and_patterns_are_two_sides():
+    template = "GO {x:.3f},{y:.3f} END"
+    line = filled(template, {"x": 1.5, "y": -2.0})
+    assert line == "GO 1.500,-2.000 END"
+    assert numbers_in(expression_for(template), line) == {"x": 1.5, "y": -2.0}
+    assert numbers_in(expression_for(template), "GO 1.500,-2.0x0 END") is None
+    with pytest.raises(InputError, match="Known here: x, y"):
+        filled("{z}", {"x": 1.0, "y": 2.0})
+
+
+@pytest.mark.parametrize(
+    "pattern", [r"^(?P<x>[-\d.]+),\s*(?P<y>\S+);(?P<z>.+)$", r"P=(?P<x>-?\d+(\.\d+)?) (?P<y>\S+) (?P<z>\S+)"]
+)
+def test_virtual_answers_match_the_pattern_they_are_made_from(pattern):
+    line = answer_for(pattern, {"x": 1.25, "y": -2.5, "z": 3.0})
+    assert numbers_in(re.compile(pattern), line) == {"x": 1.25, "y": -2.5, "z": 3.0}
+
+
+def test_packets_of_a_universal_robot_read_back_also_in_pieces():
+    states = [
+        ur_packets.State(k, np.full(6, 0.1 * k), np.zeros(6), 30.0, ur_packets.NORMAL) for k in range(3)
+    ]
+    stream = b"".join(map(ur_packets.build, states))
+    packet, rest = ur_packets.last_whole(stream[:-7])
+    assert packet is not None
+    assert ur_packets.parse(packet).time_s == 1.0
+    packet, rest = ur_packets.last_whole(rest + stream[-7:])
+    np.testing.assert_array_equal(ur_packets.parse(packet).readings, states[2].readings)
+    assert rest == b""
+    with pytest.raises(ValueError, match="packet of"):
+        ur_packets.last_whole(b"\x00\x00\x00\x01" + stream)
+
+
+RULES = Rules(contacts=2, attempts=6, agree_m=0.4e-3, likely_m=4e-3)
+
+
+def readings(*points_mm):
+    return [
+        Stored(k, point is not None, None if point is None else np.array([point, 0.0, 0.0]) / 1e3, 6e-5)
+        for k, point in enumerate(points_mm, start=1)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("points", "decision", "attempts"),
+    [
+        ((), "again", ()),
+        ((1.0,), "again", ()),
+        ((1.0, 1.1), "accept", (1, 2)),
+        ((1.0, None, 1.1), "accept", (1, 3)),
+        ((1.0, 6.0), "again", ()),
+        ((1.0, 6.0, 1.1), "accept", (1, 3)),
+        ((9.0, 9.1), "again", ()),
+        ((9.0, 9.1, 9.05), "accept", (1, 2, 3)),
+        ((1.0, 1.1, 3.0, 3.1), "again", ()),
+        ((None,) * 6, "give up", ()),
+    ],
+)
+def test_verdicts(points, decision, attempts):
+    verdict = judge(readings(*points), np.zeros(3), RULES)
+    assert (verdict.decision, verdict.attempts) == (decision, attempts)
+
+
+@given(st.lists(st.floats(-3.0, 3.0), max_size=6))
+def test_what_is_accepted_agrees_and_outnumbers_what_contradicts(points):
+    verdict = judge(readings(*points), np.zeros(3), RULES)
+    if verdict.decision == "accept":
+        chosen = [points[attempt - 1] for attempt in verdict.attempts]
+        assert len(chosen) > len(points) - len(chosen)
+        assert max(chosen) - min(chosen) <= 2 * 0.4 + 1e-9
+
+
+def test_stretches_grow():
+    assert boundaries(20, 100) == [20, 40, 60, 80, 100]
+    found = boundaries(20, 5000)
+    assert found[-1] <= 2000
+    assert len(found) < 30
+    assert boundaries(0, 100) == []
+
+
+def test_the_gap_between_link_and_column_is_that_of_the_nearest_points():
+    arm = Robot.load("rv-m2")
+    panel = PanelSection().geometry()
+    sizes = ClearanceSection(link_radius_mm=10.0, column_radius_mm=10.0, column_mm=400.0)
+    clearance = Clearance(arm, arm.tool, panel, sizes)
+    stretched = np.array([[0.0, 0.0, -1e-9, 0.0, 0.0]])
+    links = np.concatenate([arm.base[None, :3, 3], clearance._links(stretched)[0]])
+    outermost = links[np.argmax(np.linalg.norm(links[:, :2], axis=1))]
+    middle = panel.axes[:, :2] @ (0.5 * panel.area_m)
+    above = outermost + np.array([0.0, 0.2, 0.1])
+    gap = clearance.gap(stretched, np.eye(4), (above - middle)[None])
+    assert gap == pytest.approx(0.2 - 0.02, abs=2e-3)
+    through = clearance.gap(stretched, np.eye(4), (outermost + np.array([0.0, 0.0, 0.1]) - middle)[None])
+    assert through < 0.0

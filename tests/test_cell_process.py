@@ -1,0 +1,188 @@
+"""The measurement process on the virtual cell, through Python and through the command line."""
+
+import json
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.cell_support import cell_text, measured, poses_of, virtual, write_poses
+from tests.trials import measuring, simulated
+from truearm.cell import Cell
+from truearm.cell.accepted import accepted_table, measurements_of
+from truearm.cell.measuring import ACCURATE, DONE
+from truearm.cell.poses_file import Poses
+from truearm.cell.registering import register_cell
+from truearm.cell.session import Session
+from truearm.cell.summary import summary_of
+from truearm.cli import main
+from truearm.errors import WorkError
+
+SMALL = {"stretch": 20, "check_every": 0}
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """A session of forty poses, some approached from either side; its path, the cell, and the virtual one."""
+    path = tmp_path_factory.mktemp("session") / "session.db"
+    text = cell_text(process=SMALL)
+    cell = Cell.from_toml(text)
+    poses = poses_of(cell, 40, seed=1, approach=np.tile([0, 1, -1, 0], 10))
+    with virtual(text) as (running, found):
+        reports = []
+        end, _ = measured(found, poses, path, reports)
+        assert end == DONE
+        yield path, cell, running.world, reports
+
+
+def test_measurements_are_where_the_pin_really_was(session):
+    path, cell, world, _ = session
+    with Session(path, writing=False) as known:
+        table, summary = accepted_table(known), summary_of(known)
+    assert summary["measured"] == 40
+    assert (table["readings"] == 2).all()
+    assert (table["temperature_c"] == 21.0).all()
+    joints = table[[f"q{j}" for j in range(1, 6)]].to_numpy()
+    tenths = np.degrees(joints) * 10.0
+    np.testing.assert_allclose(tenths, np.rint(tenths), atol=1e-6)
+    truth = world.truth.true_pose(joints, tool=cell.flange_from_target)[:, :3, 3]
+    truth = truth @ world.world_from_base[:3, :3].T + world.world_from_base[:3, 3]
+    off_mm = 1e3 * np.linalg.norm(table[["x", "y", "z"]].to_numpy() - truth, axis=1)
+    assert np.sqrt(np.square(off_mm).mean()) < 0.12
+    assert off_mm.max() < 0.35
+
+
+def test_they_calibrate_the_arm(session):
+    with Session(session[0], writing=False) as known:
+        data = measurements_of(known)
+    calibration = ta.calibrate(session[1].arm, data, model="constant")
+    errors = calibration.validation.holdout
+    assert errors["constant"].position.mean < 0.3 * errors["nominal"].position.mean
+
+
+def test_progress_tells_residuals_stretches_and_time_left(session):
+    said = [report.text for report in session[3]]
+    assert any("frame registered from 6 contacts" in text for text in said)
+    assert any(text.startswith("20 poses, constant model") for text in said)
+    assert sum("stored" in text for text in said) == 46
+    assert session[3][-1].done == session[3][-1].total == 46
+    assert all(report.left_s is None or report.left_s >= 0.0 for report in session[3])
+
+
+def test_a_finished_session_is_not_done_again(session):
+    path, cell, _, _ = session
+    poses = poses_of(cell, 40, seed=1, approach=np.tile([0, 1, -1, 0], 10))
+    assert measured(cell_text(process=SMALL), poses, path)[0] == DONE
+
+
+def test_the_target_accuracy_ends_it_early(tmp_path):
+    text = cell_text(process={"stretch": 15, "check_every": 0, "target_mm": 1.0})
+    poses = poses_of(Cell.from_toml(text), 60, seed=2)
+    with virtual(text) as (_, found):
+        assert measured(found, poses, tmp_path / "s.db")[0] == ACCURATE
+        assert measured(found, poses, tmp_path / "s.db")[0] == ACCURATE
+    with Session(tmp_path / "s.db", writing=False) as known:
+        summary = summary_of(known)
+    assert summary["measured"] == 30
+    assert all(row["p95_mm"] <= 1.0 for row in summary["stretches"])
+
+
+def test_an_implausible_frame_is_refused(tmp_path):
+    # The real base is turned by 10 degrees about a vertical axis: too far for the panel to catch the pin.
+    turned = cell_text(simulate={"frame_error_deg": 10.0, "frame_error_mm": 0.0}, process={"attempts": 2})
+    with virtual(turned) as (_, found), pytest.raises(WorkError, match="registration"):
+        measured(found, poses_of(Cell.from_toml(turned), 8), tmp_path / "s.db")
+
+
+def test_registration_finds_the_frame_and_refuses_what_cannot_be():
+    cell = Cell.from_toml(cell_text())
+    joints = poses_of(cell, 12, seed=4).readings
+    frame = cell.file.world.transform()
+    points = cell.targets_in_base(joints) @ frame[:3, :3].T + frame[:3, 3]
+    found = register_cell(cell, joints, points + 1e-3)
+    assert found.residual_m < 1e-9
+    np.testing.assert_allclose(found.world_from_base[:3, 3], frame[:3, 3] + 1e-3, atol=1e-9)
+    with pytest.raises(WorkError, match="3 contacts"):
+        register_cell(cell, joints[:3], points[:3])
+    with pytest.raises(WorkError, match="of a line"):
+        register_cell(cell, joints[[0] * 6], points[[0] * 6])
+    with pytest.raises(WorkError, match="mm RMS.*implausible"):
+        register_cell(cell, joints, points + 0.02 * np.random.default_rng(0).normal(size=points.shape))
+    with pytest.raises(WorkError, match="from the cell file's: implausible"):
+        register_cell(cell, joints, points + 0.1)
+
+
+def test_what_the_table_cannot_reach_is_skipped_with_the_reason(tmp_path):
+    text = cell_text(process={"check_every": 0})
+    poses = poses_of(Cell.from_toml(text), 8, seed=6)
+    up = np.radians([0.0, 60.0, -20.0, 0.0, 20.0])
+    more = Poses(np.vstack([poses.readings, up]), np.append(poses.approach, 0), (*poses.purpose, ""))
+    with virtual(text) as (_, found):
+        assert measured(found, more, tmp_path / "s.db")[0] == DONE
+    with Session(tmp_path / "s.db", writing=False) as known:
+        skipped = summary_of(known)["skipped"]
+    assert [entry["pose"] for entry in skipped] == [9]
+    assert "the pin meets the panel at" in skipped[0]["reason"]
+
+
+def test_a_laser_tracker_needs_no_guess_of_its_frame(tmp_path):
+    text = cell_text("tracker", process={"check_every": 0})
+    with virtual(text) as (running, found):
+        assert measured(found, poses_of(Cell.from_toml(text), 8), tmp_path / "s.db")[0] == DONE
+        truth = running.world.world_from_base
+    with Session(tmp_path / "s.db", writing=False) as known:
+        frame, residual_mm = known.registration()
+    assert residual_mm < 3.0
+    assert np.linalg.norm(frame[:3, 3] - truth[:3, 3]) < 0.02
+
+
+@pytest.mark.slow
+def test_the_commands_lead_from_a_cell_file_to_measurements(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["cell", "example", "rv-m2"]) == 0
+    assert main(["cell", "example", "rv-m2"]) == 1
+    text = cell_text(process=SMALL)
+    poses = poses_of(Cell.from_toml(text), 15, seed=1)
+    write_poses(tmp_path / "poses.csv", poses)
+    capsys.readouterr()
+    assert main(["measure", "cell.toml", "poses.csv", "--dry-run"]) == 0
+    plan = capsys.readouterr().out
+    assert "8 contacts for the frame, 15 poses" in plan
+    assert main(["measure", "cell.toml", "poses.csv", "--dry-run", "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["steps"]) == 24
+    with simulated(tmp_path, text, "--seed", "3") as cell:
+        done = measuring(cell, "poses.csv", "session.db")
+        assert "15 of 15 poses measured" in done.communicate()[0]
+        assert main(["cell", "check", str(cell), "--json"]) == 0
+        assert len(json.loads(capsys.readouterr().out)["readings"]) == 5
+    assert main(["session", "show", "session.db"]) == 0
+    shown = capsys.readouterr().out
+    assert "15 of 15 poses measured" in shown
+    assert max(map(len, shown.splitlines())) <= 80
+    assert main(["session", "show", "session.db", "--pose", "2"]) == 0
+    assert "accepted" in capsys.readouterr().out
+    assert main(["session", "show", "session.db", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["measured"] == 15
+    assert main(["session", "export", "session.db"]) == 0
+    assert len(ta.Measurements.read_csv("measurements.csv")) == 15
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["cell", "example", "nothing"], 2, "there is no example"),
+        (["cell", "simulate", "missing.toml"], 1, "there is no such file"),
+        (["cell", "simulate", "cell.toml", "--fault", "lost"], 2, "is no fault"),
+        (["cell", "simulate", "cell.toml", "--fault", "lst=0.1"], 1, 'Did you mean "lost"'),
+        (["cell", "simulate", "playback.toml"], 1, "no virtual counterpart"),
+        (["measure", "cell.toml", "missing.csv"], 1, "there is no such file"),
+        (["session", "show", "missing.db"], 1, "there is no such file"),
+        (["session", "export", "missing.db"], 1, "there is no such file"),
+    ],
+)
+def test_wrong_commands_are_told(words, status, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ("rv-m2", "playback"):
+        main(["cell", "example", name, "-o", "cell.toml" if name == "rv-m2" else "playback.toml"])
+    assert main(words) == status
+    assert message in capsys.readouterr().err
