@@ -16,6 +16,7 @@ from truearm.cell.conformance import ConformanceError, check_robot, check_sensor
 from truearm.cell.playback import PlaybackRobot, PlaybackSensor
 from truearm.cell.prediction import Prediction
 from truearm.cell.session import Step
+from truearm.cell.table_panel import TablePanel
 from truearm.cell.virtual.launch import release_emergency_stop
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
@@ -131,6 +132,7 @@ def test_a_stop_halts_the_table_where_it_is():
         Connected(sensor := Cell.from_toml(found).sensor),
         ThreadPoolExecutor(1) as aside,
     ):
+        assert isinstance(sensor, TablePanel)
         moving = aside.submit(sensor.go_to, np.array([0.7, 0.0, 0.0]))
         time.sleep(0.3)
         sensor.stop()
@@ -155,7 +157,9 @@ def test_the_read_out_of_the_rv_m2_leads_back_to_the_joints(angles):
 
 @given(st.lists(st.integers(-9999, 9999), min_size=5, max_size=5))
 def test_movemaster_numbers_read_back(values):
-    assert movemaster.parse_numbers(movemaster.listed(values)).tolist() == values
+    read = movemaster.parse_numbers(movemaster.listed(values))
+    assert read is not None
+    assert read.tolist() == values
 
 
 @pytest.mark.parametrize("text", ["", "1,2,3,4,5", "+1.0,+2.0,+3.0,+4.0", "+1.0,+2.0,x3.0,+4.0,+5.0"])

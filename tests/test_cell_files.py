@@ -122,7 +122,9 @@ def test_one_process_writes_and_any_reads(cell, poses, tmp_path):
         with pytest.raises(WorkError, match="another process"):
             open_session(path, cell, poses)
         with Session(path, writing=False) as reader:
-            assert reader.next_step().step == 0
+            step = reader.next_step()
+            assert step is not None
+            assert step.step == 0
     open_session(path, cell, poses).close()
 
 

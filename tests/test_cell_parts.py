@@ -81,6 +81,7 @@ def test_packets_of_a_universal_robot_read_back_also_in_pieces():
     assert packet is not None
     assert ur_packets.parse(packet).time_s == 1.0
     packet, rest = ur_packets.last_whole(rest + stream[-7:])
+    assert packet is not None
     np.testing.assert_array_equal(ur_packets.parse(packet).readings, states[2].readings)
     assert rest == b""
     with pytest.raises(ValueError, match="packet of"):

@@ -10,7 +10,7 @@ from tests.cell_support import cell_text, measured, poses_of, virtual, write_pos
 from tests.trials import measuring, simulated
 from truearm.cell import Cell
 from truearm.cell.accepted import accepted_table, measurements_of
-from truearm.cell.measuring import ACCURATE, DONE
+from truearm.cell.measuring import ACCURATE, DONE, Progress
 from truearm.cell.poses_file import Poses
 from truearm.cell.registering import register_cell
 from truearm.cell.session import Session
@@ -29,7 +29,7 @@ def session(tmp_path_factory):
     cell = Cell.from_toml(text)
     poses = poses_of(cell, 40, seed=1, approach=np.tile([0, 1, -1, 0], 10))
     with virtual(text) as (running, found):
-        reports = []
+        reports: list[Progress] = []
         end, _ = measured(found, poses, path, reports)
         assert end == DONE
         yield path, cell, running.world, reports
@@ -97,6 +97,7 @@ def test_an_implausible_frame_is_refused(tmp_path):
 def test_registration_finds_the_frame_and_refuses_what_cannot_be():
     cell = Cell.from_toml(cell_text())
     joints = poses_of(cell, 12, seed=4).readings
+    assert cell.file.world is not None
     frame = cell.file.world.transform()
     points = cell.targets_in_base(joints) @ frame[:3, :3].T + frame[:3, 3]
     found = register_cell(cell, joints, points + 1e-3)
@@ -131,7 +132,9 @@ def test_a_laser_tracker_needs_no_guess_of_its_frame(tmp_path):
         assert measured(found, poses_of(Cell.from_toml(text), 8), tmp_path / "s.db")[0] == DONE
         truth = running.world.world_from_base
     with Session(tmp_path / "s.db", writing=False) as known:
-        frame, residual_mm = known.registration()
+        found_frame = known.registration()
+    assert found_frame is not None
+    frame, residual_mm = found_frame
     assert residual_mm < 3.0
     assert np.linalg.norm(frame[:3, 3] - truth[:3, 3]) < 0.02
 
