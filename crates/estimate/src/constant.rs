@@ -295,6 +295,9 @@ impl Fit<'_> {
     /// A pose's weight from the root mean square of its standardised residuals.
     fn robust_weights(&self, robust: Robust, noise: Noise, residuals: &[f64]) -> Vec<f64> {
         let set = self.problem.measurements;
+        if set.is_distances() {
+            return self.robust_weights_of_distances(robust, noise, residuals);
+        }
         let rows = set.rows_per_pose();
         let of_pose = |pose: usize| {
             let standardised: Vec<f64> = (0..rows)
@@ -317,7 +320,21 @@ impl Fit<'_> {
             let mean = standardised.iter().map(|z| z * z).sum::<f64>() / standardised.len().max(1) as f64;
             set.weight[pose] * robust.weight(mean.sqrt())
         };
-        if set.is_distances() { set.weight.clone() } else { (0..set.pose_count()).map(of_pose).collect() }
+        (0..set.pose_count()).map(of_pose).collect()
+    }
+
+    /// The same of the distances that start at each pose.
+    fn robust_weights_of_distances(&self, robust: Robust, noise: Noise, residuals: &[f64]) -> Vec<f64> {
+        let set = self.problem.measurements;
+        let mut squares = vec![(0.0, 0.0_f64); set.pose_count()];
+        for (distance, residual) in set.distances.iter().zip(residuals) {
+            let sigma = noise.position.hypot(set.sigma[distance.pose]);
+            let (sum, count) = &mut squares[distance.pose];
+            *sum += (residual / sigma).powi(2);
+            *count += 1.0;
+        }
+        let weights = squares.iter().zip(&set.weight);
+        weights.map(|((sum, count), weight)| weight * robust.weight((sum / count.max(1.0)).sqrt())).collect()
     }
 
     /// Whether another minimisation would change nothing that matters.

@@ -56,6 +56,24 @@ fn robust_losses_estimate_the_noise_of_the_good_rows() {
 }
 
 #[test]
+fn gross_distances_are_told_apart_too() {
+    let anchors = [[1.5, 0.2, -0.4], [-0.3, 1.8, 0.9], [0.5, -1.5, 0.2], [-1.2, -0.4, -0.8]];
+    let clean = plan().make().with_distances(&anchors, 1e-4);
+    let mut dirty = plan().make().with_distances(&anchors, 1e-4);
+    for distance in dirty.set.distances.iter_mut().filter(|distance| distance.pose % 10 == 3) {
+        distance.value += 0.2;
+    }
+    let error = |scene: &Scene, robust| clean.error_of(&fit(scene, robust).parameters);
+    let (best, plain) = (error(&clean, None), error(&dirty, None));
+    let cauchy = error(&dirty, Some(Robust::Cauchy));
+    assert!(cauchy < 3.0 * best, "Cauchy {cauchy:e}, without outliers {best:e}");
+    assert!(plain > 50.0 * best, "least squares {plain:e}, without outliers {best:e}");
+    for (pose, &weight) in fit(&dirty, Some(Robust::Cauchy)).weights.iter().enumerate() {
+        assert_eq!(weight < 0.1, pose % 10 == 3, "pose {pose} has the weight {weight}");
+    }
+}
+
+#[test]
 fn no_loss_is_least_squares() {
     let scene = plan().make();
     let (none, plain) = (fit(&scene, Some(Robust::None)), fit(&scene, None));
