@@ -232,7 +232,8 @@ def test_euler_angles_at_the_pole_keep_the_third():
 
 def test_turns_stay_within_limits():
     branch = np.array([[0.1, -1.0, 0.5, 3.1, 0.5, -3.0]])
-    turned = with_turns(branch, KUKA)
+    owners, turned = with_turns(branch[None], KUKA)
+    assert (owners == 0).all()
     assert ((turned >= KUKA.limits[:, 0]) & (turned <= KUKA.limits[:, 1])).all()
     assert len(turned) == 4
     near = nearest_turns(branch, KUKA, np.array([0.0, 0.0, 0.0, -3.1, 0.0, 5.9]))

@@ -4,7 +4,6 @@ A language says how digits follow from readings; telling them of a branch and fi
 target means are the same function, so that what is written is what is read.
 """
 
-from itertools import product
 from typing import Final, Protocol
 
 import numpy as np
@@ -18,7 +17,6 @@ Integers = NDArray[np.int64]
 ANY: Final = -(2**31)
 EDGE_RAD: Final = np.deg2rad(0.01)
 FULL_TURN: Final = 2.0 * np.pi
-MAX_TURNED: Final = 512
 
 
 class Configuration(Protocol):
@@ -41,27 +39,37 @@ class Configuration(Protocol):
         ...
 
 
-def meant(configuration: Configuration, values: Floats, candidates: Floats) -> NDArray[np.bool_]:
-    """Which of the readings (k, N) the numbers (C,) of one target mean, (k,).
+def meant(configuration: Configuration, wanted: Integers, candidates: Floats) -> NDArray[np.bool_]:
+    """Which of the readings (m, N) agree with the digits (m, D) of their targets, (m,).
 
     The position in a text is rounded, so a joint within EDGE_RAD of a digit's edge agrees with the digits
     on both sides of it.
     """
-    wanted = configuration.digits_of_text(values[None])
-    agrees = np.zeros((len(candidates), wanted.shape[1]), dtype=bool)
+    if len(candidates) == 0:
+        return np.zeros(0, dtype=bool)
+    agrees = np.asarray(wanted == ANY)
     for shift in (0.0, EDGE_RAD, -EDGE_RAD):
         agrees |= configuration.digits(candidates + shift) == wanted
-    found: NDArray[np.bool_] = (agrees | (wanted == ANY)).all(axis=1)
+    found: NDArray[np.bool_] = agrees.all(axis=1)
     return found
 
 
-def with_turns(branches: Floats, robot: RobotData) -> Floats:
-    """Readings (k, N) of branches (b, N) with every full turn that the limits of the joints allow.
+def with_turns(branches: Floats, robot: RobotData) -> tuple[Integers, Floats]:
+    """Readings of branches (n, K, N) with every full turn that the limits of the joints allow.
 
     Joints without limits may be a turn away from the principal range, not more.
+
+    Returns:
+        For each of m readings, in order, the row of `branches` it belongs to, (m,), and the readings, (m, N).
     """
-    found = [turned for branch in branches for turned in _turned(branch, robot)]
-    return np.array(found).reshape(-1, robot.joint_count)
+    limits = _limits(robot) + np.array([-EDGE_RAD, EDGE_RAD])
+    rows, which = np.nonzero(np.isfinite(branches).all(axis=2))
+    found = branches[rows, which]
+    for joint, kind in enumerate(robot.joints):
+        if kind == "revolute" and len(found) > 0:
+            rows, found = _turned(rows, found, joint, limits[joint])
+    order = np.argsort(rows, kind="stable")
+    return rows[order], found[order]
 
 
 def nearest_turns(branches: Floats, robot: RobotData, before: Floats) -> Floats:
@@ -77,18 +85,16 @@ def nearest_turns(branches: Floats, robot: RobotData, before: Floats) -> Floats:
     return found
 
 
-def _turned(branch: Floats, robot: RobotData) -> list[tuple[float, ...]]:
-    choices = []
-    for value, joint, (low, high) in zip(branch, robot.joints, _limits(robot), strict=True):
-        if joint != "revolute":
-            choices.append([float(value)])
-            continue
-        first = int(np.ceil((low - EDGE_RAD - value) / FULL_TURN))
-        last = int(np.floor((high + EDGE_RAD - value) / FULL_TURN))
-        choices.append([float(value + turn * FULL_TURN) for turn in range(first, last + 1)])
-    if np.prod([float(len(choice)) for choice in choices]) > MAX_TURNED:
-        return []
-    return list(product(*choices))
+def _turned(rows: Integers, q: Floats, joint: int, limits: Floats) -> tuple[Integers, Floats]:
+    """Readings with every turn of one joint within its limits."""
+    first = np.ceil((limits[0] - q[:, joint]) / FULL_TURN).astype(np.int64)
+    last = np.floor((limits[1] - q[:, joint]) / FULL_TURN).astype(np.int64)
+    counts = np.maximum(last - first + 1, 0)
+    owners = np.repeat(np.arange(len(q)), counts)
+    turns = first[owners] + np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+    turned = q[owners]
+    turned[:, joint] += turns * FULL_TURN
+    return rows[owners], turned
 
 
 def _limits(robot: RobotData) -> Floats:

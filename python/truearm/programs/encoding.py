@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from truearm.controller import Controller
 from truearm.inverse import Inverse
-from truearm.programs.configuration import ANY, with_turns
+from truearm.programs.configuration import ANY, Configuration, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program
-from truearm.programs.solving import AT_ONCE, is_singular, numbers_of
+from truearm.programs.solving import AT_ONCE, are_singular, numbers_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -121,29 +121,32 @@ class Encoder:
         configuration = self.program.configuration
         if configuration is None:
             return stated
-        digits = configuration.digits(said)
-        text = configuration.text_of_digits(digits, stated)
+        text = configuration.text_of_digits(configuration.digits(said), stated)
         absent = np.isnan(stated)
         rows = np.flatnonzero(~absent.all(axis=1))
         for start in range(0, len(rows), AT_ONCE):
             some = rows[start : start + AT_ONCE]
-            for row, branches in zip(some, self.inverse.branches(flange[some]), strict=True):
-                wanted = configuration.digits_of_text(text[row : row + 1])
-                if np.isnan(text[row, ~absent[row]]).any() or not self._only(said[row], branches, wanted):
-                    self.reasons[int(which[row])] = NOT_UNIQUE
+            complete = some[(np.isfinite(text[some]) | absent[some]).all(axis=1)]
+            alone = self._alone(configuration, said[complete], flange[complete], text[complete])
+            for row in np.setdiff1d(some, complete[alone]):
+                self.reasons[int(which[row])] = NOT_UNIQUE
         return np.where(absent, np.nan, text)
 
-    def _only(self, said: Floats, branches: Floats, wanted: Integers) -> bool:
-        """Whether the configuration data `wanted` leaves the controller no readings but `said`."""
-        configuration = self.program.configuration
-        if configuration is None:
-            return True
-        candidates = with_turns(branches[np.isfinite(branches).all(axis=1)], self.robot)
+    def _alone(
+        self, configuration: Configuration, said: Floats, flange: Floats, text: Floats
+    ) -> NDArray[np.bool_]:
+        """Where configuration data (n, C) leaves the controller no readings but `said` (n, N)."""
+        if len(said) == 0:
+            return np.zeros(0, dtype=bool)
+        rows, candidates = with_turns(self.inverse.branches(flange), self.robot)
         if len(candidates) == 0:
-            return False
+            return np.zeros(len(said), dtype=bool)
+        wanted = configuration.digits_of_text(text)[rows]
         agrees = ((configuration.digits(candidates) == wanted) | (wanted == ANY)).all(axis=1)
-        apart = np.abs(candidates[agrees] - said).max(axis=1)
-        return bool(len(apart) > 0 and (apart < AGREES_RAD).all())
+        same = np.abs(candidates - said[rows]).max(axis=1) < AGREES_RAD
+        right = np.bincount(rows[agrees & same], minlength=len(said)) > 0
+        wrong = np.bincount(rows[agrees & ~same], minlength=len(said)) > 0
+        return right & ~wrong
 
     def _rounded(
         self, which: Integers, layout: JointLayout | PoseLayout, values: Floats
@@ -202,5 +205,5 @@ def joints_of(robot: Robot, base_from_flange: Floats, near: Floats) -> tuple[Flo
         step = (np.linalg.pinv(jacobian @ robot.coupling) @ error[:, :, None])[:, :, 0]
         steady &= np.abs(step).max(axis=1) < AGREES_RAD * 10
         q += np.where(steady[:, None], step, 0.0)
-    steady &= np.array([not is_singular(robot, row) for row in q], dtype=bool)
+    steady &= ~are_singular(robot, q)
     return q, steady

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
-from truearm.programs.configuration import meant, nearest_turns, with_turns
+from truearm.programs.configuration import ANY, meant, nearest_turns, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight
@@ -31,6 +31,7 @@ SAME_RAD: Final = 1e-6
 NEARER: Final = 0.8
 LEAST_GAIN: Final = 2e-3
 AT_ONCE: Final = 1000
+CLOSE_RAD: Final = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +80,21 @@ def flange_poses(stored: Floats, environment: Environment) -> Floats:
     return poses
 
 
+@dataclass(frozen=True, eq=False)
+class _Possible:
+    """What the readings of a Cartesian target can be.
+
+    Attributes:
+        branches: One turn of each branch, (b, N).
+        named: Those that its configuration data names, (k, N); None where it has none.
+        singular: Whether these lie at a singularity, (k,).
+    """
+
+    branches: Floats
+    named: Floats | None
+    singular: Bools | None
+
+
 class _Solver:
     """Gathers readings and reasons."""
 
@@ -110,8 +126,8 @@ class _Solver:
 
     def take_poses(self, tell: Callable[[int, int], None]) -> None:
         """Cartesian targets, in the order of the moves, each with the one before for a seed."""
-        branches = self._branches(tell)
-        if not branches:
+        possible = self._possible(tell)
+        if not possible:
             return
         before: Floats | None = None
         moves = self.program.moves
@@ -119,23 +135,58 @@ class _Solver:
         for target, follows, motion in zip(*columns, strict=True):
             if not follows:
                 before = None
-            if target in branches:
-                self._take(target, branches[target], before, straight=motion_is_straight(motion))
+            if target in possible:
+                self._take(target, possible[target], before, straight=motion_is_straight(motion))
             known = not np.isnan(self.q[target, 0])
             before = self.q[target] if known else None
 
-    def _branches(self, tell: Callable[[int, int], None]) -> dict[int, Floats]:
-        """The readings (k, N) of each Cartesian target in all branches, one turn of each."""
+    def _possible(self, tell: Callable[[int, int], None]) -> dict[int, _Possible]:
+        """What the readings of each Cartesian target can be."""
         poses = self._flange_poses()
-        numbers = list(poses)
-        found: dict[int, Floats] = {}
+        numbers = np.array(list(poses), dtype=np.int64)
+        found: dict[int, _Possible] = {}
         for start in range(0, len(numbers), AT_ONCE):
             tell(start, len(numbers))
             some = numbers[start : start + AT_ONCE]
-            reached = self.inverse.branches(np.stack([poses[number] for number in some]))
-            for number, rows in zip(some, reached, strict=True):
-                found[number] = rows[np.isfinite(rows).all(axis=1)]
+            branches = self.inverse.branches(np.stack([poses[number] for number in some.tolist()]))
+            named = self._named(some, branches)
+            for row, number in enumerate(some.tolist()):
+                reached = branches[row][np.isfinite(branches[row]).all(axis=1)]
+                found[number] = _Possible(reached, *named.get(row, (None, None)))
         return found
+
+    def _named(self, some: Integers, branches: Floats) -> dict[int, tuple[Floats, Bools]]:
+        """By row: readings that the configuration data of the targets `some` names, and whether singular."""
+        configuration = self.program.configuration
+        wanted = self._wanted(some)
+        if configuration is None or wanted is None:
+            return {}
+        stated = (wanted != ANY).any(axis=1)
+        rows, candidates = with_turns(branches, self.robot)
+        agree = stated[rows]
+        agree[agree] = meant(configuration, wanted[rows[agree]], candidates[agree])
+        rows, candidates = rows[agree], candidates[agree]
+        singular = are_singular(self.robot, candidates)
+        places = np.searchsorted(rows, np.arange(len(some) + 1))
+        return {
+            int(row): (candidates[places[row] : places[row + 1]], singular[places[row] : places[row + 1]])
+            for row in np.flatnonzero(stated)
+        }
+
+    def _wanted(self, some: Integers) -> Integers | None:
+        """Digits (n, D) of targets' configuration data, ANY where open; None where no target has any."""
+        configuration, wanted = self.program.configuration, None
+        for number, layout in enumerate(self.program.layouts):
+            count = getattr(layout, "configuration", 0)
+            here = self.program.targets.layout[some] == number
+            if configuration is None or count == 0 or not here.any():
+                continue
+            values = numbers_of(self.program, some[here], layout)[:, -count:]
+            digits = configuration.digits_of_text(values)
+            if wanted is None:
+                wanted = np.full((len(some), digits.shape[1]), ANY, dtype=np.int64)
+            wanted[here] = digits
+        return wanted
 
     def _flange_poses(self) -> dict[int, Floats]:
         """Poses of the flange for every Cartesian target that may be changed."""
@@ -154,14 +205,13 @@ class _Solver:
                 found.update(zip(which.tolist(), poses, strict=True))
         return found
 
-    def _take(self, target: int, branches: Floats, before: Floats | None, *, straight: bool) -> None:
+    def _take(self, target: int, possible: _Possible, before: Floats | None, *, straight: bool) -> None:
         if target in self.reasons:
             return
         known = None if np.isnan(self.q[target, 0]) else self.q[target]
-        stated = self._stated(target)
-        if known is not None and stated is not None:
+        if known is not None and possible.named is not None:
             return
-        found = self._chosen(branches, stated, before, straight=straight)
+        found = self._chosen(possible, before, straight=straight)
         if isinstance(found, str):
             self.reasons[target] = found
             self.q[target] = np.nan
@@ -171,44 +221,37 @@ class _Solver:
         else:
             self.q[target] = found
 
-    def _chosen(
-        self, branches: Floats, stated: Floats | None, before: Floats | None, *, straight: bool
-    ) -> Floats | str:
+    def _chosen(self, possible: _Possible, before: Floats | None, *, straight: bool) -> Floats | str:
         """The readings that are meant, or why they are not known."""
-        if len(branches) == 0:
+        if len(possible.branches) == 0:
             return OUT_OF_REACH
-        if stated is None or self.program.configuration is None:
-            if before is None:
-                return AMBIGUOUS
-            candidates = nearest_turns(branches, self.robot, before)
-            found = the_nearest(candidates, before) if len(candidates) else None
-        else:
-            candidates = with_turns(branches, self.robot)
-            candidates = candidates[meant(self.program.configuration, stated, candidates)]
-            if len(candidates) == 0:
-                return NO_BRANCH
-            found = the_nearest(candidates, before)
-            if found is not None and straight and before is not None:
-                every = nearest_turns(branches, self.robot, before)
-                found = found if is_nearest(found, every, before) else None
+        if possible.named is None:
+            return self._unnamed(possible, before)
+        if len(possible.named) == 0:
+            return NO_BRANCH
+        found = the_nearest(possible.named, before)
         if found is None:
-            return AMBIGUOUS if stated is None else CONTRADICTS
-        return SINGULAR if is_singular(self.robot, found) else found
+            return AMBIGUOUS
+        if straight and before is not None and np.abs(found - before).max() > CLOSE_RAD:
+            every = nearest_turns(possible.branches, self.robot, before)
+            if not is_nearest(found, every, before):
+                return CONTRADICTS
+        return SINGULAR if possible.singular is not None and possible.singular.any() else found
 
-    def _stated(self, target: int) -> Floats | None:
-        """The configuration data of a target; None where there is none."""
-        layout = self.program.layouts[int(self.program.targets.layout[target])]
-        count = getattr(layout, "configuration", 0)
-        if count == 0:
-            return None
-        first = self.program.targets.first[target]
-        values = self.program.targets.values[first : first + layout.width][-count:]
-        return None if np.isnan(values).all() else values
+    def _unnamed(self, possible: _Possible, before: Floats | None) -> Floats | str:
+        """The readings nearest to those before, where the text does not tell."""
+        if before is None:
+            return AMBIGUOUS
+        candidates = nearest_turns(possible.branches, self.robot, before)
+        found = the_nearest(candidates, before) if len(candidates) else None
+        if found is None:
+            return AMBIGUOUS
+        return SINGULAR if are_singular(self.robot, found[None])[0] else found
 
 
 def the_nearest(candidates: Floats, before: Floats | None) -> Floats | None:
     """The one of the candidates (k, N) that is meant: the only one, or clearly the nearest to `before`."""
-    distinct = _distinct(candidates)
+    distinct = candidates if len(candidates) == 1 else _distinct(candidates)
     if len(distinct) == 1:
         return np.asarray(distinct[0])
     if before is None:
@@ -234,9 +277,10 @@ def _distinct(candidates: Floats) -> Floats:
     return np.array(kept)
 
 
-def is_singular(robot: Robot, q: Floats) -> bool:
-    """Whether a small change of the pose asks for a large one of the joints (six axes or more)."""
-    if robot.joint_count < 6:
-        return False
+def are_singular(robot: Robot, q: Floats) -> Bools:
+    """Where a small change of the pose asks for a large one of the joints, (n,) (six axes or more)."""
+    if robot.joint_count < 6 or len(q) == 0:
+        return np.zeros(len(q), dtype=bool)
     jacobian = robot.joint_jacobian(q, pose=True)
-    return bool(np.linalg.svd(jacobian, compute_uv=False)[5] < LEAST_GAIN)
+    gains: Bools = np.linalg.svd(jacobian, compute_uv=False)[:, 5] < LEAST_GAIN
+    return gains
