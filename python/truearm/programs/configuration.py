@@ -47,10 +47,9 @@ def meant(configuration: Configuration, wanted: Integers, candidates: Floats) ->
     """
     if len(candidates) == 0:
         return np.zeros(0, dtype=bool)
-    agrees = np.asarray(wanted == ANY)
-    for shift in (0.0, EDGE_RAD, -EDGE_RAD):
-        agrees |= configuration.digits(candidates + shift) == wanted
-    found: NDArray[np.bool_] = agrees.all(axis=1)
+    shifts = (0.0, EDGE_RAD, -EDGE_RAD)
+    agrees = [configuration.digits(candidates + shift) == wanted for shift in shifts]
+    found: NDArray[np.bool_] = np.logical_or.reduce([wanted == ANY, *agrees]).all(axis=1)
     return found
 
 
