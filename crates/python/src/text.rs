@@ -3,7 +3,7 @@
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use truearm_text::{Numbers, TextError, Words, scan_lines as scan, splice};
+use truearm_text::{Numbers, TextError, Words, scan_lines as scan, splice_in_pieces};
 
 use crate::door::{CoreError, Failure, quick};
 
@@ -30,17 +30,16 @@ impl Failure for TextError {
 pub fn scan_lines<'py>(py: Python<'py>, text: &[u8]) -> Scanned<'py> {
     let lines = py.detach(|| scan(text));
     let integers = |values: Vec<i64>| values.into_pyarray(py);
-    let places = |values: Vec<usize>| integers(values.into_iter().map(|value| value as i64).collect());
-    let numbers = &lines.numbers;
+    let numbers = lines.numbers;
     (
-        places(lines.starts),
-        integers(lines.skeleton.into_iter().map(i64::from).collect()),
-        places(lines.representative),
-        places(lines.first_number),
-        integers(numbers.iter().map(|number| number.start as i64).collect()),
-        integers(numbers.iter().map(|number| number.end as i64).collect()),
-        numbers.iter().map(|number| number.value).collect::<Vec<f64>>().into_pyarray(py),
-        integers(numbers.iter().map(|number| i64::from(number.decimals)).collect()),
+        integers(lines.starts),
+        integers(lines.skeleton),
+        integers(lines.representative),
+        integers(lines.first_number),
+        integers(numbers.starts),
+        integers(numbers.ends),
+        numbers.values.into_pyarray(py),
+        integers(numbers.decimals),
     )
 }
 
@@ -62,6 +61,14 @@ pub fn splice_numbers<'py>(
     };
     let words: Vec<Words<'_>> =
         words.iter().map(|(start, end, bytes)| Words { start: *start, end: *end, bytes }).collect();
-    let out = quick(py, || splice(text, numbers, &words))?;
-    Ok(PyBytes::new(py, &out))
+    let pieces = quick(py, || splice_in_pieces(text, numbers, &words))?;
+    PyBytes::new_with(py, pieces.iter().map(Vec::len).sum(), |out| {
+        let mut rest = out;
+        for piece in &pieces {
+            let (here, behind) = rest.split_at_mut(piece.len());
+            here.copy_from_slice(piece);
+            rest = behind;
+        }
+        Ok(())
+    })
 }

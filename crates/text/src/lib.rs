@@ -9,5 +9,5 @@ mod splice;
 pub use error::TextError;
 pub use format::write_fixed;
 pub use number::Number;
-pub use scan::{Lines, scan_lines};
-pub use splice::{Numbers, Words, splice};
+pub use scan::{Found, Lines, scan_lines};
+pub use splice::{Numbers, Words, splice, splice_in_pieces};

@@ -2,6 +2,15 @@
 
 /// Behind these a sign is an operator.
 const ENDS_AN_OPERAND: &[u8] = b")]}";
+/// Powers of ten that a machine number holds exactly.
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
+    1e19, 1e20, 1e21, 1e22,
+];
+/// Up to here integers are exact machine numbers.
+const EXACT: u64 = 1 << 53;
+/// So many digits fit an integer, whatever they are.
+const MOST_DIGITS: usize = 18;
 
 /// A number in a line, its sign included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,24 +25,77 @@ pub struct Number {
     pub decimals: i32,
 }
 
-/// Whether a byte can be in a name; bytes of other alphabets can.
-pub(crate) fn in_name(byte: u8) -> bool {
-    byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'$' || byte >= 0x80
+/// What a byte can be part of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Class {
+    /// A name, not as a digit; bytes of other alphabets can.
+    Name,
+    /// A number or a name.
+    Digit,
+    /// A number.
+    Point,
+    /// Neither.
+    Other,
+}
+
+/// The classes of all bytes.
+const CLASSES: [Class; 256] = {
+    let mut classes = [Class::Other; 256];
+    let mut byte = 0_usize;
+    while byte < 256 {
+        let letter = byte as u8;
+        if letter.is_ascii_digit() {
+            classes[byte] = Class::Digit;
+        } else if letter == b'.' {
+            classes[byte] = Class::Point;
+        } else if letter.is_ascii_alphabetic() || letter == b'_' || letter == b'$' || letter >= 0x80 {
+            classes[byte] = Class::Name;
+        }
+        byte += 1;
+    }
+    classes
+};
+
+/// What a byte can be part of.
+pub(crate) fn class(byte: u8) -> Class {
+    CLASSES[usize::from(byte)]
+}
+
+/// Whether a byte can be in a name.
+fn in_name(byte: u8) -> bool {
+    matches!(class(byte), Class::Name | Class::Digit)
+}
+
+/// Digits read so far.
+#[derive(Default)]
+struct Digits {
+    whole: u64,
+    count: usize,
+}
+
+impl Digits {
+    /// Take the digits at `at`; where they end.
+    fn take(&mut self, line: &[u8], mut at: usize) -> usize {
+        while let Some(digit) = line.get(at).filter(|byte| byte.is_ascii_digit()) {
+            self.whole = self.whole.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
+            self.count += 1;
+            at += 1;
+        }
+        at
+    }
 }
 
 /// The number whose first digit or point is at `at`; None where digits are part of something else.
 pub(crate) fn number_at(line: &[u8], at: usize) -> Option<Number> {
-    let (mut end, mut digits, mut decimals) = (at, 0_usize, 0_i32);
-    while line.get(end).is_some_and(u8::is_ascii_digit) {
-        (end, digits) = (end + 1, digits + 1);
-    }
+    let mut digits = Digits::default();
+    let mut decimals = 0;
+    let mut end = digits.take(line, at);
     if line.get(end) == Some(&b'.') && line.get(end + 1) != Some(&b'.') {
-        end += 1;
-        while line.get(end).is_some_and(u8::is_ascii_digit) {
-            (end, digits, decimals) = (end + 1, digits + 1, decimals.saturating_add(1));
-        }
+        let before = digits.count;
+        end = digits.take(line, end + 1);
+        decimals = i32::try_from(digits.count - before).unwrap_or(i32::MAX);
     }
-    if digits == 0 {
+    if digits.count == 0 {
         return None;
     }
     let (end, exponent) = exponent_at(line, end);
@@ -41,8 +103,20 @@ pub(crate) fn number_at(line: &[u8], at: usize) -> Option<Number> {
         return None;
     }
     let start = sign_before(line, at).unwrap_or(at);
-    let value = value_of(&line[start..end])?;
-    Some(Number { start, end, value, decimals: decimals.saturating_sub(exponent).max(0) })
+    let shift = exponent.saturating_sub(decimals);
+    let magnitude = exact(&digits, shift).or_else(|| parsed(&line[at..end]))?;
+    let value = if line[start] == b'-' { -magnitude } else { magnitude };
+    Some(Number { start, end, value, decimals: shift.saturating_neg().max(0) })
+}
+
+/// The value of digits times a power of ten where both are exact, so that their quotient is the nearest number.
+fn exact(digits: &Digits, shift: i32) -> Option<f64> {
+    if digits.count > MOST_DIGITS || digits.whole > EXACT {
+        return None;
+    }
+    let power = POWERS.get(shift.unsigned_abs() as usize)?;
+    let whole = digits.whole as f64;
+    Some(if shift < 0 { whole / power } else { whole * power })
 }
 
 /// End and value of the exponent that may begin at `at`.
@@ -69,7 +143,7 @@ fn sign_before(line: &[u8], at: usize) -> Option<usize> {
 }
 
 /// The value of a number's text; None if it is out of range.
-fn value_of(text: &[u8]) -> Option<f64> {
+fn parsed(text: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(text).ok()?;
     text.parse::<f64>().ok().filter(|value| value.is_finite())
 }

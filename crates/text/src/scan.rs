@@ -2,83 +2,203 @@
 
 use std::collections::HashMap;
 
-use crate::number::{Number, in_name, number_at};
+use rayon::prelude::*;
+
+use crate::number::{Class, Number, class, number_at};
 
 /// Stands for a number in a skeleton. No text has it: readers refuse texts with this byte.
 const PLACEHOLDER: u8 = 0;
+/// Bytes that are scanned at a time; the result does not depend on it.
+const PIECE: usize = 1 << 18;
+/// Bytes to a line, and to a number, about: what is made room for.
+const LINE: usize = 64;
+const NUMBER: usize = 12;
+
+/// Numbers of a text at places in the whole of it, in columns.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// First byte of each.
+    pub starts: Vec<i64>,
+    /// Behind the last byte of each.
+    pub ends: Vec<i64>,
+    /// What they say.
+    pub values: Vec<f64>,
+    /// Digits behind the point, a negative exponent counted.
+    pub decimals: Vec<i64>,
+}
+
+impl Found {
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.starts.is_empty()
+    }
+
+    /// They, one by one.
+    pub fn iter(&self) -> impl Iterator<Item = Number> + '_ {
+        (0..self.len()).map(|row| Number {
+            start: self.starts[row] as usize,
+            end: self.ends[row] as usize,
+            value: self.values[row],
+            decimals: self.decimals[row] as i32,
+        })
+    }
+
+    fn with_room_for(count: usize) -> Self {
+        Self {
+            starts: Vec::with_capacity(count),
+            ends: Vec::with_capacity(count),
+            values: Vec::with_capacity(count),
+            decimals: Vec::with_capacity(count),
+        }
+    }
+
+    fn push(&mut self, number: &Number, offset: usize) {
+        self.starts.push((number.start + offset) as i64);
+        self.ends.push((number.end + offset) as i64);
+        self.values.push(number.value);
+        self.decimals.push(i64::from(number.decimals));
+    }
+
+    fn append(&mut self, other: &Self) {
+        self.starts.extend_from_slice(&other.starts);
+        self.ends.extend_from_slice(&other.ends);
+        self.values.extend_from_slice(&other.values);
+        self.decimals.extend_from_slice(&other.decimals);
+    }
+}
 
 /// The lines of a text and their numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Lines {
     /// First byte of each line, and the length of the text.
-    pub starts: Vec<usize>,
+    pub starts: Vec<i64>,
     /// For each line, which of the different lines it is, numbers apart.
-    pub skeleton: Vec<u32>,
+    pub skeleton: Vec<i64>,
     /// For each different line, the first line that is so.
-    pub representative: Vec<usize>,
+    pub representative: Vec<i64>,
     /// For each line, its first number; and how many numbers there are.
-    pub first_number: Vec<usize>,
-    /// The numbers, at places in the whole text.
-    pub numbers: Vec<Number>,
+    pub first_number: Vec<i64>,
+    /// The numbers.
+    pub numbers: Found,
 }
 
 /// Find the lines and the numbers of a text.
 ///
 /// Digits within names are no numbers. A sign belongs to its number unless something that it could be
 /// subtracted from stands before it.
+#[must_use]
 pub fn scan_lines(text: &[u8]) -> Lines {
-    let mut lines = Lines::default();
-    let mut known: HashMap<Vec<u8>, u32> = HashMap::new();
-    let (mut scratch, mut last, mut last_id) = (Vec::new(), Vec::new(), None);
-    let mut start = 0;
-    for line in text.split_inclusive(|&byte| byte == b'\n') {
-        lines.starts.push(start);
-        lines.first_number.push(lines.numbers.len());
-        scan_line(line, start, &mut scratch, &mut lines.numbers);
-        let id = match last_id {
-            Some(id) if scratch == last => id,
-            _ => {
-                let fresh = lines.representative.len() as u32;
-                let id = *known.entry(scratch.clone()).or_insert(fresh);
-                if id == fresh {
-                    lines.representative.push(lines.skeleton.len());
-                }
-                std::mem::swap(&mut scratch, &mut last);
-                id
-            }
-        };
-        last_id = Some(id);
-        lines.skeleton.push(id);
-        start += line.len();
+    let pieces: Vec<Piece> =
+        pieces(text).into_par_iter().map(|(start, end)| Piece::of(text, start, end)).collect();
+    let mut lines = Lines {
+        numbers: Found::with_room_for(pieces.iter().map(|piece| piece.lines.numbers.len()).sum()),
+        ..Lines::default()
+    };
+    let mut known: HashMap<Vec<u8>, i64> = HashMap::new();
+    for piece in pieces {
+        lines.append(piece, &mut known);
     }
-    lines.starts.push(start);
-    lines.first_number.push(lines.numbers.len());
+    lines.starts.push(text.len() as i64);
+    lines.first_number.push(lines.numbers.len() as i64);
     lines
 }
 
+impl Lines {
+    /// Add the lines of the next piece of the text.
+    fn append(&mut self, piece: Piece, known: &mut HashMap<Vec<u8>, i64>) {
+        let (line, number) = (self.skeleton.len() as i64, self.numbers.len() as i64);
+        let mut ids = Vec::with_capacity(piece.skeletons.len());
+        for (skeleton, first) in piece.skeletons.into_iter().zip(&piece.lines.representative) {
+            let fresh = self.representative.len() as i64;
+            let id = *known.entry(skeleton).or_insert(fresh);
+            if id == fresh {
+                self.representative.push(first + line);
+            }
+            ids.push(id);
+        }
+        self.starts.extend_from_slice(&piece.lines.starts);
+        self.skeleton.extend(piece.lines.skeleton.iter().map(|&id| ids[id as usize]));
+        self.first_number.extend(piece.lines.first_number.iter().map(|first| first + number));
+        self.numbers.append(&piece.lines.numbers);
+    }
+}
+
+/// Spans of the text, each of whole lines.
+fn pieces(text: &[u8]) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    while start < text.len() {
+        let near = (start + PIECE).min(text.len());
+        let rest = text[near..].iter().position(|&byte| byte == b'\n');
+        let end = rest.map_or(text.len(), |place| near + place + 1);
+        found.push((start, end));
+        start = end;
+    }
+    found
+}
+
+/// The lines of a part of the text, and the different lines among them, numbers apart.
+struct Piece {
+    lines: Lines,
+    skeletons: Vec<Vec<u8>>,
+}
+
+impl Piece {
+    /// The lines from `start` to `end`.
+    fn of(text: &[u8], start: usize, end: usize) -> Self {
+        let mut lines = Lines { numbers: Found::with_room_for((end - start) / NUMBER), ..Lines::default() };
+        lines.starts.reserve((end - start) / LINE);
+        let mut known: HashMap<Vec<u8>, i64> = HashMap::new();
+        let mut skeletons: Vec<Vec<u8>> = Vec::new();
+        let (mut scratch, mut at) = (Vec::new(), start);
+        let mut last = usize::MAX;
+        for line in text[start..end].split_inclusive(|&byte| byte == b'\n') {
+            lines.starts.push(at as i64);
+            lines.first_number.push(lines.numbers.len() as i64);
+            scan_line(line, at, &mut scratch, &mut lines.numbers);
+            if skeletons.get(last) != Some(&scratch) {
+                let fresh = skeletons.len() as i64;
+                let id = *known.entry(scratch.clone()).or_insert(fresh);
+                if id == fresh {
+                    lines.representative.push(lines.skeleton.len() as i64);
+                    skeletons.push(scratch.clone());
+                }
+                last = id as usize;
+            }
+            lines.skeleton.push(last as i64);
+            at += line.len();
+        }
+        Self { lines, skeletons }
+    }
+}
+
 /// The skeleton of one line into `scratch`, its numbers, at `offset` more, behind `numbers`.
-fn scan_line(line: &[u8], offset: usize, scratch: &mut Vec<u8>, numbers: &mut Vec<Number>) {
+fn scan_line(line: &[u8], offset: usize, scratch: &mut Vec<u8>, numbers: &mut Found) {
     scratch.clear();
     let (mut at, mut copied) = (0, 0);
-    while at < line.len() {
-        let byte = line[at];
-        if in_name(byte) && !byte.is_ascii_digit() {
-            at = end_of_name(line, at);
-            continue;
+    while let Some(&byte) = line.get(at) {
+        match class(byte) {
+            Class::Other => at += 1,
+            Class::Name => at = end_of_name(line, at),
+            Class::Digit | Class::Point => {
+                let Some(number) = number_at(line, at) else {
+                    at = end_of_name(line, at);
+                    continue;
+                };
+                scratch.extend_from_slice(&line[copied..number.start]);
+                scratch.push(PLACEHOLDER);
+                at = number.end;
+                copied = at;
+                numbers.push(&number, offset);
+            }
         }
-        if !byte.is_ascii_digit() && byte != b'.' {
-            at += 1;
-            continue;
-        }
-        let Some(number) = number_at(line, at) else {
-            at = end_of_name(line, at);
-            continue;
-        };
-        scratch.extend_from_slice(&line[copied..number.start]);
-        scratch.push(PLACEHOLDER);
-        at = number.end;
-        copied = at;
-        numbers.push(Number { start: number.start + offset, end: number.end + offset, ..number });
     }
     scratch.extend_from_slice(&line[copied..]);
 }
@@ -86,5 +206,5 @@ fn scan_line(line: &[u8], offset: usize, scratch: &mut Vec<u8>, numbers: &mut Ve
 /// Behind the name, or the digits that are none of ours, at `at`.
 fn end_of_name(line: &[u8], at: usize) -> usize {
     let rest = &line[at + 1..];
-    at + 1 + rest.iter().position(|&byte| !in_name(byte) && byte != b'.').unwrap_or(rest.len())
+    at + 1 + rest.iter().position(|&byte| class(byte) == Class::Other).unwrap_or(rest.len())
 }

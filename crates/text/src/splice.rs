@@ -1,10 +1,14 @@
 //! A text with other numbers in it.
 
+use rayon::prelude::*;
+
 use crate::error::TextError;
 use crate::format::write_fixed;
 
 /// Bytes that a number grows by, usually less.
 const GROWTH: usize = 4;
+/// Numbers that are written at a time; the result does not depend on it.
+const PIECE: usize = 1 << 15;
 
 /// Numbers to write over spans of a text, in the order of the text; all columns have the same length.
 #[derive(Clone, Copy, Debug)]
@@ -35,17 +39,47 @@ pub struct Words<'a> {
 /// # Errors
 /// If a span does not fit the text or overlaps another one, or a value is not finite.
 pub fn splice(text: &[u8], numbers: Numbers<'_>, words: &[Words<'_>]) -> Result<Vec<u8>, TextError> {
+    Ok(splice_in_pieces(text, numbers, words)?.concat())
+}
+
+/// The same in pieces, which follow one another.
+///
+/// # Errors
+/// As for [`splice`].
+pub fn splice_in_pieces(
+    text: &[u8],
+    numbers: Numbers<'_>,
+    words: &[Words<'_>],
+) -> Result<Vec<Vec<u8>>, TextError> {
     let count = numbers.starts.len();
     for other in [numbers.ends.len(), numbers.values.len(), numbers.decimals.len()] {
         if other != count {
             return Err(TextError::Lengths { first: count, other });
         }
     }
-    let inserted: usize = words.iter().map(|word| word.bytes.len()).sum();
-    let mut out = Vec::with_capacity(text.len() + inserted + count * GROWTH);
-    let mut copied = 0;
-    let mut waiting = words.iter().peekable();
-    for row in 0..count {
+    let pieces: Vec<Result<Vec<u8>, TextError>> = (0..count.div_ceil(PIECE).max(1))
+        .into_par_iter()
+        .map(|piece| spliced(text, numbers, words, piece))
+        .collect();
+    pieces.into_iter().collect()
+}
+
+/// Piece number `piece`: from behind the numbers of the one before to behind its own, or to the end.
+fn spliced(
+    text: &[u8],
+    numbers: Numbers<'_>,
+    words: &[Words<'_>],
+    piece: usize,
+) -> Result<Vec<u8>, TextError> {
+    let (first, last) = (piece * PIECE, numbers.starts.len().min((piece + 1) * PIECE));
+    let from = if first == 0 { 0 } else { behind(numbers.ends[first - 1], text) };
+    let is_last = last == numbers.starts.len();
+    let to = if is_last { text.len() } else { behind(numbers.ends[last - 1], text) };
+    let skipped = words.iter().take_while(|word| first > 0 && word.start < from).count();
+    let mut waiting = words[skipped..].iter().take_while(|word| is_last || word.start < to).peekable();
+    let mut out = Vec::with_capacity(to.saturating_sub(from) + (last - first) * GROWTH);
+    let mut copied = from;
+    for row in first..last {
         let span = span(numbers.starts[row], numbers.ends[row], copied, text.len())?;
         while let Some(word) = waiting.next_if(|word| word.start <= span.0) {
             copied = put(&mut out, text, copied, word)?;
@@ -65,8 +99,16 @@ pub fn splice(text: &[u8], numbers: Numbers<'_>, words: &[Words<'_>]) -> Result<
     for word in waiting {
         copied = put(&mut out, text, copied, word)?;
     }
-    out.extend_from_slice(&text[copied..]);
+    if copied > to {
+        return Err(TextError::Span { start: to, end: to, after: copied, length: text.len() });
+    }
+    out.extend_from_slice(&text[copied..to]);
     Ok(out)
+}
+
+/// An offset within the text; one that is not is an error where its number is written.
+fn behind(end: i64, text: &[u8]) -> usize {
+    usize::try_from(end).unwrap_or(0).min(text.len())
 }
 
 /// The text from `copied` to a word and the word; where copying goes on.

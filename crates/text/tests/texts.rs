@@ -76,7 +76,39 @@ fn zeros_and_signs() {
     assert_eq!(fixed(-1e-30, 20, false), "0.00000000000000000000");
 }
 
+#[test]
+fn long_texts_are_read_and_written_in_pieces() {
+    let text: String =
+        (0..60_000).map(|i| format!("mov {i}.25, -{i}e-1 ; {}\n", ["a", "b"][i % 2])).collect();
+    let lines = scan_lines(text.as_bytes());
+    assert_eq!(lines.representative, [0, 1]);
+    assert_eq!(lines.skeleton[59_999], 1);
+    assert_eq!(lines.first_number[60_000], 120_000);
+    assert!(lines.numbers.iter().step_by(2).enumerate().all(|(i, n)| n.value == i as f64 + 0.25));
+    let decimals = vec![2; 120_000];
+    let found = &lines.numbers;
+    let numbers =
+        Numbers { starts: &found.starts, ends: &found.ends, values: &found.values, decimals: &decimals };
+    let words = [Words { start: text.len(), end: text.len(), bytes: b"end" }];
+    let out = String::from_utf8(splice(text.as_bytes(), numbers, &words).unwrap()).unwrap();
+    let wanted: String = (0..60_000)
+        .map(|i| format!("mov {i}.25, {:.2} ; {}\n", -(i as f64) / 10.0, ["a", "b"][i % 2]))
+        .collect();
+    assert_eq!(out, wanted.replacen("-0.00", "0.00", 1) + "end");
+}
+
 proptest! {
+    #[test]
+    fn values_are_those_of_the_text(value in any::<f64>(), decimals in 0..20_usize) {
+        let text = format!("[{value:.decimals$}");
+        let lines = scan_lines(text.as_bytes());
+        let wanted: Vec<f64> = text[1..].parse().ok().filter(|v: &f64| v.is_finite()).into_iter().collect();
+        let found: Vec<f64> = lines.numbers.iter().map(|n| n.value).collect();
+        if value.is_finite() {
+            prop_assert_eq!(found.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), wanted.iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        }
+    }
+
     #[test]
     fn written_numbers_are_within_half_a_digit(value in -1e6..1e6_f64, decimals in 0..9_u32) {
         let back: f64 = fixed(value, decimals, false).parse().unwrap();
@@ -90,7 +122,7 @@ proptest! {
         let lines = scan_lines(&text);
         prop_assert_eq!(lines.starts.len(), lines.skeleton.len() + 1);
         let mut after = 0;
-        for number in &lines.numbers {
+        for number in lines.numbers.iter() {
             prop_assert!(after <= number.start && number.start < number.end && number.end <= text.len());
             prop_assert!(number.value.is_finite());
             after = number.end;
