@@ -26,9 +26,12 @@ class Branches:
 
     Attributes:
         robot: The arm.
+        above: 1 or -1: where the wrist centre is in front, axis 3 is above the line from axis 2 to it where
+            the elbow times this is positive.
     """
 
     robot: Robot
+    above: float
     _to_wrist: Chain
     _forward: Floats
     _on_axis_1: Floats
@@ -56,13 +59,17 @@ class Branches:
         forward = np.cross(directions[1], directions[0])
         if np.linalg.norm(forward) < PARALLEL:
             raise _unsuited(robot, "its first two axes are parallel")
+        sense = float(np.sign(robot.coupling[2, 2]))
+        forward *= np.sign(forward @ robot.base[:3, 0] or 1.0) / np.linalg.norm(forward)
+        up = directions[0] * np.sign(directions[0] @ robot.base[:3, 2] or 1.0)
         return cls(
             robot,
+            float(np.sign(sense * directions[2] @ np.cross(up, forward))),
             _chain_to(robot, wrist),
-            forward * np.sign(forward @ robot.base[:3, 0] or 1.0) / np.linalg.norm(forward),
+            forward,
             points[0],
             float(swept),
-            float(np.sign(robot.coupling[2, 2])),
+            sense,
         )
 
     def reach(self, q: Floats) -> Floats:

@@ -5,11 +5,22 @@ from pathlib import Path
 from typing import Final
 
 from truearm.errors import UsageError, list_names
+from truearm.programs.csv_path import CsvPath
 from truearm.programs.krl import KRL
+from truearm.programs.melfa import MelfaBasic
 from truearm.programs.program import Language
 from truearm.programs.rapid import RAPID
+from truearm.programs.tp import FanucTp
+from truearm.programs.urscript import UrScript
 
-LANGUAGES: Final[tuple[Language, ...]] = (KRL(), RAPID())
+LANGUAGES: Final[tuple[Language, ...]] = (
+    KRL(),
+    RAPID(),
+    FanucTp(),
+    UrScript(),
+    MelfaBasic(),
+    CsvPath(),
+)
 
 
 def language_of(path: Path, name: str | None = None, known: Sequence[Language] = LANGUAGES) -> Language:

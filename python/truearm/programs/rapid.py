@@ -22,7 +22,7 @@ class RAPID:
     """RAPID of IRC5 and OmniCore controllers, and of older ones where they agree."""
 
     name = "RAPID"
-    endings = (".mod", ".modx", ".sys", ".sysx", ".prg")
+    endings = (".mod", ".modx", ".sys", ".sysx")
     controller_differs = (
         "ABB arms with Absolute Accuracy compute with a model of their own, and a program does not say so"
     )

@@ -1,0 +1,273 @@
+"""Paths as CSV: a header line, then one waypoint a row, as joints or as poses with or without a seed.
+
+Columns are those of measurement files (docs/reference/measurements.md): q1 ... qN in rad and m, or with a
+unit, as q1_deg; x, y, z in m, or x_mm; qw, qx, qy, qz, or rx, ry, rz for a rotation vector in rad, or rx_deg.
+Where there are both joints and a pose, the pose is the waypoint and the joints are what its solution is
+looked for next to. Other columns are kept as they are.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import scan_lines
+from truearm.columns import JOINT, QUATERNION, TARGET
+from truearm.programs.environment import IDENTITY, Environment, Environments
+from truearm.programs.frames import Frames
+from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
+from truearm.programs.program import LinearStep, Program
+from truearm.programs.source import Source
+from truearm.programs.tables import Motion, MoveTable, TargetTable
+from truearm.robot import Robot
+from truearm.units import to_si
+
+Integers = NDArray[np.int64]
+
+ROTATION: Final = re.compile(r"r([xyz])(?:_(rad|deg))?")
+_FIELD: Final = re.compile(r'(?:[^,"]|"[^"]*")*')
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Columns that make one target: their places in a row, and what makes SI of each number."""
+
+    layout: int
+    columns: tuple[int, ...]
+    factors: tuple[float, ...]
+    required: bool
+
+
+class CsvPath:
+    """Waypoints in a table."""
+
+    name = "CSV path"
+    endings = (".csv",)
+    controller_differs = ""
+
+    def companions(self, path: Path) -> tuple[Path, ...]:
+        """None."""
+        return ()
+
+    def read(self, sources: Sequence[Source], robot: Robot, frames: Frames) -> Program:
+        """As in Language."""
+        reader = _Reader(sources[0], robot)
+        environments = Environments()
+        tool = frames.tool("tool", robot.tool)
+        known = "object" in frames.objects
+        environments.number(
+            Environment(
+                tool=tool,
+                work_object=frames.work_object("object") if known else IDENTITY,
+                payload_kg=frames.payloads_kg.get("tool"),
+            )
+        )
+        targets, moves = reader.tables()
+        return Program(
+            language=self,
+            sources=tuple(sources),
+            layouts=reader.layouts,
+            targets=targets.freeze(),
+            moves=moves.freeze(),
+            environments=tuple(environments.all),
+        )
+
+    def mark(self, source: Source, text: str) -> tuple[int, str]:
+        """A remark before the header."""
+        return 0, f"# {text}{source.newline}"
+
+    def linear_step(self, program: Program, step: LinearStep) -> str | None:
+        """None: a path says itself how densely it is sampled."""
+        return None
+
+
+class _Reader:
+    """One table.
+
+    Attributes:
+        layouts: How its numbers are meant.
+    """
+
+    layouts: tuple[Layout, ...]
+
+    def __init__(self, source: Source, robot: Robot) -> None:
+        self._source = source
+        found = scan_lines(source.text.encode("latin-1"))
+        self._starts, self._skeleton, self._examples, self._first_number = found[:4]
+        self._numbers = found[4:]
+        self._header = self._find_header()
+        self._names = [name.strip().strip('"') for name in self._fields(self._header)]
+        self._joints = robot.joints
+        quaternion = all(name in self._names for name in QUATERNION)
+        self.layouts = (
+            Joints.of(robot.joints, degrees=False, millimetres=False),
+            QuaternionPose() if quaternion else RotationVectorPose(),
+        )
+        self._parts = self._find_parts(quaternion=quaternion)
+
+    def tables(self) -> tuple[TargetTable, MoveTable]:
+        """Targets and moves, row by row; of a row with both, joints come first and are not moved to."""
+        order, columns = self._all()
+        targets, moves = TargetTable(), MoveTable()
+        layout = columns[0][order]
+        at = columns[1][order]
+        edges = np.flatnonzero(np.diff(layout, prepend=-1))
+        for first, last in zip(edges, [*edges[1:], len(order)], strict=True):
+            rows = order[first:last]
+            width = self.layouts[int(layout[first])].width
+            numbers = [column[rows][:, :width] for column in columns[2:]]
+            targets.extend(0, at[first:last], int(layout[first]), numbers)
+        both = len(self._parts) == 2
+        motion = np.where(
+            (layout == 0) & both, int(Motion.NONE), np.where(layout == 0, Motion.JOINT, Motion.LINEAR)
+        )
+        count = len(order)
+        zeros = np.zeros(count, dtype=np.int64)
+        ones = np.ones(count, dtype=np.int64)
+        follows = np.arange(count) > 0
+        moves.extend([np.arange(count), zeros, at, motion, ones, zeros, follows.astype(np.int64)])
+        return targets, moves
+
+    def _all(self) -> tuple[Integers, list[NDArray[Any]]]:
+        """Order in the text, and columns layout, offset and numbers of all targets, kind by kind of row."""
+        width = max(self.layouts[part.layout].width for part in self._parts)
+        found: list[list[NDArray[Any]]] = []
+        for kind, example in enumerate(self._examples):
+            lines = np.flatnonzero(self._skeleton == kind)
+            lines = lines[lines > self._header]
+            if len(lines) == 0 or self._is_remark(int(example)):
+                continue
+            places = self._places(int(lines[0]))
+            found += [one for part in self._parts if (one := self._columns(part, places, lines, width))]
+        if not found:
+            self._source.fail(int(self._starts[self._header]), "there are no rows below the header")
+        columns = [np.concatenate(parts) for parts in zip(*found, strict=True)]
+        order = np.lexsort((columns[0], columns[1]))
+        return order, columns
+
+    def _columns(
+        self, part: _Part, places: list[int | None], lines: Integers, width: int
+    ) -> list[NDArray[Any]]:
+        """Columns of the targets of one part in rows of one kind; none where their cells are empty."""
+        chosen = [places[column] for column in part.columns]
+        empty = [column for column, place in zip(part.columns, chosen, strict=True) if place is None]
+        if empty and (part.required or len(empty) < len(chosen)):
+            self._fail_cell(int(lines[0]), empty[0])
+        if empty:
+            return []
+        where = self._first_number[lines][:, None] + np.array(chosen, dtype=np.int64)
+        starts, ends, values, decimals = (_padded(column[where], width) for column in self._numbers)
+        factors = _padded(np.broadcast_to(part.factors, where.shape), width)
+        layout = np.full(len(lines), part.layout)
+        return [layout, self._starts[lines], starts, ends, values, decimals, factors]
+
+    def _is_remark(self, line: int) -> bool:
+        text = self._line(line).strip()
+        return not text or text.startswith("#")
+
+    def _line(self, line: int) -> str:
+        return self._source.text[int(self._starts[line]) : int(self._starts[line + 1])]
+
+    def _fields(self, line: int) -> list[str]:
+        """The fields of a line."""
+        text = self._line(line).rstrip("\r\n")
+        fields, at = [], 0
+        while at <= len(text):
+            found = _FIELD.match(text, at)
+            end = found.end() if found is not None else len(text)
+            fields.append(text[at:end])
+            at = max(end, at) + 1
+        return fields
+
+    def _find_header(self) -> int:
+        for line in range(len(self._starts) - 1):
+            if not self._is_remark(line):
+                return line
+        return self._source.fail(0, "the file is empty", rule="A header and rows are needed")
+
+    def _places(self, line: int) -> list[int | None]:
+        """Which number of the line each field is; None for an empty field, or one of text."""
+        fields = self._fields(line)
+        start = int(self._starts[line])
+        if len(fields) != len(self._names):
+            self._source.fail(start, f"there are {len(fields)} fields, and {len(self._names)} in the header")
+        numbers = slice(int(self._first_number[line]), int(self._first_number[line + 1]))
+        known = {int(at): place for place, at in enumerate(self._numbers[0][numbers])}
+        ends = self._numbers[1][numbers]
+        places: list[int | None] = []
+        for name, text in zip(self._names, fields, strict=True):
+            at = start + len(text) - len(text.lstrip())
+            place = known.get(at)
+            whole = place is not None and int(ends[place]) == start + len(text.rstrip())
+            if not whole and text.strip() and self._is_needed(name):
+                self._source.fail(at, f'"{text.strip()}" in column "{name}" is no number')
+            places.append(place if whole else None)
+            start += len(text) + 1
+        return places
+
+    def _is_needed(self, name: str) -> bool:
+        return any(name == self._names[column] for part in self._parts for column in part.columns)
+
+    def _fail_cell(self, line: int, column: int) -> None:
+        self._source.fail(
+            int(self._starts[line]),
+            f'there is nothing in column "{self._names[column]}"',
+            rule="A waypoint needs all of its numbers; joints beside a pose may be left out together",
+        )
+
+    def _find_parts(self, *, quaternion: bool) -> list[_Part]:
+        names = dict(enumerate(self._names))
+        joints = {int(m[1]): (c, m[2] or "") for c, n in names.items() if (m := JOINT.fullmatch(n))}
+        points = {m[1]: (c, m[3] or "m") for c, n in names.items() if (m := TARGET.fullmatch(n)) and not m[2]}
+        turns = {m[1]: (c, m[2] or "rad") for c, n in names.items() if (m := ROTATION.fullmatch(n))}
+        wanted = range(1, len(self._joints) + 1)
+        has_pose = set(points) == set("xyz") and (quaternion or set(turns) == set("xyz"))
+        has_joints = set(joints) == set(wanted)
+        if joints and not has_joints:
+            self._fail_header(f"there are joints {sorted(joints)}, and the arm has {len(self._joints)}")
+        if not has_joints and not has_pose:
+            self._fail_header("there are neither all joints nor a whole pose")
+        parts = []
+        if has_joints:
+            columns = tuple(joints[joint][0] for joint in wanted)
+            factors = tuple(_si(unit) for _, unit in (joints[joint] for joint in wanted))
+            parts.append(_Part(0, columns, factors, required=not has_pose))
+        if has_pose:
+            parts.append(self._pose_part(points, turns, quaternion=quaternion))
+        return parts
+
+    def _pose_part(
+        self, points: dict[str, tuple[int, str]], turns: dict[str, tuple[int, str]], *, quaternion: bool
+    ) -> _Part:
+        length = 1e3 if quaternion else 1.0
+        columns = [points[axis][0] for axis in "xyz"]
+        factors = [length * _si(points[axis][1]) for axis in "xyz"]
+        if quaternion:
+            columns += [self._names.index(name) for name in QUATERNION]
+            factors += [1.0] * len(QUATERNION)
+        else:
+            columns += [turns[axis][0] for axis in "xyz"]
+            factors += [_si(turns[axis][1]) for axis in "xyz"]
+        return _Part(1, tuple(columns), tuple(factors), required=True)
+
+    def _fail_header(self, what: str) -> None:
+        self._source.fail(
+            int(self._starts[self._header]),
+            what,
+            rule="Columns are q1 ... qN, or x, y, z with qw, qx, qy, qz or rx, ry, rz, or both",
+            way_out="docs/reference/programs.md has the units that names may carry",
+        )
+
+
+def _si(unit: str) -> float:
+    return float(to_si(1.0, unit)) if unit else 1.0
+
+
+def _padded(values: NDArray[Any], width: int) -> NDArray[Any]:
+    """Rows of at least so many numbers."""
+    short = width - values.shape[1]
+    return np.ascontiguousarray(np.pad(values, ((0, 0), (0, short)))) if short else values

@@ -1,0 +1,60 @@
+"""Mitsubishi MELFA-BASIC IV and V, .prg: numbered lines, and behind them the positions and joints.
+
+Positions are (X, Y, Z, A, B, C, L1, L2)(FL1, FL2): mm and deg of the rotation Rz(C) Ry(B) Rx(A), additional
+axes, and structure flags. Joints are in deg; an arm with five of them leaves the fourth slot empty. Source:
+Mitsubishi Electric, CR750/CR751 and CR800 instruction manuals, "Detailed explanations of functions and
+operations".
+"""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from truearm.programs.frames import Frames
+from truearm.programs.layouts import Joints
+from truearm.programs.melfa_reader import FLAGGED, Reader
+from truearm.programs.program import LinearStep, Program
+from truearm.programs.source import Source
+from truearm.robot import Robot
+
+_NUMBERED: Final = re.compile(r"[ \t]*\d+[ \t]+[^\r\n]*")
+
+
+class MelfaBasic:
+    """The language of Mitsubishi's controllers."""
+
+    name = "MELFA BASIC"
+    endings = (".prg", ".mb4", ".mb5")
+    controller_differs = ""
+
+    def companions(self, path: Path) -> tuple[Path, ...]:
+        """None: positions are in the program."""
+        return ()
+
+    def read(self, sources: Sequence[Source], robot: Robot, frames: Frames) -> Program:
+        """As in Language."""
+        reader = Reader(sources[0], robot, frames)
+        configuration = reader.configuration()
+        return Program(
+            language=self,
+            sources=tuple(sources),
+            layouts=(Joints.of(robot.joints), FLAGGED),
+            targets=reader.targets.freeze(),
+            moves=reader.moves.freeze(),
+            environments=tuple(reader.environments.all),
+            listed=tuple(sorted(reader.listed)),
+            configuration=configuration,
+            fixed=reader.fixed,
+        )
+
+    def mark(self, source: Source, text: str) -> tuple[int, str]:
+        """A remark: behind the first line where lines are numbered, else a line of its own before it."""
+        numbered = _NUMBERED.match(source.text)
+        if numbered is not None:
+            return numbered.end(), f" ' {text}"
+        return 0, f"' {text}{source.newline}"
+
+    def linear_step(self, program: Program, step: LinearStep) -> str | None:
+        """None: a step would need a line number and a variable of its own."""
+        return None

@@ -1,0 +1,267 @@
+"""Reads a FANUC listing: the motions of /MN, and how each uses the positions of /POS."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.programs.branches import Branches
+from truearm.programs.environment import Environment, Environments, Frame
+from truearm.programs.frames import Frames
+from truearm.programs.program import Listed
+from truearm.programs.source import Source
+from truearm.programs.tables import Motion, MoveTable, Number, TargetTable
+from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
+from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, positions
+from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
+
+Floats = NDArray[np.float64]
+
+_SECTION: Final = re.compile(r"^/(PROG|ATTR|APPL|MN|POS|END)\b[^\n]*(?:\n|\Z)", re.MULTILINE)
+_STATEMENT: Final = re.compile(r"^[ \t]*\d*[ \t]*:(.*?);[ \t]*\r?$", re.MULTILINE | re.DOTALL)
+_MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
+_TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
+_SET: Final = re.compile(r"\s*(UFRAME_NUM|UTOOL_NUM)\s*=\s*(\S+)\s*$")
+_REDEFINED: Final = re.compile(r"\s*(UFRAME|UTOOL)\[([^\]]+)\]\s*=")
+_STRING: Final = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"")
+_BLEND: Final = re.compile(r"\b(FINE|CNT\s*(\d+|R\[)|CR\s*\d+|CD\s*\d+)", re.IGNORECASE)
+_JUMPS: Final = re.compile(r"\s*(LBL|JMP|IF|ELSE|ENDIF|FOR|ENDFOR|SELECT|CALL|RUN|SKIP)\b|.*\b(JMP|CALL)\b")
+# fmt: off
+_OPTIONS: Final = (
+    (re.compile(r"\bINC\b", re.IGNORECASE), "it is a relative move (INC)"),
+    (re.compile(r"\b(TOOL_OFFSET|VOFFSET|OFFSET)\b", re.IGNORECASE), "an offset known at run time is added"),
+    (re.compile(r"\bRTCP\b", re.IGNORECASE), "the tool stands still and the arm holds the part (RTCP)"),
+    (re.compile(r"\bCOORD\b", re.IGNORECASE), "it is coordinated with another motion group (COORD)"),
+    (re.compile(r"\b(TRACK|STITCH|TOUCH)\b", re.IGNORECASE), "the path is changed at run time by a sensor"),
+)
+# fmt: on
+_MOTIONS: Final = {"J": Motion.JOINT, "L": Motion.LINEAR, "C": Motion.CIRCULAR, "A": Motion.CIRCULAR}
+_POSE: Final = ConfiguredPose()
+LONGEST_NAME: Final = 48
+ORDER_UNKNOWN: Final = (
+    "its turn numbers mean different joints to different controllers, and no joint position of the "
+    "same place tells which"
+)
+
+
+@dataclass
+class _Current:
+    """What UFRAME_NUM and UTOOL_NUM are set to anywhere in the program, and frames that are redefined."""
+
+    numbers: dict[str, set[str]] = field(default_factory=lambda: {"UFRAME_NUM": set(), "UTOOL_NUM": set()})
+    redefined: dict[tuple[str, str], int] = field(default_factory=dict)
+
+    def of(self, name: str) -> str | None:
+        """The one number; None if there are several, or one known at run time, or none."""
+        found = self.numbers[name]
+        return next(iter(found)) if len(found) == 1 and next(iter(found)).isdigit() else None
+
+
+class Reader:
+    """One listing.
+
+    Attributes:
+        targets: Positions.
+        moves: Their uses.
+        environments: Frames, tools and problems of the uses.
+        listed: What is left as it is.
+        fixed: Why positions cannot be changed whatever uses them, by target.
+        orders: Joints that turn numbers may be of.
+    """
+
+    def __init__(self, source: Source, robot: Robot, frames: Frames) -> None:
+        self.targets, self.moves = TargetTable(), MoveTable()
+        self.environments = Environments()
+        self.listed: list[Listed] = []
+        self.fixed: dict[int, str] = {}
+        self._source, self._robot, self._frames = source, robot, frames
+        self._main = section(source, "MN")
+        start, end = section(source, "POS")
+        self._positions = {p.number: p for p in positions(source, start, end, robot.joint_count)}
+        self._targets = {number: self._target(p) for number, p in self._positions.items()}
+        self._current = _Current()
+        self._settings()
+        self._motions()
+        self.orders = self._orders()
+
+    def configuration(self) -> FanucConfiguration | None:
+        """How CONFIG is meant; None where there is none to read."""
+        if all(position.layout == JOINTS for position in self._positions.values()):
+            return None
+        try:
+            return FanucConfiguration(Branches.of(self._robot), self.orders)
+        except InputError as unsuited:
+            for number, position in self._positions.items():
+                if position.layout == POSE:
+                    self.fixed.setdefault(self._targets[number], unsuited.what)
+            return None
+
+    def _target(self, position: Position) -> int:
+        number = self.targets.add(0, position.at, position.layout, position.numbers, f"P[{position.number}]")
+        if position.problem:
+            self.fixed[number] = position.problem
+        return number
+
+    def _statements(self) -> Iterator[tuple[int, str]]:
+        """Offset and text of each statement of /MN, remarks and what is commented out left out."""
+        for found in _STATEMENT.finditer(self._source.text, *self._main):
+            text = found.group(1)
+            if not text.lstrip().startswith(("!", "//", "--")):
+                start = found.start(1) + len(text) - len(text.lstrip())
+                yield start, _STRING.sub(lambda one: " " * len(one.group()), text).replace("\n", " ")
+
+    def _settings(self) -> None:
+        for at, text in self._statements():
+            chosen, redefined = _SET.match(text), _REDEFINED.match(text)
+            if chosen is not None:
+                self._current.numbers[chosen.group(1)].add(chosen.group(2))
+            if redefined is not None:
+                key = (redefined.group(1), redefined.group(2).partition(":")[0].strip())
+                self._current.redefined.setdefault(key, self._source.place(at)[0])
+
+    def _motions(self) -> None:
+        follows = False
+        for at, text in self._statements():
+            motion = _MOTION.match(text)
+            if motion is None:
+                self._other_use(at, text)
+                follows = follows and _JUMPS.match(text) is None
+            else:
+                follows = self._motion(at, text, motion.group(1), follows=follows)
+
+    def _other_use(self, at: int, text: str) -> None:
+        """A position that is read or compared: what it is changed to would be computed with."""
+        for found in _TARGET.finditer(text):
+            number = found.group(2)
+            if found.group(1) == "P" and number.isdigit() and int(number) in self._targets:
+                line = self._source.place(at)[0]
+                reason = f"it is also used in line {line} for something else than a motion"
+                self.fixed.setdefault(self._targets[int(number)], reason)
+
+    def _motion(self, at: int, text: str, kind: str, *, follows: bool) -> bool:
+        """One motion; whether the arm is where it leads, afterwards."""
+        found = [one for one in _TARGET.finditer(text) if one.start() < _options_at(text)]
+        problem = next((why for option, why in _OPTIONS if option.search(text)), "")
+        blended = _is_blended(text)
+        known = True
+        for place, target in enumerate(found[:2]):
+            via = kind == "C" and place == 0
+            motion = Motion.VIA if via else _MOTIONS.get(kind, Motion.LINEAR)
+            number = int(target.group(2)) if target.group(2).isdigit() else None
+            reason = self._why_unknown(target.group(1), number)
+            if number is None or reason:
+                self._list(at, target.group(), reason)
+                follows = known = False
+                continue
+            position = self._positions[number]
+            environment = self.environments.number(self._environment(position, problem))
+            self.moves.add(
+                self._targets[number],
+                (0, at),
+                motion,
+                environment=environment,
+                blended=blended or via,
+                follows=follows,
+            )
+            follows = True
+        return known and not problem and not re.search(r"\bSKIP\b", text, re.IGNORECASE)
+
+    def _why_unknown(self, kind: str, number: int | None) -> str:
+        if kind == "PR":
+            return "a position register is set at run time"
+        if number is None:
+            return "which position it is, is computed at run time"
+        return "" if number in self._positions else "there is no such position in /POS"
+
+    def _list(self, at: int, name: str, reason: str) -> None:
+        line, column = self._source.place(at)
+        self.listed.append(Listed(0, line, column, name[:LONGEST_NAME], reason))
+
+    def _environment(self, position: Position, problem: str) -> Environment:
+        tool = self._frame("UTOOL", position.tool)
+        return Environment(
+            tool=tool,
+            work_object=self._frame("UFRAME", position.frame),
+            problem=problem,
+            payload_kg=self._frames.payloads_kg.get(tool.name.casefold()),
+        )
+
+    def _frame(self, kind: str, number: str) -> Frame:
+        """The frame that a position is in, or its tool; number 0 is the robot's own."""
+        if number == CURRENT:
+            current = self._current.of(f"{kind}_NUM")
+            if current is None:
+                return Frame.missing(f"{kind}_NUM is not one number throughout the program", number)
+            number = current
+        line = self._current.redefined.get((kind, number))
+        if line is not None:
+            return Frame.missing(f"{kind}[{number}] is set in line {line} when the program runs", number)
+        stated = np.eye(4) if number == "0" else None
+        find = self._frames.tool if kind == "UTOOL" else self._frames.work_object
+        return find(number, stated)
+
+    def _orders(self) -> tuple[tuple[int, int, int], ...]:
+        """Which joints the turn numbers may be of; positions for which it matters are left as they are."""
+        posed = [p for p in self._positions.values() if p.layout == POSE and not p.problem]
+        turned = [p for p in posed if any(number.value for number in _turns(p))]
+        stated = np.array([[n.value for n in _turns(p)] for p in turned], dtype=np.int64).reshape(-1, 3)
+        flange = np.array([self._flange(p) for p in turned]).reshape(-1, 4, 4)
+        taught = [p for p in self._positions.values() if p.layout == JOINTS and not p.problem]
+        readings = np.deg2rad(np.array([[n.value for n in p.numbers] for p in taught], dtype=np.float64))
+        readings = readings.reshape(-1, self._robot.joint_count)
+        orders = turn_orders(stated, flange, readings, self._robot)
+        for position in turned if len(orders) > 1 else ():
+            if any(number.value for number in _turns(position)[:2]):
+                self.fixed.setdefault(self._targets[position.number], ORDER_UNKNOWN)
+        return orders
+
+    def _flange(self, position: Position) -> Floats:
+        """base_from_flange (4, 4) as the controller has it; NaN where frame or tool are not known."""
+        environment = self._environment(position, "")
+        if environment.tool.unknown or environment.work_object.unknown:
+            return np.full((4, 4), np.nan)
+        values = np.array([[number.value for number in position.numbers[: len("XYZWPR")]]])
+        stored = _POSE.to_poses(values)[0]
+        flange: Floats = (
+            environment.work_object.controller @ stored @ rigid_inverse(environment.tool.controller)
+        )
+        return flange
+
+
+def section(source: Source, name: str) -> tuple[int, int]:
+    """Where a section's text begins, and where it ends.
+
+    Raises:
+        InputError: If there is none.
+    """
+    marks = list(_SECTION.finditer(source.text))
+    for mark, behind in zip(marks, [*marks[1:], None], strict=False):
+        if mark.group(1) == name:
+            return mark.end(), len(source.text) if behind is None else behind.start()
+    return source.fail(
+        0, f"there is no section /{name}", rule="A FANUC listing has /PROG, /ATTR, /MN, /POS and /END"
+    )
+
+
+def _turns(position: Position) -> tuple[Number, ...]:
+    return position.numbers[len("XYZWPR") + len(LETTERS) :]
+
+
+def _options_at(text: str) -> int:
+    """Where the options of a motion begin: behind its speed."""
+    found = re.search(
+        r"\d\s*(%|mm/sec|cm/min|inch/min|deg/sec|sec|msec)|WELD_SPEED|R\[\d+[^\]]*\]\s*(%|mm|sec)", text
+    )
+    return len(text) if found is None else found.start()
+
+
+def _is_blended(text: str) -> bool:
+    found = _BLEND.search(text)
+    if found is None:
+        return True
+    return not (found.group(1).upper() == "FINE" or found.group(2) == "0")

@@ -1,0 +1,87 @@
+"""Universal Robots URScript, .script: joint angles in rad, poses p[x, y, z, rx, ry, rz] in m and rad.
+
+The syntax and the functions are those of Universal Robots' Script Manual. Poses are of the active TCP in the
+frame of the base. A program has no configuration data: the controller takes the solution that is nearest to
+where the arm stands, or to `qnear`.
+"""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from truearm.errors import InputError
+from truearm.programs.frames import Frames
+from truearm.programs.layouts import Joints, RotationVectorPose
+from truearm.programs.program import LinearStep, Program
+from truearm.programs.source import Source
+from truearm.programs.urscript_constants import AXES
+from truearm.programs.urscript_places import argument
+from truearm.programs.urscript_reader import Reader
+from truearm.programs.urscript_syntax import NotReadable, expression, statements
+from truearm.robot import Robot
+
+BYTE_ORDER_MARK: Final = "\u00ef\u00bb\u00bf"
+
+
+class UrScript:
+    """The language of Universal Robots' controllers."""
+
+    name = "URScript"
+    endings = (".script", ".urscript")
+    controller_differs = (
+        "the controllers of Universal Robots compute with the factory kinematics of the very arm"
+    )
+
+    def companions(self, path: Path) -> tuple[Path, ...]:
+        """None: a program is one file."""
+        return ()
+
+    def read(self, sources: Sequence[Source], robot: Robot, frames: Frames) -> Program:
+        """As in Language."""
+        source = sources[0]
+        if robot.joints != ("revolute",) * AXES:
+            raise InputError(
+                f"{robot.name} has {robot.joint_count} joints",
+                where=str(source.path),
+                rule="A URScript program is of an arm with six revolute ones",
+            )
+        reader = Reader(source, frames)
+        targets, moves = reader.tables()
+        return Program(
+            language=self,
+            sources=tuple(sources),
+            layouts=(Joints.of(robot.joints, degrees=False), RotationVectorPose()),
+            targets=targets,
+            moves=moves,
+            environments=tuple(reader.environments.all),
+            listed=tuple(sorted(reader.listed)),
+        )
+
+    def mark(self, source: Source, text: str) -> tuple[int, str]:
+        """A comment before the first line."""
+        start = len(BYTE_ORDER_MARK) if source.text.startswith(BYTE_ORDER_MARK) else 0
+        return start, f"# {text}{source.newline}"
+
+    def linear_step(self, program: Program, step: LinearStep) -> str | None:
+        """The motion's own line with the step in place of its target; None if it states a time."""
+        source = program.sources[step.file]
+        start, end = source.line_starts[step.line - 1 : step.line + 1] or (0, 0)
+        found = list(statements(source.text, start, end))
+        try:
+            call = expression(found[0].tokens) if len(found) == 1 else None
+        except NotReadable:
+            return None
+        target = argument(call, 0, "pose") if call is not None and call.text == "movel" else None
+        if call is None or target is None or argument(call, 3, "t") is not None:
+            return None
+        numbers = ", ".join(_written(step.values, step.decimals))
+        line = source.text[start : target.start] + f"p[{numbers}]" + source.text[target.end : call.end]
+        return line + source.newline
+
+
+def _written(values: Iterable[float], decimals: Iterable[int]) -> list[str]:
+    return [
+        f"{np.round(value, places) + 0.0:.{places}f}" for value, places in zip(values, decimals, strict=True)
+    ]

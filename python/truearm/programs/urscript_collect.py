@@ -1,0 +1,273 @@
+"""The first reading of a URScript program: its variables, motions, and what changes TCP and payload."""
+
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final, NamedTuple
+
+from truearm.programs.environment import Frame
+from truearm.programs.frames import Frames
+from truearm.programs.program import Listed
+from truearm.programs.source import Source
+from truearm.programs.tables import Motion
+from truearm.programs.urscript_constants import Constants, RunTime
+from truearm.programs.urscript_flow import Step
+from truearm.programs.urscript_lines import MOTIONS, STREAMED, TARGETS, Lines, blend_radius
+from truearm.programs.urscript_places import argument
+from truearm.programs.urscript_syntax import (
+    HEADERS,
+    Node,
+    NotReadable,
+    Statement,
+    Token,
+    expression,
+    statements,
+)
+
+UNTRACKED: Final = {
+    "speedj": "it is a speed, not a target",
+    "speedl": "it is a speed, not a target",
+    "force_mode": "the arm is moved by forces",
+    "freedrive_mode": "the arm is moved by hand",
+    "teach_mode": "the arm is moved by hand",
+}
+SHIFTING: Final = frozenset(
+    {"path_offset_enable", "path_offset_set", "track_conveyor_linear", "track_conveyor_circular"}
+)
+HARMLESS: Final = frozenset({"textmsg", "popup", "pose_dist", "point_dist", "get_inverse_kin_has_solution"})
+PAYLOADS: Final = frozenset({"set_payload", "set_target_payload", "set_payload_mass"})
+FUNCTIONS: Final = frozenset({"def", "thread", "sec"})
+LONGEST_NAME: Final = 48
+
+
+class MotionCall(NamedTuple):
+    """A motion to a target, where it is not one of Lines."""
+
+    at: int
+    target: Node
+    motion: Motion
+    blended: bool
+
+
+class Collected:
+    """What the statements of a program say.
+
+    Attributes:
+        lines: Motions that fill their lines.
+        motions: The other motions.
+        constants: Variables.
+        elsewhere: Variables used for something else than a motion, and where.
+        listed: Motions without a target.
+        shifted: Why no target is where it is written; empty if they are.
+        breaks: Offsets behind which the arm may come from several places.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.lines = Lines(source.text)
+        self.motions: list[MotionCall] = []
+        self.constants = Constants()
+        self.elsewhere: dict[str, int] = {}
+        self.listed: list[Listed] = []
+        self.shifted = ""
+        self.breaks = array("q")
+        self._source = source
+        self._steps: list[Step] = []
+        self._tcps: dict[int, Node | None] = {}
+        self._masses: dict[int, Node | None] = {}
+        self._made_of: dict[str, tuple[int, list[str]]] = {}
+        for start, end in self.lines.rest():
+            for statement in statements(source.text, start, end):
+                self._statement(statement)
+        self._resolve()
+
+    def leave(self, at: int, name: str, reason: str) -> None:
+        """Something is left as it is, and where the arm comes from behind it is not known."""
+        line, column = self._source.place(at)
+        shown = name or " ".join(self._source.line_text(line).split())[:LONGEST_NAME]
+        self.listed.append(Listed(0, line, column, shown, reason))
+        self.breaks.append(at)
+
+    def steps(self, frames: Frames) -> Iterator[Step]:
+        """The steps, with the TCPs and payloads that they set."""
+        names = self._tcp_names()
+        for step in self._steps:
+            if step.kind == "tcp":
+                yield step._replace(tool=self._tool(step.at, names.get(step.at, ""), frames))
+            elif step.kind == "payload":
+                yield step._replace(payload_kg=self._mass(self._masses[step.at]))
+            else:
+                yield step
+
+    def _tool(self, at: int, name: str, frames: Frames) -> Frame:
+        node = self._tcps.get(at)
+        try:
+            if node is None:
+                raise RunTime("")
+            return frames.tool(name, self.constants.transform(node))
+        except RunTime:
+            line = self._source.place(at)[0]
+            return Frame.missing(f"the TCP is computed when the program runs, in line {line}")
+
+    def _tcp_names(self) -> dict[int, str]:
+        """Name of each TCP that is set: its variable, or tcp, or tcp 1, tcp 2 and so on where they differ."""
+        written = {at: node for at, node in self._tcps.items() if node is not None and node.kind != "name"}
+        texts = {at: self._source.text[node.start : node.end] for at, node in written.items()}
+        different = list(dict.fromkeys(texts.values()))
+        several = len(different) > 1
+        found = {at: f"tcp {different.index(text) + 1}" if several else "tcp" for at, text in texts.items()}
+        return found | {at: node.text for at, node in self._tcps.items() if node and node.kind == "name"}
+
+    def _mass(self, node: Node | None) -> float | None:
+        try:
+            return None if node is None else self.constants.number(node)
+        except RunTime:
+            return None
+
+    def _statement(self, statement: Statement) -> None:
+        word = statement.word
+        if word in FUNCTIONS:
+            self._function(statement)
+        elif word in HEADERS or word in ("end", "break", "continue", "return"):
+            self._steps.append(Step(statement.at, word))
+            self._used(statement.tokens[1:], statement.at)
+        else:
+            self._plain(statement)
+
+    def _function(self, statement: Statement) -> None:
+        names = statement.names
+        self._steps.append(Step(statement.at, statement.word, names[1] if len(names) > 1 else ""))
+        for parameter in names[2:]:
+            self.constants.change(parameter, self._source.place(statement.at)[0])
+
+    def _plain(self, statement: Statement) -> None:
+        """An assignment, a call, or something that is neither."""
+        tokens = statement.tokens
+        scope = 1 if statement.word in ("global", "local") else 0
+        target = tokens[scope : scope + 2]
+        if len(target) == 2 and target[0].kind == "name" and target[1].text == "=":
+            self._assignment(target[0].text, statement, tokens[scope + 2 :])
+        elif len(target) == 2 and target[1].text in ("[", ".") and any(t.text == "=" for t in tokens):
+            self.constants.change(target[0].text, self._source.place(statement.at)[0])
+            self._used(tokens, statement.at)
+        else:
+            try:
+                node = expression(tokens)
+            except NotReadable:
+                node = None
+            self._call(node, statement)
+
+    def _assignment(self, name: str, statement: Statement, tokens: Sequence[Token]) -> None:
+        line = self._source.place(statement.at)[0]
+        try:
+            value = expression(tokens)
+        except NotReadable:
+            self.constants.assign(name, None, line)
+            self._used(tokens, statement.at)
+            return
+        self.constants.assign(name, value, line)
+        used = self._used(tokens, None)
+        self._made_of[name] = (statement.at, [*used, *self._made_of.get(name, (0, []))[1]])
+
+    def _call(self, node: Node | None, statement: Statement) -> None:
+        """A statement that is a call; None, or another expression, for one that is not understood."""
+        word = node.text if node is not None and node.kind == "call" else ""
+        if node is not None and word in MOTIONS:
+            self._motion(node)
+        elif node is not None and word == "set_tcp":
+            self._tcps[node.start] = node.parts[0] if node.parts else None
+            self._steps.append(Step(node.start, "tcp"))
+        elif node is not None and word in PAYLOADS:
+            self._masses[node.start] = node.parts[0] if node.parts else None
+            self._steps.append(Step(node.start, "payload"))
+        else:
+            self._used(statement.tokens, statement.at)
+
+    def _motion(self, node: Node) -> None:
+        if node.text == "movec":
+            pairs = [
+                (argument(node, 0, "pose_via"), Motion.VIA),
+                (argument(node, 1, "pose_to"), Motion.CIRCULAR),
+            ]
+        else:
+            pairs = [(argument(node, 0, TARGETS.get(node.text, "pose")), MOTIONS[node.text])]
+        for target, motion in pairs:
+            if target is None:
+                self.leave(node.start, "", "it has no target")
+            else:
+                self.motions.append(MotionCall(node.start, target, motion, _blended(node)))
+        targets = [target for target, _ in pairs]
+        others = [part for part in node.parts if not any(part is target for target in targets)]
+        for name in _names(others):
+            self.elsewhere.setdefault(name, node.start)
+
+    def _used(self, tokens: Sequence[Token], at: int | None) -> list[str]:
+        """Take note of calls among `tokens`, and of the variables if `at` says where; those variables."""
+        used: list[str] = []
+        behind: list[Token | None] = [*tokens[1:], None]
+        skip_to = -1
+        for place, (token, following) in enumerate(zip(tokens, behind, strict=False)):
+            if token.kind != "name" or place < skip_to:
+                continue
+            if following is None or following.text != "(":
+                used.append(token.text)
+            elif token.text in HARMLESS:
+                skip_to = _closing(tokens, place + 1)
+            else:
+                self._called(token.text, token.start)
+        if at is not None:
+            for name in used:
+                self.elsewhere.setdefault(name, at)
+        return used
+
+    def _called(self, name: str, at: int) -> None:
+        if name in MOTIONS:
+            self.leave(at, "", "it stands within another statement, or the statement cannot be read")
+        elif name in UNTRACKED:
+            self.leave(at, "", UNTRACKED[name])
+        elif name in SHIFTING:
+            line = self._source.place(at)[0]
+            self.shifted = f"{name} in line {line} shifts it when the program runs"
+        elif name == "set_tcp":
+            self._tcps[at] = None
+            self._steps.append(Step(at, "tcp"))
+        else:
+            self._steps.append(Step(at, "call", name))
+
+    def _resolve(self) -> None:
+        """What is only known when all was read: calls of the program's own functions, indirect uses."""
+        own = {step.name for step in self._steps if step.kind in FUNCTIONS}
+        self._steps = [step for step in self._steps if step.kind != "call" or step.name in own]
+        self.breaks.extend(step.at for step in self._steps if step.kind not in ("tcp", "payload"))
+        moved_to = set(_names([motion.target for motion in self.motions]))
+        pending = list(self._made_of)
+        while pending:
+            name = pending.pop()
+            at, used = self._made_of[name]
+            if name not in moved_to:
+                self.elsewhere.setdefault(name, at)
+            if name in self.elsewhere:
+                fresh = [other for other in used if other not in self.elsewhere]
+                self.elsewhere |= dict.fromkeys(fresh, self.elsewhere[name])
+                pending += [other for other in fresh if other in self._made_of]
+
+
+def _blended(node: Node) -> bool:
+    radius = blend_radius(node)
+    if node.text in STREAMED or radius is None:
+        return node.text in STREAMED
+    return radius.kind != "number" or float(radius.text) != 0.0
+
+
+def _names(nodes: Iterable[Node]) -> Iterator[str]:
+    """Variables in expressions."""
+    for node in nodes:
+        yield from (part.text for part in node.walk() if part.kind == "name")
+
+
+def _closing(tokens: Sequence[Token], opening: int) -> int:
+    """Place of the bracket that closes the one at `opening`; behind the last token if none does."""
+    depth = 0
+    for place in range(opening, len(tokens)):
+        depth += (tokens[place].text in "([{") - (tokens[place].text in ")]}")
+        if depth == 0:
+            return place
+    return len(tokens)

@@ -1,0 +1,185 @@
+"""What is constant in a URScript program: variables assigned once, arithmetic, and poses made of poses."""
+
+import math
+import operator
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.programs.layouts import RotationVectorPose
+from truearm.programs.urscript_syntax import Node
+from truearm.rotations import rigid_inverse
+
+Transform = NDArray[np.float64]
+
+AXES: Final = 6
+DEGREE: Final = math.pi / 180.0
+_POSE: Final = RotationVectorPose()
+_DEEPEST: Final = 60
+_ARITHMETIC: Final[dict[str, Callable[[float, float], float]]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+}
+_FUNCTIONS: Final[dict[str, Callable[[float], float]]] = {
+    "d2r": math.radians,
+    "r2d": math.degrees,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+}
+
+
+class RunTime(Exception):  # noqa: N818 - nothing is wrong: the target is listed
+    """What cannot be known before the program runs.
+
+    Attributes:
+        reason: Why, in words that end a line.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
+class Constants:
+    """Variables by name: what each is assigned, or why it is not constant."""
+
+    def __init__(self) -> None:
+        self._values: dict[str, Node] = {}
+        self._why_not: dict[str, str] = {}
+
+    def assign(self, name: str, value: Node | None, line: int) -> None:
+        """The program assigns `value` to a variable; None for one that cannot be read."""
+        if name in self._values or name in self._why_not or value is None:
+            self._why_not[name] = f'"{name}" is assigned in line {line} and elsewhere, or is computed'
+        else:
+            self._values[name] = value
+
+    def change(self, name: str, line: int) -> None:
+        """The program changes a variable in place, or it is a parameter of a function."""
+        self._why_not[name] = f'"{name}" is changed when the program runs, in line {line}'
+
+    def names(self) -> Sequence[str]:
+        """Variables assigned exactly once."""
+        return [name for name in self._values if name not in self._why_not]
+
+    def value(self, name: str) -> Node:
+        """What the variable is assigned, once and for all.
+
+        Raises:
+            RunTime: If it is assigned several times, changed, or not assigned in this file.
+        """
+        if name in self._why_not:
+            raise RunTime(self._why_not[name])
+        if name not in self._values:
+            raise RunTime(f'"{name}" is not assigned in this file')
+        return self._values[name]
+
+    def literal(self, node: Node, depth: int = 0) -> Node:
+        """What `node` stands for, names and constant places in lists followed.
+
+        Raises:
+            RunTime: If that is not known.
+        """
+        if depth > _DEEPEST:
+            raise RunTime("variables are assigned one another")
+        if node.kind == "name":
+            return self.literal(self.value(node.text), depth + 1)
+        if node.kind == "index" and len(node.parts) == 2:
+            whole = self.literal(node.parts[0], depth + 1)
+            place = self.number(node.parts[1], depth + 1)
+            if whole.kind in ("list", "pose") and place.is_integer() and 0 <= place < len(whole.parts):
+                return self.literal(whole.parts[int(place)], depth + 1)
+            raise RunTime("there is no such element")
+        return node
+
+    def number(self, node: Node, depth: int = 0) -> float:
+        """The value of a constant expression.
+
+        Raises:
+            RunTime: If it is none.
+        """
+        if depth > _DEEPEST:
+            raise RunTime("variables are assigned one another")
+        node = self.literal(node, depth + 1)
+        found = math.nan
+        if node.kind == "number":
+            found = float(node.text)
+        elif node.kind == "sign" and node.text != "not":
+            found = self.number(node.parts[0], depth + 1) * (-1.0 if node.text == "-" else 1.0)
+        elif node.kind == "operation" and node.text in _ARITHMETIC:
+            left, right = (self.number(part, depth + 1) for part in node.parts)
+            found = _calculated(lambda: _ARITHMETIC[node.text](left, right))
+        elif node.kind == "call" and node.text in _FUNCTIONS and len(node.parts) == 1:
+            given = self.number(node.parts[0], depth + 1)
+            found = _calculated(lambda: _FUNCTIONS[node.text](given))
+        if not math.isfinite(found):
+            raise RunTime("a number is computed when the program runs")
+        return found
+
+    def transform(self, node: Node, depth: int = 0) -> Transform:
+        """The transform (4, 4) of a constant pose, poses made of poses included.
+
+        Raises:
+            RunTime: If it is none.
+        """
+        if depth > _DEEPEST:
+            raise RunTime("variables are assigned one another")
+        node = self.literal(node, depth + 1)
+        if node.kind == "pose" and len(node.parts) == AXES:
+            values = np.array([[self.number(part, depth + 1) for part in node.parts]])
+            found: Transform = _POSE.to_poses(values)[0]
+            return found
+        if node.kind == "call" and node.text == "pose_inv" and len(node.parts) == 1:
+            return rigid_inverse(self.transform(node.parts[0], depth + 1))
+        if node.kind == "call" and node.text in COMBINED and len(node.parts) == 2:
+            first, second = (self.transform(part, depth + 1) for part in node.parts)
+            return COMBINED[node.text](first, second)
+        raise RunTime("a pose is computed when the program runs")
+
+
+def added(first: Transform, second: Transform) -> Transform:
+    """pose_add: positions are added, orientations multiplied (Script Manual, pose_add)."""
+    result = first @ turning(second)
+    result[:3, 3] = first[:3, 3] + second[:3, 3]
+    return result
+
+
+def subtracted(first: Transform, second: Transform) -> Transform:
+    """pose_sub: positions are subtracted, the first orientation times the inverse of the second."""
+    result = first @ turning(rigid_inverse(second))
+    result[:3, 3] = first[:3, 3] - second[:3, 3]
+    return result
+
+
+def turning(transform: Transform) -> Transform:
+    """The rotation alone."""
+    result = transform.copy()
+    result[:3, 3] = 0.0
+    return result
+
+
+def moving(transform: Transform, factor: float = 1.0) -> Transform:
+    """The translation alone, times `factor`."""
+    result = np.eye(4)
+    result[:3, 3] = factor * transform[:3, 3]
+    return result
+
+
+COMBINED: Final[dict[str, Callable[[Transform, Transform], Transform]]] = {
+    "pose_trans": operator.matmul,
+    "pose_add": added,
+    "pose_sub": subtracted,
+}
+
+
+def _calculated(work: Callable[[], float]) -> float:
+    """The result, or NaN where there is none."""
+    try:
+        return float(work())
+    except (ZeroDivisionError, ValueError, OverflowError):
+        return math.nan

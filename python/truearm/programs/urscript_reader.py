@@ -1,0 +1,220 @@
+"""Tables of a URScript program's targets and moves, with what TCP and offsets each is gone to."""
+
+from array import array
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.programs.environment import Environment, Environments
+from truearm.programs.frames import Frames
+from truearm.programs.program import Listed
+from truearm.programs.source import Source
+from truearm.programs.tables import Motion, Moves, Number, Targets
+from truearm.programs.urscript_collect import Collected, MotionCall
+from truearm.programs.urscript_constants import AXES, RunTime
+from truearm.programs.urscript_flow import UNSURE, State, states
+from truearm.programs.urscript_lines import JOINTS, POSE, Columns
+from truearm.programs.urscript_places import Place, Places, numbers_of
+
+Integers = NDArray[np.int64]
+
+ALSO_A_FRAME: Final = "it is also an offset, or a frame, of another target"
+
+
+@dataclass
+class _Leaves:
+    """Targets of the motions that are no lines of their own, in columns."""
+
+    at: "array[int]" = field(default_factory=lambda: array("q"))
+    layout: "array[int]" = field(default_factory=lambda: array("b"))
+    numbers: "list[array[float]]" = field(default_factory=lambda: [array(code) for code in "qqdqd"])
+    names: dict[int, str] = field(default_factory=dict)
+    known: dict[int, int] = field(default_factory=dict)
+
+    def number(self, place: Place) -> int:
+        """Number of the target at a place; a new one is added.
+
+        Raises:
+            RunTime: If its numbers are written otherwise.
+        """
+        start = place.leaf.start
+        if start not in self.known:
+            for number in numbers_of(place.leaf):
+                for column, value in zip(self.numbers, _row(number), strict=True):
+                    column.append(value)
+            self.known[start] = len(self.at)
+            self.at.append(start)
+            self.layout.append(JOINTS if place.is_joints else POSE)
+        if place.name:
+            self.names.setdefault(self.known[start], place.name)
+        return self.known[start]
+
+
+@dataclass
+class _Rows:
+    """Uses of these targets, in columns: target, offset, motion, blended, environment, alone."""
+
+    columns: "list[array[int]]" = field(default_factory=lambda: [array(code) for code in "qqbbqb"])
+
+    def add(self, *row: int) -> None:
+        """One more."""
+        for column, value in zip(self.columns, row, strict=True):
+            column.append(value)
+
+
+class Reader:
+    """One program.
+
+    Attributes:
+        environments: TCPs, payloads and offsets that motions have.
+        listed: What is left as it is.
+    """
+
+    def __init__(self, source: Source, frames: Frames) -> None:
+        self.environments = Environments()
+        self._found = Collected(source)
+        self._source = source
+        steps = list(self._found.steps(frames))
+        unknown = {step.at: State(UNSURE) for step in steps}
+        flow = unknown | states(steps, State(frames.tool("tcp")))
+        self._offsets = np.array(sorted(flow), dtype=np.int64)
+        self._states = [flow[int(at)] for at in self._offsets]
+        self._leaves = _Leaves()
+        self._rows = _Rows()
+        self._slow()
+
+    @property
+    def listed(self) -> list[Listed]:
+        """What is left as it is."""
+        return self._found.listed
+
+    def tables(self) -> tuple[Targets, Moves]:
+        """All targets and moves, in the order of the text."""
+        lines = list(self._found.lines.columns())
+        count = sum(len(columns.at) for columns in lines)
+        leaves, rows = self._leaves, self._rows.columns
+        leaf = _joined([c.leaf for c in lines], leaves.at)
+        order = np.argsort(leaf, kind="stable")
+        rank = np.empty(len(order), dtype=np.int64)
+        rank[order] = np.arange(len(order))
+        starts, ends, values, decimals, factors = (
+            _joined([column[place] for column in lines], own).reshape(-1, AXES)[order].reshape(-1)
+            for place, own in enumerate(leaves.numbers, start=Columns._fields.index("starts"))
+        )
+        targets = Targets(
+            source=np.zeros(len(order), dtype=np.int64),
+            at=leaf[order],
+            layout=_joined([c.layout for c in lines], leaves.layout)[order].astype(np.int64),
+            first=AXES * np.arange(len(order) + 1),
+            starts=starts,
+            ends=ends,
+            values=values,
+            decimals=decimals,
+            factors=factors,
+            names={int(rank[count + number]): name for number, name in leaves.names.items()},
+        )
+        target = rank[np.concatenate([np.arange(count), count + np.array(rows[0], dtype=np.int64)])]
+        return targets, self._moves(lines, target)
+
+    def _moves(self, lines: list[Columns], target: Integers) -> Moves:
+        rows = self._rows.columns
+        at = _joined([c.at for c in lines], rows[1])
+        motion, blended = (
+            _joined([c[place] for c in lines], rows[own])
+            for place, own in ((Columns._fields.index("motion"), 2), (Columns._fields.index("blended"), 3))
+        )
+        own = np.array(rows[4], dtype=np.int64)
+        environment = np.concatenate([self._plain_environments(at[: len(at) - len(own)]), own])
+        alone = _joined([np.zeros(len(c.at), dtype=np.int64) for c in lines], rows[5]).astype(bool)
+        order = np.argsort(at, kind="stable")
+        region = np.searchsorted(np.sort(np.array(self._found.breaks, dtype=np.int64)), at[order], "right")
+        follows = np.diff(region, prepend=-1) == 0
+        follows &= ~alone[order]
+        follows[1:] &= ~alone[order][:-1]
+        return Moves(
+            target[order],
+            np.zeros(len(at), dtype=np.int64),
+            at[order],
+            motion[order].astype(np.int64),
+            blended[order].astype(bool),
+            environment[order],
+            follows,
+        )
+
+    def _state(self, at: Integers) -> Integers:
+        """Which state holds at offsets."""
+        return np.searchsorted(self._offsets, at, side="right") - 1
+
+    def _plain_environments(self, at: Integers) -> Integers:
+        """Environments of lines that are motions."""
+        which, inverse = np.unique(self._state(at), return_inverse=True)
+        numbers = [self.environments.number(self._environment(self._states[one])) for one in which]
+        found: Integers = np.array(numbers, dtype=np.int64)[inverse]
+        return found
+
+    def _environment(self, state: State, place: Place | None = None, problem: str = "") -> Environment:
+        identity = np.eye(4)
+        before = place.before if place is not None else None
+        after = place.after if place is not None else None
+        return Environment(
+            tool=state.tool,
+            before=identity if before is None else before,
+            after=identity if after is None else after,
+            problem=self._found.shifted or problem,
+            payload_kg=state.payload_kg,
+        )
+
+    def _slow(self) -> None:
+        """Targets and uses of the motions that are no lines of their own."""
+        places = Places(self._found.constants)
+        for motion in self._found.motions:
+            places.note_direct(motion.target)
+        resolved = [(motion, self._places(places, motion)) for motion in self._found.motions]
+        frames = {other for _, found in resolved for place in found for other in place.others}
+        for motion, found in resolved:
+            for place in found:
+                self._use(motion, place, frames, alone=len(found) > 1)
+
+    def _places(self, places: Places, motion: MotionCall) -> list[Place]:
+        try:
+            return list(places.every(motion.target))
+        except RunTime as unknown:
+            self._found.leave(motion.at, "", unknown.reason)
+            return []
+
+    def _use(self, motion: MotionCall, place: Place, frames: Iterable[int], *, alone: bool) -> None:
+        state = self._states[int(self._state(np.array(motion.at)))]
+        try:
+            target = self._leaves.number(place)
+            seed = None if place.seed is None else self._leaves.number(place.seed)
+        except RunTime as unknown:
+            self._found.leave(motion.at, place.name, unknown.reason)
+            return
+        if seed is not None and place.seed is not None:
+            environment = self._environment(state, None, self._problem(place.seed, frames))
+            number = self.environments.number(environment)
+            self._rows.add(seed, motion.at, int(Motion.NONE), 0, number, int(alone))
+        number = self.environments.number(self._environment(state, place, self._problem(place, frames)))
+        row = (target, motion.at, int(motion.motion), int(motion.blended), number)
+        self._rows.add(*row, int(alone and seed is None))
+
+    def _problem(self, place: Place, frames: Iterable[int]) -> str:
+        if place.leaf.start in frames:
+            return ALSO_A_FRAME
+        if place.name in self._found.elsewhere:
+            line = self._source.place(self._found.elsewhere[place.name])[0]
+            return f'"{place.name}" is also used in line {line} for something else than a motion'
+        return ""
+
+
+def _row(number: Number) -> tuple[float, ...]:
+    return (number.start, number.end, number.value, number.decimals, number.factor)
+
+
+def _joined(columns: list[NDArray[Any]], own: "array[int] | array[float]") -> NDArray[Any]:
+    """Columns of lines, then our own, in one, the rows' numbers in order."""
+    flat = [np.asarray(column).reshape(-1) for column in columns]
+    return np.concatenate([*flat, np.array(own)])
