@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 from tests.programs_rig import KUKA, again, models, obeyed, read, rewritten
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
+from truearm.programs.densify import Spacing
 from truearm.programs.krl_status import StatusAndTurn
+from truearm.programs.rewriting import Choices, rewrite
 
 TOOL = '[tool."TOOL_DATA[1]"]\nxyz = [10, 0, 120]\neuler_zyx_deg = [0, 30, 0]\n'
 SRC = """&ACCESS RVP\r
@@ -302,3 +304,44 @@ def test_digits_are_what_the_text_says_again():
     digits = configuration.digits(q)
     text = configuration.text_of_digits(digits, np.zeros((50, 2)))
     np.testing.assert_array_equal(configuration.digits_of_text(text), digits)
+
+
+def test_the_mark_stands_behind_the_line_that_begins_the_module():
+    program = read("weld.src", weld(), KUKA, TOOL, dat=data())
+    done = rewrite(program, models(KUKA), Choices(), mark="compensated by truearm")
+    for content, line in zip(done.contents, (b"DEF weld( )", b"DEFDAT weld PUBLIC"), strict=True):
+        assert line + b"\r\n;compensated by truearm\r\n" in content
+        assert content.startswith(b"&ACCESS RVP\r\n")
+
+
+def test_waypoints_on_a_line_are_passed():
+    ends = [pose_text(q_deg, decimals=5) for q_deg in ([-30, -90, 100, 0, 45, 0], [30, -90, 100, 0, 45, 0])]
+    src = ALREADY + f"PTP {ends[0]}\n  LIN {ends[1]}\nEND\n"
+    bent = models(KUKA, by_rad=0.0)
+    bent.compensator.by_rad = Bend()
+    done = rewritten(read("a.src", src, KUKA), bent, spacing=Spacing.of(0.05, 20.0))
+    lines = done.contents[0].decode().splitlines()
+    inserted = [line for line in lines if line.endswith("C_DIS")]
+    assert 2 <= done.inserted == len(inserted)
+    assert all(line.startswith("  LIN {X ") for line in inserted)
+    last = next(line for line in lines if "LIN" in line and "E1" in line)
+    assert lines.index(inserted[-1]) + 1 == lines.index(last)
+    folded = src.replace("  LIN", ";FOLD LIN P2\nLIN").replace("\nEND", "\n;ENDFOLD\nEND")
+    assert rewritten(read("a.src", folded, KUKA), bent, spacing=Spacing.of(0.05, 20.0)).inserted == 0
+
+
+class Bend:
+    """A correction that varies with axis 1, added to an array of readings."""
+
+    def __radd__(self, q):
+        return q + 4e-3 * np.sin(6.0 * q[:, :1]) * np.eye(6)[0]
+
+    __array_ufunc__ = None
+
+
+def test_frames_of_the_world_and_of_the_start():
+    places = {'object."$WORLD"': "[0, 0, 100]", 'tool."$TOOL"': "[0, 0, 0]", 'object."$BASE"': "[50, 0, 0]"}
+    frames = "".join(f"[{name}]\nxyz = {place}\n" for name, place in places.items())
+    program = read("a.src", f"DEF a()\nPTP {pose_text([0, -90, 90, 0, 45, 0])}\nEND\n", KUKA, frames)
+    np.testing.assert_allclose(program.environments[0].work_object.true[:3, 3], [0.05, 0.0, 0.1])
+    assert program.environments[0].tool.unknown == ""

@@ -1,14 +1,17 @@
 """A program's texts with other numbers in them and nothing else changed."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm._core import splice_numbers
 from truearm.programs.encoding import Written
 from truearm.programs.program import Program
 
 Words = tuple[int, int, bytes]
+Columns = list[NDArray[Any]]
 
 
 def edited(program: Program, written: Written, inserted: Mapping[int, Sequence[Words]]) -> list[bytes]:
@@ -19,37 +22,46 @@ def edited(program: Program, written: Written, inserted: Mapping[int, Sequence[W
         written: Numbers to write.
         inserted: Further words by file: first byte, the byte behind the last, and what stands there.
     """
-    targets = program.targets
-    sources = np.repeat(targets.source, np.diff(targets.first))[written.places]
     lettered = _lettered(program)
     out = []
     for number, source in enumerate(program.sources):
-        here = sources == number
-        starts, ends = targets.starts[written.places[here]], targets.ends[written.places[here]]
-        values, decimals, places = written.values[here], written.decimals[here], written.places[here]
-        in_words = np.array([int(place) in lettered for place in places], dtype=bool) if lettered else None
-        words = list(inserted.get(number, ()))
-        if in_words is not None:
-            words += [
-                (int(start), int(end), lettered[int(place)][round(value)].encode("latin-1"))
-                for start, end, place, value in zip(
-                    starts[in_words], ends[in_words], places[in_words], values[in_words], strict=True
-                )
-            ]
-            starts, ends, values, decimals = (
-                column[~in_words] for column in (starts, ends, values, decimals)
-            )
-        order = np.argsort(starts, kind="stable")
-        out.append(
-            splice_numbers(
-                source.text.encode("latin-1"),
-                (starts[order], ends[order]),
-                values[order],
-                decimals[order],
-                sorted(words),
-            )
-        )
+        numbers, words = _in_file(program, written, number), list(inserted.get(number, ()))
+        if lettered:
+            numbers, spelled = _spelled(numbers, lettered)
+            words += spelled
+        _, starts, ends, values, decimals = numbers
+        content = source.text.encode("latin-1")
+        out.append(splice_numbers(content, (starts, ends), values, decimals, sorted(words)))
     return out
+
+
+def _in_file(program: Program, written: Written, number: int) -> Columns:
+    """Places, starts, ends, values and decimals of the numbers of one file, in the order of its text."""
+    targets = program.targets
+    columns: Columns = [
+        written.places,
+        targets.starts[written.places],
+        targets.ends[written.places],
+        np.ascontiguousarray(written.values),
+        np.ascontiguousarray(written.decimals),
+    ]
+    if len(program.sources) > 1:
+        here = np.repeat(targets.source, np.diff(targets.first))[written.places] == number
+        columns = [column[here] for column in columns]
+    if (np.diff(columns[1]) < 0).any():
+        order = np.argsort(columns[1], kind="stable")
+        columns = [column[order] for column in columns]
+    return columns
+
+
+def _spelled(numbers: Columns, lettered: Mapping[int, tuple[str, ...]]) -> tuple[Columns, list[Words]]:
+    """The numbers that are written as numbers, and words for the others."""
+    in_words = np.array([int(place) in lettered for place in numbers[0]], dtype=bool)
+    words = [
+        (int(start), int(end), lettered[int(place)][round(value)].encode("latin-1"))
+        for place, start, end, value, _ in zip(*(column[in_words] for column in numbers), strict=True)
+    ]
+    return [column[~in_words] for column in numbers], words
 
 
 def _lettered(program: Program) -> dict[int, tuple[str, ...]]:

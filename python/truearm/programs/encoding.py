@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 STEPS: Final = 4
+ALMOST: Final = 1e-9
 AGREES_RAD: Final = 1e-3
 NOT_UNIQUE: Final = "no configuration data says its corrected readings and no others"
 CORRECTED_SINGULAR: Final = "its correction ends at a singularity, where a pose does not determine the joints"
@@ -114,7 +115,7 @@ class Encoder:
     def joint_numbers(self, which: Integers, layout: JointLayout, q: Floats) -> tuple[Floats, Integers]:
         """The same for joint targets."""
         near = numbers_of(self.program, which, layout)
-        return self._rounded(which, layout, layout.from_readings(q, near))
+        return self._in_text(which, layout, layout.from_readings(q, near))
 
     def _configured(self, which: Integers, stated: Floats, said: Floats, flange: Floats) -> Floats:
         """Configuration data (n, C) that tells the readings `said` from all others of the same pose."""
@@ -152,31 +153,46 @@ class Encoder:
         self, which: Integers, layout: JointLayout | PoseLayout, values: Floats
     ) -> tuple[Floats, Integers]:
         """Numbers in the text's units, rounded as they are written, and their decimals, (n, width) each."""
-        places = self.program.targets.numbers(which, layout.width)
-        factors = self.program.targets.factors[places]
-        least = np.array(layout.least_decimals) + np.ceil(np.log10(np.abs(factors)) - 1e-9)
-        decimals = np.maximum(self.program.targets.decimals[places], np.maximum(least, 0.0)).astype(np.int64)
+        exact, decimals = self._in_text(which, layout, values)
         scale = 10.0**decimals
-        rounded: Floats = np.round(values / factors * scale) / scale
+        rounded: Floats = np.round(exact * scale) / scale
         return rounded, decimals
 
+    def _in_text(
+        self, which: Integers, layout: JointLayout | PoseLayout, values: Floats
+    ) -> tuple[Floats, Integers]:
+        """Numbers in the text's units, and the decimals to write them with."""
+        targets, factors = self.program.targets, self._factors(which, layout)
+        least = np.array(layout.least_decimals, dtype=np.int64)
+        if (factors != 1.0).any():
+            lost = np.ceil(np.log10(np.abs(factors)) - ALMOST).astype(np.int64)
+            values, least = values / factors, np.maximum(least + lost, 0)
+        return values, np.maximum(targets.of(targets.decimals, which, layout.width), least)
+
     def _factors(self, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
-        factors: Floats = self.program.targets.factors[self.program.targets.numbers(which, layout.width)]
+        factors: Floats = self.program.targets.of(self.program.targets.factors, which, layout.width)
         return factors
 
     def _keep(
         self, which: Integers, layout: JointLayout | PoseLayout, values: Floats, decimals: Integers
     ) -> None:
-        places = self.program.targets.numbers(which, layout.width)
-        kept = np.array([int(target) not in self.reasons for target in which], dtype=bool)
-        present = (self.program.targets.starts[places] >= 0) & kept[:, None]
-        self._found.append((places[present], values[present], decimals[present]))
+        targets = self.program.targets
+        present = targets.of(targets.starts, which, layout.width) >= 0
+        if self.reasons:
+            present &= ~np.isin(which, list(self.reasons))[:, None]
+        places = targets.numbers(which, layout.width)
+        if present.all():
+            self._found.append((places.reshape(-1), values.reshape(-1), decimals.reshape(-1)))
+        else:
+            self._found.append((places[present], values[present], decimals[present]))
 
     def written(self) -> Written:
         """All that was found, in the order of the numbers."""
         if not self._found:
             nothing = np.empty(0, dtype=np.int64)
             return Written(nothing, np.empty(0), nothing, self.reasons)
+        if len(self._found) == 1:
+            return Written(*self._found[0], self.reasons)
         places, values, decimals = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
         order = np.argsort(places, kind="stable")
         return Written(places[order], values[order], decimals[order], self.reasons)

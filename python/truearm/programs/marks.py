@@ -1,13 +1,11 @@
 """The mark in a rewritten program: a comment that says it was rewritten, and with what."""
 
-import re
 from typing import Final
 
 from truearm.errors import WorkError
 from truearm.programs.program import Program
 
 MARK: Final = "compensated by truearm"
-_FOUND: Final = re.compile(re.escape(MARK), re.IGNORECASE)
 
 
 def mark_text(version: str, data_hash: str) -> str:
@@ -22,9 +20,9 @@ def refuse_marked(program: Program) -> None:
         WorkError: If it does; names file and line.
     """
     for source in program.sources:
-        found = _FOUND.search(source.text)
-        if found is not None:
-            line, _ = source.place(found.start())
+        at = source.text.find(MARK)
+        if at >= 0:
+            line, _ = source.place(at)
             raise WorkError(
                 "this program was compensated already",
                 where=f"{source.path}, line {line}",

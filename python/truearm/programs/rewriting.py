@@ -301,6 +301,8 @@ class _State:
         )
 
     def _forget(self, unchanged: Bools) -> None:
+        if not unchanged.any():
+            return
         self.corrected[unchanged] = self.nominal[unchanged]
         for column in (self.correction_mm, self.correction_mrad, self.std_mm):
             column[unchanged] = np.nan

@@ -67,8 +67,8 @@ def solve_targets(
 
 def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
     """Numbers (n, width) of targets of one layout, in the layout's units."""
-    places = program.targets.numbers(which, layout.width)
-    numbers: Floats = program.targets.values[places] * program.targets.factors[places]
+    targets, width = program.targets, layout.width
+    numbers: Floats = targets.of(targets.values, which, width) * targets.of(targets.factors, which, width)
     return numbers
 
 

@@ -84,6 +84,16 @@ class Targets:
         """Places of the numbers of targets `which` (n,) of one layout, (n, width)."""
         return self.first[which][:, None] + np.arange(width)
 
+    def of(self, column: NDArray[Any], which: Integers, width: int) -> NDArray[Any]:
+        """A column of the numbers of targets `which` (n,) of one layout, (n, width); a view if they adjoin."""
+        count = len(which)
+        if count > 0 and np.array_equal(which, np.arange(which[0], which[0] + count)):
+            start, stop = int(self.first[which[0]]), int(self.first[which[-1] + 1])
+            if stop - start == count * width:
+                return column[start:stop].reshape(count, width)
+        found: NDArray[Any] = column[self.numbers(which, width)]
+        return found
+
 
 @dataclass(frozen=True, eq=False)
 class Moves:
