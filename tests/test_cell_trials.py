@@ -226,8 +226,10 @@ def test_a_long_session_costs_little_time_and_no_memory(tmp_path):
     count, different = sized((120, 20), (10_000, 200))
     text = cell_text(simulate={"speed": 2000.0})
     few = poses_of(Cell.from_toml(text), different, seed=8)
-    repeats = count // different
-    poses = Poses(np.tile(few.readings, (repeats, 1)), np.tile(few.approach, repeats), few.purpose * repeats)
+    # As in a dense plan, every pose is near the one before.
+    rng, near = np.random.default_rng(0), count // different
+    readings = np.repeat(few.readings, near, axis=0) + np.radians(rng.uniform(-1.0, 1.0, (count, 5)))
+    poses = Poses(np.clip(readings, *cell_limits(text)), np.zeros(count, dtype=np.int64), ("",) * count)
     used: list[tuple[float, float]] = []
     with simulated(tmp_path, text) as path:
         cell = Cell.load(path)
@@ -237,10 +239,14 @@ def test_a_long_session_costs_little_time_and_no_memory(tmp_path):
     milliseconds = 1e3 * (used[-1][0] - used[quarter][0]) / (len(used) - quarter)
     grown = used[-1][1] - used[quarter][1]
     say(f"{count} poses: {milliseconds:.2f} ms of process time a pose, memory grew by {grown:.1f} MB")
-    assert len(outcomes(tmp_path / "session.db")) >= count
+    assert len(outcomes(tmp_path / "session.db")) > 0.9 * count
     assert grown < 20.0
     if FULL:
         assert milliseconds < 1.0
+
+
+def cell_limits(text):
+    return Cell.from_toml(text).arm.limits.T
 
 
 def memory_mb():

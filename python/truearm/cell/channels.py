@@ -1,6 +1,7 @@
 """Bytes to and from a device: a serial port, or a TCP connection."""
 
 import errno
+import os
 import select
 import socket
 import termios
@@ -62,12 +63,14 @@ class SerialChannel:
     def read(self, *, wait: bool = True) -> bytes:
         """See Channel."""
         try:
-            if not (wait or self._port.in_waiting):
+            if not select.select([self._port], [], [], SLICE_S if wait else 0.0)[0]:
                 return b""
-            first = self._port.read(1)
-            return first + self._port.read(self._port.in_waiting) if first else b""
-        except SERIAL_ERRORS as error:
+            data = os.read(self._port.fileno(), CHUNK)
+        except (*SERIAL_ERRORS, ValueError) as error:  # ValueError: closed in mid-wait
             raise ConnectionEndedError(str(error)) from None
+        if not data:
+            raise ConnectionEndedError("the port is gone")
+        return data
 
     def write(self, data: bytes) -> None:
         """See Channel."""

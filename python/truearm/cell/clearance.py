@@ -35,38 +35,32 @@ class Clearance:
             for k in range(1, arm.joint_count + 1)
         ]
 
-    def tool_gap(self, readings: Floats, world_from_base: Floats, carriage: Floats) -> float:
-        """The smallest distance of the tool from the plate over n moments, m; negative below its face.
-
-        Args:
-            readings: Joint readings (n, N).
-            world_from_base: Where the base stands in the table's frame (4, 4).
-            carriage: Where the carriage is (n, 3), m.
-        """
+    def tool_gap(self, readings: Floats, world_from_base: Floats, carriages: Floats) -> float:
+        """The smallest distance of the tool from the plate, m; negative below its face. As for gap."""
         values, panel, smallest = self._arm.joints_from_readings(readings), self._panel, np.inf
         for chain in self._tool:
             points = chain.position(values) @ world_from_base[:3, :3].T + world_from_base[:3, 3]
-            seen = (points - carriage - panel.offset_m) @ panel.axes
-            beside = np.maximum(-RIM_M - seen[:, :2], seen[:, :2] - panel.area_m - RIM_M).max(axis=1)
-            smallest = min(smallest, float(np.maximum(seen[:, 2], beside).min()))
+            seen = (points[:, None] - carriages - panel.offset_m) @ panel.axes
+            beside = np.maximum(-RIM_M - seen[..., :2], seen[..., :2] - panel.area_m - RIM_M).max(axis=-1)
+            smallest = min(smallest, float(np.maximum(seen[..., 2], beside).min()))
         return smallest
 
-    def gap(self, readings: Floats, world_from_base: Floats, carriage: Floats) -> float:
-        """The smallest gap over n moments, m; negative where link and column meet.
+    def gap(self, readings: Floats, world_from_base: Floats, carriages: Floats) -> float:
+        """The smallest gap between links and column, m; negative where they meet.
 
         Args:
-            readings: Joint readings (n, N).
+            readings: Places of the arm (n, N), readings.
             world_from_base: Where the base stands in the table's frame (4, 4).
-            carriage: Where the carriage is (n, 3), m.
+            carriages: Places of the carriage (m, 3), each combined with every place of the arm, m.
         """
         links = self._links(readings) @ world_from_base[:3, :3].T + world_from_base[:3, 3]
-        top = carriage + self._panel.offset_m + self._panel.axes[:, :2] @ (0.5 * self._panel.area_m)
-        foot = top - self._column * self._panel.normal
-        spans = np.linalg.norm(np.diff(links, axis=1), axis=2).max(axis=0) > SHORTEST_LINK_M
-        smallest = np.inf
-        for k in np.flatnonzero(spans):
-            smallest = min(smallest, float(_between(links[:, k], links[:, k + 1], top, foot).min()))
-        return smallest - self._radii
+        top = carriages + self._panel.offset_m + self._panel.axes[:, :2] @ (0.5 * self._panel.area_m)
+        spans = np.linalg.norm(np.diff(links[0], axis=0), axis=1) > SHORTEST_LINK_M
+        begin = links[:, :-1][:, spans].reshape(-1, 1, 3)
+        along = np.diff(links, axis=1)[:, spans].reshape(-1, 1, 3)
+        return (
+            float(_between(begin, along, top[None], -self._column * self._panel.normal).min()) - self._radii
+        )
 
     def _links(self, readings: Floats) -> Floats:
         """Origins (n, N + 1, 3) of the base and of all links, in the base frame."""
@@ -77,21 +71,31 @@ class Clearance:
         return np.stack([base, *ends], axis=1)
 
 
-def _between(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
-    """Distances (n,) between segments a-b and c-d, all (n, 3). Ericson 2005, section 5.1.9."""
-    along, across, apart = b - a, d - c, a - c
-    aa, bb, ab = _dot(along, along), _dot(across, across), _dot(along, across)
-    to_a, to_b = _dot(along, apart), _dot(across, apart)
-    parallel = aa * bb - ab * ab
-    s = np.where(parallel > 0.0, (ab * to_b - to_a * bb) / np.where(parallel > 0.0, parallel, 1.0), 0.0)
-    t = (ab * np.clip(s, 0.0, 1.0) + to_b) / bb
-    t = np.clip(t, 0.0, 1.0)
+def _between(begin: Floats, along: Floats, top: Floats, down: Floats) -> Floats:
+    """Distances (k, m) between segments from `begin` (k, 1, 3) and from `top` (1, m, 3).
+
+    Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
+
+    Args:
+        begin: Where the first ones begin.
+        along: From there to their ends (k, 1, 3).
+        top: Where the second ones begin.
+        down: From there to their ends, the same for all (3,).
+    """
+    apart = begin - top
+    aa, bb, ab = _dot(along, along), float(down @ down), along @ down
+    to_a, to_b = _dot(along, apart), apart @ down
+    crossing = aa * bb - ab * ab
+    parallel = crossing <= 0.0
+    s = np.where(parallel, 0.0, (ab * to_b - to_a * bb) / np.where(parallel, 1.0, crossing))
+    t = np.clip((ab * np.clip(s, 0.0, 1.0) + to_b) / bb, 0.0, 1.0)
     s = np.clip((ab * t - to_a) / aa, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(apart + s[:, None] * along - t[:, None] * across, axis=1))
+    nearest = apart + s[..., None] * along - t[..., None] * down
+    return np.asarray(np.sqrt(_dot(nearest, nearest)))
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("ni,ni->n", a, b))
+    return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
 def _rows(arm: Robot) -> tuple[str, list[str], Floats, Floats]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
+from truearm.cell.clearance import Clearance
 from truearm.cell.device_errors import DeviceError, RefusedError
 from truearm.cell.paths import Paths
 from truearm.cell.reading import Expected
@@ -30,6 +31,7 @@ class Crew:
         self._cell, self._note = cell, note
         self._table = cell.sensor if isinstance(cell.sensor, TablePanel) else None
         self._aside = ThreadPoolExecutor(1, thread_name_prefix="sensor")
+        self._clearance: Clearance | None = None
         self._here: Floats | None = None
         self._refuge = np.clip(np.zeros(cell.arm.joint_count), *cell.arm.limits.T)
 
@@ -67,7 +69,7 @@ class Crew:
         carriage, here = table.carriage, self._here
         if carriage is None or here is None or world_from_base is None:
             raise RefusedError("where arm and table are is not known", where="the cell")
-        paths = Paths(self._cell, table, world_from_base, expected.radius_m)
+        paths = Paths(self._clearance_of(table), world_from_base, expected.radius_m)
         end = table.carriage_for(expected)
         if self._cell.file.process.together and paths.free([here, *way], [carriage, end]):
             self._together(way, expected)
@@ -86,6 +88,14 @@ class Crew:
                 table.prepare(expected)
                 return
         raise RefusedError("link or tool would meet the table on every way there", where="the arm")
+
+    def _clearance_of(self, table: TablePanel) -> Clearance:
+        if self._clearance is None:
+            file = self._cell.file
+            self._clearance = Clearance(
+                self._cell.arm, self._cell.flange_from_target, table.panel, file.clearance
+            )
+        return self._clearance
 
     def _together(self, way: list[Floats], expected: Expected) -> None:
         coming = self._aside.submit(self._cell.sensor.prepare, expected)

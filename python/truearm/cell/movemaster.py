@@ -74,7 +74,7 @@ def parse_numbers(text: str) -> Tenths | None:
 
 def whereabouts(arm: Robot, readings: Floats) -> Floats:
     """Position x, y, z in mm and angles p, r in deg (5,) that the controller computes, not yet rounded."""
-    point = arm.position(readings) * MM_PER_METRE
+    point = _point(arm, readings) * MM_PER_METRE
     degrees = np.asarray(readings) / RADIANS_PER_DEGREE
     return np.array([*point, degrees[1:4].sum(), degrees[4]])
 
@@ -88,7 +88,7 @@ def readings_near(arm: Robot, where: Floats, seed: Floats) -> Floats | None:
     readings[4] = where[4] * RADIANS_PER_DEGREE
     for _ in range(NEWTON_STEPS):
         readings[3] = where[3] * RADIANS_PER_DEGREE - readings[1] - readings[2]
-        missing = where[:3] / MM_PER_METRE - arm.position(readings)
+        missing = where[:3] / MM_PER_METRE - _point(arm, readings)
         if np.abs(missing).max() < NEWTON_TOLERANCE_M:
             return readings
         jacobian = arm.joint_jacobian(readings)
@@ -97,6 +97,11 @@ def readings_near(arm: Robot, where: Floats, seed: Floats) -> Floats | None:
         step, *_ = np.linalg.lstsq(reduced, missing, rcond=None)
         readings[:3] += np.clip(step, -LONGEST_STEP_RAD, LONGEST_STEP_RAD)
     return None
+
+
+def _point(arm: Robot, readings: Floats) -> Floats:
+    """The nominal tool point (3,) of readings that are known to be sound."""
+    return np.asarray(arm.chain.position(np.ascontiguousarray((arm.coupling @ readings)[None]))[0])
 
 
 NEWTON_STEPS: Final = 30

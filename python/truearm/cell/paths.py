@@ -6,9 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
-from truearm.cell.table_panel import TablePanel
 
 Floats = NDArray[np.float64]
 
@@ -20,10 +18,9 @@ TOOL_MARGIN_M: Final = 0.002
 class Paths:
     """Ways of the arm through readings, and of the table through places of its carriage."""
 
-    def __init__(self, cell: Cell, table: TablePanel, world_from_base: Floats, uncertain_m: float) -> None:
+    def __init__(self, clearance: Clearance, world_from_base: Floats, uncertain_m: float) -> None:
         """Set up for a frame (4, 4) and how far predicted points may be off."""
-        self._clearance = Clearance(cell.arm, cell.flange_from_target, table.panel, cell.file.clearance)
-        self._frame, self._uncertain_m = world_from_base, uncertain_m
+        self._clearance, self._frame, self._uncertain_m = clearance, world_from_base, uncertain_m
 
     def free(self, arm: list[Floats], table: list[Floats]) -> bool:
         """Whether they keep apart at any moment, however fast one or the other goes.
@@ -33,12 +30,10 @@ class Paths:
             table: Places (3,) that the carriage goes through.
         """
         places, carriages = _along(arm, ARM_STEP_RAD), _along(table, TABLE_STEP_M)
-        readings = np.repeat(places, len(carriages), axis=0)
-        together = np.tile(carriages, (len(places), 1))
-        links = self._clearance.gap(readings, self._frame, together)
-        if links <= self._clearance.margin_m + self._uncertain_m:
+        if self._clearance.tool_gap(places, self._frame, carriages) <= TOOL_MARGIN_M:
             return False
-        return self._clearance.tool_gap(readings, self._frame, together) > TOOL_MARGIN_M
+        gap = self._clearance.gap(places, self._frame, carriages)
+        return gap > self._clearance.margin_m + self._uncertain_m
 
 
 def _along(stops: list[Floats], step: float) -> Floats:

@@ -7,8 +7,8 @@ and compares with what the nominal arm would be at the count. A command that was
 shows there and is put right. Joint readings are therefore exact, as long as the nominal kinematics are those
 the controller computes with.
 
-The command set has no way to end a motion. Increments are kept short, so that a stop takes hold within
-`leg_deg` degrees.
+The command set has no way to end a motion. Increments are kept so short that they take `leg_s` seconds at the
+most, and a stop takes hold after the one under way.
 """
 
 import threading
@@ -55,7 +55,7 @@ class RvM2:
         frame: str = Field(default="8E2", pattern="[78][NEO][12]")
         timeout_s: Positive = 3.0
         speed: int = Field(default=5, ge=0, le=9)
-        leg_deg: Positive = 20.0
+        leg_s: Positive = 0.5
         origin_deg: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
         origin_timeout_s: Positive = 60.0
 
@@ -72,7 +72,7 @@ class RvM2:
         )
         self._count: Tenths | None = None
         self._guesses: list[Tenths] = []
-        self._leg = round(10.0 * settings.leg_deg)
+        self._leg = max(1, round(10.0 * settings.leg_s * movemaster.SPEEDS_DEG_S[settings.speed]))
         self._busy = threading.RLock()
         self._still_at = 0.0
         self._silences = 0

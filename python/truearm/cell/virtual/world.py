@@ -92,13 +92,14 @@ class World:
             return
         until = max(now, self.arm.ends(), self.table.ends())
         moments = np.linspace(now, until, MOMENTS)
-        readings = np.array([self.arm.at(moment) for moment in moments])
-        carriage = np.array([self.table.at(moment) for moment in moments])
-        links = self.clearance.gap(readings, self.world_from_base, carriage)
-        tool = self.clearance.tool_gap(readings, self.world_from_base, carriage)
-        if min(links, tool) < 0.0:
-            self.shared.count(COLLISIONS)
-            self.emergency_stop(now)
+        for moment in moments:
+            readings, carriage = self.arm.at(moment)[None], self.table.at(moment)[None]
+            links = self.clearance.gap(readings, self.world_from_base, carriage)
+            tool = self.clearance.tool_gap(readings, self.world_from_base, carriage)
+            if min(links, tool) < 0.0:
+                self.shared.count(COLLISIONS)
+                self.emergency_stop(now)
+                return
 
     def emergency_stop(self, now: float) -> None:
         """All that moves stands still, and nothing moves again."""
