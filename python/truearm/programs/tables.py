@@ -85,7 +85,7 @@ class Targets:
         return self.first[which][:, None] + np.arange(width)
 
     def of(self, column: NDArray[Any], which: Integers, width: int) -> NDArray[Any]:
-        """A column of the numbers of targets `which` (n,) of one layout, (n, width); a view if they adjoin."""
+        """A column of the numbers of targets `which` (n,) of one layout, (n, width); a view if it can be."""
         count = len(which)
         if count > 0 and np.array_equal(which, np.arange(which[0], which[0] + count)):
             start, stop = int(self.first[which[0]]), int(self.first[which[-1] + 1])
