@@ -52,10 +52,11 @@ class Source:
 
     @property
     def newline(self) -> str:
-        """How the lines end."""
-        if "\r\n" in self.text:
-            return "\r\n"
-        return "\n" if "\n" in self.text or "\r" not in self.text else "\r"
+        """How the first line ends."""
+        at = self.text.find("\n")
+        if at < 0:
+            return "\r" if "\r" in self.text else "\n"
+        return "\r\n" if self.text[:at].endswith("\r") else "\n"
 
     def place(self, offset: int) -> tuple[int, int]:
         """Line and column of an offset, both from 1."""
