@@ -3,19 +3,21 @@
 //! Each step is the smallest change of the joints that removes the error, J^T (J J^T)^-1 e. Where that is longer than a
 //! step may be, the error is far smaller than what the joints would have to turn for it: the step is then damped,
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
-//! which the arm moves well nearly undamped. A step that makes the error larger is halved. What a pose
-//! gets does not depend on the poses beside it.
+//! which the arm moves well nearly undamped. A step that makes the error larger is halved. Once the error is small its
+//! Jacobian is kept. What a pose gets does not depend on the poses beside it.
 
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
 
 use crate::aimed::{Aimed, AimedScratch};
-use crate::cholesky::{gram, solve};
+use crate::cholesky::{Factor, gram};
 use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task};
 
 /// So far apart 1 rad and 1 m weigh the same, in errors and in joint changes, m: half the length of a lower arm.
 pub(crate) const LEVER: f64 = 0.3;
 /// Error at which the search ends, m: a few roundings of a pose.
 const ENOUGH: f64 = 1e-12;
+/// Error from which on a Jacobian is good enough for the steps to come, m.
+const CALM: f64 = 1e-4;
 /// Step at which it ends where an error is left that the joints cannot remove, rad.
 const STANDSTILL: f64 = 1e-11;
 /// Added to J J^T so that it can be inverted everywhere, m^2.
@@ -44,6 +46,7 @@ pub(crate) struct Search {
     pub best: Vec<Lane>,
     trial: Vec<Lane>,
     step: Vec<Lane>,
+    /// Motions of the task's rows by the moving readings, in metres and units.
     pub columns: Vec<[Lane; 6]>,
     pub model: AimedScratch,
 }
@@ -61,7 +64,7 @@ impl Search {
     }
 }
 
-/// How far each pose's search has come.
+/// How far each pose's search has come. Flags are one where they hold, and zero.
 struct Progress {
     /// Smallest squared error.
     least: Lane,
@@ -69,7 +72,18 @@ struct Progress {
     length: Lane,
     /// What the smallest error leaves of position and orientation, squared.
     left: [Lane; 2],
+    /// Flag: the search goes on.
+    open: Lane,
+    /// Flag: the last trial was better than those before.
+    better: Lane,
+    /// Flag: the next step needs a Jacobian of its own.
+    stale: Lane,
+    /// Damping of the last Jacobian.
+    damping: Lane,
 }
+
+const NO: Lane = Lane::ZERO;
+const YES: Lane = Lane::splat(1.0);
 
 /// Moves `search.best` to the target; gives what is left of position (m) and orientation (rad).
 #[inline(always)]
@@ -115,33 +129,101 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
     alone: bool,
     search: &mut Search,
 ) -> [Lane; 2] {
-    let infinite = Lane::splat(f64::INFINITY);
-    let mut progress = Progress { least: infinite, length: infinite, left: [infinite; 2] };
+    let mut progress = Progress::new();
+    let mut factor = Factor::<M>::new::<I>(&[[NO; M]; M], YES);
     search.trial.copy_from_slice(&search.best);
     for step in 0..=plan.steps {
-        let frame = aimed.sweep::<I>(&search.trial, alone, &mut search.model);
+        let stale = progress.any_stale();
+        let frame = if stale {
+            aimed.sweep::<I>(&search.trial, alone, &mut search.model)
+        } else {
+            aimed.end::<I>(&search.trial, alone, &mut search.model)
+        };
         let error = weighted::<I, G, M>(&frame, target, plan.turn_weight);
-        let norm = squared::<I>(&error);
-        let better = keep_better::<I, M>(&error, norm, search, &mut progress);
-        let open = progress.open();
-        if step == plan.steps || !Lane::ZERO.any_below(open) {
+        let norm = progress.take::<I, M>(&error, search);
+        if step == plan.steps || !NO.any_below(progress.open) {
             break;
         }
-        fill_columns::<I, G, M>(aimed, plan, &frame, search);
-        progress.length = find_step::<I, M>(plan, &error, norm, search);
-        search.advance(plan, open, better);
+        if stale {
+            fill_columns::<I, G, M>(aimed, plan, &frame, progress.stale, search);
+            factor = progress.factor::<I, M>(plan, search);
+        }
+        progress.find_step::<I, M>(plan, &mut factor, (&error, norm), search);
+        search.advance(plan, &progress);
+        progress.settle(norm);
     }
-    let weight = 1.0 / plan.turn_weight;
-    [progress.left[0].sqrt(), progress.left[1].sqrt() * weight]
+    [progress.left[0].sqrt(), progress.left[1].sqrt() * (1.0 / plan.turn_weight)]
 }
 
 impl Progress {
-    /// One where the search goes on, zero where it has ended.
     #[inline(always)]
-    fn open(&self) -> Lane {
-        let (one, enough) = (Lane::splat(1.0), Lane::splat(ENOUGH * ENOUGH));
-        let far = enough.where_below(self.least, one, Lane::ZERO);
-        Lane::splat(STANDSTILL * STANDSTILL).where_below(self.length, far, Lane::ZERO)
+    fn new() -> Self {
+        let infinite = Lane::splat(f64::INFINITY);
+        Self {
+            least: infinite,
+            length: infinite,
+            left: [infinite; 2],
+            open: YES,
+            better: NO,
+            stale: YES,
+            damping: Lane::splat(FLOOR),
+        }
+    }
+
+    #[inline(always)]
+    fn any_stale(&self) -> bool {
+        NO.any_below(self.stale * self.open)
+    }
+
+    /// Takes over the trials that are better than what was found before; gives the squared errors.
+    #[inline(always)]
+    fn take<I: Isa, const M: usize>(&mut self, error: &[Lane; M], search: &mut Search) -> Lane {
+        let (norm, before) = (squared::<I>(error), self.least);
+        let left = [squared::<I>(&error[..3]), squared::<I>(&error[3..])];
+        for (kept, found) in self.left.iter_mut().zip(left) {
+            *kept = norm.where_below(before, found, *kept);
+        }
+        for (best, trial) in search.best.iter_mut().zip(&search.trial) {
+            *best = norm.where_below(before, *trial, *best);
+        }
+        self.least = norm.where_below(before, norm, before);
+        self.better = norm.where_below(before, YES, NO);
+        let far = Lane::splat(ENOUGH * ENOUGH).where_below(self.least, YES, NO);
+        self.open = Lane::splat(STANDSTILL * STANDSTILL).where_below(self.length, far, NO);
+        norm
+    }
+
+    /// Takes the floor for the damping of new Jacobians; factors all.
+    #[inline(always)]
+    fn factor<I: Isa, const M: usize>(&mut self, plan: &Plan, search: &Search) -> Factor<M> {
+        self.damping = NO.where_below(self.stale, Lane::splat(FLOOR), self.damping);
+        Factor::new::<I>(&gram::<I, M>(&search.columns[..plan.moving.len()]), self.damping)
+    }
+
+    /// Writes the next step in units, damped where it would be too long.
+    #[inline(always)]
+    fn find_step<I: Isa, const M: usize>(
+        &mut self,
+        plan: &Plan,
+        factor: &mut Factor<M>,
+        (error, norm): (&[Lane; M], Lane),
+        search: &mut Search,
+    ) {
+        let longest = Lane::splat(plan.longest * plan.longest);
+        self.length = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
+        if longest.any_below(self.length) {
+            let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
+            self.damping = longest.where_below(self.length, damping, self.damping);
+            *factor = Factor::new::<I>(&gram::<I, M>(&search.columns[..plan.moving.len()]), self.damping);
+            self.length = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
+        }
+    }
+
+    /// Which poses need a Jacobian at their next trial: those with a large error, and those that did not improve.
+    #[inline(always)]
+    fn settle(&mut self, norm: Lane) {
+        let far = Lane::splat(CALM * CALM).where_below(norm, YES, NO);
+        self.stale = NO.where_below(self.better, far, YES);
     }
 }
 
@@ -161,39 +243,20 @@ fn weighted<I: Isa, G: Goal<M>, const M: usize>(
 
 #[inline(always)]
 fn squared<I: Isa>(values: &[Lane]) -> Lane {
-    let mut sum = Lane::ZERO;
+    let mut sum = NO;
     for value in values {
         sum = I::mul_add(*value, *value, sum);
     }
     sum
 }
 
-/// Takes over the trials that are better than what was found before; one for those, zero for the others.
-#[inline(always)]
-fn keep_better<I: Isa, const M: usize>(
-    error: &[Lane; M],
-    norm: Lane,
-    search: &mut Search,
-    progress: &mut Progress,
-) -> Lane {
-    let before = progress.least;
-    let left = [squared::<I>(&error[..3]), squared::<I>(&error[3..])];
-    for (kept, found) in progress.left.iter_mut().zip(left) {
-        *kept = norm.where_below(before, found, *kept);
-    }
-    for (best, trial) in search.best.iter_mut().zip(&search.trial) {
-        *best = norm.where_below(before, *trial, *best);
-    }
-    progress.least = norm.where_below(before, norm, before);
-    norm.where_below(before, Lane::splat(1.0), Lane::ZERO)
-}
-
-/// Motions of the task's rows by the readings that may change, in metres and units.
+/// Takes the columns of the stale poses.
 #[inline(always)]
 fn fill_columns<I: Isa, G: Goal<M>, const M: usize>(
     aimed: &Aimed,
     plan: &Plan,
     frame: &LaneFrame,
+    stale: Lane,
     search: &mut Search,
 ) {
     let moving = plan.moving.iter().zip(&plan.unit);
@@ -201,7 +264,8 @@ fn fill_columns<I: Isa, G: Goal<M>, const M: usize>(
         let screw = aimed.model.coupling.screw::<I>(&search.model.screws, k);
         let rows = G::column::<I>(&screw, frame);
         for (i, (value, row)) in column.iter_mut().zip(rows).enumerate() {
-            *value = row * if i < 3 { unit } else { unit * plan.turn_weight };
+            let row = row * if i < 3 { unit } else { unit * plan.turn_weight };
+            *value = NO.where_below(stale, row, *value);
         }
     }
 }
@@ -210,35 +274,15 @@ fn fill_columns<I: Isa, G: Goal<M>, const M: usize>(
 #[inline(always)]
 pub(crate) fn fill_pose_columns<I: Isa>(aimed: &Aimed, plan: &Plan, alone: bool, search: &mut Search) {
     let frame = aimed.sweep::<I>(&search.best, alone, &mut search.model);
-    fill_columns::<I, PoseGoal, 6>(aimed, plan, &frame, search);
+    fill_columns::<I, PoseGoal, 6>(aimed, plan, &frame, YES, search);
 }
 
-/// Writes the next step in units; gives its squared length.
+/// J^T y, the step; gives its squared length.
 #[inline(always)]
-fn find_step<I: Isa, const M: usize>(
-    plan: &Plan,
-    error: &[Lane; M],
-    norm: Lane,
-    search: &mut Search,
-) -> Lane {
-    let columns = &search.columns[..plan.moving.len()];
-    let a = gram::<I, M>(columns);
-    let (floor, longest) = (Lane::splat(FLOOR), Lane::splat(plan.longest * plan.longest));
-    let length = step_for::<I, M>(columns, &solve::<I, M>(&a, floor, error), &mut search.step);
-    if !longest.any_below(length) {
-        return length;
-    }
-    let damping = I::mul_add(norm, Lane::splat(0.25 / (plan.longest * plan.longest)), floor);
-    let damping = longest.where_below(length, damping, floor);
-    step_for::<I, M>(columns, &solve::<I, M>(&a, damping, error), &mut search.step)
-}
-
-/// J^T y, and its squared length.
-#[inline(always)]
-fn step_for<I: Isa, const M: usize>(columns: &[[Lane; 6]], y: &[Lane; M], step: &mut [Lane]) -> Lane {
-    let mut length = Lane::ZERO;
-    for (step, column) in step.iter_mut().zip(columns) {
-        let mut sum = Lane::ZERO;
+fn step_for<I: Isa, const M: usize>(plan: &Plan, y: &[Lane; M], search: &mut Search) -> Lane {
+    let mut length = NO;
+    for (step, column) in search.step.iter_mut().zip(&search.columns).take(plan.moving.len()) {
+        let mut sum = NO;
         for (value, row) in column.iter().zip(y) {
             sum = I::mul_add(*value, *row, sum);
         }
@@ -251,13 +295,12 @@ fn step_for<I: Isa, const M: usize>(columns: &[[Lane; 6]], y: &[Lane; M], step: 
 impl Search {
     /// The next trials: a step on from those that were better, half the way back from the others.
     #[inline(always)]
-    fn advance(&mut self, plan: &Plan, open: Lane, better: Lane) {
-        let half = Lane::splat(0.5);
+    fn advance(&mut self, plan: &Plan, progress: &Progress) {
         for ((&k, &unit), step) in plan.moving.iter().zip(&plan.unit).zip(&self.step) {
             let best = self.best[k];
             let back = (self.trial[k] + best) * 0.5;
-            let next = half.where_below(better, best + *step * unit, back);
-            self.trial[k] = half.where_below(open, next, best);
+            let next = NO.where_below(progress.better, best + *step * unit, back);
+            self.trial[k] = NO.where_below(progress.open, next, best);
         }
     }
 }
