@@ -14,8 +14,10 @@ use crate::task::{Task, shift, turn};
 
 /// Steps at most: two or three do for a model that is smooth over the correction, a field takes one or two more.
 const STEPS: usize = 10;
-/// Longest step where joint corrections have no bound, rad.
+/// Longest step where joint corrections have a wide bound or none, rad.
 const LONGEST_STEP: f64 = 0.5;
+/// Longest step where they have a tight one: enough to find out what they would have to be.
+const SHORT_STEP: f64 = 0.05;
 /// With fewer joints than the task has numbers, turns weigh so much less that the position is met first.
 const POSITION_FIRST: f64 = 1e-3;
 
@@ -262,7 +264,7 @@ pub(crate) fn length(vector: &[f64; 3]) -> f64 {
 /// How corrections of a model are searched for.
 fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let limits = &options.limits;
-    let longest = limits.largest_angle.min(LONGEST_STEP);
+    let longest = limits.largest_angle.clamp(SHORT_STEP, LONGEST_STEP);
     Plan::new(model, options.task, options.moving.as_deref(), STEPS, longest)
 }
 

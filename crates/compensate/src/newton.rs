@@ -130,7 +130,7 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
     search: &mut Search,
 ) -> [Lane; 2] {
     let mut progress = Progress::new();
-    let mut factor = Factor::<M>::new::<I>(&[[NO; M]; M], YES);
+    let mut factor = Factor::<M>::NONE;
     search.trial.copy_from_slice(&search.best);
     for step in 0..=plan.steps {
         let stale = progress.any_stale();
@@ -214,7 +214,8 @@ impl Progress {
         if longest.any_below(self.length) {
             let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
             self.damping = longest.where_below(self.length, damping, self.damping);
-            *factor = Factor::new::<I>(&gram::<I, M>(&search.columns[..plan.moving.len()]), self.damping);
+            let columns = &search.columns[..plan.moving.len()];
+            dispatch_on(I::LEVEL, Damp { columns, damping: self.damping, factor });
             self.length = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
         }
     }
@@ -260,8 +261,9 @@ fn fill_columns<I: Isa, G: Goal<M>, const M: usize>(
     search: &mut Search,
 ) {
     let moving = plan.moving.iter().zip(&plan.unit);
+    let screws = &search.model.screws[..aimed.chain.joint_count()];
     for (column, (&k, &unit)) in search.columns.iter_mut().zip(moving) {
-        let screw = aimed.model.coupling.screw::<I>(&search.model.screws, k);
+        let screw = aimed.model.coupling.screw::<I>(screws, k);
         let rows = G::column::<I>(&screw, frame);
         for (i, (value, row)) in column.iter_mut().zip(rows).enumerate() {
             let row = row * if i < 3 { unit } else { unit * plan.turn_weight };
@@ -290,6 +292,22 @@ fn step_for<I: Isa, const M: usize>(plan: &Plan, y: &[Lane; M], search: &mut Sea
         length = I::mul_add(sum, sum, length);
     }
     length
+}
+
+/// Factors anew with other damping: rare, and so kept out of the way of what is not.
+struct Damp<'a, const M: usize> {
+    columns: &'a [[Lane; 6]],
+    damping: Lane,
+    factor: &'a mut Factor<M>,
+}
+
+impl<const M: usize> Kernel for Damp<'_, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        *self.factor = Factor::new::<I>(&gram::<I, M>(self.columns), self.damping);
+    }
 }
 
 impl Search {
