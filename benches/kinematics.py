@@ -43,13 +43,13 @@ def chain():
 class PinocchioArm:
     """The same arm as pinocchio sees it: joints about z, each placed by the links before it."""
 
-    def __init__(self):
+    def __init__(self, table=TABLE):
         import pinocchio  # noqa: PLC0415 - the bench's own processes do without it
 
         self.pin = pin = pinocchio
         self.model = pin.Model()
         placement, parent = pin.SE3.Identity(), 0
-        for theta, d, a, alpha, _ in TABLE:
+        for theta, d, a, alpha, _ in table:
             here = placement * pin.SE3(pin.utils.rotate("z", theta), np.zeros(3))
             parent = self.model.addJoint(parent, pin.JointModelRZ(), here, f"joint{parent + 1}")
             placement = pin.SE3(pin.utils.rotate("x", alpha), np.array([a, 0.0, d]))

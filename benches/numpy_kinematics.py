@@ -8,26 +8,26 @@ import numpy as np
 
 def poses(table, end, q, out):
     """base_from_end (n, 4, 4) of joint values q (n, L) for the table (L, 5); written to `out`."""
-    axes, origin, _ = _walk(table, q)
+    axes, origin, _ = walk(table, q)
     for column in range(3):
         out[:, :3, column] = sum(end[k, column] * axes[k] for k in range(3)).T
-    out[:, :3, 3] = _shifted(axes, origin, end[:3, 3]).T
+    out[:, :3, 3] = shifted(axes, origin, end[:3, 3]).T
     out[:, 3] = [0.0, 0.0, 0.0, 1.0]
     return out
 
 
 def jacobian(table, end, q, out):
     """Derivative (n, 3, 5 L) of the end's position with respect to all parameters; written to `out`."""
-    axes, origin, pivots = _walk(table, q)
-    tip = _shifted(axes, origin, end[:3, 3])
+    axes, origin, pivots = walk(table, q)
+    tip = shifted(axes, origin, end[:3, 3])
     for link, (z, x, y, before, after) in enumerate(pivots):
-        columns = (_cross(z, tip - before), z, x, _cross(x, tip - after), _cross(y, tip - after))
+        columns = (cross(z, tip - before), z, x, cross(x, tip - after), cross(y, tip - after))
         for k, column in enumerate(columns):
             out[:, :, 5 * link + k] = column.T
     return out
 
 
-def _walk(table, q):
+def walk(table, q):
     """Axes and origin of the last link's frame, and of each link what its parameters turn about."""
     axes = list(np.repeat(np.eye(3)[:, :, None], len(q), 2))
     origin = np.zeros((3, len(q)))
@@ -47,9 +47,9 @@ def _walk(table, q):
     return axes, origin, pivots
 
 
-def _shifted(axes, origin, point):
+def shifted(axes, origin, point):
     return origin + sum(point[k] * axes[k] for k in range(3))
 
 
-def _cross(u, v):
+def cross(u, v):
     return np.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]])
