@@ -1,5 +1,6 @@
 """What is the same in every language: marks, refusals, frames files, declarations, inserted waypoints."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -183,7 +184,8 @@ def test_frames_files_say_what_is_wrong_in_them():
 
 def test_the_report_and_the_diff():
     done = rewritten(program_of(TWO), models(ABB))
-    report = report_of(done, {"controller": {"kind": "nominal"}})
+    report = report_of(done.with_facts({"controller": {"kind": "nominal"}}, ()), [Path("out.mod")])
+    assert (report["controller"], report["outputs"]) == ({"kind": "nominal"}, ["out.mod"])
     assert report["counts"] == {"targets": 6, "moves": 2, "changed": 2, "kept": 0, "listed": 4}
     assert report["targets"][0]["name"] == "pa"
     assert (report["targets"][0]["line"], report["targets"][0]["column"]) == (11, 23)
@@ -277,3 +279,13 @@ def test_languages_by_ending(tmp_path):
     assert len({language.name for language in LANGUAGES}) == len(LANGUAGES)
     with pytest.raises(UsageError, match="no known language"):
         language_of(tmp_path / "a.xyz")
+
+
+def test_a_task_that_needs_the_tool_lists_joint_targets_without_one():
+    program = program_of("MoveAbsJ jHome,v100,fine,tOther;")
+    given = models(ABB)
+    assert rewritten(program, given).changed.sum() == 1
+    axis = replace(given, task="axis")
+    done = rewritten(program, axis)
+    assert done.changed.sum() == 0
+    assert any("tOther" in one.reason for one in done.listed)

@@ -22,16 +22,21 @@ if TYPE_CHECKING:
     from truearm.limits import Limits
     from truearm.measurements import Measurements
     from truearm.options import Options
+    from truearm.programs.compensating import compensate_program
+    from truearm.programs.frames import Frames
+    from truearm.programs.rewriting import Choices, Rewritten
     from truearm.robot import Robot
     from truearm.splitting import HoldoutRange, SplitRule
 
 __all__ = [
     "Calibration",
+    "Choices",
     "Compensated",
     "Compensator",
     "Controller",
     "Evaluation",
     "EvaluationOptions",
+    "Frames",
     "HoldoutRange",
     "InputError",
     "Limits",
@@ -39,12 +44,14 @@ __all__ = [
     "Notice",
     "Options",
     "Refusal",
+    "Rewritten",
     "Robot",
     "SplitRule",
     "TruearmError",
     "UsageError",
     "WorkError",
     "calibrate",
+    "compensate_program",
     "evaluate",
 ]
 
@@ -66,6 +73,10 @@ _HOME: Final = {
     "Limits": "limits",
     "Measurements": "measurements",
     "Options": "options",
+    "compensate_program": "programs.compensating",
+    "Frames": "programs.frames",
+    "Choices": "programs.rewriting",
+    "Rewritten": "programs.rewriting",
     "Robot": "robot",
     "HoldoutRange": "splitting",
     "SplitRule": "splitting",

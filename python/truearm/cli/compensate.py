@@ -1,7 +1,6 @@
 """`truearm compensate`: rewrite a program so that the calibrated arm goes where its author meant."""
 
 import json
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -14,16 +13,11 @@ from truearm.cli.progress import told_progress, told_stages
 from truearm.compensation import Compensator
 from truearm.errors import UsageError
 from truearm.files import write_whole
-from truearm.inverse import Inverse
-from truearm.limits import Limits
-from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
+from truearm.limits import Limits, Task
+from truearm.programs.compensating import compensate_program
 from truearm.programs.densify import Spacing
-from truearm.programs.frames import Frames
-from truearm.programs.languages import language_of
-from truearm.programs.marks import mark_text
-from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.report import counts, report_of, table_rows, unified_diff
-from truearm.programs.rewriting import Choices, Models, Rewritten, describe, read_program, rewrite
+from truearm.programs.rewriting import Choices, Rewritten, describe
 from truearm.robot import Robot
 
 OnRefusal = Literal["stop", "keep-nominal"]
@@ -108,43 +102,35 @@ def command(
         largest_joint_deg=largest_joint_deg,
         largest_std_mm=largest_std_mm,
     )
-    written_in = language_of(program, language)
     spacing = None if densify_mm is None else Spacing.of(densify_mm, least_spacing_mm)
-    choices = Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing)
-    known = Calibration.load(calibration)
-    author = known.robot if programming is None else Robot.load(programming)
-    declared = declared_controller(controller, written_in, known.robot)
+    choices = Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language)
     compensator = Compensator(
-        known,
-        programming=author,
-        task=_one_of("--task", task, Literal["pose", "axis", "position"]),
+        Calibration.load(calibration),
+        programming=None if programming is None else Robot.load(programming),
+        task=_one_of("--task", task, Task),
         moving=_joints(moving),
         limits=limits,
         features=_features(feature),
     )
-    models = Models(author, Inverse(author), declared, compensator)
     with ends_promptly(), told_stages()("compensation"):
-        text = read_program(program, written_in, author, Frames() if frames is None else Frames.load(frames))
-        refuse_contradiction(text, declared, force=force)
-        paths = [] if output is None else output_paths(text, output)
-        mark = mark_text(version("truearm"), known.data_hash)
-        done = rewrite(text, models, choices, mark=mark, tell=told_progress())
-    warn([*payload_notices(text, known.robot), *done.notices])
-    facts = {
-        "outputs": [] if dry_run else [str(path) for path in paths],
-        "calibration": {"file": str(calibration), "data_hash": known.data_hash, "robot": known.robot.name},
-        "controller": {"kind": declared.kind, "source": declared.source},
-        "task": task,
-    }
-    if not dry_run:
-        write_outputs(paths, done.contents)
+        done = compensate_program(
+            program,
+            compensator,
+            controller=controller,
+            frames=frames,
+            choices=choices,
+            tell=told_progress(),
+        )
+    warn(done.notices)
+    paths = [] if dry_run or output is None else done.save(output)
     if report is not None:
-        write_whole(report, json.dumps(report_of(done, facts), indent=1, ensure_ascii=False) + "\n")
+        content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
+        write_whole(report, f"{content}\n")
     if as_json:
-        print_json(report_of(done, facts))
+        print_json(report_of(done, paths))
     else:
         _print(done, dry_run=dry_run)
-        for path in [] if dry_run else paths:
+        for path in paths:
             say(f"Written: {path}")
 
 

@@ -1,7 +1,8 @@
 """What a rewriting did, for programs that read it and for people."""
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,18 +13,14 @@ from truearm.programs.rewriting import Rewritten, listed_target
 FORMAT = 1
 
 
-def report_of(done: Rewritten, facts: Mapping[str, Any]) -> dict[str, Any]:
-    """The report as JSON values.
-
-    Args:
-        done: The rewriting.
-        facts: Further keys: calibration, controller, options.
-    """
+def report_of(done: Rewritten, outputs: Sequence[Path] = ()) -> dict[str, Any]:
+    """The report as JSON values; `outputs` are the files that were written."""
     return {
         "format": FORMAT,
         "language": done.program.language.name,
         "files": [str(source.path) for source in done.program.sources],
-        **facts,
+        "outputs": [str(path) for path in outputs],
+        **done.facts,
         "counts": counts(done),
         "correction_mm": _spread(done.correction_mm[done.changed]),
         "correction_mrad": _spread(done.correction_mrad[done.changed]),

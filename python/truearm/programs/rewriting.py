@@ -1,7 +1,7 @@
 """From a program and a calibration to the program that hits: the whole way, whatever the language."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
 
@@ -16,6 +16,7 @@ from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
 from truearm.programs.frames import Frames
 from truearm.programs.marks import refuse_marked
+from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.program import Language, Listed, Program
 from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
@@ -73,12 +74,14 @@ class Models:
         inverse: Its inverse kinematics.
         controller: What the controller computes with.
         compensator: From programming to calibrated.
+        task: What it meets; another than "pose" needs to know the tool for joint targets as well.
     """
 
     programming: Robot
     inverse: Inverse
     controller: Controller
     compensator: Compensator
+    task: str = "pose"
 
 
 @dataclass(frozen=True)
@@ -89,11 +92,13 @@ class Choices:
         on_refusal: "stop", or "keep-nominal" to leave refused targets as they are where that makes no step.
         force: Rewrite a program that bears a mark.
         spacing: How waypoints are inserted on long lines; None inserts none.
+        language: Name of the program's language; by the ending without.
     """
 
     on_refusal: Literal["stop", "keep-nominal"] = "stop"
     force: bool = False
     spacing: Spacing | None = None
+    language: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +118,7 @@ class Rewritten:
         listed: What was left as it was because it cannot be changed with certainty.
         inserted: How many waypoints were inserted.
         notices: What the user should know.
+        facts: With what it was rewritten, for the report.
     """
 
     program: Program
@@ -127,6 +133,26 @@ class Rewritten:
     listed: tuple[Listed, ...]
     inserted: int = 0
     notices: tuple[Notice, ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def with_facts(self, facts: Mapping[str, Any], notices: Sequence[Notice]) -> "Rewritten":
+        """The same with facts for the report, and more notices."""
+        return replace(self, facts=facts, notices=(*notices, *self.notices))
+
+    def save(self, output: str | Path) -> list[Path]:
+        """Write the program's files, each beside its place and then moved there; their paths.
+
+        Args:
+            output: The file, further ones getting its name with their endings; or a directory for files of
+                the same names.
+
+        Raises:
+            UsageError: If it is the program itself.
+            InputError: If a directory does not exist or may not be written to.
+        """
+        paths = output_paths(self.program, Path(output))
+        write_outputs(paths, self.contents)
+        return paths
 
 
 def read_program(path: Path, language: Language, robot: Robot, frames: Frames) -> Program:
@@ -197,6 +223,10 @@ class _State:
             if len(which) == 0:
                 continue
             tool = self.program.environments[example].tool
+            if tool.unknown and self.models.task != "pose":
+                self.reasons.update(dict.fromkeys(which.tolist(), tool.unknown))
+                self.known[which] = False
+                continue
             found = self.models.compensator.joints(
                 np.ascontiguousarray(self.nominal[which]), tool=None if tool.unknown else tool.true
             )

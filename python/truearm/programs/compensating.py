@@ -1,0 +1,77 @@
+"""Compensating a program: the public call."""
+
+from importlib.metadata import version
+from pathlib import Path
+
+from truearm.compensation import Compensator
+from truearm.controller import Controller
+from truearm.errors import UsageError
+from truearm.inverse import Inverse
+from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
+from truearm.programs.frames import Frames
+from truearm.programs.languages import language_of
+from truearm.programs.marks import mark_text
+from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
+
+
+def compensate_program(
+    path: str | Path,
+    compensator: Compensator,
+    *,
+    controller: Controller | str | Path | None = None,
+    frames: Frames | str | Path | None = None,
+    choices: Choices | None = None,
+    tell: Tell = lambda _what, _done, _all: None,
+) -> Rewritten:
+    """Rewrite a program so that the calibrated arm's tool goes where its author meant it to go.
+
+    Args:
+        path: The program, or one of its files: KRL, RAPID, FANUC's listings, URScript, MELFA BASIC, or a
+            path in CSV.
+        compensator: From the author's model of the arm to the calibrated one.
+        controller: What the controller computes with, "nominal", or a file of its own kinematics. Needed
+            for arms whose controllers may have one.
+        frames: Tools and work objects from outside the program, or the file that holds them.
+        choices: What is to be done in case of doubt.
+        tell: Called now and then with what is counted, how many are done, and of how many.
+
+    Returns:
+        The rewritten program, not yet saved.
+
+    Raises:
+        UsageError: If the controller must be declared and is not, or the language is not told.
+        InputError: If a file cannot be read, or is no program.
+        WorkError: If targets were refused, or the program was compensated already.
+    """
+    chosen = choices or Choices()
+    calibration, author = compensator.calibration, compensator.programming
+    written_in = language_of(Path(path), chosen.language)
+    declared = (
+        controller
+        if isinstance(controller, Controller)
+        else declared_controller(None if controller is None else str(controller), written_in, author)
+    )
+    if declared.robot.joints != author.joints:
+        raise UsageError(
+            f"the controller's model {declared.robot.name} has other joints than {author.name}",
+            way_out="Declare the controller of this arm",
+        )
+    program = read_program(Path(path), written_in, author, _frames(frames))
+    refuse_contradiction(program, declared, force=chosen.force)
+    models = Models(author, Inverse(author), declared, compensator, compensator.task)
+    mark = mark_text(version("truearm"), calibration.data_hash)
+    done = rewrite(program, models, chosen, mark=mark, tell=tell)
+    return done.with_facts(
+        {
+            "calibration": {"data_hash": calibration.data_hash, "robot": calibration.robot.name},
+            "controller": {"kind": declared.kind, "source": declared.source},
+            "task": compensator.task,
+        },
+        payload_notices(program, calibration.robot),
+    )
+
+
+def _frames(given: Frames | str | Path | None) -> Frames:
+    if given is None:
+        return Frames()
+    return given if isinstance(given, Frames) else Frames.load(Path(given))
