@@ -47,10 +47,12 @@ def test_killed_at_random_moments_nothing_is_lost_or_doubled(tmp_path):
         done = measuring(cell, tmp_path / "poses.csv", whole)
         assert done.communicate()[1]
         assert done.returncode == 0
-        for moment in moments(kills, sized(3.0, 5.0)):
-            said += acknowledged(killed_after(measuring(cell, tmp_path / "poses.csv", killed), moment))
+        for number, moment in enumerate(moments(kills, 2.5)):
+            process = measuring(cell, tmp_path / "poses.csv", killed)
+            said += acknowledged(killed_after(process, moment, once_it_measures=number % 2 == 0))
             stored = outcomes(killed) if killed.exists() else []
-            assert len(set(stored)) == len(stored) or {kind for kind, _ in stored} != {"pose"}
+            poses_stored = [step for step in stored if step[0] == "pose"]
+            assert len(set(poses_stored)) == len(poses_stored)
             assert set(said) <= set(stored)
         last = measuring(cell, tmp_path / "poses.csv", killed)
         said += acknowledged(last.communicate()[1])
@@ -211,8 +213,9 @@ def test_ctrl_c_in_any_state_ends_within_two_seconds(tmp_path):
             process.send_signal(signal.SIGINT)
             _, said = process.communicate()
             slowest = max(slowest, time.monotonic() - began)
-            assert process.returncode == 130, said
-            assert "Interrupted." in said
+            # Before the program has begun Python itself ends on the signal.
+            assert process.returncode in (130, -signal.SIGINT), said
+            assert "Interrupted." in said or process.returncode != 130
             if session.exists():
                 with Session(session, writing=True) as known:
                     assert known.rows("PRAGMA integrity_check") == [("ok",)]

@@ -78,12 +78,13 @@ def outcomes(session):
         )
 
 
-def killed_after(process, seconds):
-    """Kill a process without warning after a time; what it said on stderr."""
+def killed_after(process, seconds, *, once_it_measures):
+    """Kill a process without warning, a time after its start or its first word; what it said on stderr."""
+    first = process.stderr.readline() if once_it_measures else ""
     with contextlib.suppress(subprocess.TimeoutExpired):
         process.wait(seconds)
     process.kill()
-    return process.communicate()[1]
+    return first + process.communicate()[1]
 
 
 def moments(count, longest_s, seed=0):

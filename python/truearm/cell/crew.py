@@ -17,14 +17,17 @@ from truearm.cell.table_panel import TablePanel
 
 Floats = NDArray[np.float64]
 
+# How far the table goes down at first to let the arm pass; if that does not help, as far as it can.
+DEPTHS_M: Final = (0.03, 0.1)
 LETS_GO_WITHIN_S: Final = 0.7
 
 
 class Crew:
     """The two devices of a cell.
 
-    A table moves together with the arm where they cannot meet on the way; else it goes out of the way first
-    and comes when the arm is there, and if that does not help either, the arm goes by where it was at first.
+    A table moves together with the arm where they cannot meet on the way; else it goes out of the way first,
+    no farther than it has to, and comes when the arm is there; and if that does not help either, the arm goes
+    by where it was at first.
     """
 
     def __init__(self, cell: Cell, note: Callable[[str, str], None]) -> None:
@@ -74,9 +77,10 @@ class Crew:
         if self._cell.file.process.together and paths.free([here, *way], [carriage, end]):
             self._together(way, expected)
             return
-        low = table.released(carriage)
-        under = table.released(end)
-        for first, over in ((way, [low]), (way, [low, under]), ([self._refuge, *way], [low])):
+        low, under = table.released(carriage), table.released(end)
+        detours = [(way, [table.lowered(carriage, depth)]) for depth in DEPTHS_M]
+        detours += [(way, [low]), (way, [low, under]), ([self._refuge, *way], [low])]
+        for first, over in detours:
             if (
                 paths.free([here], [carriage, *over])
                 and paths.free([here, *first], [over[-1]])

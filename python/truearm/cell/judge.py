@@ -1,5 +1,6 @@
 """Whether the readings of a pose can be believed, from each other and from what was predicted."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -88,4 +89,4 @@ def _reason(made: int, valid: int, agreeing: int, *, far: bool) -> str:
 
 
 def _distance(a: Floats, b: Floats) -> float:
-    return float(np.linalg.norm(a - b))
+    return math.dist(a, b)

@@ -188,6 +188,10 @@ class TablePanel:
         end = np.where(self.panel.normal > 0.0, 0.0, self.ranges_m)
         return np.asarray(np.where(across > 0.0, carriage, end))
 
+    def lowered(self, carriage: Floats, depth_m: float) -> Floats:
+        """Where the carriage (3,) is when it goes back by `depth_m` from a place (3,), as far as it can."""
+        return np.asarray(np.clip(carriage - depth_m * self.panel.normal, 0.0, self.ranges_m))
+
     @property
     def carriage(self) -> Floats | None:
         """Where the carriage is (3,), m; None while it is not connected."""
