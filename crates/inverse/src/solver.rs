@@ -22,6 +22,8 @@ const SEARCHING: usize = 60;
 const STARTS: usize = 96;
 /// Of these, starts at whose poses the closed form is tried.
 const TRIALS: usize = 6;
+/// How far beside a target the plain arm is asked for branches that it may lack at the target, metres.
+const BESIDE_M: [f64; 4] = [-0.02, -0.003, 0.003, 0.02];
 /// Solutions of an arm with a closed form when none is lacking.
 const BRANCHES: usize = 8;
 
@@ -135,17 +137,29 @@ impl Inverse {
     /// Solutions in readings that differ by more than whole turns, wherever the limits are.
     ///
     /// Near the border of its reach, the plain arm beside the given one may lack branches that this one has:
-    /// unless all are there, they are searched for.
+    /// unless all are there, they are searched for from where it has them, a little beside the target.
     fn distinct(&self, target: &Transform, seed: &[f64]) -> Result<Vec<Vec<f64>>, KinematicsError> {
         let mut found = Vec::new();
-        if self.method() != Method::Numeric {
-            let candidates = self.shape.candidates(target, &self.readings.joints(seed)).concat();
-            self.collect(target, candidates, POLISHING, &mut found)?;
-        }
+        let joints = self.readings.joints(seed);
+        self.collect(target, self.shape.candidates(target, &joints).concat(), POLISHING, &mut found)?;
         if !self.exact && found.len() < BRANCHES {
+            self.collect(target, self.around(target, &joints), SEARCHING, &mut found)?;
+        }
+        if !self.exact && found.is_empty() {
             self.collect(target, self.starts.clone(), SEARCHING, &mut found)?;
         }
         Ok(found)
+    }
+
+    /// The seed, and the plain arm's candidates for targets beside this one.
+    fn around(&self, target: &Transform, seed: &[f64]) -> Vec<f64> {
+        let mut candidates = seed.to_vec();
+        for (axis, step) in (0..3).flat_map(|axis| BESIDE_M.map(|step| (axis, step))) {
+            let mut beside = *target;
+            beside.translation[axis] += step;
+            candidates.extend(self.shape.candidates(&beside, seed).concat());
+        }
+        candidates
     }
 
     fn collect(
