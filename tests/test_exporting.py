@@ -116,7 +116,7 @@ def test_origins_and_pure_motions_make_the_arm(name):
         assert np.abs(frame @ last @ robot.tool - pose).max() < 1e-12
 
 
-@pytest.mark.parametrize("name", ["ur10", "franka-panda", "kuka-kr-6-r900", "fanuc-lr-mate-200id", "rv-m2"])
+@pytest.mark.parametrize("name", ["ur10", "franka-panda", "kuka-kr-6-r900", "fanuc-lr-mate-200id", "rv-m2", "adept-cobra-600"])
 def test_every_format_says_how_near_it_is(name):
     calibration = calibrated(Robot.load(name), count=40)
     for chosen in ("urdf", "dh-toml", "dh-json", "dh-csv"):
@@ -173,6 +173,25 @@ def test_a_new_urdf_keeps_names_of_the_old(hand_made):
     assert joints == ["turn", "lift", "bend", "roll", "nod", "spin", "mount_fixed"]
     links = [link.get("name") for link in root.findall("link")]
     assert links == ["world", "upper", "elbow", "fore", "hand", "wrist", "finger", "mount"]
+
+
+def test_names_come_through_a_calibration_file(hand_made, tmp_path):
+    _, calibration = hand_made
+    calibration.save(tmp_path / "arm.calib")
+    again = ta.Calibration.load(tmp_path / "arm.calib")
+    assert again.robot == calibration.robot
+    assert export(again, "urdf").text == export(calibration, "urdf").text
+
+
+def test_a_tool_of_the_robot_file_follows_the_flange(tmp_path):
+    plain = Robot.load("ur10").to_dict()
+    tool = np.eye(4)
+    tool[:3, 3] = [0.01, 0.02, 0.15]
+    calibration = calibrated(Robot.from_dict({**plain, "tool": tool.tolist()}))
+    path = tmp_path / "arm.urdf"
+    export(calibration, "urdf", path)
+    q = random_readings(calibration.robot)
+    assert np.abs(Robot.load(f"{path}#tool0").pose(q) - constant_robot(calibration).pose(q)).max() < 1e-9
 
 
 def test_a_corrected_urdf_keeps_all_but_the_chain(hand_made):

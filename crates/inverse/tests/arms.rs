@@ -1,5 +1,7 @@
 //! Random arms of both shapes, plain and as a factory measures them: every solution reaches, none is lost.
 
+#![allow(clippy::expect_used, reason = "a test may stop")]
+
 use proptest::prelude::*;
 use truearm_inverse::{Arm, Inverse, InverseError, Method, Readings};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Parameters, Transform};

@@ -67,6 +67,8 @@ def command(
 
     A work object: joint readings at touches of three or more of its points, with their true places
     x, y, z in the object's own frame.
+
+    Example: truearm frame arm.calib touches.csv --tool tGripper --orientation 0,0,0 -o frames.toml
     """
     kind, name = _asked(tool, work_object)
     known = Calibration.load(calibration)
