@@ -116,7 +116,9 @@ def test_origins_and_pure_motions_make_the_arm(name):
         assert np.abs(frame @ last @ robot.tool - pose).max() < 1e-12
 
 
-@pytest.mark.parametrize("name", ["ur10", "franka-panda", "kuka-kr-6-r900", "fanuc-lr-mate-200id", "rv-m2", "adept-cobra-600"])
+@pytest.mark.parametrize(
+    "name", ["ur10", "franka-panda", "kuka-kr-6-r900", "fanuc-lr-mate-200id", "rv-m2", "adept-cobra-600"]
+)
 def test_every_format_says_how_near_it_is(name):
     calibration = calibrated(Robot.load(name), count=40)
     for chosen in ("urdf", "dh-toml", "dh-json", "dh-csv"):

@@ -15,13 +15,15 @@ use crate::readings::Readings;
 use crate::shape::{Method, Shape};
 
 /// Steps that polish a closed form's candidate: enough from where a factory calibration puts it.
-const POLISHING: usize = 12;
+const POLISHING: usize = 16;
 /// Steps from a start that is near to nothing.
 const SEARCHING: usize = 60;
 /// Starts of an arm without a closed form, spread over its limits.
 const STARTS: usize = 96;
 /// Of these, starts at whose poses the closed form is tried.
 const TRIALS: usize = 6;
+/// Distance from a seed within which the solution that Newton's steps lead to is the nearest, rad.
+const NEARBY: f64 = 0.2;
 /// How far beside a target the plain arm is asked for branches that it may lack at the target, metres.
 const BESIDE_M: [f64; 4] = [-0.02, -0.003, 0.003, 0.02];
 /// Solutions of an arm with a closed form when none is lacking.
@@ -121,11 +123,13 @@ impl Inverse {
     }
 
     fn near_one(&self, target: &Transform, seed: &[f64]) -> Result<Option<Vec<f64>>, InverseError> {
-        if self.method() == Method::Numeric {
+        if !self.exact {
             let mut joints = self.readings.joints(seed);
             let left = self.newton.improve(target, &mut joints, SEARCHING)?;
             let found = self.readings.turned(&self.readings.readings(&joints), seed);
-            if left.iter().all(|left| self.newton.arrived(left)) && found.is_some() {
+            let there = left.iter().all(|left| self.newton.arrived(left));
+            let reach = if self.method() == Method::Numeric { f64::INFINITY } else { NEARBY };
+            if there && found.as_ref().is_some_and(|found| distance(found, seed) < reach * reach) {
                 return Ok(found);
             }
         }
@@ -140,10 +144,12 @@ impl Inverse {
     /// unless all are there, they are searched for from where it has them, a little beside the target.
     fn distinct(&self, target: &Transform, seed: &[f64]) -> Result<Vec<Vec<f64>>, KinematicsError> {
         let mut found = Vec::new();
-        let joints = self.readings.joints(seed);
-        self.collect(target, self.shape.candidates(target, &joints).concat(), POLISHING, &mut found)?;
-        if !self.exact && found.len() < BRANCHES {
-            self.collect(target, self.around(target, &joints), SEARCHING, &mut found)?;
+        if self.method() != Method::Numeric {
+            let joints = self.readings.joints(seed);
+            self.collect(target, self.shape.candidates(target, &joints).concat(), POLISHING, &mut found)?;
+            if !self.exact && found.len() < BRANCHES {
+                self.collect(target, self.around(target, &joints), POLISHING, &mut found)?;
+            }
         }
         if !self.exact && found.is_empty() {
             self.collect(target, self.starts.clone(), SEARCHING, &mut found)?;
