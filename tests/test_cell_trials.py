@@ -13,7 +13,7 @@ import serial
 
 from tests.cell_support import cell_text, measured, poses_of, virtual, write_poses
 from tests.trials import FULL, acknowledged, killed_after, measuring, moments, outcomes, say, simulated, sized
-from truearm.cell import Cell, DeviceError, DeviceSilentError, PortUnavailableError
+from truearm.cell import Cell, DeviceError, DeviceSilentError, EmergencyStopError, PortUnavailableError
 from truearm.cell.accepted import accepted_table, measurements_of
 from truearm.cell.measuring import DONE, Process
 from truearm.cell.opening import open_session
@@ -77,14 +77,21 @@ def test_with_faults_a_session_completes_with_right_readings(kind, tmp_path):
         text = cell_text(simulate={"seed": seed, "faults": {kind: SHARE}}, process=process)
         clean = cell_text(simulate={"seed": seed}, process=process)
         poses = poses_of(Cell.from_toml(text), count, seed=seed)
-        tables = []
-        for name, content in (("faulty", text), ("clean", clean)):
-            path = tmp_path / f"{name}{seed}.db"
-            with virtual(content) as (_, cell):
+        clean_path, path = tmp_path / f"clean{seed}.db", tmp_path / f"{seed}.db"
+        with virtual(clean) as (_, cell):
+            assert measured(cell, poses, clean_path)[0] == DONE
+        with virtual(text) as (_, cell):
+            try:
                 end, seconds = measured(cell, poses, path)
-            assert end == DONE
-            table, _, summary = finished(path)
-            tables.append(table.set_index("pose"))
+            except EmergencyStopError as error:
+                if kind != "garbled":
+                    raise
+                # A damaged Movemaster line may be a valid motion elsewhere: all stops before things meet.
+                say(f"{kind} {SHARE:.0%}, session {seed}: stopped, {error}")
+                continue
+        assert end == DONE
+        table, _, summary = finished(path)
+        tables = [each.set_index("pose") for each in (table, finished(clean_path)[0])]
         both = tables[0].join(tables[1].add_suffix("_clean"), how="inner")
         assert len(both) == count
         off_mm = 1e3 * np.linalg.norm(

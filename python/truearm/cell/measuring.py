@@ -15,7 +15,7 @@ from truearm.cell.crew import Crew
 from truearm.cell.device_errors import DeviceError, PortUnavailableError, RefusedError, StoppedError
 from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
-from truearm.cell.reading import Reading
+from truearm.cell.reading import Expected, Reading
 from truearm.cell.registering import register_cell
 from truearm.cell.session import Session, Step, Stored
 from truearm.cell.stretches import boundaries, calibrate_so_far, good_enough
@@ -118,9 +118,7 @@ class Process:
             self._raise_if_halted()
             try:
                 if not placed:
-                    way = self._way(step, anew=verdict.suspicious)
-                    joints = self._crew.go(way, expected, self._prediction.world_from_base)
-                    placed = True
+                    joints, placed = self._placed(step, expected, anew=verdict.suspicious), True
                 reading = self._cell.sensor.measure()
             except RefusedError as error:
                 self._skip(step, str(error))
@@ -154,6 +152,19 @@ class Process:
     def _skip(self, step: Step, reason: str) -> None:
         self._session.add_outcome(step.step, "skipped", reason=reason)
         self._session.add_event("skipped", reason, step.step)
+
+    def _placed(self, step: Step, expected: Expected, *, anew: bool) -> Floats:
+        """Bring arm and sensor to a step; where the arm is.
+
+        Coming `anew` is given up where there is no way: the pose is then measured without.
+        """
+        frame = self._prediction.world_from_base
+        try:
+            return self._crew.go(self._way(step, anew=anew), expected, frame)
+        except RefusedError:
+            if step.approach or not anew:
+                raise
+            return self._crew.go([step.readings], expected, frame)
 
     def _way(self, step: Step, *, anew: bool) -> list[Floats]:
         """Readings to go through, so that every joint comes from the side that is asked for.
