@@ -5,7 +5,7 @@ Lines that are equal but for their numbers are read once; their numbers come as 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,8 +103,7 @@ class Lines:
             yield self._columns(template, np.flatnonzero(self._skeleton == number))
 
     def _columns(self, template: _Template, lines: Integers) -> Columns:
-        places = self._first_number[lines][:, None] + np.array(template.places)
-        starts, ends, values, decimals = (column[places] for column in self._numbers)
+        starts, ends, values, decimals = self._picked(template, lines)
         blended = np.full(len(lines), template.blended)
         if template.radius is not None:
             blended |= self._numbers[2][self._first_number[lines] + template.radius] != 0.0
@@ -120,6 +119,19 @@ class Lines:
             decimals,
             np.broadcast_to(template.factors, values.shape),
         )
+
+    def _picked(self, template: _Template, lines: Integers) -> Iterator[NDArray[Any]]:
+        """The targets' numbers in lines, (n, 6) each; views where lines and places follow one another."""
+        first, last = int(lines[0]), int(lines[-1]) + 1
+        numbers = slice(int(self._first_number[first]), int(self._first_number[last]))
+        start = template.places[0]
+        if last - first == len(lines) and template.places == tuple(range(start, start + AXES)):
+            for column in self._numbers:
+                yield column[numbers].reshape(len(lines), -1)[:, start : start + AXES]
+            return
+        places = self._first_number[lines][:, None] + np.array(template.places)
+        for column in self._numbers:
+            yield column[places]
 
     def _template(self, line: int) -> _Template | None:
         """What line number `line` is; None if it is not one whole motion with its numbers in it."""

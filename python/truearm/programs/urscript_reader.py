@@ -101,7 +101,7 @@ class Reader:
         rank = np.empty(len(order), dtype=np.int64)
         rank[order] = np.arange(len(order))
         starts, ends, values, decimals, factors = (
-            _joined([column[place] for column in lines], own).reshape(-1, AXES)[order].reshape(-1)
+            _in_order(_joined([column[place] for column in lines], own).reshape(-1, AXES), order).reshape(-1)
             for place, own in enumerate(leaves.numbers, start=Columns._fields.index("starts"))
         )
         targets = Targets(
@@ -217,4 +217,9 @@ def _row(number: Number) -> tuple[float, ...]:
 def _joined(columns: list[NDArray[Any]], own: "array[int] | array[float]") -> NDArray[Any]:
     """Columns of lines, then our own, in one, the rows' numbers in order."""
     flat = [np.asarray(column).reshape(-1) for column in columns]
-    return np.concatenate([*flat, np.array(own)])
+    return flat[0] if len(flat) == 1 and not own else np.concatenate([*flat, np.array(own)])
+
+
+def _in_order(rows: NDArray[Any], order: Integers) -> NDArray[Any]:
+    """Rows in an order; they themselves where they are in it already."""
+    return rows if (order[1:] > order[:-1]).all() else rows[order]
