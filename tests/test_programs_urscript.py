@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from tests.program_tools import names_changed, read, reasons, rewritten, says, skeleton, survives
 from truearm.errors import InputError
+from truearm.programs.program import LinearStep
 from truearm.programs.tables import Motion
 from truearm.programs.urscript import UrScript
 from truearm.robot import Robot
@@ -299,6 +300,20 @@ def test_the_mark_is_a_comment_before_everything(robot):
     assert marked.startswith(b"# compensated by truearm 1\r\nmovej([")
     with pytest.raises(InputError, match="compensated already"):
         rewritten(UR, marked, robot)
+
+
+def test_a_step_is_a_copy_of_its_motion(robot, sample):
+    program = read(UR, sample, robot)
+    values, decimals = (0.1, -0.2, 0.3, 1.0, -0.5, 0.25), (6,) * 6
+
+    def step(line):
+        return UR.linear_step(program, LinearStep(line, 0, 0, values, decimals))
+
+    numbers = "p[0.100000, -0.200000, 0.300000, 1.000000, -0.500000, 0.250000]"
+    assert step(16) == f"  movel({numbers}, a=1.2, v=0.25)\n"
+    assert step(11) is None
+    timed = read(UR, "movel(p[0.1, 0.2, 0.3, 0, 0, 0], t=2)\n", robot)
+    assert UR.linear_step(timed, LinearStep(1, 0, 0, values, decimals)) is None
 
 
 @settings(max_examples=60)

@@ -23,7 +23,7 @@ from truearm.rotations import rigid_inverse
 Floats = NDArray[np.float64]
 
 _SECTION: Final = re.compile(r"^/(PROG|ATTR|APPL|MN|POS|END)\b[^\n]*(?:\n|\Z)", re.MULTILINE)
-_STATEMENT: Final = re.compile(r"^[ \t]*\d*[ \t]*:(.*?);[ \t]*\r?$", re.MULTILINE | re.DOTALL)
+_LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
 _TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
 _SET: Final = re.compile(r"\s*(UFRAME_NUM|UTOOL_NUM)\s*=\s*(\S+)\s*$")
@@ -109,11 +109,25 @@ class Reader:
 
     def _statements(self) -> Iterator[tuple[int, str]]:
         """Offset and text of each statement of /MN, remarks and what is commented out left out."""
-        for found in _STATEMENT.finditer(self._source.text, *self._main):
-            text = found.group(1)
-            if not text.lstrip().startswith(("!", "//", "--")):
-                start = found.start(1) + len(text) - len(text.lstrip())
-                yield start, _STRING.sub(lambda one: " " * len(one.group()), text).replace("\n", " ")
+        for start, text in self._whole_lines():
+            body = text.lstrip()
+            if not body.startswith(("!", "//", "--")):
+                yield start + len(text) - len(body), _STRING.sub(lambda one: " " * len(one.group()), text)
+
+    def _whole_lines(self) -> Iterator[tuple[int, str]]:
+        """Offset and text of each line up to its semicolon, with the lines that go on with it."""
+        start, pieces = -1, list[str]()
+        for found in _LINE.finditer(self._source.text, *self._main):
+            text = found.group(2)
+            if text is None or found.group(1) or not pieces:
+                start, pieces = found.start(2), []
+            if text is None:
+                continue
+            ended = text.rstrip().endswith(";")
+            pieces.append(text.rstrip()[:-1] if ended else text)
+            if ended:
+                yield start, " ".join(pieces)
+                pieces = []
 
     def _settings(self) -> None:
         for at, text in self._statements():
