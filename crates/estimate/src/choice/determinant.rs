@@ -122,3 +122,28 @@ fn unit_directions(width: usize) -> Vec<(f64, Vec<f64>)> {
     let direction = |k: usize| (0..width).map(|i| f64::from(u8::from(i == k))).collect();
     (0..width).map(|k| (1.0, direction(k))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::stream::Stream;
+
+    #[test]
+    fn changes_of_low_rank_add_up_to_the_inverse_made_anew() {
+        let mut stream = Stream::new(4);
+        let jacobian: Vec<f64> = (0..50 * 18).map(|_| stream.normal()).collect();
+        let mut pool = Pool::<3>::new(&jacobian, 3, 6);
+        let mut present = Present::new(&mut pool, &Mat::zeros(6, 6), &[1, 7, 9]).unwrap();
+        present.fill(12).unwrap();
+        present.settle(60, &Cancel::default()).unwrap();
+        let (kept, gains) = (present.inverse.clone(), present.pool.gains.clone());
+        present.renew().unwrap();
+        let error = (&kept - &present.inverse).norm_max() / present.inverse.norm_max();
+        assert!(error < 1e-9, "{error:e}");
+        for (before, after) in gains.iter().zip(&present.pool.gains) {
+            assert!((before / after - 1.0).abs() < 1e-8);
+        }
+        let leaves = present.pool.loss(present.chosen[0]);
+        assert!(leaves > 0.0 && leaves < 1.0);
+    }
+}

@@ -165,3 +165,33 @@ fn add(normal: &mut Mat<f64>, jacobian: &Mat<f64>, sign: f64) {
     use faer::linalg::matmul::matmul;
     matmul(normal.as_mut(), faer::Accum::Add, jacobian.transpose(), jacobian.as_ref(), sign, Par::Seq);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::stream::Stream;
+    use proptest::prelude::*;
+
+    fn random(rows: usize, columns: usize, stream: &mut Stream) -> Mat<f64> {
+        Mat::from_fn(rows, columns, |_, _| stream.normal())
+    }
+
+    proptest! {
+        #[test]
+        fn candidates_are_dropped_only_where_they_are_worse(seed in 0u64..500, share in 0.2..3.0f64) {
+            let mut stream = Stream::new(seed);
+            let (rows, pose) = (random(9, 6, &mut stream), random(3, 6, &mut stream));
+            let without = rows.transpose() * &rows;
+            let with = &without + pose.transpose() * &pose;
+            let spectrum = Spectrum::new(&without).unwrap();
+            for criterion in [Criterion::Condition, Criterion::O3, Criterion::O4] {
+                let value = criterion.value(&eigenvalues(&with).unwrap());
+                let reached = spectrum.can_reach(&pose, criterion, share * value);
+                prop_assert!(reached || share > 1.0 - 1e-9);
+                if criterion == Criterion::O3 {
+                    prop_assert_eq!(reached, share < 1.0);
+                }
+            }
+        }
+    }
+}

@@ -13,6 +13,8 @@ mod network;
 mod roughness;
 mod sensor;
 mod table;
+#[cfg(test)]
+mod tests;
 mod training;
 
 pub use fit::{FitOptions, NetworkFit, Scales};

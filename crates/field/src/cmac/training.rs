@@ -29,7 +29,7 @@ pub struct TrainingOptions {
 
 impl Default for TrainingOptions {
     fn default() -> Self {
-        Self { rate: Rate::Printed(0.5), tolerance: 1e-6, epochs: 2000, cancel: Cancel::default() }
+        Self { rate: Rate::Printed(1.0), tolerance: 1e-5, epochs: 5000, cancel: Cancel::default() }
     }
 }
 

@@ -114,3 +114,92 @@ pub fn shrunk(regions: &Regions, own: &[Own], halving: Option<f64>) -> Option<(V
     }
     Some((ceps, spread))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use truearm_estimate::dense::column;
+
+    fn tree() -> Regions {
+        let mut regions = Regions::new(&[0.0], &[1.0]).unwrap();
+        regions.halve(0, 0);
+        regions.halve(2, 0);
+        regions
+    }
+
+    /// Normal equations of three rows in every leaf but the last.
+    fn own(regions: &Regions) -> Vec<Own> {
+        let of = |region: usize| {
+            let rows = if regions.is_leaf(region) && region != 4 { 3 } else { 0 };
+            let a = Mat::from_fn(rows, 2, |i, j| ((7 * region + 3 * i + j) as f64).sin());
+            let r: Vec<f64> = (0..rows).map(|i| ((region + i) as f64).cos()).collect();
+            let right = a.transpose() * column(&r);
+            Own {
+                normal: a.transpose() * &a,
+                right: vec![right[(0, 0)], right[(1, 0)]],
+                squares: r.iter().map(|x| x * x).sum(),
+                rows,
+            }
+        };
+        (0..regions.count()).map(of).collect()
+    }
+
+    /// Precision of all regions' CEPs side by side, written out.
+    fn joint(regions: &Regions, own: &[Own], spread: Spread) -> (Mat<f64>, Vec<f64>) {
+        let n = 2 * regions.count();
+        let (mut precision, mut right) = (Mat::zeros(n, n), vec![0.0; n]);
+        for region in 0..regions.count() {
+            let weight = spread.of(regions.depth(region)).powi(-2);
+            for k in 0..2 {
+                let here = 2 * region + k;
+                precision[(here, here)] += weight;
+                right[here] += own[region].right[k];
+                (0..2).for_each(|j| precision[(here, 2 * region + j)] += own[region].normal[(k, j)]);
+                if let Some(parent) = regions.parent(region) {
+                    let there = 2 * parent + k;
+                    precision[(there, there)] += weight;
+                    precision[(here, there)] -= weight;
+                    precision[(there, here)] -= weight;
+                }
+            }
+        }
+        (precision, right)
+    }
+
+    #[test]
+    fn messages_give_the_posterior_written_out() {
+        let regions = tree();
+        let own = own(&regions);
+        let (ceps, spread) = shrunk(&regions, &own, Some(0.3)).unwrap();
+        let spread = Spread { noise: 1.0, halving: spread.halving / spread.noise, finer: 1.0 };
+        let (precision, right) = joint(&regions, &own, spread);
+        let expected = Cholesky::new(precision, Par::Seq).unwrap().solve_vector(&right);
+        for (found, expected) in ceps.iter().flatten().zip(&expected) {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
+        // A region without rows is like the one that it is half of.
+        assert!((ceps[4][0] - ceps[2][0]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn evidence_differs_as_that_written_out_does() {
+        let regions = tree();
+        let own = own(&regions);
+        let direct = |halving: f64| {
+            let spread = Spread { noise: 1.0, halving, finer: 1.0 };
+            let (precision, right) = joint(&regions, &own, spread);
+            let factor = Cholesky::new(precision, Par::Seq).unwrap();
+            let explained: f64 = factor.solve_vector(&right).iter().zip(&right).map(|(a, b)| a * b).sum();
+            let prior: f64 =
+                (0..regions.count()).map(|r| 2.0 * spread.of(regions.depth(r)).powi(-2).ln()).sum();
+            0.5 * (prior - factor.log_determinant() + explained)
+        };
+        let messages = |halving: f64| {
+            let spread = Spread { noise: 1.0, halving, finer: 1.0 };
+            let (_, evidence, explained) = upwards(&regions, &own, spread).unwrap();
+            evidence + 0.5 * explained
+        };
+        let difference = (messages(0.2) - messages(2.0)) - (direct(0.2) - direct(2.0));
+        assert!(difference.abs() < 1e-6, "{difference}");
+    }
+}

@@ -229,3 +229,82 @@ impl Regions {
         Ok(regions)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn divided(halvings: &[(usize, usize)]) -> Regions {
+        let mut regions = Regions::new(&[0.0, -1.0], &[2.0, 3.0]).unwrap();
+        for &(which, axis) in halvings {
+            let leaves = regions.leaves();
+            regions.halve(leaves[which % leaves.len()], axis);
+        }
+        regions
+    }
+
+    fn halvings() -> impl Strategy<Value = Vec<(usize, usize)>> {
+        proptest::collection::vec((0usize..100, 0usize..2), 0..20)
+    }
+
+    fn volume(regions: &Regions, region: usize) -> f64 {
+        let (low, high) = regions.corners(region);
+        low.iter().zip(high).map(|(a, b)| b - a).product()
+    }
+
+    proptest! {
+        #[test]
+        fn look_up_finds_the_box_that_holds_the_point(how in halvings(), x in 0.0..2.0f64, y in -1.0..3.0f64) {
+            let regions = divided(&how);
+            let (low, high) = regions.corners(regions.find(&[x, y]));
+            prop_assert!(low[0] <= x && x < high[0] && low[1] <= y && y < high[1]);
+            prop_assert!(regions.is_leaf(regions.find(&[x, y])));
+        }
+
+        #[test]
+        fn leaves_fill_the_workspace(how in halvings()) {
+            let regions = divided(&how);
+            prop_assert_eq!(regions.leaves().len(), how.len() + 1);
+            let sum: f64 = regions.leaves().iter().map(|&leaf| volume(&regions, leaf)).sum();
+            prop_assert!((sum - 8.0).abs() < 1e-12);
+        }
+
+        #[test]
+        fn arrays_hold_all_of_the_tree(how in halvings()) {
+            let regions = divided(&how);
+            prop_assert_eq!(Regions::from_parts(&regions.parts()).unwrap(), regions);
+        }
+
+        #[test]
+        fn neighbours_are_mutual_and_touch(how in halvings()) {
+            let regions = divided(&how);
+            for leaf in regions.leaves() {
+                for other in regions.neighbours(leaf) {
+                    prop_assert!(regions.neighbours(other).contains(&leaf) && other != leaf);
+                }
+                prop_assert!(!regions.neighbours(leaf).is_empty() || how.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn an_even_division_differs_by_one_halving_at_most() {
+        let regions = Regions::new(&[0.0; 3], &[1.0, 2.0, 3.0]).unwrap().evenly(110);
+        let depths: Vec<usize> = regions.leaves().iter().map(|&leaf| regions.depth(leaf)).collect();
+        assert_eq!((depths.len(), regions.count()), (110, 219));
+        assert!(depths.iter().all(|&depth| depth == 6 || depth == 7));
+    }
+
+    #[test]
+    fn arrays_that_are_no_tree_are_refused() {
+        let parts = divided(&[(0, 0), (1, 1)]).parts();
+        for child in [vec![1, 1, -1, -1, -1], vec![2, -1, -1], vec![-1; 5], vec![1, -1, 9, -1, -1]] {
+            let axis = vec![0; child.len()];
+            assert!(Regions::from_parts(&Parts { child, axis, ..parts.clone() }).is_err());
+        }
+        assert!(Regions::from_parts(&Parts { axis: vec![7; 5], ..parts }).is_err());
+        assert!(Regions::new(&[0.0], &[0.0]).is_err());
+        assert!(Regions::new(&[], &[]).is_err());
+    }
+}
