@@ -62,7 +62,7 @@ class Arm:
     def measure(self, q: Floats) -> _core.MeasurementSet:
         self.measured.append(q)
         points = self.points(q) + self.noise * self.rng.normal(size=(len(q), 3))
-        arrays = {
+        arrays: dict[str, Any] = {
             "joints": q,
             "group": np.zeros(len(q), dtype=np.int64),
             "targets": points[:, None],

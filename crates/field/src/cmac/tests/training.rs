@@ -90,7 +90,7 @@ fn angles_count_at_the_length_of_an_arm() {
 fn measurements_train_to_the_ceps_that_they_determine() {
     // Two rows a pose that see both CEPs, and a third of nothing.
     let network = network(&[10, 10], 3, 2, GAUSSIAN);
-    let s = inputs(150, 2);
+    let s = inputs(60, 2);
     let (mut jacobian, mut residual) = (Vec::new(), Vec::new());
     for (pose, ceps) in smooth(&s).chunks_exact(2).enumerate() {
         let (sine, cosine) = (pose as f64).sin_cos();
@@ -102,7 +102,7 @@ fn measurements_train_to_the_ceps_that_they_determine() {
     let rows = Rows { inputs: &s, jacobian: &jacobian, residual: &residual, columns: &LENGTHS };
     let how = TrainingOptions { tolerance: 1e-5, ..options(Rate::Printed(1.0), 3000) };
     let trained = network.train_on_rows(&rows, &how).unwrap();
-    let mut out = vec![0.0; 300];
+    let mut out = vec![0.0; 120];
     trained.network.output(&s, &mut out).unwrap();
     let left = out.iter().zip(smooth(&s)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(trained.end == TrainingEnd::Converged && left < 2e-5, "{left} {:?}", trained.end);
