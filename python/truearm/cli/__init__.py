@@ -23,6 +23,7 @@ COMMANDS: Final = (
     Entry("frame", "truearm.cli.frame", "Teach a tool or a work object again."),
     Entry("export", "truearm.cli.export", "A calibration as URDF, D-H table or samples."),
     Entry("compensate", "truearm.cli.compensate", "Rewrite a robot program for the calibrated arm."),
+    Entry("study", "truearm.cli.study", "The paper's simulations, run again."),
 )
 
 

@@ -142,7 +142,11 @@ class CartesianSpace:
 
     def readings(self, coordinates: Floats) -> tuple[Floats, Mask]:
         """Readings by nominal inverse kinematics."""
-        return self._inverse.readings(np.asarray(self.origin) + self._offset(coordinates))
+        return self._inverse.readings(self.points(coordinates))
+
+    def points(self, coordinates: Floats) -> Floats:
+        """Points (n, 3) of coordinates (n, 3) in the base frame, m."""
+        return np.asarray(self.origin) + self._offset(coordinates)
 
     def coordinates(self, readings: Floats) -> Floats:
         """Where the nominal tool point is."""

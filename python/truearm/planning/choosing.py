@@ -1,0 +1,173 @@
+"""The choice of the poses that determine the parameters best."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import choose_poses
+from truearm.errors import WorkError
+from truearm.identified import IdentifiedArm
+from truearm.parameters import KIND_COUNT, THETA, A, D
+
+Floats = NDArray[np.float64]
+Criterion = Literal["kappa", "d", "o1", "o2", "o3", "o4", "o5"]
+
+CRITERIA: Final = ("kappa", "d", "o1", "o2", "o3", "o4", "o5")
+LENGTH_PER_ANGLE_M: Final = 0.3
+"""Columns are taken per mm and per 1/300 rad, so that all move the tool about alike."""
+INDEPENDENT: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class ChoiceOptions:
+    """How poses are chosen.
+
+    Attributes:
+        criterion: "kappa" to minimise the condition number; "o1" to "o5", or "d", to maximise an index.
+        limit: Largest condition number of M that is good enough; None for none.
+        names: Parameters that are to be determined; all that the pool can determine by default.
+        pose: Whether orientation is measured too.
+        passes: Passes of the exchange at the most.
+    """
+
+    criterion: Criterion = "kappa"
+    limit: float | None = None
+    names: Sequence[str] | None = None
+    pose: bool = False
+    passes: int = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Chosen poses.
+
+    Attributes:
+        rows: Of the pool (count,).
+        before: Indices of the start by name: kappa of M, kappa_normal of M^t M (equation (4) as it is meant),
+            o1 to o5, log_det. Rows of M are mm, columns per mm and per 1/300 rad.
+        after: The same of the choice.
+        exchanges: How often a pose was exchanged.
+        well_conditioned: Whether the limit is met.
+        reason: Why it ended, or why it cannot be met.
+    """
+
+    rows: NDArray[np.int64]
+    before: dict[str, float]
+    after: dict[str, float]
+    exchanges: int
+    well_conditioned: bool
+    reason: str
+
+
+def choose(
+    arm: IdentifiedArm,
+    readings: Floats,
+    count: int,
+    options: ChoiceOptions | None = None,
+    *,
+    given: Floats | None = None,
+) -> Choice:
+    """Choose `count` of the poses `readings` (n, N).
+
+    With the arm's frame "world" the parameters are the base row's and the links'; else the unknowns of the
+    set-up, world_from_base and the target, are determined along with them.
+
+    Args:
+        arm: The arm and what of it is unknown.
+        readings: The pool.
+        count: How many.
+        options: Criterion and limit.
+        given: Poses (k, N) that are measured anyway.
+
+    Raises:
+        WorkError: If the pool is smaller than the choice.
+    """
+    chosen = options or ChoiceOptions()
+    if len(readings) < count:
+        raise WorkError(
+            f"{count} poses are to be chosen from {len(readings)}",
+            rule="The pool must be larger than the choice",
+            way_out="Draw a larger pool, or choose fewer",
+        )
+    jacobian, columns = unknowns_jacobian(arm, readings, names=chosen.names, pose=chosen.pose)
+    kept = independent_columns(jacobian, columns)
+    measured = None
+    if given is not None and len(given):
+        measured = unknowns_jacobian(arm, given, names=chosen.names, pose=chosen.pose)[0][:, :, kept]
+    core = choose_poses(
+        np.ascontiguousarray(jacobian[:, :, kept]),
+        count,
+        {
+            "columns": [columns[k] for k in kept],
+            "criterion": chosen.criterion,
+            "limit": chosen.limit,
+            "given": None if measured is None else np.ascontiguousarray(measured),
+            "start": None,
+            "passes": chosen.passes,
+        },
+    )
+    return Choice(core.chosen, core.before, core.after, core.exchanges, core.well_conditioned, core.reason)
+
+
+def unknowns_jacobian(
+    arm: IdentifiedArm, readings: Floats, *, names: Sequence[str] | None = None, pose: bool = False
+) -> tuple[Floats, list[int]]:
+    """Derivatives (n, 3 or 6, P) of the tool by the unknowns, and a parameter of each one's kind.
+
+    Args:
+        arm: The arm.
+        readings: Poses (n, N).
+        names: Parameters of the arm; all candidates by default.
+        pose: Whether the rotation vector follows the position.
+    """
+    candidates = arm.candidates
+    wanted = [
+        column
+        for column, name in zip(candidates.columns, candidates.names, strict=True)
+        if names is None or name in names
+    ]
+    chain = arm.chain(arm.robot.flange @ arm.robot.tool)
+    values = arm.robot.joints_from_readings(readings)
+    jacobian = chain.parameter_jacobian(values, pose=pose)[:, :, wanted]
+    if arm.world_is_known:
+        return jacobian, wanted
+    setup = _setup_jacobian(chain.pose(values), pose=pose)
+    return np.concatenate([setup, jacobian], axis=2), [D, D, D, THETA, THETA, THETA, D, D, D, *wanted]
+
+
+def _setup_jacobian(poses: Floats, *, pose: bool) -> Floats:
+    """Derivatives (n, 3 or 6, 9) for shift and turn of the base, and shift of the target."""
+    found = np.zeros((len(poses), 6 if pose else 3, 9))
+    found[:, :3, :3] = np.eye(3)
+    x, y, z = poses[:, :3, 3].T
+    zero = np.zeros_like(x)
+    found[:, :3, 3:6] = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).transpose(2, 0, 1)
+    found[:, :3, 6:] = poses[:, :3, :3]
+    if pose:
+        found[:, 3:, 3:6] = np.eye(3)
+    return found
+
+
+def independent_columns(jacobian: Floats, columns: Sequence[int]) -> list[int]:
+    """Positions of columns that none before them can stand for, in order.
+
+    Args:
+        jacobian: Derivatives (n, m, P).
+        columns: A parameter of each one's kind.
+    """
+    scale = np.array([1.0 if c % KIND_COUNT in (A, D) else 1.0 / LENGTH_PER_ANGLE_M for c in columns])
+    rows = jacobian.reshape(-1, len(columns)) * scale
+    largest = np.linalg.norm(rows, axis=0).max()
+    kept: list[int] = []
+    basis = np.empty((len(rows), 0))
+    for k in range(len(columns)):
+        left = rows[:, k] - basis @ (basis.T @ rows[:, k])
+        left -= basis @ (basis.T @ left)
+        size = np.linalg.norm(left)
+        if size > INDEPENDENT * largest:
+            kept.append(k)
+            basis = np.column_stack([basis, left / size])
+    return kept

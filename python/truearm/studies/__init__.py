@@ -1,0 +1,1 @@
+"""Studies: the paper's simulations, reproduced and measured."""
