@@ -86,6 +86,7 @@ def calibrate(
         rows=FittedRows.of(final, sides(len(given), split)[order], task.selection),
         data_hash=given.hash(),
         version=version("truearm"),
+        scheme=None if final.scheme is None else final.scheme.details,
         notices=(*notices, *_open_setup(task, final.identifiability)),
         seconds=trained.seconds,
     )

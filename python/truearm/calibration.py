@@ -22,9 +22,10 @@ from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.inputs import feature_columns
 from truearm.limits import Task
-from truearm.models import CONSTANT, VARIABLE, ArmModel
+from truearm.models import CONSTANT, ArmModel
 from truearm.options import Options
 from truearm.robot import Robot
+from truearm.scheme_fitting import SchemeDetails
 from truearm.solving import solve
 from truearm.summary import summarise
 from truearm.uncertainty import ConstantSpread, Spread, VariableSpread
@@ -49,7 +50,7 @@ class Calibration:
         options: How it was calibrated.
         groups: Names of the set-ups.
         selection: What of the measurements was used.
-        models: The fitted models by name: "nominal", "constant" and, if fitted, "variable".
+        models: The fitted models by name: "nominal", "constant" and, if fitted, one that varies.
         identifiability: Which parameters the measurements determined.
         constant: More about the constant model.
         variable: More about the variable model; None where there is none.
@@ -59,6 +60,7 @@ class Calibration:
         version: Version of truearm that made it.
         notices: What the user should know.
         seconds: Time of the fits that were validated; empty for a calibration that was read.
+        scheme: More about one of the paper's schemes; None where it is none.
     """
 
     robot: Robot
@@ -75,6 +77,7 @@ class Calibration:
     version: str
     notices: tuple[Notice, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
+    scheme: SchemeDetails | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> "Calibration":
@@ -105,8 +108,13 @@ class Calibration:
 
     @property
     def model(self) -> ArmModel:
-        """The model that predicts: the variable one if there is one."""
-        return self.models[VARIABLE if VARIABLE in self.models else CONSTANT]
+        """The model that predicts: the one that varies if there is one."""
+        return self.models[self.model_name]
+
+    @property
+    def model_name(self) -> str:
+        """Its name."""
+        return self.options.model if self.options.model in self.models else CONSTANT
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -248,6 +256,12 @@ class Calibration:
 
     @cached_property
     def _spread(self) -> Spread:
+        if self.scheme is not None:
+            raise WorkError(
+                "standard deviations are not known",
+                rule=f"The scheme {self.model_name} does not tell them",
+                way_out="Calibrate with --model variable or constant",
+            )
         if self.variable is None:
             return ConstantSpread.of(self)
         return VariableSpread.of(self)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm import rows_content
+from truearm import rows_content, schemes
 from truearm._core import Field, Setup
 from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
@@ -17,6 +17,7 @@ from truearm.identified import IdentifiedArm
 from truearm.models import ArmModel
 from truearm.options import Options
 from truearm.robot import Robot
+from truearm.scheme_fitting import SchemeDetails
 from truearm.validation import Validation
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         "identifiability": calibration.identifiability.to_dict(),
         "constant": _constant(calibration.constant),
         "variable": _variable(calibration.variable),
+        "scheme": None if calibration.scheme is None else calibration.scheme.to_dict(),
         "models": {name: _model(name, model, arrays) for name, model in calibration.models.items()},
         "validation": calibration.validation.to_dict(),
         "data_sha256": calibration.data_hash,
@@ -88,6 +90,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
             **{key: constant[key] for key in CONSTANT_KEYS},
         ),
         "variable": _read_variable(content["variable"]),
+        "scheme": SchemeDetails(**content["scheme"]) if content.get("scheme") else None,
         "validation": Validation.from_dict(content["validation"]),
         "rows": None if rows is None else rows_content.unpack(rows, arrays),
         "data_hash": content["data_sha256"],
@@ -124,6 +127,8 @@ def _model(name: str, model: ArmModel, arrays: Arrays) -> dict[str, Any]:
     arrays[f"{name}.constants"] = model.constants
     for part in SETUP_PARTS:
         arrays[f"{name}.{part}"] = getattr(model.setup, part)
+    if model.scheme is not None:
+        return {"blocks": None, "scheme": model.scheme.pack(name, arrays)}
     if model.field is None:
         return {"blocks": None}
     blocks = []
@@ -147,4 +152,6 @@ def _read_model(name: str, content: Mapping[str, Any], arrays: Arrays, sizes: tu
             for number, block in enumerate(content["blocks"])
         ]
         field = Field(*sizes, blocks)
-    return ArmModel(np.ascontiguousarray(arrays[f"{name}.constants"]), setup, field)
+    kept = content.get("scheme")
+    scheme = schemes.unpack(kept, name, arrays) if kept else None
+    return ArmModel(np.ascontiguousarray(arrays[f"{name}.constants"]), setup, field, scheme)

@@ -117,7 +117,10 @@ def evaluate(
     with stages("finding frame and tool"):
         models = {
             name: ArmModel(
-                model.constants, _setup(task, calibration, name, data.select(frame), chosen), model.field
+                model.constants,
+                _setup(task, calibration, name, data.select(frame), chosen),
+                model.field,
+                model.scheme,
             )
             for name, model in calibration.models.items()
         }

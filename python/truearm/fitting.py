@@ -25,6 +25,8 @@ from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.options import Options
+from truearm.scheme_fitting import SchemeFit, SchemeRows, fit_scheme
+from truearm.schemes import SCHEMES
 
 Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
@@ -79,7 +81,9 @@ class Fits:
         identifiability: What the rows determine.
         constant: Constants with frame and tool.
         variable: Constants, field, frame and tool together; None where only constants were asked for.
-        seconds: Time of the constant and the variable fit.
+        seconds: Time of the constant fit and of the one that varies.
+        scheme: One of the paper's schemes beside the constants; None where it was not asked for.
+        scheme_name: Its name.
     """
 
     data: Measurements
@@ -88,6 +92,8 @@ class Fits:
     constant: ConstantFit
     variable: FieldFit | None
     seconds: dict[str, float]
+    scheme: SchemeFit | None = None
+    scheme_name: str = ""
 
     def models(self, arm: IdentifiedArm) -> dict[str, ArmModel]:
         """The fitted models by name."""
@@ -97,6 +103,9 @@ class Fits:
         }
         if self.variable is not None:
             models[VARIABLE] = ArmModel(self.variable.parameters, self.variable.setup, self.variable.field)
+        if self.scheme is not None:
+            constant = models[CONSTANT]
+            models[self.scheme_name] = ArmModel(constant.constants, constant.setup, scheme=self.scheme.scheme)
         return models
 
 
@@ -130,7 +139,28 @@ def fit_rows(task: Task, data: Measurements, hyper: Hyper | None = None) -> Fits
         with task.stages("fitting what varies"), core_errors(data):
             variable = _fit_field(task, measured, constant, found, data, hyper)
         seconds[VARIABLE] = time.perf_counter() - began
-    return Fits(data, nominal, found, constant, variable, seconds)
+    scheme = None
+    if task.options.model in SCHEMES:
+        began = time.perf_counter()
+        with task.stages("dividing the workspace, and learning"), core_errors(data):
+            scheme = _fit_scheme(task, measured, constant, found, data)
+        seconds[task.options.model] = time.perf_counter() - began
+    return Fits(data, nominal, found, constant, variable, seconds, scheme, task.options.model)
+
+
+def _fit_scheme(
+    task: Task, measured: MeasurementSet, constant: ConstantFit, found: Identifiability, data: Measurements
+) -> SchemeFit:
+    if task.selection.distances:
+        raise WorkError(
+            "distances alone cannot tell regions apart",
+            where=", ".join(data.files),
+            way_out="Give --model constant (model='constant')",
+        )
+    columns = task.columns(found.determined)
+    values = task.arm.robot.joints_from_readings(data.readings)
+    rows = SchemeRows(task.problem(measured, columns), columns, constant, values, task.options.split.seed)
+    return fit_scheme(task.options.model, rows, task.options.scheme)
 
 
 def fit_options(

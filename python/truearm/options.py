@@ -8,14 +8,16 @@ from truearm.core_set import FIRST_TARGET, USES, Use
 from truearm.errors import UsageError, did_you_mean, list_names
 from truearm.identified import Frame
 from truearm.parameters import PARALLEL_WITHIN_DEG
+from truearm.scheme_options import SchemeOptions
+from truearm.schemes import SCHEMES
 from truearm.splitting import HoldoutRange, SplitRule
 
-ModelName = Literal["variable", "constant"]
+ModelName = Literal["variable", "constant", "regions", "cmac", "fcmac"]
 Robust = Literal["none", "huber", "cauchy"]
 
 CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
     "use": (None, *USES),
-    "model": ("variable", "constant"),
+    "model": ("variable", "constant", *SCHEMES),
     "robust": ("none", "huber", "cauchy"),
     "frame": ("free", "world"),
     "degree": (2, 3),
@@ -29,7 +31,7 @@ class Options:
     Attributes:
         split: Which rows train and which are held out.
         use: What of the measurements to use; None for all: targets, else pose, else position.
-        model: "variable", or "constant" for that alone.
+        model: "variable", "constant" for that alone, or one of the paper's schemes, "regions", "cmac", "fcmac".
         robust: Loss of the constant fit.
         refit: Whether the calibration is fitted to all rows after validation.
         features: Columns that the field depends on beside the joints.
@@ -41,6 +43,8 @@ class Options:
         prior_mm: Standard deviation of the prior of lengths, before the evidence scales it.
         prior_mrad: The same of angles.
         parallel_within_deg: Angle between axes up to which beta is asked for in place of d.
+        scheme: How the paper's schemes are fitted.
+        repeatability_mm: Of the arm, to tell errors in parts of it; None where it is not known.
     """
 
     split: SplitRule = field(default_factory=SplitRule)
@@ -55,6 +59,8 @@ class Options:
     prior_mm: float = 2.0
     prior_mrad: float = 2.0
     parallel_within_deg: float = PARALLEL_WITHIN_DEG
+    scheme: SchemeOptions = field(default_factory=SchemeOptions)
+    repeatability_mm: float | None = None
 
     def __post_init__(self) -> None:
         for name, known in CHOICES.items():
@@ -66,11 +72,13 @@ class Options:
             if not getattr(self, name) > 0.0:
                 raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
 
-        if self.features and self.model == "constant":
+        if self.repeatability_mm is not None and not self.repeatability_mm > 0.0:
+            raise UsageError(f"{self.repeatability_mm}", where="repeatability_mm", rule="It must be positive")
+        if self.features and self.model != "variable":
             raise UsageError(
                 "features belong to what varies",
                 where="features",
-                way_out="Leave them out, or --model constant",
+                way_out="Leave them out, or --model variable",
             )
 
     @property
@@ -80,17 +88,18 @@ class Options:
 
     @classmethod
     def of(cls, **given: Any) -> "Options":
-        """Options from keywords: those of this class and those of SplitRule, side by side.
+        """Options from keywords: those of this class, of SplitRule and of SchemeOptions, side by side.
 
         Raises:
             UsageError: If there is no such option or a value breaks a rule.
         """
-        known = (*cls.__dataclass_fields__, *SplitRule.__dataclass_fields__)
+        parts = {"split": SplitRule.__dataclass_fields__, "scheme": SchemeOptions.__dataclass_fields__}
+        known = (*cls.__dataclass_fields__, *parts["split"], *parts["scheme"])
         for name in given:
             if name not in known:
                 raise UsageError(
                     f'there is no option "{name}"',
-                    rule=f"There are {list_names(sorted(set(known) - {'split'}))}",
+                    rule=f"There are {list_names(sorted(set(known) - set(parts)))}",
                     way_out=did_you_mean(name, known),
                 )
         splitting = {name: given.pop(name) for name in SplitRule.__dataclass_fields__ if name in given}
@@ -100,6 +109,11 @@ class Options:
             part |= {name: _words(part[name]) for name in names if name in part}
         if splitting:
             given["split"] = SplitRule(**splitting)
+        scheme = {name: given.pop(name) for name in parts["scheme"] if name in given}
+        if scheme:
+            given["scheme"] = SchemeOptions(
+                **scheme | {name: tuple(scheme[name]) for name in ("scheme_joints", "cells") if name in scheme}
+            )
         return cls(**given)
 
     def to_dict(self) -> dict[str, Any]:
@@ -108,7 +122,9 @@ class Options:
         split: dict[str, Any] = content.pop("split")
         split["split_by"] = list(self.split.split_by)
         split["holdout_range"] = None if self.split.holdout_range is None else str(self.split.holdout_range)
-        return split | content | {"features": list(self.features)}
+        scheme: dict[str, Any] = content.pop("scheme")
+        lists = {name: list(scheme[name]) for name in ("scheme_joints", "cells")}
+        return split | content | scheme | lists | {"features": list(self.features)}
 
 
 def _words(value: Any) -> tuple[str, ...]:  # noqa: ANN401

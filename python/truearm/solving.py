@@ -27,7 +27,17 @@ def plain_model(robot: Robot) -> ArmModel:
 
 
 def calibrated_model(calibration: "Calibration") -> ArmModel:
-    """The arm as identified, with what is known of its uncertainty."""
+    """The arm as identified, with what is known of its uncertainty.
+
+    Raises:
+        UsageError: If the calibration is of one of the paper's schemes.
+    """
+    if calibration.scheme is not None:
+        raise UsageError(
+            f"this calibration is of the scheme {calibration.model_name}",
+            rule="Compensation knows constant and variable models",
+            way_out="Calibrate with --model variable or constant",
+        )
     model, spread = calibration.model, ConstantSpread.of(calibration)
     return ArmModel(
         calibration.arm.flange_chain,

@@ -22,6 +22,8 @@ def summarise(calibration: "Calibration") -> dict[str, Any]:
         **calibration.validation.to_dict(),
         "identifiability": calibration.identifiability.to_dict(),
         "noise_mm": noise_mm(calibration),
+        "scheme": None if calibration.scheme is None else calibration.scheme.to_dict(),
+        "error_to_repeatability": error_to_repeatability(calibration),
         "outliers": [] if calibration.rows is None else calibration.rows.outliers(),
         "blocks": describe_blocks(calibration),
         "refit": calibration.options.refit,
@@ -32,6 +34,14 @@ def summarise(calibration: "Calibration") -> dict[str, Any]:
         "seconds": dict(calibration.seconds),
         "notices": [str(notice) for notice in calibration.notices],
     }
+
+
+def error_to_repeatability(calibration: "Calibration") -> dict[str, float] | None:
+    """Mean held-out position error of each model in parts of the arm's repeatability; None if not stated."""
+    known = calibration.options.repeatability_mm
+    if known is None:
+        return None
+    return {name: errors.position.mean / known for name, errors in calibration.validation.holdout.items()}
 
 
 def noise_mm(calibration: "Calibration") -> float:

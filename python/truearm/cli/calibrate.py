@@ -18,8 +18,10 @@ from truearm.files import write_whole
 from truearm.measurements import Measurements
 from truearm.options import Options
 from truearm.robot import Robot
+from truearm.scheme_options import SchemeOptions
 from truearm.splitting import DEFAULT_HOLDOUT, DEFAULT_SEED
 
+SCHEME = SchemeOptions()
 CALIBRATION_NAME = "calibration.calib"
 SUMMARY_NAME = "summary.json"
 OUTLIERS_NAMED = 5
@@ -57,7 +59,11 @@ def command(
         int, typer.Option(metavar="K", help="Judge at this target; another than 1 takes no part in the fit.")
     ] = 1,
     model: Annotated[
-        str, typer.Option(metavar="variable|constant", help="The constant model alone, or both.")
+        str,
+        typer.Option(
+            metavar="variable|constant|regions|cmac|fcmac",
+            help="The variable model, the constant one alone, or a scheme of the paper.",
+        ),
     ] = "variable",
     robust: Annotated[
         str, typer.Option(metavar="none|huber|cauchy", help="Loss of the constant fit.")
@@ -74,6 +80,35 @@ def command(
     ] = None,
     angle_unit: Annotated[
         str | None, typer.Option(metavar="deg|rad", help="Unit of joint columns that name none.")
+    ] = None,
+    scheme_joints: Annotated[
+        str | None,
+        typer.Option(metavar="J,J", help="Schemes: joints that are divided.  [default: 1,2,3]"),
+    ] = None,
+    demanded_mm: Annotated[
+        float, typer.Option(metavar="MM", help="Schemes: a region this accurate is not divided.")
+    ] = SCHEME.demanded_mm,
+    regions: Annotated[
+        int, typer.Option(metavar="N", help="Schemes: regions at the most.")
+    ] = SCHEME.most_regions,
+    region_rows: Annotated[
+        int, typer.Option(metavar="N", help="Schemes: rows that a region needs.")
+    ] = SCHEME.region_rows,
+    region_ceps: Annotated[
+        str,
+        typer.Option(metavar="shrunk|least_squares", help="Schemes: shrunk to the parent, or as the paper."),
+    ] = SCHEME.region_ceps,
+    train_on: Annotated[
+        str, typer.Option(metavar="ceps|measurements", help="Networks: what they learn from.")
+    ] = SCHEME.train_on,
+    membership: Annotated[
+        str, typer.Option(metavar="gaussian|bspline", help="FCMAC: its fuzzy sensors.")
+    ] = SCHEME.membership,
+    composition: Annotated[
+        str, typer.Option(metavar="min|product", help="Networks: how sensors combine.")
+    ] = SCHEME.composition,
+    repeatability_mm: Annotated[
+        float | None, typer.Option(metavar="MM", help="Of the arm; errors are told in parts of it too.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
     degree: Annotated[int, typer.Option(hidden=True)] = 2,
@@ -97,6 +132,15 @@ def command(
         frame=frame,
         refit=not no_refit,
         degree=degree,
+        scheme_joints=_numbers(scheme_joints),
+        demanded_mm=demanded_mm,
+        most_regions=regions,
+        region_rows=region_rows,
+        region_ceps=region_ceps,
+        train_on=train_on,
+        membership=membership,
+        composition=composition,
+        repeatability_mm=repeatability_mm,
     )
     arm = Robot.load(robot)
     data = Measurements.read_files(
@@ -122,6 +166,15 @@ def _holdout(share: float | None, holdout_range: str | None) -> float:
             "--holdout and --holdout-range both say how much is held out", way_out="Give one of them"
         )
     return DEFAULT_HOLDOUT if share is None else share
+
+
+def _numbers(joints: str | None) -> tuple[int, ...]:
+    if joints is None:
+        return SCHEME.scheme_joints
+    parts = [part.strip() for part in joints.split(",")]
+    if not all(part.isdigit() for part in parts):
+        raise UsageError(f'"{joints}"', where="--scheme-joints", rule="Numbers of joints with commas: 2,3,4")
+    return tuple(int(part) for part in parts)
 
 
 def check_directory(output: Path) -> None:
@@ -159,6 +212,7 @@ def print_results(calibration: Calibration) -> None:
     if validation.coverage_95 is not None:
         inside = f"{100 * validation.coverage_95:.1f} %"
         say(f"The variable model's 95 % intervals hold {inside} of the held-out coordinates.")
+    _print_scheme(calibration, summary["error_to_repeatability"])
     _print_outliers(summary["outliers"], calibration)
     if calibration.options.refit and calibration.rows is not None:
         say(f"After that fitted to all {len(calibration.rows.data)} rows.")
@@ -183,6 +237,21 @@ def _by_reason(names: tuple[str, ...], sentences: tuple[str, ...]) -> dict[str, 
     for name, sentence in zip(names, sentences, strict=True):
         grouped.setdefault(sentence.removeprefix(name).strip(), []).append(name)
     return grouped
+
+
+def _print_scheme(calibration: Calibration, ratios: dict[str, float] | None) -> None:
+    """Say how the workspace was divided, how training ended, and how errors compare with repeatability."""
+    details = calibration.scheme
+    if details is not None and details.regions:
+        of = f"{details.regions_with_rows} of {details.regions} regions have CEPs of their own"
+        kappa = details.condition_median
+        say_wrapped(f"{of}{'' if kappa is None else f', condition number {kappa:.0f} in the median'}.")
+    if details is not None and details.epochs is not None:
+        left = f"{details.largest_left_mm:.3g} mm left at most (angles at 300 mm)"
+        say_wrapped(f"Training, {details.epochs} epochs, {left}: {details.ended}.")
+    if ratios is not None:
+        words = ", ".join(f"{name} {ratio:.1f}" for name, ratio in ratios.items())
+        say(f"Mean error in parts of the repeatability: {words}.")
 
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: Calibration) -> None:

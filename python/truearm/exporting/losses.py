@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.errors import list_rows
-from truearm.models import CONSTANT, VARIABLE
+from truearm.models import CONSTANT
 from truearm.parameters import BETA
 from truearm.robot_data import RobotData
 
@@ -28,10 +28,10 @@ FORMAT_WORDS: Final = {
 
 def field_is_lost(calibration: Calibration, export_format: str) -> list[str]:
     """That the field is not in a file of constants, with the held-out errors that this makes."""
-    if calibration.variable is None:
+    if calibration.model_name == CONSTANT:
         return []
     errors = calibration.validation.holdout
-    constant, variable = (errors[name].position.mean for name in (CONSTANT, VARIABLE))
+    constant, variable = (errors[name].position.mean for name in (CONSTANT, calibration.model_name))
     return [
         f"The parameters of this calibration vary over the workspace; {FORMAT_WORDS[export_format]} holds "
         f"the constant part alone. On {calibration.validation.n_holdout} held-out rows the constant part "

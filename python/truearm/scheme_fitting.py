@@ -1,0 +1,171 @@
+"""The paper's schemes on measured rows, its passive mode: regions, their CEPs, and networks."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import (
+    ConstantFit,
+    Network,
+    Problem,
+    divide_rows,
+    fill_without_data,
+    linearise,
+    regional_ceps,
+)
+from truearm.errors import UsageError
+from truearm.scheme_options import SchemeOptions
+from truearm.schemes import FCMAC, REGIONS, NetworkCeps, RegionalCeps, Scheme, training_pairs
+
+Floats = NDArray[np.float64]
+
+JUDGING_SHARE: Final = 0.2
+LARGEST_CONDITION: Final = 1e4
+
+
+@dataclass(frozen=True)
+class SchemeDetails:
+    """About a fitted scheme.
+
+    Attributes:
+        regions: Leaves of the tree; 0 where a network was fitted to measurements.
+        regions_with_rows: Those that have CEPs of their own.
+        prior_mm: Scale of the steps from parent to child that the rows told, angles at 0.3 m; None if not shrunk.
+        condition_median: Median condition number of the leaves; None where there are none.
+        epochs: Runs of training; None without.
+        largest_left_mm: Largest difference that training left; None without.
+        ended: Why the training, or the fit, ended.
+    """
+
+    regions: int = 0
+    regions_with_rows: int = 0
+    prior_mm: float | None = None
+    condition_median: float | None = None
+    epochs: int | None = None
+    largest_left_mm: float | None = None
+    ended: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class SchemeFit:
+    """A fitted scheme and what is worth knowing of it."""
+
+    scheme: Scheme
+    details: SchemeDetails
+
+
+@dataclass(frozen=True, eq=False)
+class SchemeRows:
+    """What a scheme is fitted to.
+
+    Attributes:
+        problem: Measured rows with the parameters that they determine.
+        columns: Those parameters.
+        constant: The constant fit beside which CEPs are found; its frames and targets are held.
+        inputs: Joint values of all joints (n, N).
+        seed: Of the draw of the rows that judge the division.
+    """
+
+    problem: Problem
+    columns: Sequence[int]
+    constant: ConstantFit
+    inputs: Floats
+    seed: int
+
+
+def fit_scheme(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit:
+    """Fit the scheme of a name.
+
+    Raises:
+        UsageError: If the arm has no such joints.
+    """
+    joints = rows.inputs.shape[1]
+    if any(not 1 <= joint <= joints for joint in options.scheme_joints):
+        raise UsageError(f"{list(options.scheme_joints)}", where="scheme_joints", rule=f"There are 1 to {joints}")
+    if name != REGIONS and options.train_on == "measurements":
+        return _fit_on_measurements(name, rows, options)
+    regional, details = _fit_regions(rows, options)
+    if name == REGIONS:
+        filled = fill_without_data(regional.regions, regional.ceps)
+        scheme = RegionalCeps(regional.inputs, regional.columns, regional.regions, filled)
+        return SchemeFit(scheme, SchemeDetails(**details))
+    return _train_on_ceps(name, rows, options, regional, details)
+
+
+def _features(rows: SchemeRows, options: SchemeOptions) -> tuple[tuple[int, ...], Floats]:
+    inputs = tuple(joint - 1 for joint in options.scheme_joints)
+    return inputs, np.ascontiguousarray(rows.inputs[:, list(inputs)])
+
+
+def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps, dict[str, Any]]:
+    inputs, features = _features(rows, options)
+    parameters, setup = rows.constant.parameters, rows.constant.setup
+    judges = np.random.default_rng([rows.seed, len(features)]).uniform(size=len(features)) < JUDGING_SHARE
+    division = {
+        "low": features.min(axis=0),
+        "high": features.max(axis=0),
+        "accuracy": options.demanded_mm / 1e3,
+        "regions": options.most_regions,
+        "halving": options.halving,
+        "order": "worst",
+        "poses": options.region_rows,
+        "limit": LARGEST_CONDITION,
+        "seed": rows.seed,
+    }
+    regions = divide_rows(rows.problem, parameters, setup, features, judges, division).regions
+    how = {"method": options.region_ceps, "prior": None}
+    fit = regional_ceps(regions, rows.problem, parameters, setup, features, how)
+    leaves = regions.leaves
+    kappa = fit.kappa[leaves][np.isfinite(fit.kappa[leaves])]
+    details = {
+        "regions": len(leaves),
+        "regions_with_rows": int(np.isfinite(fit.ceps[leaves]).all(axis=1).sum()),
+        "prior_mm": float(1e3 * np.max(fit.prior)) if len(fit.prior) else None,
+        "condition_median": float(np.median(kappa)) if len(kappa) else None,
+    }
+    return RegionalCeps(inputs, tuple(rows.columns), regions, fit.ceps), details
+
+
+def _train_on_ceps(
+    name: str, rows: SchemeRows, options: SchemeOptions, regional: RegionalCeps, details: dict[str, Any]
+) -> SchemeFit:
+    network = _empty(name, rows, options)
+    inputs, wanted = training_pairs(regional.regions, regional.ceps)
+    trained = network.train(inputs, wanted, {**options.training, "columns": list(rows.columns)})
+    details |= {
+        "epochs": trained.epochs,
+        "largest_left_mm": 1e3 * trained.largest,
+        "ended": trained.reason,
+    }
+    return SchemeFit(_kept(name, rows, options, trained.network), SchemeDetails(**details))
+
+
+def _fit_on_measurements(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit:
+    jacobian, residual = linearise(rows.problem, rows.constant.parameters, rows.constant.setup)
+    _, features = _features(rows, options)
+    how = {"columns": list(rows.columns), "scales": None, "threads": None}
+    fitted = _empty(name, rows, options).fit(features, jacobian, residual, how)
+    details = SchemeDetails(ended="noise and roughness by the largest evidence")
+    return SchemeFit(_kept(name, rows, options, fitted.network), details)
+
+
+def _empty(name: str, rows: SchemeRows, options: SchemeOptions) -> Network:
+    _, features = _features(rows, options)
+    low, high = features.min(axis=0).tolist(), features.max(axis=0).tolist()
+    sensors = [
+        (least, most, cells, options.active)
+        for least, most, cells in zip(low, high, options.sensor_cells, strict=True)
+    ]
+    return Network(sensors, len(rows.columns), options.network(fuzzy=name == FCMAC))
+
+
+def _kept(name: str, rows: SchemeRows, options: SchemeOptions, network: Network) -> NetworkCeps:
+    inputs, _ = _features(rows, options)
+    return NetworkCeps(inputs, tuple(rows.columns), network, options.network(fuzzy=name == FCMAC))
