@@ -31,7 +31,7 @@ class Options:
     Attributes:
         split: Which rows train and which are held out.
         use: What of the measurements to use; None for all: targets, else pose, else position.
-        model: "variable", "constant" for that alone, or one of the paper's schemes, "regions", "cmac", "fcmac".
+        model: "variable", "constant" for that alone, or a scheme of the paper: "regions", "cmac", "fcmac".
         robust: Loss of the constant fit.
         refit: Whether the calibration is fitted to all rows after validation.
         features: Columns that the field depends on beside the joints.
@@ -112,7 +112,8 @@ class Options:
         scheme = {name: given.pop(name) for name in parts["scheme"] if name in given}
         if scheme:
             given["scheme"] = SchemeOptions(
-                **scheme | {name: tuple(scheme[name]) for name in ("scheme_joints", "cells") if name in scheme}
+                **scheme
+                | {name: tuple(scheme[name]) for name in ("scheme_joints", "cells") if name in scheme}
             )
         return cls(**given)
 

@@ -33,7 +33,7 @@ class SchemeDetails:
     Attributes:
         regions: Leaves of the tree; 0 where a network was fitted to measurements.
         regions_with_rows: Those that have CEPs of their own.
-        prior_mm: Scale of the steps from parent to child that the rows told, angles at 0.3 m; None if not shrunk.
+        prior_mm: Step from parent to child that the rows told, angles at 0.3 m; None if not shrunk.
         condition_median: Median condition number of the leaves; None where there are none.
         epochs: Runs of training; None without.
         largest_left_mm: Largest difference that training left; None without.
@@ -88,7 +88,9 @@ def fit_scheme(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit
     """
     joints = rows.inputs.shape[1]
     if any(not 1 <= joint <= joints for joint in options.scheme_joints):
-        raise UsageError(f"{list(options.scheme_joints)}", where="scheme_joints", rule=f"There are 1 to {joints}")
+        raise UsageError(
+            f"{list(options.scheme_joints)}", where="scheme_joints", rule=f"There are 1 to {joints}"
+        )
     if name != REGIONS and options.train_on == "measurements":
         return _fit_on_measurements(name, rows, options)
     regional, details = _fit_regions(rows, options)

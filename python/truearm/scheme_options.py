@@ -27,8 +27,8 @@ class SchemeOptions:
         most_regions: Number of regions at the most.
         region_rows: Rows that a region needs.
         halving: Axis of each halving: "longest" side, or "best", the one that helps most.
-        region_ceps: "shrunk" towards the parent region by what the rows tell, or "least_squares" as in the paper.
-        train_on: Networks learn from "ceps" of regions by (A5), or from "measurements" with a roughness penalty.
+        region_ceps: "shrunk" towards the parent as the rows tell, or "least_squares" as in the paper.
+        train_on: Networks learn by (A5) from "ceps" of regions, or from "measurements", kept smooth.
         membership: Of the FCMAC: "gaussian" as in the paper, or "bspline".
         composition: "min" as in the paper, or "product".
         sigma_cells: Standard deviation of a Gaussian sensor, in cells.
@@ -65,7 +65,15 @@ class SchemeOptions:
                 raise UsageError(
                     f'"{getattr(self, name)}" is not known', where=name, rule=f"Either {' or '.join(known)}"
                 )
-        for name in ("most_regions", "region_rows", "sigma_cells", "active", "rate", "tolerance_mm", "epochs"):
+        for name in (
+            "most_regions",
+            "region_rows",
+            "sigma_cells",
+            "active",
+            "rate",
+            "tolerance_mm",
+            "epochs",
+        ):
             if not getattr(self, name) > 0:
                 raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
         if self.demanded_mm < 0.0:
@@ -73,7 +81,9 @@ class SchemeOptions:
         if not self.scheme_joints or len(set(self.scheme_joints)) < len(self.scheme_joints):
             raise UsageError(f"{list(self.scheme_joints)}", where="scheme_joints", rule="Each joint once")
         if self.cells and len(self.cells) != len(self.scheme_joints):
-            raise UsageError(f"{len(self.cells)} numbers", where="cells", rule="One for each of scheme_joints")
+            raise UsageError(
+                f"{len(self.cells)} numbers", where="cells", rule="One for each of scheme_joints"
+            )
 
     @property
     def sensor_cells(self) -> tuple[int, ...]:

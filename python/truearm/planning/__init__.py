@@ -12,13 +12,20 @@ from truearm.planning.accessibility import (
     accessible,
     either,
 )
+from truearm.planning.choosing import Choice, ChoiceOptions, choose
 from truearm.planning.configurations import Configuration
+from truearm.planning.dividing import DividedSpace, DivisionOptions, divide_space
 from truearm.planning.pool import Pool, PoolOptions, draw_pool, needed_pool
 from truearm.planning.spaces import CartesianSpace, JointSpace, Space, SphericalSpace
+from truearm.planning.workspace import Workspace
 
 __all__ = [
     "CartesianSpace",
+    "Choice",
+    "ChoiceOptions",
     "Configuration",
+    "DividedSpace",
+    "DivisionOptions",
     "InBox",
     "InCone",
     "InSphere",
@@ -32,7 +39,10 @@ __all__ = [
     "Rule",
     "Space",
     "SphericalSpace",
+    "Workspace",
     "accessible",
+    "choose",
+    "divide_space",
     "draw_pool",
     "either",
     "needed_pool",

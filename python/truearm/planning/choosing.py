@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import choose_poses
+from truearm.endpoints import at_tool
 from truearm.errors import WorkError
 from truearm.identified import IdentifiedArm
 from truearm.parameters import KIND_COUNT, THETA, A, D
@@ -31,6 +32,8 @@ class ChoiceOptions:
         names: Parameters that are to be determined; all that the pool can determine by default.
         pose: Whether orientation is measured too.
         passes: Passes of the exchange at the most.
+        tool: What is measured: a point (3,) in the flange frame or a transform (4, 4) from it; the robot
+            file's tool by default.
     """
 
     criterion: Criterion = "kappa"
@@ -38,6 +41,7 @@ class ChoiceOptions:
     names: Sequence[str] | None = None
     pose: bool = False
     passes: int = 20
+    tool: ArrayLike | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +54,7 @@ class Choice:
             o1 to o5, log_det. Rows of M are mm, columns per mm and per 1/300 rad.
         after: The same of the choice.
         exchanges: How often a pose was exchanged.
-        well_conditioned: Whether the limit is met.
-        reason: Why it ended, or why it cannot be met.
+        well_conditioned: Whether the limit is met; if not, the pool cannot be well conditioned.
     """
 
     rows: NDArray[np.int64]
@@ -59,7 +62,6 @@ class Choice:
     after: dict[str, float]
     exchanges: int
     well_conditioned: bool
-    reason: str
 
 
 def choose(
@@ -92,11 +94,11 @@ def choose(
             rule="The pool must be larger than the choice",
             way_out="Draw a larger pool, or choose fewer",
         )
-    jacobian, columns = unknowns_jacobian(arm, readings, names=chosen.names, pose=chosen.pose)
+    jacobian, columns = unknowns_jacobian(arm, readings, chosen)
     kept = independent_columns(jacobian, columns)
     measured = None
     if given is not None and len(given):
-        measured = unknowns_jacobian(arm, given, names=chosen.names, pose=chosen.pose)[0][:, :, kept]
+        measured = unknowns_jacobian(arm, given, chosen)[0][:, :, kept]
     core = choose_poses(
         np.ascontiguousarray(jacobian[:, :, kept]),
         count,
@@ -109,27 +111,28 @@ def choose(
             "passes": chosen.passes,
         },
     )
-    return Choice(core.chosen, core.before, core.after, core.exchanges, core.well_conditioned, core.reason)
+    rows = np.array(core.chosen, dtype=np.int64)
+    return Choice(rows, core.before, core.after, core.exchanges, core.well_conditioned)
 
 
 def unknowns_jacobian(
-    arm: IdentifiedArm, readings: Floats, *, names: Sequence[str] | None = None, pose: bool = False
+    arm: IdentifiedArm, readings: Floats, options: ChoiceOptions | None = None
 ) -> tuple[Floats, list[int]]:
     """Derivatives (n, 3 or 6, P) of the tool by the unknowns, and a parameter of each one's kind.
 
     Args:
         arm: The arm.
         readings: Poses (n, N).
-        names: Parameters of the arm; all candidates by default.
-        pose: Whether the rotation vector follows the position.
+        options: Parameters of the arm, and what is measured; all candidates and a position by default.
     """
-    candidates = arm.candidates
+    chosen, candidates = options or ChoiceOptions(), arm.candidates
+    names, pose = chosen.names, chosen.pose
     wanted = [
         column
         for column, name in zip(candidates.columns, candidates.names, strict=True)
         if names is None or name in names
     ]
-    chain = arm.chain(arm.robot.flange @ arm.robot.tool)
+    chain = arm.chain(arm.robot.flange @ at_tool(arm.robot, chosen.tool))
     values = arm.robot.joints_from_readings(readings)
     jacobian = chain.parameter_jacobian(values, pose=pose)[:, :, wanted]
     if arm.world_is_known:

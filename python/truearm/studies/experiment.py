@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Problem, Regions, Setup, divide
+from truearm._core import Problem, Regions, Setup
 from truearm.identified import IdentifiedArm
+from truearm.planning.dividing import DivisionOptions, divide_space, named_columns
 from truearm.planning.pool import PoolOptions, needed_pool
 from truearm.planning.spaces import Space
 from truearm.planning.workspace import Workspace, known_setup, measured_points
@@ -32,15 +33,7 @@ from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 
-LARGEST_CONDITION: Final = 1e4
 FREE_TO_STOP: Final = 1024
-MEASURING: Final = {
-    "candidates": CANDIDATES,
-    "tests": TEST_POINTS,
-    "criterion": "kappa",
-    "passes": 2,
-    "orientation": False,
-}
 WORKSPACE_SEED: Final = 7
 
 
@@ -95,7 +88,7 @@ class Experiment:
     @cached_property
     def columns(self) -> list[int]:
         """The fifteen parameters of section 6."""
-        return paper_columns(self.identified)
+        return named_columns(self.identified, PAPER_PARAMETERS)
 
     @cached_property
     def setup(self) -> Setup:
@@ -133,13 +126,6 @@ class Experiment:
         return replace(self, readings=self.readings[kept], points=self.points[kept])
 
 
-def paper_columns(arm: IdentifiedArm) -> list[int]:
-    """Columns of the paper's fifteen parameters."""
-    candidates = arm.candidates
-    named = zip(candidates.columns, candidates.names, strict=True)
-    return [column for column, name in named if name in PAPER_PARAMETERS]
-
-
 def conduct(seed: int, plan: Plan) -> Experiment:
     """Divide the space of one virtual arm and keep what was measured in the leaves."""
     arm, space = paper_arm(seed, plan.reading), space_of(plan.kind)
@@ -150,37 +136,26 @@ def conduct(seed: int, plan: Plan) -> Experiment:
         return np.asarray(arm.true_position(readings) + noise_m * rng.normal(size=(len(readings), 3)))
 
     workspace = Workspace(space, measure)
-    identified = IdentifiedArm(arm.robot, "world")
-    found = divide(
-        identified.flange_chain,
-        paper_columns(identified),
-        identified.table,
-        known_setup(arm.robot.tool[:3, 3]),
-        workspace,
-        {
-            "low": space.low,
-            "high": space.high,
-            "poses": POSES_A_REGION,
-            "accuracy": DEMANDED_M if plan.regions is None else 0.0,
-            "regions": FREE_TO_STOP if plan.regions is None else plan.regions,
-            "limit": LARGEST_CONDITION,
-            "halving": "longest",
-            "order": "breadth",
-            "seed": seed,
-        },
-        MEASURING,
+    forced = plan.regions is not None
+    options = DivisionOptions(
+        accuracy_m=0.0 if forced else DEMANDED_M,
+        most_regions=plan.regions if plan.regions is not None else FREE_TO_STOP,
+        poses=POSES_A_REGION,
+        candidates=CANDIDATES,
+        tests=TEST_POINTS,
+        seed=seed,
     )
+    found = divide_space(IdentifiedArm(arm.robot, "world"), workspace, PAPER_PARAMETERS, options)
     readings, points = np.concatenate(workspace.readings), np.concatenate(workspace.points)
-    nodes, counts, tests = (np.array(column) for column in zip(*found.batches, strict=True))
-    is_leaf = np.repeat(np.isin(nodes, found.regions.leaves) & ~tests, counts)
+    is_leaf = found.identifying_rows()
     return Experiment(
         plan=plan,
         arm=arm,
         space=space,
         regions=found.regions,
-        node_error_m=found.error,
+        node_error_m=found.error_m,
         node_kappa=found.kappa,
         readings=readings[is_leaf],
         points=points[is_leaf],
-        measured=found.measurements,
+        measured=found.measured,
     )

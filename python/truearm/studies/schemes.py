@@ -14,14 +14,13 @@ from truearm.fitting import Hyper, Task, fit_rows
 from truearm.measurements import Measurements
 from truearm.models import VARIABLE
 from truearm.options import Options
-from truearm.parameters import KIND_COUNT
+from truearm.schemes import add_ceps, training_pairs
 from truearm.studies.experiment import Experiment
 
 Floats = NDArray[np.float64]
 Parameters = Callable[[Floats], Floats]
 
 CONSTANT_STEPS: Final = 3
-GRID_A_REGION: Final = 3
 SIGMA_CELLS: Final = 0.5
 NETWORK: Final[Mapping[str, Any]] = {
     "membership": "gaussian",
@@ -136,8 +135,7 @@ def trained_network(
     training: Mapping[str, Any] = TRAINING,
 ) -> Scheme:
     """A network trained by (A5) on regional CEPs, several points of each region; it starts at their mean."""
-    leaves = [leaf for leaf in np.asarray(made.regions.leaves) if np.isfinite(ceps[leaf]).all()]
-    inputs, wanted = _training_pairs(made.regions, leaves, ceps)
+    inputs, wanted = training_pairs(made.regions, ceps)
     empty = Network(made.sensors, len(made.columns), dict(network))
     trained: Training = empty.train(inputs, wanted, {**training, "columns": made.columns})
     notes = {
@@ -146,14 +144,6 @@ def trained_network(
         "largest_left_mm": 1e3 * trained.largest,
     }
     return _network(made, constant, trained.network, notes)
-
-
-def _training_pairs(regions: Regions, leaves: list[int], ceps: Floats) -> tuple[Floats, Floats]:
-    low, high = regions.low[leaves], regions.high[leaves]
-    part = (np.arange(GRID_A_REGION) + 0.5) / GRID_A_REGION
-    grid = np.stack(np.meshgrid(*[part] * low.shape[1], indexing="ij"), axis=-1).reshape(-1, low.shape[1])
-    inputs = low[:, None] + grid * (high - low)[:, None]
-    return inputs.reshape(-1, low.shape[1]), np.repeat(ceps[leaves], len(grid), axis=0)
 
 
 def _fitted_network(
@@ -191,10 +181,3 @@ def _network(made: Experiment, constant: Floats, network: Network, notes: dict[s
         return add_ceps(constant, made.columns, network.output(made.space.coordinates(readings)))
 
     return Scheme(parameters, made.arm.robot.tool[:3, 3], notes)
-
-
-def add_ceps(parameters: Floats, columns: list[int], ceps: Floats) -> Floats:
-    """Parameters (n, L, 5): those of (L, 5) with CEPs (n, P) added to their columns."""
-    found = np.repeat(parameters.reshape(1, -1), len(ceps), axis=0)
-    found[:, columns] += ceps
-    return found.reshape(len(ceps), -1, KIND_COUNT)

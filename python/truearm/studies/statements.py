@@ -10,8 +10,8 @@ from truearm._core import Network
 from truearm.identified import IdentifiedArm
 from truearm.parameters import ALPHA, BETA, A, D
 from truearm.planning.choosing import independent_columns
-from truearm.simulation import VirtualArm
-from truearm.studies.experiment import paper_columns
+from truearm.planning.dividing import named_columns
+from truearm.simulation import PAPER_PARAMETERS, VirtualArm
 from truearm.studies.schemes import NETWORK
 from truearm.studies.setting import CELLS, MEMBERSHIPS, space_of
 
@@ -63,11 +63,11 @@ def _observable(_: Result) -> tuple[str, bool]:
     values = arm.poses(200, held=(4, 5))
     chain = base.chain(arm.robot.flange @ arm.robot.tool)
     jacobian, tool = chain.parameter_jacobian(values), chain.pose(values)[:, :3, :3]
-    # FLANGE moves the tool point by theta along the tool's y, d along z, a along x, and not by alpha and beta.
+    # FLANGE moves the tool point by theta along y, d along z, a along x, by alpha and beta not at all.
     flange = np.concatenate([tool[:, :, [1, 2, 0]], np.zeros_like(tool[:, :, :2])], axis=2)
     columns = [*range(20), D, D, A, ALPHA, BETA]
     rank = len(independent_columns(np.concatenate([jacobian[:, :, :20], flange], axis=2), columns))
-    chosen = paper_columns(base)
+    chosen = named_columns(base, PAPER_PARAMETERS)
     own = len(independent_columns(jacobian[:, :, chosen], chosen))
     return f"rank {rank} of 25; the named ones have rank {own}", (rank, own) == (15, 15)
 

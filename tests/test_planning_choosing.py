@@ -1,0 +1,137 @@
+"""Chosen poses are better conditioned than drawn ones, and divisions hold what they promise."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from truearm.errors import InputError, WorkError
+from truearm.identified import IdentifiedArm
+from truearm.planning import (
+    ChoiceOptions,
+    DividedSpace,
+    DivisionOptions,
+    JointSpace,
+    Workspace,
+    choose,
+    divide_space,
+    draw_pool,
+)
+from truearm.planning.choosing import independent_columns, unknowns_jacobian
+from truearm.planning.drawing import draw_regions, draw_tree
+from truearm.robot import Robot
+from truearm.simulation import PAPER_PARAMETERS, VirtualArm
+
+RV_M2 = Robot.load("rv-m2")
+WORLD = IdentifiedArm(RV_M2, "world")
+
+
+@pytest.fixture(scope="module")
+def pool():
+    return draw_pool(JointSpace(RV_M2), 150).readings
+
+
+@pytest.fixture(scope="module")
+def divided():
+    arm = VirtualArm.paper(seed=1)
+    workspace = Workspace(JointSpace(RV_M2), arm.true_position)
+    options = DivisionOptions(accuracy_m=0.0, most_regions=6, candidates=40)
+    return divide_space(WORLD, workspace, PAPER_PARAMETERS, options), workspace
+
+
+def test_a_choice_is_better_conditioned_than_its_start(pool):
+    found = choose(WORLD, pool, 20, ChoiceOptions(names=PAPER_PARAMETERS, limit=100.0))
+    assert len(set(found.rows.tolist())) == 20
+    assert found.after["kappa"] <= found.before["kappa"]
+    assert found.well_conditioned
+    assert found.after["kappa_normal"] == pytest.approx(found.after["kappa"] ** 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("criterion", ["o1", "o3", "d"])
+def test_an_index_is_not_lowered(pool, criterion):
+    found = choose(WORLD, pool, 15, ChoiceOptions(criterion=criterion, names=PAPER_PARAMETERS))
+    index = "log_det" if criterion == "d" else criterion
+    assert found.after[index] >= found.before[index]
+
+
+def test_a_region_that_is_too_small_is_badly_conditioned():
+    space = JointSpace(RV_M2)
+    middle = (space.low + space.high) / 2.0
+    small = draw_pool(space, 100, box=(middle, middle + 0.01)).readings
+    found = choose(WORLD, small, 20, ChoiceOptions(names=PAPER_PARAMETERS, limit=1000.0))
+    assert not found.well_conditioned
+    assert found.after["kappa"] > 1000.0
+
+
+def test_frame_and_target_are_determined_along_with_a_free_arm():
+    robot = Robot.load("ur10")
+    arm = IdentifiedArm(robot)
+    readings = VirtualArm(robot).poses(120)
+    offset = ChoiceOptions(tool=[0.05, 0.02, 0.1])
+    jacobian, columns = unknowns_jacobian(arm, readings, offset)
+    assert len(independent_columns(jacobian, columns)) == 27
+    assert np.isfinite(choose(arm, readings, 30, offset).after["kappa"])
+
+
+def test_a_pool_that_is_too_small_is_refused(pool):
+    with pytest.raises(WorkError, match="200 poses are to be chosen from 150"):
+        choose(WORLD, pool, 200)
+
+
+def test_a_forced_division_has_its_number_and_counts_what_it_measured(divided):
+    found, workspace = divided
+    assert len(found.regions.leaves) == 6
+    nodes = found.regions.count
+    assert nodes == 11
+    assert found.measured == sum(map(len, workspace.readings)) == nodes * 30
+    assert found.identifying_rows().sum() == 6 * 20
+    assert np.isfinite(found.ceps).all()
+    assert found.error_m[found.regions.leaves].max() < found.error_m[0]
+
+
+def test_a_division_stops_where_it_is_accurate_enough():
+    arm = VirtualArm.paper(seed=1)
+    workspace = Workspace(JointSpace(RV_M2), arm.true_position)
+    found = divide_space(WORLD, workspace, PAPER_PARAMETERS, DivisionOptions(accuracy_m=1e-3, candidates=40))
+    assert len(found.regions.leaves) == 1
+    assert found.ended[0]
+
+
+def test_a_division_survives_its_file(divided, tmp_path):
+    found, _ = divided
+    found.save(tmp_path / "division.json")
+    again = DividedSpace.load(tmp_path / "division.json")
+    points = np.random.default_rng(0).uniform(JointSpace(RV_M2).low, JointSpace(RV_M2).high, (200, 3))
+    np.testing.assert_array_equal(again.regions.find(points), found.regions.find(points))
+    np.testing.assert_array_equal(again.ceps, found.ceps)
+    assert (again.ended, again.batches) == (found.ended, found.batches)
+
+
+@pytest.mark.parametrize("text", ["{}", "no JSON", '{"format": "other"}', "[1]"])
+def test_a_file_that_is_no_division_is_refused(text, tmp_path):
+    (tmp_path / "bad.json").write_text(text)
+    with pytest.raises(InputError, match="no division"):
+        DividedSpace.load(tmp_path / "bad.json")
+
+
+def test_a_division_can_be_drawn(divided):
+    found, _ = divided
+    figure = Figure()
+    tree = figure.add_subplot(1, 2, 1)
+    draw_tree(found.regions, tree)
+    shares = [text.get_text() for text in tree.texts]
+    assert shares.count("1") == 1
+    assert {"A", "B", "F"} <= set(shares)
+    boxes = draw_regions(found.regions, JointSpace(RV_M2), figure, (1, 2, 2))
+    assert boxes.get_xlabel() == "q1, deg"
+
+
+def test_a_measuring_callable_of_another_shape_is_refused():
+    workspace = Workspace(JointSpace(RV_M2), lambda readings: np.zeros((len(readings), 2)))
+    with pytest.raises(InputError, match=r"shape \(20, 2\)"):
+        divide_space(WORLD, workspace, PAPER_PARAMETERS, DivisionOptions(candidates=40))
+
+
+def test_unknown_parameter_is_refused():
+    workspace = Workspace(JointSpace(RV_M2), VirtualArm.paper().true_position)
+    with pytest.raises(InputError, match='no parameter "theta9"'):
+        divide_space(WORLD, workspace, ["theta9"])

@@ -1,0 +1,140 @@
+"""The paper's schemes as models of a calibration: fitted, judged, kept, refused where they cannot serve."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from truearm import Calibration, Options, Robot, UsageError, WorkError, calibrate, evaluate
+from truearm.cli import main
+from truearm.compensation import Compensator
+from truearm.simulation import Imperfections, VirtualArm
+
+QUICK: dict[str, Any] = {"most_regions": 12, "region_rows": 12, "holdout": 0.3, "cells": (9, 7, 7)}
+WAVY = Imperfections(share=0.5, noise_mm=0.01)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return VirtualArm.paper(seed=2, imperfections=WAVY)
+
+
+@pytest.fixture(scope="module")
+def data(arm):
+    return arm.measure(arm.poses(500, held=(4, 5)))
+
+
+@pytest.fixture(scope="module")
+def calibrations(data):
+    robot = Robot.load("rv-m2")
+    return {model: calibrate(robot, data, model=model, **QUICK) for model in ("regions", "fcmac", "cmac")}
+
+
+@pytest.mark.parametrize("model", ["regions", "fcmac"])
+def test_schemes_beat_the_constants_where_errors_vary(calibrations, model):
+    held_out = calibrations[model].validation.holdout
+    assert held_out[model].position.mean < 0.8 * held_out["constant"].position.mean
+
+
+def test_predictions_are_those_of_the_scheme(calibrations, arm):
+    found = calibrations["fcmac"]
+    assert found.model_name == "fcmac"
+    q = arm.poses(20, seed=5, held=(4, 5))
+    seen = arm.measure_table(q)[["x", "y", "z"]].to_numpy()
+    missed = np.linalg.norm(found.position(q, group=found.groups[0]) - seen, axis=1)
+    assert missed.mean() < found.validation.holdout["constant"].position.mean * 1e-3
+    assert np.ptp(found.parameters(q), axis=0).max() > 0.0
+
+
+@pytest.mark.parametrize("model", ["regions", "fcmac", "cmac"])
+def test_a_scheme_survives_its_file(calibrations, model, arm, data, tmp_path):
+    found = calibrations[model]
+    found.save(tmp_path / "a.calib")
+    again = Calibration.load(tmp_path / "a.calib")
+    q = arm.poses(50, seed=6)
+    np.testing.assert_array_equal(again.parameters(q), found.parameters(q))
+    assert again.scheme == found.scheme
+    assert again.options == found.options
+    errors = evaluate(again, data).errors
+    assert errors[model].position.mean < errors["constant"].position.mean
+
+
+def test_weights_on_measurements_beat_weights_on_regional_ceps(data, calibrations):
+    options: dict[str, Any] = {
+        **QUICK,
+        "train_on": "measurements",
+        "membership": "bspline",
+        "composition": "product",
+    }
+    fitted = calibrate(Robot.load("rv-m2"), data, model="fcmac", refit=False, **options)
+    trained = calibrations["fcmac"].validation.holdout["fcmac"].position.mean
+    assert fitted.validation.holdout["fcmac"].position.mean < trained
+
+
+def test_six_inputs_and_poses():
+    """Section 8: a network over all joints of a six-axis arm, orientation measured, its table hashed."""
+    robot = Robot.load("ur10")
+    arm = VirtualArm(robot, seed=1, imperfections=WAVY)
+    data = arm.measure(arm.poses(300), orientation=True)
+    found = calibrate(
+        robot,
+        data,
+        model="fcmac",
+        scheme_joints=(1, 2, 3, 4, 5, 6),
+        table=20_011,
+        refit=False,
+        most_regions=4,
+    )
+    held_out = found.validation.holdout
+    assert held_out["fcmac"].orientation is not None
+    assert held_out["fcmac"].position.mean < 1.5 * held_out["constant"].position.mean
+
+
+def test_what_a_scheme_cannot_do_is_refused(calibrations, arm):
+    found = calibrations["regions"]
+    with pytest.raises(WorkError, match="does not tell"):
+        found.position_std(arm.poses(2))
+    with pytest.raises(UsageError, match="scheme regions"):
+        Compensator(found)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"model": "fuzzy"}, "fuzzy"),
+        ({"region_ceps": "best"}, "shrunk or least_squares"),
+        ({"scheme_joints": (1, 1)}, "once"),
+        ({"cells": (3,)}, "scheme_joints"),
+        ({"demanded_mm": -1.0}, "negative"),
+        ({"rate": 0.0}, "positive"),
+        ({"repeatability_mm": 0.0}, "positive"),
+        ({"model": "regions", "features": ("t",)}, "varies"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(given, message):
+    with pytest.raises(UsageError, match=message):
+        Options.of(**given)
+
+
+def test_an_arm_has_only_its_joints(data):
+    with pytest.raises(UsageError, match="1 to 5"):
+        calibrate(Robot.load("rv-m2"), data, model="regions", scheme_joints=(1, 2, 9))
+
+
+def test_from_the_command_line(arm, tmp_path, capsys):
+    table = arm.measure_table(arm.poses(300, held=(4, 5)))
+    table.to_csv(tmp_path / "m.csv", index=False)
+    out = tmp_path / "out"
+    words = ["calibrate", "rv-m2", str(tmp_path / "m.csv"), "-o", str(out), "--model", "regions"]
+    assert main([*words, "--regions", "8", "--scheme-joints", "1,2", "--repeatability-mm", "0.1"]) == 0
+    printed = capsys.readouterr().out
+    assert "regions have CEPs of their own" in printed
+    assert "repeatability" in printed
+    summary = json.loads((out / "summary.json").read_text())
+    ratio = summary["error_to_repeatability"]["regions"]
+    assert ratio == pytest.approx(summary["holdout"]["regions"]["mean_mm"] / 0.1)
+    assert main(["evaluate", str(out / "calibration.calib"), str(tmp_path / "m.csv")]) == 0
+    assert "regions" in capsys.readouterr().out
+    assert main([*words, "--scheme-joints", "one"]) == 2
+    assert "--scheme-joints" in capsys.readouterr().err

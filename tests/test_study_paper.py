@@ -1,0 +1,125 @@
+"""The study of the paper's simulations: one seed of each figure, and what it writes."""
+
+import json
+from contextlib import nullcontext
+
+import numpy as np
+import pytest
+
+from truearm.cli import main
+from truearm.errors import UsageError
+from truearm.studies import paper, setting
+from truearm.studies.claims import CLAIMS, judged
+from truearm.studies.metrics import over_seeds, quantiles
+from truearm.studies.paper import run
+from truearm.studies.paper_results import conduct_study, save_pictures
+
+SCHEMES = {"uncalibrated", "conventional", "regional", "fcmac", "fcmac_shrunk", "variable"}
+FEW_POSES = 400
+
+
+@pytest.fixture(scope="module")
+def study():
+    """One seed of every figure, with few regions so that it is quick."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(paper, "JOINT_REGIONS", 16)
+    patch.setattr(paper, "SPHERE_REGIONS", 16)
+    patch.setattr(paper, "READINGS", setting.READINGS[:1])
+    patch.setattr("truearm.studies.experiment.WORKSPACE_POSES", FEW_POSES)
+    yield conduct_study([0], paper.FIGURES)
+    patch.undo()
+
+
+def test_paper_json_has_the_stated_shape(study):
+    result = study.result
+    for name in ("figure6", "figure7", "noise"):
+        assert set(result[name]) >= SCHEMES
+        found = result[name]["fcmac"]
+        assert set(found["path"]) >= {"mean_mm", "rms_mm", "max_mm", "jump_mm", "cep_jump"}
+        assert set(found["workspace"]) >= {"mean_mm", "rms_mm", "max_mm"}
+        assert set(found["path"]["mean_mm"]) == {"median", "p05", "p95"}
+    assert set(result["figure8"]["variable"]["path"]) == {"inside", "rest"}
+    assert set(result["paths"]) >= SCHEMES
+    assert set(result["cmac"]) >= {"cmac", "fcmac", "sensitivity"}
+    json.dumps(result, allow_nan=False)
+
+
+def test_calibration_helps_and_varying_helps_more(study):
+    mean = {
+        name: part["workspace"]["mean_mm"]["median"]
+        for name, part in study.result["figure6"].items()
+        if name != "facts"
+    }
+    assert mean["variable"] < mean["regional"] < mean["conventional"] < mean["uncalibrated"]
+
+
+def test_the_network_smooths_what_regions_break(study):
+    jump = {
+        name: study.result["figure6"][name]["path"]["cep_jump"]["median"] for name in ("regional", "fcmac")
+    }
+    assert jump["fcmac"] < 0.5 * jump["regional"]
+
+
+def test_measurements_of_parents_and_tests_are_counted(study):
+    facts = study.result["figure6"]["facts"]
+    assert facts["measurements"]["median"] == 16 * 20
+    assert facts["measured_in_all"]["median"] == 31 * 30
+
+
+def test_the_papers_own_numbers_are_checked(study):
+    agreed = {entry["paper"]: entry["agrees"] for entry in study.result["statements"]}
+    assert agreed["15 of 25 parameters are observable, by name"]
+    assert agreed["39 sensor cells, 2057 association cells, 27 a point"]
+    assert {True, False} == set(agreed.values())
+
+
+def test_every_claim_is_judged_and_stands_in_the_page(study):
+    assert len(study.result["claims"]) == len(CLAIMS)
+    for entry in study.result["claims"]:
+        assert entry["claim"] in study.page
+
+
+def test_pictures_are_written_for_print(study, tmp_path):
+    files = {path.name for path in save_pictures(study, tmp_path)}
+    stems = ("figure6", "figure7", "figure8", "noise", "cmac", "division_joint", "division_sphere")
+    assert files == {f"{stem}.{ending}" for stem in stems for ending in ("png", "svg")}
+    again = (tmp_path / "figure6.svg").read_bytes()
+    save_pictures(study, tmp_path)
+    assert (tmp_path / "figure6.svg").read_bytes() == again
+
+
+def test_the_path_of_figure_7_is_within_reach():
+    for kind in ("joint", "sphere"):
+        space = setting.space_of(kind)
+        _, reached = space.readings(setting.path_of(kind))
+        assert reached.all()
+
+
+def test_statistics_over_seeds():
+    assert quantiles([1.0, 2.0, 3.0])["median"] == 2.0
+    merged = over_seeds([{"a": {"b": 1.0}}, {"a": {"b": 3.0}}])
+    assert merged["a"]["b"]["median"] == 2.0
+    assert np.isclose(merged["a"]["b"]["p95"], 2.9)
+
+
+def test_claims_of_figures_that_were_not_run_are_left_out(study):
+    assert judged([{"paths": study.result["paths"]}]) == []
+
+
+def test_command_writes_its_files(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(paper, "JOINT_REGIONS", 8)
+    monkeypatch.setattr("truearm.studies.experiment.WORKSPACE_POSES", FEW_POSES)
+    out = tmp_path / "study"
+    assert main(["study", "paper", "-o", str(out), "--figure", "cmac", "--seeds", "1", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads((out / "paper.json").read_text())
+    assert {path.name for path in out.iterdir()} == {"paper.json", "paper.md", "cmac.png", "cmac.svg"}
+    assert "CMAC" in (out / "paper.md").read_text()
+
+
+def test_unknown_figures_and_no_seeds_are_refused(tmp_path, capsys):
+    with pytest.raises(UsageError, match='no figure "9"'):
+        run([0], ["9"], lambda _: nullcontext())
+    assert main(["study", "paper", "-o", str(tmp_path / "x"), "--figure", "9"]) == 2
+    assert "no figure" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
