@@ -159,7 +159,7 @@ def figure8(seed: Seed) -> Result:
     leaf = seed.joint.regions.find(seed.joint.space.coordinates(readings))
     missing = int(leaf[len(leaf) // 2])
     made, inside = seed.joint.without(missing), leaf == missing
-    schemes = {**basic_schemes(made), "variable": variable_scheme(made, seed.keep("figure8"))}
+    schemes = {**basic_schemes(made), "variable": variable_scheme(made, seed.keep("figure6"))}
     box = (seed.joint.regions.low[missing], seed.joint.regions.high[missing])
     poses = draw_pool(made.space, REGION_POSES, PoolOptions(seed=(seed.number, 8)), box=box).readings
     result: Result = {}
