@@ -29,7 +29,7 @@ SCHEMES = {
     "fcmac-measurements-234": f"--model fcmac {SPLINES} --scheme-joints 2,3,4",
     "cmac": "--model cmac",
 }
-COMMON = "--train-size 400 --seed 7 --no-refit --json"
+COMMON = "--use position --train-size 400 --seed 7 --no-refit --json"
 
 
 def main() -> int:

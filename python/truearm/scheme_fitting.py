@@ -14,6 +14,7 @@ from truearm._core import (
     divide_rows,
     fill_without_data,
     linearise,
+    observability,
     regional_ceps,
 )
 from truearm.errors import UsageError
@@ -23,7 +24,8 @@ from truearm.schemes import FCMAC, REGIONS, NetworkCeps, RegionalCeps, Scheme, t
 Floats = NDArray[np.float64]
 
 JUDGING_SHARE: Final = 0.2
-LARGEST_CONDITION: Final = 1e4
+CONDITION_OF_WHOLE: Final = 30.0
+"""A region is not divided where its condition number would be so many times that of the whole."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
     inputs, features = _features(rows, options)
     parameters, setup = rows.constant.parameters, rows.constant.setup
     judges = np.random.default_rng([rows.seed, len(features)]).uniform(size=len(features)) < JUDGING_SHARE
+    jacobian, _ = linearise(rows.problem, parameters, setup)
     division = {
         "low": features.min(axis=0),
         "high": features.max(axis=0),
@@ -118,7 +121,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
         "halving": options.halving,
         "order": "worst",
         "poses": options.region_rows,
-        "limit": LARGEST_CONDITION,
+        "limit": CONDITION_OF_WHOLE * observability(jacobian, list(rows.columns))["kappa"],
         "seed": rows.seed,
     }
     regions = divide_rows(rows.problem, parameters, setup, features, judges, division).regions
