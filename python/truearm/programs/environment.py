@@ -1,6 +1,5 @@
 """What a motion statement is executed with: its tool, its work object, and offsets on its target."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -103,7 +102,3 @@ class Environments:
         if found == len(self.all):
             self.all.append(environment)
         return found
-
-    def payloads_kg(self) -> Mapping[float, int]:
-        """Payloads that the program states, and the number of one environment of each."""
-        return {e.payload_kg: number for number, e in enumerate(self.all) if e.payload_kg is not None}

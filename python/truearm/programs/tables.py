@@ -4,7 +4,7 @@ A target is numbers in the text, stored under a name or written in a motion stat
 """
 
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Final, NamedTuple
@@ -253,10 +253,3 @@ class _Column:
         if self._pending:
             self._chunks.append(np.array(self._pending))
             self._pending = array(self._code)
-
-
-def number_columns(rows: Iterable[Sequence[Number]]) -> tuple[Floats, Floats]:
-    """Values and factors, (n, width) each, of numbers that did not go through a table."""
-    listed = [[(number.value, number.factor) for number in row] for row in rows]
-    both = np.array(listed, dtype=np.float64)
-    return both[..., 0], both[..., 1]
