@@ -10,9 +10,6 @@ use crate::number::{Class, Number, class, number_at};
 const PLACEHOLDER: u8 = 0;
 /// Bytes that are scanned at a time; the result does not depend on it.
 const PIECE: usize = 1 << 18;
-/// Bytes to a line, and to a number, about: what is made room for.
-const LINE: usize = 64;
-const NUMBER: usize = 12;
 
 /// Numbers of a text at places in the whole of it, in columns.
 #[derive(Clone, Debug, Default)]
@@ -50,13 +47,18 @@ impl Found {
         })
     }
 
-    fn with_room_for(count: usize) -> Self {
-        Self {
-            starts: Vec::with_capacity(count),
-            ends: Vec::with_capacity(count),
-            values: Vec::with_capacity(count),
-            decimals: Vec::with_capacity(count),
-        }
+    fn clear(&mut self) {
+        self.starts.clear();
+        self.ends.clear();
+        self.values.clear();
+        self.decimals.clear();
+    }
+
+    fn reserve(&mut self, count: usize) {
+        self.starts.reserve(count);
+        self.ends.reserve(count);
+        self.values.reserve(count);
+        self.decimals.reserve(count);
     }
 
     fn push(&mut self, number: &Number, offset: usize) {
@@ -95,15 +97,17 @@ pub struct Lines {
 /// subtracted from stands before it.
 #[must_use]
 pub fn scan_lines(text: &[u8]) -> Lines {
-    let pieces: Vec<Piece> =
-        pieces(text).into_par_iter().map(|(start, end)| Piece::of(text, start, end)).collect();
-    let mut lines = Lines {
-        numbers: Found::with_room_for(pieces.iter().map(|piece| piece.lines.numbers.len()).sum()),
-        ..Lines::default()
-    };
+    let (mut lines, spans) = (Lines::default(), pieces(text));
     let mut known: HashMap<Vec<u8>, i64> = HashMap::new();
-    for piece in pieces {
-        lines.append(piece, &mut known);
+    let mut room: Vec<Piece> = (0..rayon::current_num_threads().max(1)).map(|_| Piece::default()).collect();
+    for batch in spans.chunks(room.len()) {
+        room.par_iter_mut().zip(batch).for_each(|(piece, &(start, end))| piece.fill(text, start, end));
+        for piece in &mut room[..batch.len()] {
+            lines.append(piece, &mut known);
+        }
+        if let Some(&(_, done)) = batch.last() {
+            lines.reserve_for(text.len(), done);
+        }
     }
     lines.starts.push(text.len() as i64);
     lines.first_number.push(lines.numbers.len() as i64);
@@ -111,11 +115,19 @@ pub fn scan_lines(text: &[u8]) -> Lines {
 }
 
 impl Lines {
+    fn clear(&mut self) {
+        for column in [&mut self.starts, &mut self.skeleton, &mut self.representative, &mut self.first_number]
+        {
+            column.clear();
+        }
+        self.numbers.clear();
+    }
+
     /// Add the lines of the next piece of the text.
-    fn append(&mut self, piece: Piece, known: &mut HashMap<Vec<u8>, i64>) {
+    fn append(&mut self, piece: &mut Piece, known: &mut HashMap<Vec<u8>, i64>) {
         let (line, number) = (self.skeleton.len() as i64, self.numbers.len() as i64);
         let mut ids = Vec::with_capacity(piece.skeletons.len());
-        for (skeleton, first) in piece.skeletons.into_iter().zip(&piece.lines.representative) {
+        for (skeleton, first) in piece.skeletons.drain(..).zip(&piece.lines.representative) {
             let fresh = self.representative.len() as i64;
             let id = *known.entry(skeleton).or_insert(fresh);
             if id == fresh {
@@ -127,6 +139,16 @@ impl Lines {
         self.skeleton.extend(piece.lines.skeleton.iter().map(|&id| ids[id as usize]));
         self.first_number.extend(piece.lines.first_number.iter().map(|first| first + number));
         self.numbers.append(&piece.lines.numbers);
+    }
+
+    /// Make room for the whole of a text of which `done` bytes were read, as if it went on alike.
+    fn reserve_for(&mut self, length: usize, done: usize) {
+        let more = |count: usize| (count as u128 * (length - done) as u128 / done.max(1) as u128) as usize;
+        let (lines, numbers) = (more(self.skeleton.len()), more(self.numbers.len()));
+        for column in [&mut self.starts, &mut self.skeleton, &mut self.first_number] {
+            column.reserve(lines);
+        }
+        self.numbers.reserve(numbers);
     }
 }
 
@@ -145,25 +167,26 @@ fn pieces(text: &[u8]) -> Vec<(usize, usize)> {
 }
 
 /// The lines of a part of the text, and the different lines among them, numbers apart.
+#[derive(Default)]
 struct Piece {
     lines: Lines,
     skeletons: Vec<Vec<u8>>,
+    scratch: Vec<u8>,
 }
 
 impl Piece {
-    /// The lines from `start` to `end`.
-    fn of(text: &[u8], start: usize, end: usize) -> Self {
-        let mut lines = Lines { numbers: Found::with_room_for((end - start) / NUMBER), ..Lines::default() };
-        lines.starts.reserve((end - start) / LINE);
+    /// The lines from `start` to `end`, in place of what was here.
+    fn fill(&mut self, text: &[u8], start: usize, end: usize) {
+        let Self { lines, skeletons, scratch } = self;
+        lines.clear();
+        skeletons.clear();
         let mut known: HashMap<Vec<u8>, i64> = HashMap::new();
-        let mut skeletons: Vec<Vec<u8>> = Vec::new();
-        let (mut scratch, mut at) = (Vec::new(), start);
-        let mut last = usize::MAX;
+        let (mut at, mut last) = (start, usize::MAX);
         for line in text[start..end].split_inclusive(|&byte| byte == b'\n') {
             lines.starts.push(at as i64);
             lines.first_number.push(lines.numbers.len() as i64);
-            scan_line(line, at, &mut scratch, &mut lines.numbers);
-            if skeletons.get(last) != Some(&scratch) {
+            scan_line(line, at, scratch, &mut lines.numbers);
+            if skeletons.get(last) != Some(scratch) {
                 let fresh = skeletons.len() as i64;
                 let id = *known.entry(scratch.clone()).or_insert(fresh);
                 if id == fresh {
@@ -175,7 +198,6 @@ impl Piece {
             lines.skeleton.push(last as i64);
             at += line.len();
         }
-        Self { lines, skeletons }
     }
 }
 
