@@ -16,6 +16,7 @@ COMMANDS: Final = (
     Entry("robots", "truearm.cli.robots", "List the library of arms, show and check a robot."),
     Entry("import", "truearm.cli.import_", "Bring in other people's measurement tables."),
     Entry("calibrate", "truearm.cli.calibrate", "Learn an arm's parameters and validate them."),
+    Entry("plan", "truearm.cli.plan", "Choose measurement poses."),
     Entry("measure", "truearm.cli.measure", "Measure poses with the devices of a cell."),
     Entry("session", "truearm.cli.session", "Look into a measurement session, export it."),
     Entry("cell", "truearm.cli.cell", "A virtual cell; check a cell; cell files to begin with."),

@@ -1,0 +1,38 @@
+"""A plan as a list of poses, and as a picture."""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pandas as pd
+
+from truearm.cell.plan import Plan
+from truearm.files import write_whole
+
+COLOURS: Final = {"train": "tab:blue", "validate": "tab:orange", "repeat": "tab:green"}
+
+
+def write(plan: Plan, path: Path) -> None:
+    """Write the poses: q1 ... qN in rad and m, approach, purpose."""
+    columns = {f"q{j + 1}": column for j, column in enumerate(plan.poses.readings.T)}
+    table = pd.DataFrame(columns | {"approach": plan.poses.approach, "purpose": plan.poses.purpose})
+    write_whole(path, table.to_csv(index=False, lineterminator="\n"))
+
+
+def draw(plan: Plan, path: Path) -> None:
+    """Draw the targets from above and from the side, in the base frame, with the way between them."""
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(9.0, 4.5), layout="constrained")
+    purposes = np.array(plan.poses.purpose)
+    for axes, (a, b) in zip(figure.subplots(1, 2), ((0, 1), (0, 2)), strict=True):
+        millimetres = 1e3 * plan.points
+        axes.plot(millimetres[:, a], millimetres[:, b], color="0.8", linewidth=0.6)
+        for purpose, colour in COLOURS.items():
+            chosen = millimetres[purposes == purpose]
+            axes.plot(chosen[:, a], chosen[:, b], "o", color=colour, markersize=4, label=purpose)
+        axes.set_xlabel(f"{'xyz'[a]} mm")
+        axes.set_ylabel(f"{'xyz'[b]} mm")
+        axes.set_aspect("equal")
+    figure.axes[0].legend()
+    figure.savefig(path)

@@ -1,0 +1,62 @@
+"""`truearm plan`: poses that can be measured, determine the arm, and come in a good order."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.cell_support import cell_text
+from truearm.cell import Cell
+from truearm.cell.ordering import motion_seconds, paper_order, short_order
+from truearm.cell.poses_file import Poses
+from truearm.cell.rehearsal import rehearse
+from truearm.cli import main
+
+
+@pytest.mark.slow
+def test_a_plan_for_a_cell_can_be_measured_there(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cell.toml").write_text(cell_text())
+    words = ["plan", "rv-m2", "-n", "20", "--cell", "cell.toml", "--picture", "poses.png", "--json"]
+    assert main(words) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["purposes"] == {"train": 20, "validate": 5, "repeat": 4}
+    assert told["after"]["log_det"] > told["before"]["log_det"]
+    assert told["motion_s"]["short"] <= told["motion_s"]["paper"]
+    expected = list(told["expected_mm"].values())
+    assert expected == sorted(expected, reverse=True)
+    assert (tmp_path / "poses.png").stat().st_size > 1000
+    cell = Cell.load("cell.toml")
+    poses = Poses.read_csv("poses.csv", cell.arm)
+    assert set(poses.approach) == {1, -1}
+    assert rehearse(cell, poses).refused == []
+    table = pd.read_csv("poses.csv")
+    joints = [f"q{j}" for j in range(1, 6)]
+    again = table[table["purpose"] == "repeat"][joints]
+    assert (
+        again.apply(tuple, axis=1).isin(table[table["purpose"] == "train"][joints].apply(tuple, axis=1)).all()
+    )
+
+
+def test_both_orders_go_from_low_to_high_once_through_all():
+    rng = np.random.default_rng(0)
+    points, readings = rng.uniform(0.0, 0.4, (40, 3)), rng.uniform(-1.0, 1.0, (40, 5))
+    for order in (paper_order(points), short_order(points, readings, 1.0)):
+        assert sorted(order) == list(range(40))
+        assert np.diff(points[order][:, 2]).min() > -0.08
+    short = motion_seconds(readings, short_order(points, readings, 1.0), 1.0)
+    assert short < 0.8 * motion_seconds(readings, paper_order(points), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--criterion", "best"], '"best" is not known'),
+        (["--order", "any"], '"any" is not known'),
+        (["-n", "0"], "0 poses"),
+    ],
+)
+def test_wrong_options_are_told(words, message, capsys):
+    assert main(["plan", "rv-m2", *words]) == 2
+    assert message in capsys.readouterr().err
