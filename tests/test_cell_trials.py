@@ -20,6 +20,7 @@ from truearm.cell.opening import open_session
 from truearm.cell.poses_file import Poses
 from truearm.cell.session import Session
 from truearm.cell.summary import summary_of
+from truearm.cell.virtual.state import COLLISIONS
 from truearm.errors import WorkError
 
 MESSAGE_FAULTS = ("lost", "delayed", "duplicated", "garbled")
@@ -78,8 +79,9 @@ def test_with_faults_a_session_completes_with_right_readings(kind, tmp_path):
         clean = cell_text(simulate={"seed": seed}, process=process)
         poses = poses_of(Cell.from_toml(text), count, seed=seed)
         clean_path, path = tmp_path / f"clean{seed}.db", tmp_path / f"{seed}.db"
-        with virtual(clean) as (_, cell):
+        with virtual(clean) as (running, cell):
             assert measured(cell, poses, clean_path)[0] == DONE
+            assert not running.shared.flag(COLLISIONS)
         with virtual(text) as (_, cell):
             try:
                 end, seconds = measured(cell, poses, path)

@@ -10,8 +10,9 @@ from truearm.cell.clearance import Clearance
 
 Floats = NDArray[np.float64]
 
-ARM_STEP_RAD: Final = 0.1
+ARM_STEP_RAD: Final = 0.05
 TABLE_STEP_M: Final = 0.05
+# Less than what a panel that waits is farther from its point than the point is uncertain.
 TOOL_MARGIN_M: Final = 0.002
 
 
@@ -30,7 +31,7 @@ class Paths:
             table: Places (3,) that the carriage goes through.
         """
         places, carriages = _along(arm, ARM_STEP_RAD), _along(table, TABLE_STEP_M)
-        if self._clearance.tool_gap(places, self._frame, carriages) <= TOOL_MARGIN_M:
+        if self._clearance.tool_gap(places, self._frame, carriages) <= TOOL_MARGIN_M + self._uncertain_m:
             return False
         gap = self._clearance.gap(places, self._frame, carriages)
         return gap > self._clearance.margin_m + self._uncertain_m
