@@ -51,10 +51,13 @@ the mean in parts of the repeatability that the maker states (0.01 mm IRB 120, 0
 accuracy that the paper aims at. All models are fitted to the same rows and judged on the same rows.
 """
 REASON = """
-Regions of 400 poses hold few rows each, so their CEPs say little more than the constants, and least
-squares says less. The schemes divide three joints; what these arms do wrong depends on single joints at a
-scale of a few degrees, which regions and cells this wide cannot hold. The variable model has blocks for
-just that.
+A region needs twenty rows, so that 400 poses give about ten regions, each a good part of a turn wide:
+what varies within one stays. Part of what the IRB 120 does wrong varies that slowly with its first three
+joints, and regions gain there; the UR10 errs with single joints at a scale of a few degrees, which
+neither regions nor cells this wide can hold. Weights fitted to the measurements use the same cells
+better, as every row speaks for all cells that it excites. Least squares serves only with parameters that
+all rows together determine well; others are left at the constants, or regions of poses that hardly tell
+them would shift by metres. The variable model has blocks for single joints, and that is its lead.
 """
 
 

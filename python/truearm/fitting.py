@@ -25,7 +25,7 @@ from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.options import Options
-from truearm.scheme_fitting import SchemeFit, SchemeRows, fit_scheme
+from truearm.scheme_fitting import SchemeFit, SchemeRows, fit_scheme, well_determined
 from truearm.schemes import SCHEMES
 
 Floats = NDArray[np.float64]
@@ -157,7 +157,8 @@ def _fit_scheme(
             where=", ".join(data.files),
             way_out="Give --model constant (model='constant')",
         )
-    columns = task.columns(found.determined)
+    determined = task.columns(found.determined)
+    columns = well_determined(task.problem(measured, determined), constant, determined)
     values = task.arm.robot.joints_from_readings(data.readings)
     rows = SchemeRows(task.problem(measured, columns), columns, constant, values, task.options.split.seed)
     return fit_scheme(task.options.model, rows, task.options.scheme)

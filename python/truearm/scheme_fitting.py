@@ -18,12 +18,15 @@ from truearm._core import (
     regional_ceps,
 )
 from truearm.errors import UsageError
+from truearm.parameters import KIND_COUNT, A, D
 from truearm.scheme_options import SchemeOptions
 from truearm.schemes import FCMAC, REGIONS, NetworkCeps, RegionalCeps, Scheme, training_pairs
 
 Floats = NDArray[np.float64]
 
 JUDGING_SHARE: Final = 0.2
+ANGLE_LEVER_M: Final = 0.3
+LARGEST_CONDITION_OF_WHOLE: Final = 300.0
 CONDITION_OF_WHOLE: Final = 30.0
 """A region is not divided where its condition number would be so many times that of the whole."""
 
@@ -80,6 +83,23 @@ class SchemeRows:
     constant: ConstantFit
     inputs: Floats
     seed: int
+
+
+def well_determined(problem: Problem, constant: ConstantFit, columns: Sequence[int]) -> list[int]:
+    """Those of a problem's columns that its rows determine well, one after another left out until they do.
+
+    Least squares in small regions has no prior to hold a parameter that even the whole set hardly tells.
+    """
+    jacobian, _ = linearise(problem, constant.parameters, constant.setup)
+    lengths = np.isin(np.array(columns) % KIND_COUNT, (A, D))
+    rows = jacobian.reshape(-1, len(columns)) * np.where(lengths, 1.0, 1.0 / ANGLE_LEVER_M)
+    kept = list(range(len(columns)))
+    while len(kept) > 1:
+        _, singular, right = np.linalg.svd(rows[:, kept], full_matrices=False)
+        if singular[0] <= LARGEST_CONDITION_OF_WHOLE * singular[-1]:
+            break
+        del kept[int(np.argmax(np.abs(right[-1])))]
+    return [columns[k] for k in kept]
 
 
 def fit_scheme(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit:
