@@ -73,17 +73,16 @@ def compensator(model):
 def newton_on_pinocchio(nominal, arm, q):
     """The loop that a pinocchio user writes."""
     pin, model, data, frame = arm.pin, arm.model, arm.data, arm.frame
-    aligned = pin.ReferenceFrame.LOCAL
     corrected = q.copy()
     for row in corrected:
         pin.framesForwardKinematics(nominal.model, nominal.data, row)
         target = nominal.data.oMf[nominal.frame].copy()
         for _ in range(STEPS):
-            jacobian = pin.computeFrameJacobian(model, data, row, frame, aligned)
-            pin.updateFramePlacement(model, data, frame)
+            pin.framesForwardKinematics(model, data, row)
             error = pin.log6(data.oMf[frame].actInv(target)).vector
             if error @ error < SAME_M**2:
                 break
+            jacobian = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL)
             row[:] = row + np.linalg.solve(jacobian, error)
     return corrected
 

@@ -37,13 +37,25 @@ impl Mark {
     }
 }
 
+impl Mark {
+    /// Whether the waypoint was good, or refused for nothing but the change up to it.
+    fn is_comparable(&self) -> bool {
+        let of_change = |refusal: Refusal| matches!(refusal.reason, Reason::ShiftChange | Reason::TurnChange);
+        self.correction.refusal.is_none_or(of_change)
+    }
+}
+
 impl Corrector {
-    /// Whether the correction changes too fast between two waypoints, both accepted; `readings` begin with theirs.
+    /// Whether the correction changes too fast between two waypoints; `readings` begin with theirs.
+    ///
+    /// Those that are refused for themselves have no correction to compare with.
     pub(crate) fn refuse_change(&self, before: &Mark, after: &Mark, readings: &[f64]) -> Option<Refusal> {
         let (limits, count) = (&self.options.limits, self.joint_count());
         let (from, to) = (&readings[..count], &readings[count..2 * count]);
-        let refused = before.correction.refusal.is_some() || after.correction.refusal.is_some();
-        if refused || from.iter().zip(to).any(|(a, b)| (a - b).abs() > PATH_JOINT) {
+        if !before.is_comparable()
+            || !after.is_comparable()
+            || from.iter().zip(to).any(|(a, b)| (a - b).abs() > PATH_JOINT)
+        {
             return None;
         }
         let way = apart(&before.point, &after.point);

@@ -15,7 +15,7 @@ use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task};
 /// So far apart 1 rad and 1 m weigh the same, in errors and in joint changes, m: half the length of a lower arm.
 pub(crate) const LEVER: f64 = 0.3;
 /// Error at which the search ends, m: a few roundings of a pose.
-const ENOUGH: f64 = 1e-12;
+const ENOUGH: f64 = 1e-13;
 /// Error from which on a Jacobian is good enough for the steps to come, m.
 const CALM: f64 = 1e-4;
 /// Step at which it ends where an error is left that the joints cannot remove, rad.

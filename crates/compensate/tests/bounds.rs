@@ -125,7 +125,6 @@ fn standard_deviation_of_constants() {
 
 #[test]
 fn the_correction_may_not_change_fast_along_a_path() {
-    // A field that is smooth at the scale of the path, and one whose theta jumps within a degree.
     let scene = scene();
     let path =
         |step: f64| -> Vec<f64> { (0..600).flat_map(|i| Q.map(|q| q + step * f64::from(i))).collect() };
@@ -133,9 +132,8 @@ fn the_correction_may_not_change_fast_along_a_path() {
     assert_eq!(smooth.refused.len(), 0, "{:?}", smooth.refused.first());
     let tight = Limits { shift_change: 1e-4, ..Limits::default() };
     let found = correct(&scene.corrector(limits(tight)), &path(1e-3), 1);
-    let seams = found.refused.iter().filter(|(place, _)| place % 256 == 0).count();
-    assert!(found.refused.len() > 100 && seams > 0, "{} refused, {seams} at seams", found.refused.len());
-    assert!(found.refused.is_sorted_by_key(|(place, _)| *place));
+    let places: Vec<usize> = found.refused.iter().map(|(place, _)| *place).collect();
+    assert_eq!(places, (1..600).collect::<Vec<_>>(), "all but the first, those where tasks meet included");
     for (place, refusal) in &found.refused {
         assert_eq!(refusal.reason, Reason::ShiftChange);
         assert!(found.readings[place * 6..place * 6 + 6].iter().all(|value| value.is_nan()));

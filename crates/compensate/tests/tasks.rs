@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Scene, apart, correct, five_axis, readings, seven_axis, six_axis, unbounded};
+use common::{Scene, apart, correct, readings, seven_axis, six_axis, unbounded};
 use truearm_compensate::{Options, Task};
 use truearm_kinematics::Transform;
 
@@ -105,21 +105,6 @@ fn null_direction(scene: &Scene, q: &[f64]) -> Vec<f64> {
         rows.push(row.iter().map(|x| x / length).collect());
     }
     rows.pop().unwrap()
-}
-
-#[test]
-fn five_axes_meet_the_position_and_come_near_the_orientation() {
-    let scene = Scene::new(five_axis(), 1e-3);
-    for task in [Task::Pose, Task::Axis] {
-        accepted(&scene, options(task, None), |i, from, to| {
-            let (meant, real) = (scene.meant(from)[0], scene.real(to)[0]);
-            assert!(distance(&meant, &real) < MET, "waypoint {i}: {:e}", distance(&meant, &real));
-            let without = apart(&meant, &scene.real(from)[0]).1;
-            let (a, b) = (axis(&meant), axis(&real));
-            let left = (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
-            assert!(left < without + 1e-2, "waypoint {i}: {left:e} beside {without:e}");
-        });
-    }
 }
 
 #[test]
