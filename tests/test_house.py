@@ -13,7 +13,8 @@ import pytest
 
 SPINE = ["truearm-kinematics", "truearm-estimate", "truearm-field", "truearm-compensate", "truearm-python"]
 BESIDE = ["truearm-text", "truearm-inverse"]
-CRATES = [SPINE[0], *BESIDE, *SPINE[1:]]
+ABOVE = ["truearm-capi"]
+CRATES = [SPINE[0], *BESIDE, *SPINE[1:], *ABOVE]
 LONGEST_FILE = 500
 LONGEST_FUNCTION = 60
 ROOT = Path(__file__).resolve().parents[1]

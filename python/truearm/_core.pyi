@@ -329,6 +329,44 @@ class Field:
         """Absolute parameters (n, L, 5) at inputs (n, I): constants (L, 5) and what is added to them."""
 
 @final
+class Conservative:
+    """Bounds of the standard deviation of the flange: roots of the sums of variances.
+
+    Position (m), then rotation vector (rad). A point at the distance r from the flange deviates by the first plus
+    r times the second at most.
+    """
+
+    def __init__(self, content: Mapping[str, Any], blocks: Sequence[dict[str, Any]]) -> None:
+        """Bounds from what `content` and `blocks` gave."""
+
+    @staticmethod
+    def fit(
+        plan: Mapping[str, Any],
+        fitted: tuple[NDArray[np.float64], NDArray[np.float64]],
+        fresh: tuple[NDArray[np.float64], NDArray[np.float64]],
+    ) -> Conservative:
+        """Fit to exact values, and raise the fit by what fresh ones show.
+
+        Args:
+            plan: angles: whether each input is one; ranges: lowest and highest value of each; together: inputs
+                that are tabulated together as well; largest: bounds that are never exceeded.
+            fitted: Inputs (n, I) and exact values (n, 2).
+            fresh: The same at other configurations.
+
+        Raises:
+            CoreError: Values are not positive or not finite, or shapes do not fit.
+        """
+
+    def content(self) -> dict[str, Any]:
+        """All but the tables: level, largest, ranges (None for any) and looseness (median ratio to exact)."""
+
+    def blocks(self) -> list[dict[str, Any]]:
+        """The tables, as Field.blocks."""
+
+    def std(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Position and rotation at inputs (n, I): (n, 2)."""
+
+@final
 class Posterior:
     """What the rows leave uncertain about constants and field, for known hyper-parameters."""
 
@@ -351,6 +389,9 @@ class Posterior:
 
         With `setup` (n, m, s), by the unknowns of all set-ups, their part is added.
         """
+
+    def prior(self, inputs: NDArray[np.float64], jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variances (n, m) of jacobian (n, m, P) times parameters before any measurement."""
 
     def measurement_covariance(
         self,

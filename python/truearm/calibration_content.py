@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm import rows_content, schemes
+from truearm import conservative, rows_content, schemes
 from truearm._core import Field, Setup
 from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
@@ -48,7 +48,10 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         "validation": calibration.validation.to_dict(),
         "data_sha256": calibration.data_hash,
         "rows": None,
+        "conservative": None,
     }
+    if calibration.has_conservative:
+        content["conservative"] = conservative.pack(calibration.conservative, arrays)
     if with_rows and calibration.rows is not None:
         content["rows"] = rows_content.pack(calibration.rows, calibration.options.features, arrays)
     return arrays, content
@@ -71,7 +74,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     robot = Robot.from_dict(content["robot"])
     arm = IdentifiedArm(robot, options.frame)
     selection = content["selection"]
-    constant, rows = content["constant"], content["rows"]
+    constant, rows, bounds = content["constant"], content["rows"], content.get("conservative")
     inputs = robot.joint_count + len(options.features)
     models = {
         name: _read_model(name, stored, arrays, (inputs, arm.table.size))
@@ -95,6 +98,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "rows": None if rows is None else rows_content.unpack(rows, arrays),
         "data_hash": content["data_sha256"],
         "version": content["version"],
+        "stored_conservative": None if bounds is None else conservative.unpack(bounds, arrays),
     }
 
 

@@ -1,7 +1,7 @@
 """Covariance of what a calibration predicts: the arm's part, without noise and set-up."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +17,18 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+LENGTHS: Final = (1, 2)
+"""Places of d and a among a link's parameters."""
+
 
 class Spread(Protocol):
     """Knows how uncertain the arm's parameters are."""
 
     def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I)."""
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) of the same before any measurement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,18 +37,26 @@ class ConstantSpread:
 
     columns: list[int]
     of_constants: Floats
+    before: Floats
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "ConstantSpread":
         """That of a calibration's constant model."""
         columns = task_of(calibration).columns(calibration.constant.names)
         size = len(columns)
-        return cls(columns, calibration.constant.covariance[:size, :size])
+        length, angle, scaled = calibration.options.prior
+        scale = calibration.constant.prior_scale if scaled else 1.0
+        before = scale * np.where(np.isin(np.array(columns) % 5, LENGTHS), length, angle)
+        return cls(columns, calibration.constant.covariance[:size, :size], before**2)
 
     def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Covariance (n, m, m), the same rule everywhere."""
         chosen = jacobian[:, :, self.columns]
         return np.asarray(chosen @ self.of_constants @ chosen.transpose(0, 2, 1))
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) that the prior of the constants gives."""
+        return np.asarray(np.square(jacobian[:, :, self.columns]) @ self.before)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +97,11 @@ class VariableSpread:
         """Covariance (n, m, m) at inputs (n, I)."""
         chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
         return self.posterior.covariance(np.ascontiguousarray(inputs), chosen) * self.inflation**2
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) that constants and field have before any measurement."""
+        chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
+        return self.posterior.prior(np.ascontiguousarray(inputs), chosen) * self.inflation**2
 
 
 def task_of(calibration: "Calibration") -> Task:

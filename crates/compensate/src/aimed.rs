@@ -10,19 +10,23 @@ use truearm_kinematics::{
 
 use crate::error::CompensateError;
 use crate::model::Model;
+use crate::spread::Spread;
 
 /// A model that ends at a tool.
 #[derive(Debug, Clone)]
 pub(crate) struct Aimed {
     pub model: Arc<Model>,
     pub chain: Chain,
+    /// Distance of the tool from the flange, m.
+    pub reach: f64,
 }
 
 impl Aimed {
     pub fn new(model: Arc<Model>, flange_from_tool: &Transform) -> Result<Self, CompensateError> {
         flange_from_tool.check("the tool")?;
         let chain = model.chain.with_end(model.chain.end().compose(flange_from_tool))?;
-        Ok(Self { model, chain })
+        let reach = flange_from_tool.translation.iter().map(|x| x * x).sum::<f64>().sqrt();
+        Ok(Self { model, chain, reach })
     }
 
     pub fn scratch(&self) -> AimedScratch {
@@ -35,6 +39,7 @@ impl Aimed {
             parameters: vec![Lane::ZERO; lane_room(width)],
             screws: vec![Screw::ZERO; joints.max(spread)],
             field: self.model.field.as_ref().map(|field| field.scratch()),
+            bounds: self.model.spread.as_ref().and_then(Spread::scratch),
         }
     }
 }
@@ -48,6 +53,7 @@ pub(crate) struct AimedScratch {
     parameters: Vec<Lane>,
     pub screws: Vec<Screw>,
     field: Option<FieldScratch>,
+    pub bounds: Option<FieldScratch>,
 }
 
 impl AimedScratch {
@@ -60,6 +66,12 @@ impl AimedScratch {
 }
 
 impl Aimed {
+    /// Puts the joint values of N readings into the inputs.
+    #[inline(always)]
+    pub fn set_joints<I: Isa>(&self, readings: &[Lane], scratch: &mut AimedScratch) {
+        self.model.coupling.joints::<I>(readings, &mut scratch.inputs[..self.chain.joint_count()]);
+    }
+
     /// The tool's frame of N readings, and its motions by the joint values in `scratch.screws`.
     ///
     /// `alone`: all lanes hold the same pose.
@@ -77,14 +89,14 @@ impl Aimed {
         columns: &[usize],
         scratch: &mut AimedScratch,
     ) -> LaneFrame {
-        self.model.coupling.joints::<I>(readings, &mut scratch.inputs[..self.chain.joint_count()]);
+        self.set_joints::<I>(readings, scratch);
         dispatch_on(I::LEVEL, Sweep { aimed: self, alone, columns: Some(columns), scratch })
     }
 
     /// The tool's frame alone.
     #[inline(always)]
     pub fn end<I: Isa>(&self, readings: &[Lane], alone: bool, scratch: &mut AimedScratch) -> LaneFrame {
-        self.model.coupling.joints::<I>(readings, &mut scratch.inputs[..self.chain.joint_count()]);
+        self.set_joints::<I>(readings, scratch);
         dispatch_on(I::LEVEL, Sweep { aimed: self, alone, columns: None, scratch })
     }
 }
@@ -103,7 +115,7 @@ impl Kernel for Sweep<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) -> LaneFrame {
         let Self { aimed: Aimed { model, chain }, alone, columns, scratch } = self;
-        let AimedScratch { inputs, rows, parameters, screws, field } = scratch;
+        let AimedScratch { inputs, rows, parameters, screws, field, .. } = scratch;
         if let (Some(bank), Some(room)) = (&model.field, field) {
             let count = if alone { 1 } else { LANES };
             let width = chain.parameter_count();

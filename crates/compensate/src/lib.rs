@@ -22,6 +22,7 @@ mod newton;
 mod path;
 mod refusal;
 mod spread;
+mod stream;
 mod task;
 
 pub use corrector::{Correction, Corrector, Options, Workspace};
@@ -32,4 +33,5 @@ pub use model::Model;
 pub use path::{NUMBERS, Path, Run};
 pub use refusal::{Reason, Refusal};
 pub use spread::{ConstantSpread, Spread};
+pub use stream::{Fault, Phase, Step, Stream, StreamOptions};
 pub use task::Task;

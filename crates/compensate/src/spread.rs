@@ -1,6 +1,7 @@
 //! How uncertain a model is of where it puts the tool.
 
-use truearm_kinematics::{Isa, Lane};
+use truearm_field::{Conservative, FieldScratch};
+use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::error::{CompensateError, check_finite, check_length};
@@ -14,6 +15,8 @@ const ROUNDING: f64 = 1e-12;
 pub enum Spread {
     /// The covariance of some parameters: exact for a model with constants alone.
     Constant(ConstantSpread),
+    /// Bounds of it over the configurations, for any model.
+    Field(Box<Conservative>),
 }
 
 /// Covariance of some of the parameters, as a factor whose product with itself it is.
@@ -34,6 +37,18 @@ impl ConstantSpread {
         check_length("the covariance", covariance.len(), count * count)?;
         check_finite("the covariance", covariance)?;
         Ok(ConstantSpread { factor: semidefinite_factor(covariance, count), columns })
+    }
+
+    fn check(&self, model: &Model) -> Result<(), CompensateError> {
+        let (last, all) = (self.columns.last().map_or(0, |last| last + 1), model.chain.parameter_count());
+        if last > all || !self.columns.is_sorted_by(|a, b| a < b) {
+            return Err(CompensateError::Length {
+                what: "the covariance's parameters",
+                found: last,
+                expected: all,
+            });
+        }
+        Ok(())
     }
 
     /// Variance of the end's position: |J F|^2.
@@ -58,21 +73,29 @@ impl ConstantSpread {
 
 impl Spread {
     pub(crate) fn check(&self, model: &Model) -> Result<(), CompensateError> {
-        let Self::Constant(spread) = self;
-        let (last, all) = (spread.columns.last().map_or(0, |last| last + 1), model.chain.parameter_count());
-        if last > all || !spread.columns.is_sorted_by(|a, b| a < b) {
-            return Err(CompensateError::Length {
-                what: "the covariance's parameters",
-                found: last,
-                expected: all,
-            });
+        match self {
+            Self::Constant(spread) => spread.check(model),
+            Self::Field(bounds) => {
+                let inputs = model.joint_count() + model.feature_count;
+                check_length("the standard deviation's inputs", bounds.input_count(), inputs)
+            }
         }
-        Ok(())
     }
 
+    /// Columns of the Jacobian that it needs.
     pub(crate) fn column_count(&self) -> usize {
-        let Self::Constant(spread) = self;
-        spread.columns.len()
+        match self {
+            Self::Constant(spread) => spread.columns.len(),
+            Self::Field(_) => 0,
+        }
+    }
+
+    /// Memory for bounds.
+    pub(crate) fn scratch(&self) -> Option<FieldScratch> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Field(bounds) => Some(bounds.scratch()),
+        }
     }
 
     /// Standard deviation of the tool's position, m, at N readings.
@@ -84,9 +107,21 @@ impl Spread {
         alone: bool,
         scratch: &mut AimedScratch,
     ) -> Lane {
-        let Self::Constant(spread) = self;
-        aimed.sweep_columns::<I>(readings, alone, &spread.columns, scratch);
-        spread.variance::<I>(scratch).sqrt()
+        match self {
+            Self::Constant(spread) => {
+                aimed.sweep_columns::<I>(readings, alone, &spread.columns, scratch);
+                spread.variance::<I>(scratch).sqrt()
+            }
+            Self::Field(bounds) => {
+                let poses = if alone { 1 } else { LANES };
+                aimed.set_joints::<I>(readings, scratch);
+                let AimedScratch { inputs, bounds: Some(room), .. } = scratch else {
+                    return Lane::splat(f64::NAN);
+                };
+                let [position, rotation] = bounds.group::<I>(inputs, poses, room);
+                I::mul_add(rotation, Lane::splat(aimed.reach), position)
+            }
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A bank of blocks: inputs in, CEPs out, by summing the weights of the excited cells.
 
 use crate::FieldError;
-use crate::cells::Grid;
+use crate::cells::{Axis, Grid, MOST_AXES};
 use crate::compiled::Compiled;
 
 /// One FCMAC: a grid of cells, each with a weight for every parameter that the block drives.
@@ -37,9 +37,17 @@ impl Bank {
     /// Checks that weights, grids and indices fit together, once, where a bank comes from outside.
     ///
     /// # Errors
-    /// [`FieldError::Length`].
+    /// [`FieldError::Length`], [`FieldError::NotFinite`].
     pub fn check(&self) -> Result<(), FieldError> {
         for block in &self.blocks {
+            let (axes, inputs) = (&block.grid.axes, &block.grid.inputs);
+            if !(1..=MOST_AXES).contains(&axes.len()) || !axes.iter().all(Axis::is_sound) {
+                return Err(FieldError::NotFinite { what: "axes of a block" });
+            }
+            if inputs.len() != axes.len() {
+                let (found, expected) = (inputs.len(), axes.len());
+                return Err(FieldError::Length { what: "inputs of a block", found, expected });
+            }
             let expected = block.grid.cell_count() * block.outputs.len();
             if block.weights.len() != expected {
                 return Err(FieldError::Length {
@@ -48,8 +56,8 @@ impl Bank {
                     expected,
                 });
             }
-            let input = block.grid.inputs.iter().copied().max().unwrap_or(0);
-            if input >= self.input_count || block.grid.inputs.len() != block.grid.axes.len() {
+            let input = inputs.iter().copied().max().unwrap_or(0);
+            if input >= self.input_count {
                 let expected = self.input_count;
                 return Err(FieldError::Length { what: "inputs of a block", found: input + 1, expected });
             }

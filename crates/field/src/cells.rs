@@ -7,6 +7,9 @@ use crate::kernel::{Input, InputKind, Value};
 /// Largest number of cells that are active at once along one input (cubic memberships).
 pub const MOST_ACTIVE: usize = 4;
 
+/// Inputs of a grid at the most.
+pub const MOST_AXES: usize = 3;
+
 /// Cells at equal distances along one input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
@@ -37,6 +40,8 @@ pub struct Active {
 const MARGIN: f64 = 3.0;
 /// Widest spacing, so that the first harmonics of a turn are well represented.
 const WIDEST: f64 = 0.6;
+/// More cells than this along one input are no calibration of ours.
+const MOST_CELLS: usize = 100_000;
 /// Finest spacing: more cells than this on a turn are beyond any data set.
 const FINEST: f64 = 0.004;
 
@@ -65,6 +70,14 @@ impl Axis {
         let middle = 0.5 * (low + high);
         let origin = middle - 0.5 * spacing * (count - 1) as f64;
         Self { input, origin, spacing, count, closed: false, degree }
+    }
+
+    /// Whether it can be evaluated: positive finite numbers, cells enough and not too many, a known degree.
+    pub fn is_sound(&self) -> bool {
+        let fewest = if self.closed { MOST_ACTIVE } else { 1 };
+        let positive = [self.spacing, self.input.scale].iter().all(|x| x.is_finite() && *x > 0.0);
+        let cells = (fewest..=MOST_CELLS).contains(&self.count);
+        positive && self.origin.is_finite() && cells && matches!(self.degree, 2 | 3)
     }
 
     /// First cell, beyond the axis where it may be, and grades of the cells that a raw value excites.

@@ -3,12 +3,11 @@
 use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::bank::Block;
+use crate::cells::MOST_AXES;
 use crate::compiled_axis::{CompiledAxis, Excited};
 
 /// Lanes of outputs whose sums fit into registers.
 pub const MOST_LANES: usize = 5;
-/// Inputs of a grid.
-const MOST_AXES: usize = 3;
 
 /// One output over one axis.
 #[derive(Debug, Clone, PartialEq)]

@@ -25,6 +25,12 @@ pub enum FieldError {
         /// The length needed.
         expected: usize,
     },
+    /// Values that are not finite, or not positive where they must be, or none at all.
+    #[error("{what}: they must be given, finite, and standard deviations positive")]
+    NotFinite {
+        /// The values.
+        what: &'static str,
+    },
     /// The constant stage failed.
     #[error(transparent)]
     Estimate(#[from] EstimateError),

@@ -204,6 +204,28 @@ impl Posterior {
         Ok(covariance)
     }
 
+    /// Variances of `J* CEP(q*)` before any measurement, (n, m).
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn prior(&self, values: &[f64], jacobian: &[f64], rows: usize) -> Result<Vec<f64>, FieldError> {
+        let (model, training) = (self.model(), self.training());
+        let widths = (training.inputs.len(), training.columns.len());
+        let query = Query { values, jacobian, setup: None, rows, widths };
+        let expected = query.poses() * rows * widths.1;
+        if jacobian.len() != expected {
+            return Err(FieldError::Length { what: "jacobian", found: jacobian.len(), expected });
+        }
+        let scale = model.hyper.extrapolation.powi(2);
+        let mut out = Vec::with_capacity(query.poses() * rows);
+        for pose in 0..query.poses() {
+            let excited = model.cells.excite(query.values_of(pose));
+            let variances = model.variances(&excited, &excited);
+            out.extend((0..rows).map(|i| scale * query.prior(pose, (i, i), &variances)));
+        }
+        Ok(out)
+    }
+
     /// Covariance (n, m, m) of what joints do not repeat, carried to rows of a Jacobian (n, m, P).
     pub fn repeatability(&self, jacobian: &[f64], rows: usize) -> Vec<f64> {
         let model = self.model();

@@ -306,7 +306,7 @@ impl Field {
 const HELD_POSES: usize = 64;
 
 /// The numbers of an array row by row, copied only where they do not lie so.
-fn numbers<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> Cow<'a, [f64]> {
+pub(crate) fn numbers<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> Cow<'a, [f64]> {
     match array.as_slice() {
         Ok(slice) => Cow::Borrowed(slice),
         Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
@@ -326,7 +326,7 @@ fn array3<'py>(
 /// One axis as stored: is an angle, scale, origin, spacing, count, closed, degree.
 type StoredAxis = (bool, f64, f64, f64, usize, bool, usize);
 
-fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<'py, PyDict>> {
+pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<'py, PyDict>> {
     let axes: Vec<StoredAxis> = block
         .grid
         .axes
@@ -345,7 +345,7 @@ fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<'py, PyDict
     Ok(stored)
 }
 
-fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {
+pub(crate) fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {
     let item = |name: &str| {
         let message = || PyKeyError::new_err(format!("a block of the field has no '{name}'"));
         stored.get_item(name)?.ok_or_else(message)
@@ -425,6 +425,20 @@ impl Posterior {
         let values = quick(py, || measurement_covariance(self.core(), &core, point, &inputs))?;
         let rows = core.measurements.rows_per_pose();
         array3(py, values, (core.measurements.pose_count(), rows, rows))
+    }
+
+    /// Variances (n, m) of `jacobian CEP` before any measurement, for inputs (n, I) and Jacobians (n, m, P).
+    fn prior<'py>(
+        &self,
+        py: Python<'py>,
+        inputs: PyReadonlyArray2<'py, f64>,
+        jacobian: PyReadonlyArray3<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows = jacobian.shape()[1];
+        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
+        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
+        let values = quick(py, || self.core().prior(&inputs, &jacobian, rows))?;
+        Ok(matrix(py, &values, rows))
     }
 
     /// Covariance (n, m, m) of `jacobian CEP` (+ `setup s` where set-up columns (n, m, s) are given) for inputs (n, I) and Jacobians (n, m, P) by the problem's columns.

@@ -7,6 +7,7 @@ mod choice;
 mod cmac;
 mod compensate;
 mod division;
+mod conservative;
 mod door;
 mod estimate;
 mod field;
@@ -33,6 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<cmac::Network>()?;
     module.add_class::<cmac::TrainedNetwork>()?;
     module.add_class::<cmac::NetworkFit>()?;
+    module.add_class::<conservative::Conservative>()?;
     module.add_class::<field::FieldFit>()?;
     module.add_class::<field::Field>()?;
     module.add_class::<field::Posterior>()?;

@@ -1,0 +1,68 @@
+//! The JSON values of a calibration that a controller needs.
+
+use std::collections::HashMap;
+
+use serde::Deserialize;
+
+/// The part that every layout has.
+#[derive(Deserialize)]
+pub struct Head {
+    pub schema: u64,
+    #[serde(default)]
+    pub version: String,
+}
+
+#[derive(Deserialize)]
+pub struct Content {
+    pub robot: RobotContent,
+    pub options: OptionsContent,
+    pub models: HashMap<String, ModelContent>,
+    #[serde(default)]
+    pub conservative: Option<ConservativeContent>,
+}
+
+#[derive(Deserialize)]
+pub struct RobotContent {
+    pub name: String,
+    pub convention: String,
+    pub joints: Vec<String>,
+    pub table: Vec<[f64; 5]>,
+    pub base: [[f64; 4]; 4],
+    pub flange: [[f64; 4]; 4],
+    pub tool: [[f64; 4]; 4],
+    pub base_row: Option<[f64; 5]>,
+    pub coupling: Vec<Vec<f64>>,
+    pub limits: Vec<[Option<f64>; 2]>,
+}
+
+#[derive(Deserialize)]
+pub struct OptionsContent {
+    pub frame: String,
+    pub features: Vec<String>,
+}
+
+#[derive(Deserialize)]
+pub struct ModelContent {
+    pub blocks: Option<Vec<BlockContent>>,
+}
+
+#[derive(Deserialize)]
+pub struct BlockContent {
+    pub name: String,
+    pub inputs: Vec<usize>,
+    pub axes: Vec<AxisContent>,
+    pub outputs: Vec<usize>,
+}
+
+/// Is an angle, scale, origin, spacing, count, closed, degree.
+#[derive(Deserialize)]
+pub struct AxisContent(pub bool, pub f64, pub f64, pub f64, pub usize, pub bool, pub usize);
+
+#[derive(Deserialize)]
+pub struct ConservativeContent {
+    pub blocks: Vec<BlockContent>,
+    pub level: [f64; 2],
+    pub largest: [f64; 2],
+    pub ranges: Vec<Option<[f64; 2]>>,
+    pub looseness: [f64; 2],
+}

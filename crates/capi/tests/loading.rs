@@ -1,0 +1,128 @@
+//! Files that are read, and files that are refused with the right words.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+mod common;
+
+use std::ffi::CString;
+use std::ptr::{null, null_mut};
+
+use common::{File, JOINTS, Rig, load, text};
+use serde_json::json;
+use truearm::*;
+
+fn refused(bytes: &[u8]) -> (Status, String) {
+    load(bytes).err().unwrap()
+}
+
+#[test]
+fn a_file_is_read_from_disk_and_from_memory() {
+    let bytes = File::new().bytes();
+    let path = std::env::temp_dir().join(format!("truearm-{}.calib", std::process::id()));
+    std::fs::write(&path, &bytes).unwrap();
+    let name = CString::new(path.to_str().unwrap()).unwrap();
+    let (mut out, mut arm) = (null_mut(), [1 as std::ffi::c_char; 5]);
+    // SAFETY: all pointers are to memory of the sizes given.
+    unsafe {
+        assert_eq!(truearm_load_file(name.as_ptr(), &mut out, null_mut(), 0), Status::Ok);
+        assert_eq!((truearm_joint_count(out), truearm_feature_count(out)), (JOINTS, 0));
+        assert_eq!(truearm_robot_name(out, arm.as_mut_ptr(), arm.len()), Status::Ok);
+        assert_eq!(truearm_calibration_free(out), Status::Ok);
+    }
+    std::fs::remove_file(path).unwrap();
+    assert_eq!(text(arm.as_ptr()), "test");
+}
+
+#[test]
+fn a_missing_file_is_said_to_be_missing() {
+    let (mut out, mut message) = (null_mut(), [0 as std::ffi::c_char; 200]);
+    // SAFETY: all pointers are to memory of the sizes given.
+    let status =
+        unsafe { truearm_load_file(c"/no/such/file.calib".as_ptr(), &mut out, message.as_mut_ptr(), 200) };
+    assert_eq!((status, out), (Status::Unreadable, null_mut()));
+    assert!(text(message.as_ptr()).contains("cannot be read"));
+}
+
+#[test]
+fn every_altered_byte_is_noticed() {
+    let bytes = File::new().bytes();
+    for place in (0..bytes.len()).step_by(101) {
+        let mut other = bytes.clone();
+        other[place] ^= 1;
+        let (status, _) = refused(&other);
+        assert!(matches!(status, Status::Altered | Status::NotACalibration), "{place}: {status:?}");
+    }
+    for length in [0, 1, 8, 9, 100, bytes.len() / 2, bytes.len() - 1] {
+        let (status, _) = refused(&bytes[..length]);
+        assert!(matches!(status, Status::Altered | Status::NotACalibration), "{length}: {status:?}");
+    }
+}
+
+#[test]
+fn other_files_and_layouts_are_refused_in_words() {
+    assert!(refused(b"").1.contains("it is empty"));
+    assert!(refused(b"PK\x03\x04 something else").1.contains("no safetensors file"));
+    let mut file = File::new();
+    file.content["schema"] = json!(7);
+    let (status, words) = refused(&file.bytes());
+    assert_eq!(status, Status::UnknownLayout);
+    assert!(words.contains("version 7") && words.contains("0.1.0"), "{words}");
+}
+
+#[test]
+fn contents_that_contradict_themselves_are_refused() {
+    type Change = fn(&mut File);
+    let changes: [(Change, &str); 9] = [
+        (|file| drop(file.arrays.remove(2)), "variable.block0.weights"),
+        (|file| file.arrays[0].2[3] = f64::NAN, "finite"),
+        (|file| file.arrays[2].2[3] = f64::INFINITY, "finite"),
+        (|file| file.content["robot"]["convention"] = json!("other"), "convention"),
+        (|file| file.content["robot"]["limits"] = json!([]), "limits"),
+        (|file| file.content["models"]["variable"]["blocks"][0]["inputs"] = json!([9]), "inputs of a block"),
+        (|file| file.content["models"]["variable"]["blocks"][0]["outputs"] = json!([99]), "outputs"),
+        (|file| file.content["models"]["variable"]["blocks"][0]["axes"][0][4] = json!(0), "axes of a block"),
+        (|file| file.content["conservative"]["level"] = json!([1.0]), "length 1"),
+    ];
+    for (change, words) in changes {
+        let mut file = File::new();
+        change(&mut file);
+        let (status, said) = refused(&file.bytes());
+        assert_eq!(status, Status::Altered, "{words}");
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn absurd_sizes_cost_nothing() {
+    for count in [json!(u64::MAX), json!(100_001), json!(-1)] {
+        let mut file = File::new();
+        file.content["models"]["variable"]["blocks"][0]["axes"][0][4] = count;
+        assert_eq!(refused(&file.bytes()).0, Status::Altered);
+    }
+}
+
+#[test]
+fn options_are_checked() {
+    let rig = Rig::new();
+    let options = |change: fn(&mut CorrectorOptions)| {
+        let mut options = truearm_default_options();
+        change(&mut options);
+        let (mut out, mut message) = (null_mut(), [0 as std::ffi::c_char; 200]);
+        // SAFETY: all pointers are to memory of the sizes given.
+        let status = unsafe {
+            let message = message.as_mut_ptr();
+            truearm_corrector_new(rig.calibration, null(), &options, &mut out, message, 200)
+        };
+        assert_eq!(out, null_mut());
+        (status, text(message.as_ptr()))
+    };
+    assert_eq!(options(|options| options.task = 3), (Status::BadOption, "the task must be 0, 1 or 2".into()));
+    let (status, words) = options(|options| options.largest_shift_m = -1.0);
+    assert!(status == Status::BadOption && words.contains("largest shift is -1"), "{words}");
+    assert_eq!(options(|options| options.moving = 1 << 40).0, Status::BadOption);
+    let shear = [1.0, 0.2, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let mut out = null_mut();
+    // SAFETY: all pointers are to memory of the sizes given.
+    let status =
+        unsafe { truearm_corrector_new(rig.calibration, shear.as_ptr(), null(), &mut out, null_mut(), 0) };
+    assert_eq!((status, out), (Status::BadOption, null_mut()));
+}

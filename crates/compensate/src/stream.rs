@@ -1,0 +1,281 @@
+//! Corrections of a stream of set-points, such as a controller's servo cycle: nothing is ever applied or dropped at once.
+//!
+//! What is added to the set-points follows the wanted correction with bounded rate and acceleration. Switched on or
+//! off it ramps. Where a set-point is refused, is not finite or comes late, the last correction is held for a
+//! moment and then ramped down, until good set-points come again.
+
+use std::sync::Arc;
+
+use crate::corrector::{Corrector, Workspace};
+use crate::error::CompensateError;
+use crate::limits::slides;
+use crate::refusal::Refusal;
+
+/// Between two steps less than this nothing moves, s.
+const SHORTEST: f64 = 1e-9;
+
+/// How a stream of corrections may change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StreamOptions {
+    /// Largest rate of a revolute joint's correction (rad/s) and of a prismatic one's (m/s).
+    pub rate: [f64; 2],
+    /// Largest acceleration of the same, rad/s^2 and m/s^2.
+    pub acceleration: [f64; 2],
+    /// How long the ramp takes from nothing to the whole correction, s.
+    pub ramp: f64,
+    /// How long the last correction is held where there is no good one, s.
+    pub hold: f64,
+    /// Longest time between two set-points, s; a later one counts as missed.
+    pub deadline: f64,
+}
+
+impl Default for StreamOptions {
+    fn default() -> Self {
+        Self { rate: [0.1, 0.02], acceleration: [2.0, 0.5], ramp: 1.0, hold: 0.1, deadline: 0.05 }
+    }
+}
+
+impl StreamOptions {
+    fn check(&self) -> Result<(), CompensateError> {
+        let bounds = [
+            ("the largest rate of the correction", self.rate[0]),
+            ("the largest rate of the correction", self.rate[1]),
+            ("the largest acceleration of the correction", self.acceleration[0]),
+            ("the largest acceleration of the correction", self.acceleration[1]),
+            ("the time of the ramp", self.ramp),
+            ("the time that a correction is held", self.hold),
+            ("the longest time between set-points", self.deadline),
+        ];
+        match bounds.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
+            Some((what, value)) => Err(CompensateError::Bound { what, value }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a stream is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Phase {
+    /// Nothing is added.
+    Off = 0,
+    /// On its way to the whole correction.
+    Rising = 1,
+    /// The whole correction.
+    On = 2,
+    /// The last correction is kept, for want of a good one.
+    Holding = 3,
+    /// On its way to nothing.
+    Falling = 4,
+}
+
+/// Why a step has no correction of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fault {
+    /// There was no set-point yet, so there is nothing to give out.
+    NotStarted,
+    /// The set-point or a feature is missing, not finite, or has another length.
+    NotFinite,
+    /// The set-point came after the deadline.
+    Late,
+    /// The corrector refuses the set-point.
+    Refused(Refusal),
+}
+
+/// What became of one set-point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// What the stream is doing.
+    pub phase: Phase,
+    /// Share of the correction that is aimed at, 0 to 1.
+    pub gain: f64,
+    /// How far the applied correction is from the one aimed at: the largest of the joints, rad or m.
+    pub lag: f64,
+    /// Why the correction is an older one.
+    pub fault: Option<Fault>,
+}
+
+/// Corrects set-points one after the other; one for each robot.
+#[derive(Debug, Clone)]
+pub struct Stream {
+    corrector: Arc<Corrector>,
+    workspace: Workspace,
+    options: StreamOptions,
+    /// The last good correction.
+    wanted: Vec<f64>,
+    joints: Vec<Follower>,
+    /// The last finite set-point.
+    readings: Vec<f64>,
+    corrected: Vec<f64>,
+    on: bool,
+    started: bool,
+    gain: f64,
+    without: f64,
+}
+
+impl Stream {
+    /// A stream that is switched on and has nothing applied.
+    ///
+    /// # Errors
+    /// [`CompensateError::Bound`] if an option is not positive.
+    pub fn new(corrector: Arc<Corrector>, options: StreamOptions) -> Result<Stream, CompensateError> {
+        options.check()?;
+        let count = corrector.joint_count();
+        let chain = &corrector.calibrated.chain;
+        let joints = (0..count).map(|joint| usize::from(slides(chain, joint)));
+        let joints =
+            joints.map(|kind| Follower::new(options.rate[kind], options.acceleration[kind])).collect();
+        Ok(Stream {
+            workspace: corrector.workspace(),
+            options,
+            wanted: vec![0.0; count],
+            joints,
+            readings: vec![0.0; count],
+            corrected: vec![0.0; count],
+            on: true,
+            started: false,
+            gain: 0.0,
+            without: 0.0,
+            corrector,
+        })
+    }
+
+    /// Number of joints, N.
+    pub fn joint_count(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Number of features, F.
+    pub fn feature_count(&self) -> usize {
+        self.corrector.feature_count()
+    }
+
+    /// Ramps the correction up or down from now on.
+    pub fn switch(&mut self, on: bool) {
+        self.on = on;
+    }
+
+    /// What is added to set-points now, (N,).
+    pub fn applied(&self) -> impl Iterator<Item = f64> + '_ {
+        self.joints.iter().map(|joint| joint.applied)
+    }
+
+    /// The corrected set-point to command; without allocation, lock or panic.
+    ///
+    /// `readings` (N) are the set-point, or None where none came in time, and `features` (F); `elapsed` (s) is the time since
+    /// the step before. `out` (N) is always finite, but not written before the first finite set-point.
+    pub fn step(
+        &mut self,
+        readings: Option<&[f64]>,
+        features: &[f64],
+        elapsed: f64,
+        out: &mut [f64],
+    ) -> Step {
+        let late = self.started && !(0.0..=self.options.deadline).contains(&elapsed);
+        let elapsed = if elapsed.is_finite() { elapsed.clamp(0.0, self.options.deadline) } else { 0.0 };
+        let fault = self.take(readings, features, late);
+        if !self.started || out.len() != self.joints.len() {
+            let fault = Some(if self.started { Fault::NotFinite } else { Fault::NotStarted });
+            return Step { phase: Phase::Off, gain: self.gain, lag: 0.0, fault };
+        }
+        let phase = self.ramp(fault.is_some(), elapsed);
+        let share = self.gain * self.gain * (3.0 - 2.0 * self.gain);
+        let mut lag = 0.0_f64;
+        for (joint, follower) in self.joints.iter_mut().enumerate() {
+            lag = lag.max(follower.follow(share * self.wanted[joint], elapsed));
+            out[joint] = self.readings[joint] + follower.applied;
+        }
+        Step { phase, gain: self.gain, lag, fault }
+    }
+
+    /// Takes in a set-point, and its correction if that is good.
+    fn take(&mut self, readings: Option<&[f64]>, features: &[f64], late: bool) -> Option<Fault> {
+        let count = self.joints.len();
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        let Some(readings) = readings.filter(|values| values.len() == count && finite(values)) else {
+            return Some(if late { Fault::Late } else { Fault::NotFinite });
+        };
+        self.readings.copy_from_slice(readings);
+        self.started = true;
+        if late {
+            return Some(Fault::Late);
+        }
+        if !self.on {
+            return None;
+        }
+        if features.len() != self.corrector.feature_count() || !finite(features) {
+            return Some(Fault::NotFinite);
+        }
+        let found = self.corrector.correct(readings, features, &mut self.corrected, &mut self.workspace);
+        if let Some(refusal) = found.refusal {
+            return Some(Fault::Refused(refusal));
+        }
+        for (wanted, (to, from)) in self.wanted.iter_mut().zip(self.corrected.iter().zip(readings)) {
+            *wanted = to - from;
+        }
+        None
+    }
+
+    /// Moves the share of the correction that is aimed at.
+    fn ramp(&mut self, faulty: bool, elapsed: f64) -> Phase {
+        self.without = if faulty { self.without + elapsed } else { 0.0 };
+        let step = elapsed / self.options.ramp;
+        if self.on && !faulty {
+            self.gain = (self.gain + step).min(1.0);
+            return if self.gain < 1.0 { Phase::Rising } else { Phase::On };
+        }
+        if self.on && self.without <= self.options.hold {
+            return Phase::Holding;
+        }
+        self.gain = (self.gain - step).max(0.0);
+        let still = self.joints.iter().all(|joint| joint.applied == 0.0 && joint.rate == 0.0);
+        if self.gain > 0.0 || !still { Phase::Falling } else { Phase::Off }
+    }
+}
+
+/// Follows a value with bounded rate and acceleration, without delay where it may.
+#[derive(Debug, Clone, Copy)]
+struct Follower {
+    largest_rate: f64,
+    acceleration: f64,
+    applied: f64,
+    rate: f64,
+    /// The value that was followed last.
+    aim: f64,
+}
+
+impl Follower {
+    fn new(largest_rate: f64, acceleration: f64) -> Self {
+        Self { largest_rate, acceleration, applied: 0.0, rate: 0.0, aim: 0.0 }
+    }
+
+    /// One step towards `aim`; how far from it the applied value is then.
+    ///
+    /// The rate is that of the aim plus one that closes what was left before, from which it can still stop in time.
+    fn follow(&mut self, aim: f64, elapsed: f64) -> f64 {
+        if elapsed > SHORTEST {
+            let left = self.aim - self.applied;
+            let brake = self.acceleration * elapsed;
+            let stopping = brake * (0.25 + 2.0 * left.abs() / (brake * elapsed)).sqrt() - 0.5 * brake;
+            let closing = left.signum() * stopping.min(left.abs() / elapsed);
+            let moving = ((aim - self.aim) / elapsed).clamp(-self.largest_rate, self.largest_rate);
+            let rate = (moving + closing).clamp(self.rate - brake, self.rate + brake);
+            self.rate = rate.clamp(-self.largest_rate, self.largest_rate);
+            self.applied += self.rate * elapsed;
+            self.settle(aim, brake * elapsed);
+            self.aim = aim;
+        }
+        (aim - self.applied).abs()
+    }
+
+    /// Arrives where only rounding is left.
+    fn settle(&mut self, aim: f64, reach: f64) {
+        let near = (aim - self.applied).abs() <= 1e-12 * reach;
+        if near {
+            self.applied = aim;
+        }
+        if near && aim == self.aim && self.rate.abs() <= 1e-12 * self.largest_rate {
+            self.rate = 0.0;
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! Corrections of a stream: bounded in rate and acceleration whatever happens, and whole where nothing does.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+use std::f64::consts::FRAC_PI_2;
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use truearm_compensate::{
+    CompensateError, Corrector, Fault, Limits, Model, Options, Phase, Stream, StreamOptions,
+};
+use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
+
+const JOINTS: usize = 6;
+const CYCLE: f64 = 0.002;
+const START: [f64; JOINTS] = [0.3, -1.2, 1.4, -0.7, 1.1, 0.2];
+
+fn chain() -> Chain {
+    let rows = [
+        [0.0, 0.1273, 0.0, FRAC_PI_2],
+        [0.0, 0.0, -0.612, 0.0],
+        [0.0, 0.0, -0.5723, 0.0],
+        [0.0, 0.1639, 0.0, FRAC_PI_2],
+        [0.0, 0.1157, 0.0, -FRAC_PI_2],
+        [0.0, 0.0922, 0.0, 0.0],
+    ];
+    let link =
+        |[theta, d, a, alpha]: [f64; 4]| Link { joint: Joint::Revolute, theta, d, a, alpha, beta: 0.0 };
+    let links = rows.into_iter().map(link).collect();
+    Chain::new(Convention::Standard, links, Transform::IDENTITY, Transform::IDENTITY).unwrap()
+}
+
+/// Corrects an arm with errors of a millirad in every angle.
+fn corrector() -> Arc<Corrector> {
+    let (chain, mut unit) = (chain(), vec![0.0; JOINTS * JOINTS]);
+    (0..JOINTS).for_each(|joint| unit[joint * (JOINTS + 1)] = 1.0);
+    let nominal = chain.nominal();
+    let erring = |(k, value): (usize, &f64)| {
+        value + if k % 5 == 0 || k % 5 == 3 { 1e-3 * (k as f64).cos() } else { 0.0 }
+    };
+    let actual: Vec<f64> = nominal.iter().enumerate().map(erring).collect();
+    let model = |constants: &[f64]| Arc::new(Model::new(chain.clone(), constants, &unit).unwrap());
+    let limits = Limits { joints: vec![[-3.0, 3.0]; JOINTS], ..Limits::default() };
+    let options = Options { limits, ..Options::default() };
+    Arc::new(Corrector::new(model(&actual), model(&nominal), &Transform::IDENTITY, options).unwrap())
+}
+
+fn stream() -> Stream {
+    Stream::new(corrector(), StreamOptions::default()).unwrap()
+}
+
+fn moved(time: f64) -> [f64; JOINTS] {
+    std::array::from_fn(|joint| START[joint] + 0.3 * (1.3 * time + joint as f64).sin())
+}
+
+/// Runs a stream for some time without anything bad.
+fn run(stream: &mut Stream, from: f64, seconds: f64) -> f64 {
+    let mut out = [0.0; JOINTS];
+    let steps = (seconds / CYCLE).round() as usize;
+    for k in 0..steps {
+        stream.step(Some(&moved(from + CYCLE * k as f64)), &[], CYCLE, &mut out);
+    }
+    from + CYCLE * steps as f64
+}
+
+#[test]
+fn after_the_ramp_set_points_are_corrected_as_single_ones() {
+    let (mut stream, corrector) = (stream(), corrector());
+    let mut workspace = corrector.workspace();
+    let time = run(&mut stream, 0.0, 1.5);
+    for k in 0..500 {
+        let readings = moved(time + CYCLE * f64::from(k));
+        let (mut out, mut alone) = ([0.0; JOINTS], [0.0; JOINTS]);
+        let step = stream.step(Some(&readings), &[], CYCLE, &mut out);
+        assert_eq!((step.phase, step.gain, step.fault), (Phase::On, 1.0, None));
+        assert!(corrector.correct(&readings, &[], &mut alone, &mut workspace).refusal.is_none());
+        for (a, b) in out.iter().zip(alone) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn the_first_set_point_is_given_out_as_it_is() {
+    let mut stream = stream();
+    let mut out = [7.0; JOINTS];
+    assert_eq!(stream.step(None, &[], 0.0, &mut out).fault, Some(Fault::NotStarted));
+    assert_eq!(out, [7.0; JOINTS]);
+    assert_eq!(stream.step(Some(&[f64::NAN; JOINTS]), &[], 0.0, &mut out).fault, Some(Fault::NotStarted));
+    stream.step(Some(&START), &[], 0.0, &mut out);
+    assert_eq!(out, START);
+}
+
+#[test]
+fn switched_off_it_ramps_down_to_nothing() {
+    let mut stream = stream();
+    let time = run(&mut stream, 0.0, 2.0);
+    let full = stream.applied().fold(0.0_f64, |a, b| a.max(b.abs()));
+    stream.switch(false);
+    let time = run(&mut stream, time, 0.5);
+    let half = stream.applied().fold(0.0_f64, |a, b| a.max(b.abs()));
+    assert!(full > 1e-4 && half > 0.2 * full && half < 0.8 * full, "{full} {half}");
+    let time = run(&mut stream, time, 1.0);
+    let mut out = [0.0; JOINTS];
+    let step = stream.step(Some(&moved(time)), &[], CYCLE, &mut out);
+    assert_eq!((step.phase, out), (Phase::Off, moved(time)));
+}
+
+#[test]
+fn a_refused_set_point_holds_the_correction_then_ramps_it_down_and_up_again() {
+    let mut stream = stream();
+    let time = run(&mut stream, 0.0, 2.0);
+    let before: Vec<f64> = stream.applied().collect();
+    let beyond: [f64; JOINTS] =
+        std::array::from_fn(|joint| if joint == 0 { 3.5 } else { moved(time)[joint] });
+    let mut out = [0.0; JOINTS];
+    let step = stream.step(Some(&beyond), &[], CYCLE, &mut out);
+    assert!(matches!(step.fault, Some(Fault::Refused(_))));
+    assert_eq!(step.phase, Phase::Holding);
+    for (joint, before) in before.iter().enumerate() {
+        assert!((out[joint] - beyond[joint] - before).abs() < 1e-5);
+    }
+    let mut phases = vec![step.phase];
+    for _ in 0..800 {
+        phases.push(stream.step(Some(&beyond), &[], CYCLE, &mut out).phase);
+    }
+    phases.dedup();
+    assert_eq!(phases, [Phase::Holding, Phase::Falling, Phase::Off]);
+    assert_eq!(out, beyond);
+    let step = stream.step(Some(&moved(time)), &[], CYCLE, &mut out);
+    assert_eq!((step.phase, step.fault), (Phase::Rising, None));
+}
+
+#[test]
+fn missing_late_and_broken_set_points_keep_the_last_one_corrected() {
+    let mut stream = stream();
+    let time = run(&mut stream, 0.0, 2.0);
+    let mut good = [0.0; JOINTS];
+    stream.step(Some(&moved(time)), &[], CYCLE, &mut good);
+    let broken: [f64; JOINTS] = [0.0, f64::INFINITY, 0.0, 0.0, 0.0, 0.0];
+    for readings in [None, Some(&broken[..]), Some(&good[..3])] {
+        let mut out = [0.0; JOINTS];
+        let step = stream.step(readings, &[], CYCLE, &mut out);
+        assert_eq!((step.phase, step.fault), (Phase::Holding, Some(Fault::NotFinite)));
+        for (a, b) in out.iter().zip(good) {
+            assert!((a - b).abs() < 1e-5, "{a} {b}");
+        }
+    }
+    for elapsed in [0.2, -1.0, f64::NAN] {
+        let mut out = [0.0; JOINTS];
+        let step = stream.step(Some(&moved(time)), &[], elapsed, &mut out);
+        assert_eq!(step.fault, Some(Fault::Late));
+        assert!(out.iter().all(|value| value.is_finite()));
+    }
+}
+
+#[test]
+fn options_that_bound_nothing_are_refused() {
+    for bad in [0.0, -1.0, f64::NAN] {
+        let options = StreamOptions { ramp: bad, ..StreamOptions::default() };
+        assert!(matches!(Stream::new(corrector(), options), Err(CompensateError::Bound { .. })));
+    }
+}
+
+/// Anything that may happen to a stream in one cycle.
+#[derive(Debug, Clone)]
+enum Event {
+    Good,
+    Jump(f64),
+    Broken,
+    Missing,
+    Late(f64),
+    Beyond,
+    Switch(bool),
+}
+
+fn event() -> impl Strategy<Value = Event> {
+    prop_oneof![
+        20 => Just(Event::Good),
+        1 => (-1.0..1.0f64).prop_map(Event::Jump),
+        2 => Just(Event::Broken),
+        2 => Just(Event::Missing),
+        2 => (0.0..1.0f64).prop_map(Event::Late),
+        4 => Just(Event::Beyond),
+        2 => any::<bool>().prop_map(Event::Switch),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+
+    #[test]
+    fn rate_and_acceleration_stay_bounded(events in proptest::collection::vec((event(), 1..120usize), 1..30)) {
+        let (options, mut stream) = (StreamOptions::default(), stream());
+        let (mut time, mut offset) = (0.0, 0.0);
+        let (mut applied, mut rate) = (vec![0.0; JOINTS], vec![0.0; JOINTS]);
+        for (event, times) in events {
+            for _ in 0..times {
+                let mut readings = moved(time);
+                readings[1] += offset;
+                let (mut given, mut elapsed) = (true, CYCLE);
+                match event {
+                    Event::Good => {}
+                    Event::Jump(by) => offset = by,
+                    Event::Broken => readings[2] = f64::NAN,
+                    Event::Missing => given = false,
+                    Event::Late(by) => elapsed = by,
+                    Event::Beyond => readings[0] = 3.2,
+                    Event::Switch(on) => stream.switch(on),
+                }
+                let mut out = [0.0; JOINTS];
+                stream.step(given.then_some(&readings[..]), &[], elapsed, &mut out);
+                time += CYCLE;
+                let dt = elapsed.min(options.deadline);
+                let now: Vec<f64> = stream.applied().collect();
+                for joint in 0..JOINTS {
+                    prop_assert!(out[joint].is_finite());
+                    let change = now[joint] - applied[joint];
+                    prop_assert!(change.abs() <= options.rate[0] * dt + 1e-12);
+                    if dt > 1e-6 {
+                        let next = change / dt;
+                        prop_assert!((next - rate[joint]).abs() <= options.acceleration[0] * dt + 1e-6);
+                        rate[joint] = next;
+                    }
+                }
+                applied = now;
+            }
+        }
+    }
+}

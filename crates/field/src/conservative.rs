@@ -1,0 +1,148 @@
+//! A standard deviation that costs next to nothing to evaluate and is never too small.
+//!
+//! Two numbers of a configuration: `s_p`, the root of the trace of the covariance of the flange's position (m), and
+//! `s_r`, that of its rotation vector (rad). A point of the tool at the distance `r` from the flange deviates by no more
+//! than `s_p + r s_r`: by Minkowski's inequality the root mean square of `p + w x r` is at most that of `p` plus `r` times
+//! that of `w`. Each is `exp(level + sum of tables)`: B-spline tables over every input and one over a few
+//! inputs together, fitted to exact values and raised, see [`Conservative::fit`]. Where an input leaves the range
+//! that the tables were fitted in, and nowhere above, stands the largest value that the prior allows.
+
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
+
+use crate::FieldError;
+use crate::bank::Bank;
+use crate::compiled::{Compiled, FieldScratch};
+
+/// What is bounded: position (m) and rotation (rad).
+pub const BOUNDED: usize = 2;
+
+/// Everything that a [`Conservative`] is, as it is stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConservativeParts {
+    /// Tables of both logarithms: outputs 0 and 1 of a bank with two parameters.
+    pub tables: Bank,
+    /// Added to the tables.
+    pub level: [f64; BOUNDED],
+    /// Never exceeded, and the value outside the ranges; m and rad.
+    pub largest: [f64; BOUNDED],
+    /// Where each input may lie, (I,); infinite for whole turns.
+    pub ranges: Vec<[f64; 2]>,
+    /// Median ratio to the exact values at configurations that took no part in the fit.
+    pub looseness: [f64; BOUNDED],
+}
+
+/// Bounds of the standard deviation as a function of the inputs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conservative {
+    parts: ConservativeParts,
+    compiled: Compiled,
+}
+
+impl Conservative {
+    /// Prepares stored parts for evaluation.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`] where the parts do not fit together, [`FieldError::NotFinite`].
+    pub fn new(parts: ConservativeParts) -> Result<Self, FieldError> {
+        let length = |what, found, expected| {
+            if found == expected { Ok(()) } else { Err(FieldError::Length { what, found, expected }) }
+        };
+        length("tables of the standard deviation", parts.tables.parameter_count, BOUNDED)?;
+        length("ranges of the standard deviation", parts.ranges.len(), parts.tables.input_count)?;
+        parts.tables.check()?;
+        let weights = parts.tables.blocks.iter().flat_map(|block| &block.weights);
+        if !weights.chain(&parts.level).chain(&parts.largest).all(|value| value.is_finite()) {
+            return Err(FieldError::NotFinite { what: "tables of the standard deviation" });
+        }
+        let compiled = parts.tables.compiled();
+        Ok(Self { parts, compiled })
+    }
+
+    /// What it is made of.
+    pub fn parts(&self) -> &ConservativeParts {
+        &self.parts
+    }
+
+    /// Inputs of a configuration: joints in order, then features.
+    pub fn input_count(&self) -> usize {
+        self.parts.tables.input_count
+    }
+
+    /// Room for a group of eight configurations.
+    pub fn scratch(&self) -> FieldScratch {
+        self.compiled.scratch()
+    }
+
+    /// Both numbers of a group's first `poses` configurations, at most eight; `inputs` are I lanes. The others get the
+    /// largest value. Without checks or allocation.
+    #[inline(always)]
+    pub fn group<I: Isa>(
+        &self,
+        inputs: &[Lane],
+        poses: usize,
+        scratch: &mut FieldScratch,
+    ) -> [Lane; BOUNDED] {
+        let mut logs = [0.0; BOUNDED * LANES];
+        self.compiled.excite_and_add::<I>(inputs, scratch, &mut logs[..BOUNDED * poses]);
+        let mut inside = [true; LANES];
+        for (lane, range) in inputs.iter().zip(&self.parts.ranges) {
+            for (inside, value) in inside.iter_mut().zip(&lane.0) {
+                *inside &= range[0] <= *value && *value <= range[1];
+            }
+        }
+        let mut out = [Lane::splat(self.parts.largest[0]), Lane::splat(self.parts.largest[1])];
+        for (k, lane) in out.iter_mut().enumerate() {
+            for (pose, value) in lane.0[..poses].iter_mut().enumerate() {
+                if inside[pose] {
+                    *value = value.min((logs[BOUNDED * pose + k] + self.parts.level[k]).exp());
+                }
+            }
+        }
+        out
+    }
+
+    /// Both numbers of each configuration, inputs (n, I) to (n, 2).
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn std(&self, inputs: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let poses = inputs.len() / self.input_count().max(1);
+        let expected = poses * self.input_count();
+        if expected != inputs.len() {
+            return Err(FieldError::Length { what: "inputs", found: inputs.len(), expected });
+        }
+        let mut out = vec![0.0; BOUNDED * poses];
+        dispatch(All { field: self, inputs, out: &mut out });
+        Ok(out)
+    }
+}
+
+struct All<'a> {
+    field: &'a Conservative,
+    inputs: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl Kernel for All<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        let count = self.field.input_count();
+        let mut lanes = vec![Lane::ZERO; count];
+        let mut scratch = self.field.scratch();
+        let groups = self.inputs.chunks(count * LANES).zip(self.out.chunks_mut(BOUNDED * LANES));
+        for (inputs, out) in groups {
+            for (pose, row) in inputs.chunks_exact(count).enumerate() {
+                for (lane, value) in lanes.iter_mut().zip(row) {
+                    lane.0[pose] = *value;
+                }
+            }
+            let std = self.field.group::<I>(&lanes, inputs.len() / count, &mut scratch);
+            for (pose, out) in out.chunks_exact_mut(BOUNDED).enumerate() {
+                out[0] = std[0].0[pose];
+                out[1] = std[1].0[pose];
+            }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! The conservative standard deviation against exact values it has never seen.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+mod common;
+
+use common::Random;
+use truearm_field::{Conservative, ConservativePlan, FieldError, InputKind, Samples};
+
+const JOINTS: usize = 4;
+const RANGES: [[f64; 2]; JOINTS] = [[-6.3, 6.3], [-2.0, 1.0], [-2.5, 2.5], [0.1, 0.6]];
+const KINDS: [InputKind; JOINTS] = [InputKind::Angle, InputKind::Angle, InputKind::Angle, InputKind::Line];
+const LARGEST: [f64; 2] = [2e-3, 5e-3];
+
+/// Valleys about two points, on a slope: tables over single inputs cannot follow that.
+fn exact(q: &[f64]) -> [f64; 2] {
+    let valley = |a: f64, b: f64| 1.0 - 0.5 * (-((q[1] - a).powi(2) + (q[2] - b).powi(2))).exp();
+    let slope = 1.0 + 0.3 * (q[0] - 0.4 * q[2]).sin() + q[3];
+    let std = 2e-4 * slope * valley(-0.4, 0.3) * valley(0.2, -1.0);
+    [std, 0.07 * std.sqrt()]
+}
+
+struct Drawn {
+    inputs: Vec<f64>,
+    std: Vec<f64>,
+}
+
+impl Drawn {
+    fn new(count: usize, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let mut inputs = Vec::new();
+        for _ in 0..count {
+            inputs.extend(RANGES.map(|[low, high]| random.between(low, high)));
+        }
+        let std = inputs.chunks_exact(JOINTS).flat_map(exact).collect();
+        Self { inputs, std }
+    }
+
+    fn samples(&self) -> Samples<'_> {
+        Samples { inputs: &self.inputs, std: &self.std }
+    }
+}
+
+fn plan() -> ConservativePlan {
+    ConservativePlan {
+        kinds: KINDS.to_vec(),
+        ranges: RANGES.to_vec(),
+        together: vec![1, 2],
+        largest: LARGEST,
+    }
+}
+
+fn fitted() -> Conservative {
+    let (fitted, fresh) = (Drawn::new(3000, 1), Drawn::new(3000, 2));
+    Conservative::fit(&plan(), fitted.samples(), fresh.samples()).unwrap()
+}
+
+fn ratios(field: &Conservative, drawn: &Drawn, k: usize) -> Vec<f64> {
+    let found = field.std(&drawn.inputs).unwrap();
+    let mut ratios: Vec<f64> =
+        found.iter().zip(&drawn.std).skip(k).step_by(2).map(|(found, exact)| found / exact).collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios
+}
+
+#[test]
+fn it_is_never_below_the_exact_one_and_not_far_above() {
+    let (field, drawn) = (fitted(), Drawn::new(20_000, 3));
+    for k in 0..2 {
+        let ratios = ratios(&field, &drawn, k);
+        assert!(ratios[0] >= 1.0, "{k}: {}", ratios[0]);
+        let median = ratios[ratios.len() / 2];
+        assert!(median < 1.6, "{k}: {median}");
+        assert!((median / field.parts().looseness[k] - 1.0).abs() < 0.02);
+    }
+}
+
+#[test]
+fn turns_and_batches_change_nothing() {
+    let (field, drawn) = (fitted(), Drawn::new(19, 4));
+    let all = field.std(&drawn.inputs).unwrap();
+    for (q, together) in drawn.inputs.chunks_exact(JOINTS).zip(all.chunks_exact(2)) {
+        assert_eq!(field.std(q).unwrap(), together);
+        let turned = [q[0] + std::f64::consts::TAU, q[1], q[2], q[3]];
+        let turned = field.std(&turned).unwrap();
+        assert!(turned.iter().zip(together).all(|(a, b)| (a / b - 1.0).abs() < 1e-9));
+    }
+}
+
+#[test]
+fn outside_its_range_stands_the_largest_value() {
+    let field = fitted();
+    for (joint, value) in [(1, 1.01), (2, -2.6), (3, 0.05), (3, f64::NAN)] {
+        let mut q = [0.3, 0.2, -0.4, 0.4];
+        assert!(field.std(&q).unwrap()[0] < LARGEST[0]);
+        q[joint] = value;
+        assert_eq!(field.std(&q).unwrap(), LARGEST);
+    }
+}
+
+#[test]
+fn the_same_samples_give_the_same_bits_however_many_threads() {
+    let by = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(fitted).parts().clone()
+    };
+    assert_eq!(by(1), by(3));
+}
+
+#[test]
+fn stored_parts_are_the_same_field() {
+    let field = fitted();
+    assert_eq!(Conservative::new(field.parts().clone()).unwrap(), field);
+    let mut parts = field.parts().clone();
+    parts.level[1] = f64::NAN;
+    assert!(matches!(Conservative::new(parts), Err(FieldError::NotFinite { .. })));
+    let mut parts = field.parts().clone();
+    parts.ranges.pop();
+    assert!(matches!(Conservative::new(parts), Err(FieldError::Length { .. })));
+}
+
+#[test]
+fn samples_that_are_no_standard_deviations_are_refused() {
+    let (good, mut bad) = (Drawn::new(50, 1), Drawn::new(50, 2));
+    bad.std[7] = 0.0;
+    let refused = Conservative::fit(&plan(), good.samples(), bad.samples());
+    assert!(matches!(refused, Err(FieldError::NotFinite { .. })));
+    bad.std.pop();
+    let refused = Conservative::fit(&plan(), bad.samples(), good.samples());
+    assert!(matches!(refused, Err(FieldError::Length { .. })));
+}

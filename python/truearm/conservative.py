@@ -1,0 +1,179 @@
+"""Standard deviations for controllers: quick to evaluate, and never smaller than the exact ones.
+
+The exact standard deviation of a calibration needs the measurements and takes a millisecond. For compensation and for
+controllers a calibration file carries bounds of it as tables over the configuration: one number for the
+flange's position, the root of the sum of its coordinates' variances (m), and one for its rotation vector (rad).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Conservative
+from truearm.fitting import feature_values
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
+    from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+
+SAMPLES: Final = 4000
+FEWEST_SAMPLES: Final = 1000
+QUICK_ROWS: Final = 1200
+"""Measured values up to which an exact standard deviation takes less than a millisecond."""
+ENDS: Final = 0.1
+"""How far beyond a range configurations are drawn, as a share of it, before they are brought back to its ends."""
+SEED: Final = 0
+AT_ONCE: Final = 500
+MAJOR: Final = (1, 2)
+"""Joints that are tabulated together where the evidence named none: shoulder and elbow of most arms."""
+OPEN_REACH_M: Final = 0.5
+PRIOR_MARGIN: Final = 1.1
+"""Over the largest prior seen: it is sampled as well."""
+SMALLEST: Final = 1e-12
+"""What was not asked for has no uncertainty; its logarithm is still taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Where configurations are drawn from.
+
+    Attributes:
+        limits: Lowest and highest reading (N, 2), and features (F, 2) behind them.
+        measured: The same of the measurements; the limits where there are none.
+    """
+
+    limits: Floats
+    measured: Floats
+
+    @classmethod
+    def of(cls, calibration: "Calibration") -> "Reach":
+        """That of a calibration's arm and measurements."""
+        measured = _measured(calibration)
+        limits = _closed_limits(calibration.robot, measured)
+        if measured is None:
+            return cls(limits, limits)
+        joints = len(limits)
+        inside = np.clip(measured[:joints], limits[:, :1], limits[:, 1:])
+        features = measured[joints:]
+        return cls(np.vstack([limits, features]), np.vstack([inside, features]))
+
+    def draw(self, count: int, rng: np.random.Generator) -> Floats:
+        """Readings and features (count, N + F): half within the limits, half where was measured.
+
+        A joint in six lies on an end of its range: where ranges end the tables know least.
+        """
+        place = np.clip(rng.uniform(-ENDS, 1.0 + ENDS, (count, len(self.limits))), 0.0, 1.0)
+        box = np.where(np.arange(count)[:, None, None] % 2 == 0, self.limits, self.measured)
+        return np.asarray(box[..., 0] + (box[..., 1] - box[..., 0]) * place)
+
+
+def conservative_of(calibration: "Calibration") -> Conservative:
+    """Bounds of a calibration's standard deviation, fitted to exact ones and tested on fresh ones.
+
+    Raises:
+        WorkError: If the exact ones need rows that were left out of the file.
+    """
+    reach, rng = Reach.of(calibration), np.random.default_rng(SEED)
+    count = _sample_count(calibration)
+    (fitted, prior), (fresh, _) = (_exact(calibration, reach.draw(count, rng)) for _ in range(2))
+    largest = np.maximum(PRIOR_MARGIN * prior.max(axis=0), np.maximum(fitted[1], fresh[1]).max(axis=0))
+    robot = calibration.robot
+    plan = {
+        "angles": [joint == "revolute" for joint in robot.joints if joint != "fixed"]
+        + [False] * len(calibration.options.features),
+        "ranges": _input_ranges(robot, reach.limits),
+        "together": _together(calibration),
+        "largest": largest.tolist(),
+    }
+    return Conservative.fit(plan, fitted, fresh)
+
+
+def pack(conservative: Conservative, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
+    """JSON values of bounds; their arrays are added to `arrays`."""
+    blocks = []
+    for number, block in enumerate(conservative.blocks()):
+        arrays[f"conservative.block{number}.weights"] = block.pop("weights")
+        blocks.append({**block, "axes": [list(axis) for axis in block["axes"]]})
+    return {**conservative.content(), "blocks": blocks}
+
+
+def unpack(content: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Conservative:
+    """The bounds that `pack` described.
+
+    Raises:
+        KeyError: If an array is missing.
+    """
+    blocks = [
+        {
+            **block,
+            "axes": [tuple(axis) for axis in block["axes"]],
+            "weights": arrays[f"conservative.block{number}.weights"],
+        }
+        for number, block in enumerate(content["blocks"])
+    ]
+    return Conservative(content, blocks)
+
+
+def _exact(calibration: "Calibration", drawn: Floats) -> tuple[tuple[Floats, Floats], Floats]:
+    """Inputs with exact values (n, 2), and values of the prior (n, 2), of readings and features (n, N + F)."""
+    joints = calibration.robot.joint_count
+    names = calibration.options.features
+    parts = []
+    for rows in np.array_split(drawn, max(len(drawn) // AT_ONCE, 1)):
+        features = dict(zip(names, rows[:, joints:].T, strict=True))
+        parts.append(calibration.flange_variances(rows[:, :joints], features))
+    inputs, exact, prior = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return (inputs, _roots(exact)), _roots(prior)
+
+
+def _roots(variances: Floats) -> Floats:
+    """Roots (n, 2) of the sums of position's and rotation's variances (n, 6)."""
+    return np.sqrt(np.maximum(variances.reshape(-1, 2, 3).sum(axis=2), SMALLEST**2))
+
+
+def _sample_count(calibration: "Calibration") -> int:
+    rows = 0 if calibration.rows is None else calibration.rows.residual.size
+    if calibration.variable is None or rows <= QUICK_ROWS:
+        return SAMPLES
+    return max(FEWEST_SAMPLES, SAMPLES * QUICK_ROWS // rows)
+
+
+def _measured(calibration: "Calibration") -> Floats | None:
+    """Lowest and highest reading and feature of the measurements, (N + F, 2)."""
+    if calibration.rows is None:
+        return None
+    data = calibration.rows.data
+    columns = np.hstack([data.readings, feature_values(data, calibration.options.features)])
+    return np.column_stack([columns.min(axis=0), columns.max(axis=0)])
+
+
+def _closed_limits(robot: "Robot", measured: Floats | None) -> Floats:
+    """Limits (N, 2), with a turn or the measured reach where the robot states none."""
+    limits = robot.limits.copy()
+    for joint, kind in enumerate(kind for kind in robot.joints if kind != "fixed"):
+        if not np.isfinite(limits[joint]).all():
+            reach = np.pi if kind == "revolute" else OPEN_REACH_M
+            seen = np.zeros(2) if measured is None or kind == "revolute" else measured[joint]
+            stated = np.isfinite(limits[joint])
+            limits[joint] = np.where(stated, limits[joint], seen + np.array([-reach, reach]))
+    return limits
+
+
+def _input_ranges(robot: "Robot", limits: Floats) -> list[tuple[float, float]]:
+    """Lowest and highest joint value that readings within the limits give, then those of the features."""
+    joints = robot.joint_count
+    low, high = limits[:joints].T
+    ends = np.stack([robot.coupling * low, robot.coupling * high])
+    ranges = np.column_stack([ends.min(axis=0).sum(axis=1), ends.max(axis=0).sum(axis=1)])
+    return [(float(a), float(b)) for a, b in np.vstack([ranges, limits[joints:]])]
+
+
+def _together(calibration: "Calibration") -> Sequence[int]:
+    named = [] if calibration.variable is None else calibration.variable.hyper.get("major_joints", [])
+    joints = [int(joint) for joint in named] or list(MAJOR)
+    return [joint for joint in joints if joint < calibration.robot.joint_count]
