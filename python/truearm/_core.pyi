@@ -421,6 +421,7 @@ class ArmModel:
         field: Field | None = None,
         feature_count: int = 0,
         covariance: tuple[Sequence[int], NDArray[np.float64]] | None = None,
+        bounds: Conservative | None = None,
     ) -> None:
         """Make a model.
 
@@ -431,6 +432,7 @@ class ArmModel:
             field: What is added to the constants, over joint values and features.
             feature_count: Features of the field.
             covariance: Ascending parameter indices (P) and their covariance (P, P).
+            bounds: Bounds of the standard deviation, in place of a covariance.
         """
 
 @final
@@ -476,6 +478,39 @@ class Corrector:
         self, readings: NDArray[np.float64], features: Sequence[float]
     ) -> tuple[NDArray[np.float64], tuple[int, str] | None]:
         """Correct readings (N,): corrected ones, NaN if refused; then number and words for why."""
+
+@final
+class Stream:
+    """Corrects set-points one after the other: the correction's rate and acceleration are bounded, it ramps up and down.
+
+    Where a set-point is missing, not finite, late or refused, the last correction is held, then ramped down.
+    """
+
+    def __init__(self, corrector: Corrector, options: Mapping[str, Any]) -> None:
+        """Make a stream that is switched on.
+
+        Args:
+            corrector: Corrects single set-points.
+            options: rate and acceleration, each of revolute and prismatic joints (rad and m, s); ramp, hold and
+                deadline, s.
+
+        Raises:
+            CoreError: An option is not positive.
+        """
+
+    def switch(self, on: bool) -> None:
+        """Ramp the correction up or down from now on."""
+
+    def step(
+        self, readings: NDArray[np.float64] | None, features: Sequence[float], elapsed: float
+    ) -> tuple[NDArray[np.float64] | None, str, float, float, str | None]:
+        """The next set-point (N,), `elapsed` seconds after the one before.
+
+        Returns:
+            What to command, None before the first finite set-point; "off", "rising", "on", "holding" or "falling";
+            the share of the correction that is aimed at; how far the applied one is from it; and why it is
+            an older one, if it is.
+        """
 
 @final
 class Solver:

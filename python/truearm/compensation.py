@@ -182,6 +182,15 @@ class Compensator:
     def _tool(self, tool: ArrayLike | None) -> Floats:
         return self.programming.tool if tool is None else at_tool(self.programming, tool)
 
+    @property
+    def features(self) -> list[float]:
+        """Values of the features that the calibration depends on, in its order."""
+        return self._features
+
+    def corrector(self, tool: ArrayLike | None = None) -> Corrector:
+        """The core's corrector for a tool, flange_from_tool (4, 4) or a point (3,)."""
+        return self._corrector(self._tool(tool))
+
     def _corrector(self, flange_from_tool: Floats) -> Corrector:
         key = flange_from_tool.tobytes()
         if key not in self._correctors:

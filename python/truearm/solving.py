@@ -38,14 +38,20 @@ def calibrated_model(calibration: "Calibration") -> ArmModel:
             rule="Compensation knows constant and variable models",
             way_out="Calibrate with --model variable or constant",
         )
-    model, spread = calibration.model, ConstantSpread.of(calibration)
+    model, exact, bounds = calibration.model, None, None
+    if model.field is None:
+        spread = ConstantSpread.of(calibration)
+        exact = spread.columns, np.ascontiguousarray(spread.of_constants)
+    elif calibration.has_conservative:
+        bounds = calibration.conservative
     return ArmModel(
         calibration.arm.flange_chain,
         model.constants,
         calibration.robot.coupling,
         model.field,
         len(calibration.options.features) if model.field is not None else 0,
-        (spread.columns, np.ascontiguousarray(spread.of_constants)),
+        exact,
+        bounds,
     )
 
 

@@ -19,6 +19,7 @@ fn the_header_is_fresh() {
     builder.generate().unwrap().write(&mut fresh);
     let path = root.join("include/truearm.h");
     if std::env::var_os("TRUEARM_WRITE_HEADER").is_some() {
+        std::fs::create_dir_all(root.join("include")).unwrap();
         std::fs::write(&path, &fresh).unwrap();
     }
     let stored = std::fs::read(&path).unwrap();

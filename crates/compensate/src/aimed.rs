@@ -114,7 +114,7 @@ impl Kernel for Sweep<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> LaneFrame {
-        let Self { aimed: Aimed { model, chain }, alone, columns, scratch } = self;
+        let Self { aimed: Aimed { model, chain, .. }, alone, columns, scratch } = self;
         let AimedScratch { inputs, rows, parameters, screws, field, .. } = scratch;
         if let (Some(bank), Some(room)) = (&model.field, field) {
             let count = if alone { 1 } else { LANES };

@@ -15,6 +15,7 @@ use truearm_compensate::{
 };
 
 use crate::chain::{Chain, contiguous, transform};
+use crate::conservative::Conservative;
 use crate::door::{CoreError, Failure, long, quick};
 use crate::field::Field;
 
@@ -36,7 +37,8 @@ pub struct ArmModel {
 #[pymethods]
 impl ArmModel {
     #[new]
-    #[pyo3(signature = (chain, constants, coupling, field=None, feature_count=0, covariance=None))]
+    #[pyo3(signature = (chain, constants, coupling, field=None, feature_count=0, covariance=None, bounds=None))]
+    #[allow(clippy::too_many_arguments, reason = "keywords of a Python call")]
     fn new(
         chain: &Chain,
         constants: PyReadonlyArray2<'_, f64>,
@@ -44,6 +46,7 @@ impl ArmModel {
         field: Option<&Field>,
         feature_count: usize,
         covariance: Option<(Vec<usize>, PyReadonlyArray2<'_, f64>)>,
+        bounds: Option<&Conservative>,
     ) -> PyResult<Self> {
         let numbers = |array: ArrayView2<'_, f64>| array.iter().copied().collect::<Vec<f64>>();
         let (constants, coupling) = (numbers(constants.as_array()), numbers(coupling.as_array()));
@@ -56,6 +59,10 @@ impl ArmModel {
                 let spread = ConstantSpread::new(columns, &numbers(values.as_array()))?;
                 model.with_spread(Spread::Constant(spread))
             }
+            None => Ok(model),
+        });
+        let made = made.and_then(|model| match bounds {
+            Some(bounds) => model.with_spread(Spread::Field(Box::new(bounds.core().clone()))),
             None => Ok(model),
         });
         Ok(Self { core: Arc::new(made.map_err(Failure::into_exception)?) })
@@ -128,6 +135,11 @@ pub struct Corrector {
 impl Corrector {
     fn wrap(core: Core) -> Self {
         Self { workspace: Mutex::new(core.workspace()), core }
+    }
+
+    /// The corrector itself, for the other bindings.
+    pub fn core(&self) -> &Core {
+        &self.core
     }
 }
 

@@ -6,14 +6,15 @@ mod chain;
 mod choice;
 mod cmac;
 mod compensate;
-mod division;
 mod conservative;
+mod division;
 mod door;
 mod estimate;
 mod field;
 mod inverse;
 mod measured;
 mod regions;
+mod stream;
 mod text;
 
 /// The compiled core of truearm: private, wrapped by the Python package.
@@ -48,6 +49,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(estimate::linearise, module)?)?;
     module.add_class::<compensate::ArmModel>()?;
     module.add_class::<compensate::Corrector>()?;
+    module.add_class::<stream::Stream>()?;
     module.add_class::<compensate::Solver>()?;
     module.add_function(wrap_pyfunction!(estimate::fit_constant, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;

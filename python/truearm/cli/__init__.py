@@ -22,6 +22,8 @@ COMMANDS: Final = (
     Entry("cell", "truearm.cli.cell", "A virtual cell; check a cell; cell files to begin with."),
     Entry("evaluate", "truearm.cli.evaluate", "Errors of a calibration on other measurements."),
     Entry("frame", "truearm.cli.frame", "Teach a tool or a work object again."),
+    Entry("strip", "truearm.cli.strip", "A calibration without its measurements, for controllers."),
+    Entry("serve", "truearm.cli.serve", "Correct set-points that come over TCP."),
     Entry("export", "truearm.cli.export", "A calibration as URDF, D-H table or samples."),
     Entry("compensate", "truearm.cli.compensate", "Rewrite a robot program for the calibrated arm."),
     Entry("study", "truearm.cli.study", "The paper's simulations, run again."),

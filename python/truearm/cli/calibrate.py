@@ -75,6 +75,9 @@ def command(
         str, typer.Option(metavar="free|world", help="world: the base is corrected, not fitted.")
     ] = "free",
     no_refit: Annotated[bool, typer.Option("--no-refit", help="Keep the fit to the training rows.")] = False,
+    strip: Annotated[
+        bool, typer.Option("--strip", help="Leave the measurements out of the file, for controllers.")
+    ] = False,
     length_unit: Annotated[
         str | None, typer.Option(metavar="mm|m", help="Unit of columns that name none.")
     ] = None,
@@ -149,8 +152,9 @@ def command(
     check_directory(output)
     with ends_promptly():
         calibration = calibrate(arm, data, options, threads=threads, stages=told_stages())
+        bound_std(calibration)
     warn(calibration.notices)
-    summary = write_results(calibration, output)
+    summary = write_results(calibration, output, with_rows=not strip)
     if as_json:
         print_json(summary)
         return
@@ -186,11 +190,17 @@ def check_directory(output: Path) -> None:
         raise InputError("no permission to write here", where=str(there), way_out="Name another with -o")
 
 
-def write_results(calibration: Calibration, output: Path) -> dict[str, Any]:
+def bound_std(calibration: Calibration) -> None:
+    """Work out the bounds of the standard deviation that the file carries; takes some seconds."""
+    with told_stages()("bounding the standard deviation"):
+        _ = calibration.conservative
+
+
+def write_results(calibration: Calibration, output: Path, *, with_rows: bool = True) -> dict[str, Any]:
     """Write both files to a directory, which is made if needed; the content of summary.json."""
     summary = calibration.summary
     output.mkdir(parents=True, exist_ok=True)
-    calibration.save(output / CALIBRATION_NAME)
+    calibration.save(output / CALIBRATION_NAME, with_rows=with_rows)
     write_whole(output / SUMMARY_NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
     return summary
 

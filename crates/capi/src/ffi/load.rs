@@ -131,7 +131,7 @@ pub unsafe extern "C" fn truearm_robot_name(
     })
 }
 
-/// Options with their defaults: pose, 3 deg, 10 mm, 5 mm, 1 deg, no bound of the standard deviation.
+/// Options with their defaults: pose, 3 deg, 10 mm, 5 mm, 1 deg, and 1 mm of standard deviation.
 #[unsafe(no_mangle)]
 pub extern "C" fn truearm_default_options() -> CorrectorOptions {
     CorrectorOptions::usual()

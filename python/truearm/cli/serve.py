@@ -1,0 +1,142 @@
+"""`truearm serve`: correct set-points that come over TCP."""
+
+import asyncio
+import ipaddress
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truearm.calibration import Calibration
+from truearm.cli.console import print_json, say, tell
+from truearm.compensation import Compensator
+from truearm.errors import InputError, UsageError
+from truearm.files import read_text
+from truearm.limits import Limits
+from truearm.serving import Server
+from truearm.streaming import CorrectionStream, StreamOptions
+from truearm.units import MM_PER_METRE
+
+LOOPBACK = "127.0.0.1"
+DEFAULT_PORT = 7227
+SHORTEST_TOKEN = 16
+
+
+def command(
+    calibration: Annotated[
+        Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
+    ],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port; 0 takes a free one.")] = DEFAULT_PORT,
+    address: Annotated[
+        str, typer.Option(help="Address to listen on; another than loopback needs a token.")
+    ] = LOOPBACK,
+    token_file: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="File with the token that clients send first.")
+    ] = None,
+    tool_mm: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Tool point in the flange frame.  [default: the robot file's]"),
+    ] = None,
+    feature: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Value of a feature that the calibration needs."),
+    ] = None,
+    largest_mm: Annotated[float, typer.Option(help="Largest shift of the tool.")] = 5.0,
+    largest_deg: Annotated[float, typer.Option(help="Largest turn of the tool.")] = 1.0,
+    largest_std_mm: Annotated[
+        float, typer.Option(help="Largest standard deviation of the tool's position.")
+    ] = 1.0,
+    ramp_s: Annotated[float, typer.Option(help="Time of the ramp up and down.")] = 1.0,
+    hold_s: Annotated[float, typer.Option(help="How long a correction is held for want of a good one.")] = 0.1,
+    deadline_s: Annotated[float, typer.Option(help="Longest time between two set-points.")] = 0.05,
+    as_json: Annotated[bool, typer.Option("--json", help="Say where it listens in JSON.")] = False,
+) -> None:
+    """Correct the set-points of controllers that cannot link the C library.
+
+    Newline-delimited JSON over TCP; each connection is one robot's stream. Ctrl-C ends it.
+
+    Example: truearm serve arm/calibration.calib --port 7227
+    """
+    token = _token(address, token_file)
+    known = Calibration.load(calibration)
+    limits = Limits(largest_mm=largest_mm, largest_deg=largest_deg, largest_std_mm=largest_std_mm)
+    compensator = Compensator(known, limits=limits, features=_features(feature or []))
+    options = StreamOptions(ramp_s=ramp_s, hold_s=hold_s, deadline_s=deadline_s)
+    tool = _tool(tool_mm)
+    CorrectionStream(compensator, options, tool=tool)
+    server = Server(
+        known.robot, lambda: CorrectionStream(compensator, options, tool=tool), token=token, told=tell
+    )
+
+    def listening(host: str, at: int) -> None:
+        if as_json:
+            print_json({"robot": known.robot.name, "address": host, "port": at})
+        else:
+            say(f"Correcting set-points of {known.robot.name} on {host}:{at}; Ctrl-C ends.")
+
+    asyncio.run(_serve(server, address, port, listening))
+
+
+async def _serve(server: Server, address: str, port: int, listening: Callable[[str, int], None]) -> None:
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    running = await server.start(address, port)
+    listening(*running.sockets[0].getsockname()[:2])
+    async with running:
+        await ended.wait()
+
+
+def _token(address: str, file: Path | None) -> str | None:
+    if file is None:
+        if not _is_loopback(address):
+            raise UsageError(
+                f"{address} can be reached by others",
+                where="--address",
+                rule="Another address than loopback needs a token",
+                way_out="Write a long random one to a file: --token-file FILE",
+            )
+        return None
+    token = read_text(file).strip()
+    if len(token) < SHORTEST_TOKEN:
+        raise InputError(
+            f"the token has {len(token)} characters",
+            where=str(file),
+            rule=f"At least {SHORTEST_TOKEN}",
+            way_out="Make one: python -c 'import secrets; print(secrets.token_urlsafe())'",
+        )
+    return token
+
+
+def _is_loopback(address: str) -> bool:
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
+
+
+def _tool(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        point = [float(part) / MM_PER_METRE for part in text.split(",")]
+    except ValueError:
+        point = []
+    if len(point) != 3:  # noqa: PLR2004
+        raise UsageError(f'"{text}"', where="--tool-mm", rule="Three numbers in mm, such as 0,0,120.5")
+    return point
+
+
+def _features(words: list[str]) -> dict[str, float]:
+    found = {}
+    for word in words:
+        name, mark, value = word.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            mark = ""
+        if not mark:
+            raise UsageError(f'"{word}"', where="--feature", rule="A name and a number: temperature=21.5")
+    return found

@@ -1,0 +1,106 @@
+"""Corrections of a stream of set-points, never applied or dropped at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm._core import CoreError, Stream
+from truearm.compensation import Compensator
+from truearm.errors import UsageError
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StreamOptions:
+    """How the correction of a stream may change.
+
+    Attributes:
+        rate_deg_s: Largest rate of a revolute joint's correction.
+        rate_mm_s: The same of a prismatic joint.
+        acceleration_deg_s2: Largest acceleration of a revolute joint's correction.
+        acceleration_mm_s2: The same of a prismatic joint.
+        ramp_s: How long the ramp takes from nothing to the whole correction.
+        hold_s: How long the last correction is held where there is no good one.
+        deadline_s: Longest time between two set-points.
+    """
+
+    rate_deg_s: float = 6.0
+    rate_mm_s: float = 20.0
+    acceleration_deg_s2: float = 120.0
+    acceleration_mm_s2: float = 500.0
+    ramp_s: float = 1.0
+    hold_s: float = 0.1
+    deadline_s: float = 0.05
+
+    def core(self) -> dict[str, object]:
+        """The core's options, SI."""
+        return {
+            "rate": [np.radians(self.rate_deg_s), self.rate_mm_s / MM_PER_METRE],
+            "acceleration": [np.radians(self.acceleration_deg_s2), self.acceleration_mm_s2 / MM_PER_METRE],
+            "ramp": self.ramp_s,
+            "hold": self.hold_s,
+            "deadline": self.deadline_s,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Streamed:
+    """What became of a set-point.
+
+    Attributes:
+        q: Readings to command (N,), rad and m; None before the first good set-point.
+        phase: "off", "rising", "on", "holding" or "falling".
+        gain: Share of the correction that is aimed at, 0 to 1.
+        lag: How far the applied correction is from the one aimed at: the largest of the joints, rad or m.
+        fault: Why the correction is an older one; None where it is not.
+    """
+
+    q: Floats | None
+    phase: str
+    gain: float
+    lag: float
+    fault: str | None
+
+
+class CorrectionStream:
+    """Corrects the set-points of one robot, one after the other.
+
+    Where a set-point is missing, not finite, late or refused, the last correction is held for a moment and then
+    ramped down, until good set-points come again.
+    """
+
+    def __init__(
+        self,
+        compensator: Compensator,
+        options: StreamOptions | None = None,
+        *,
+        tool: ArrayLike | None = None,
+    ) -> None:
+        """Make a stream that is switched on, with nothing applied yet.
+
+        Raises:
+            UsageError: If an option is not positive.
+        """
+        self._features: Sequence[float] = compensator.features
+        try:
+            self._core = Stream(compensator.corrector(tool), (options or StreamOptions()).core())
+        except CoreError as error:
+            raise UsageError(str(error)) from None
+
+    def switch(self, on: bool) -> None:
+        """Ramp the correction up or down from now on."""
+        self._core.switch(on)
+
+    def step(self, q: ArrayLike | None, elapsed_s: float) -> Streamed:
+        """Correct the next set-point.
+
+        Args:
+            q: Readings (N,), or None where none came in time.
+            elapsed_s: Time since the step before.
+        """
+        readings = None if q is None else np.ascontiguousarray(q, dtype=np.float64)
+        return Streamed(*self._core.step(readings, self._features, elapsed_s))
