@@ -34,7 +34,7 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help setup demo test trials check bench docs figures rust-test py-test clean
+.PHONY: help setup demo test trials check check-capi bench docs figures rust-test py-test clean
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
@@ -42,6 +42,7 @@ help:
 	@echo 'make test   Rust and Python tests'
 	@echo 'make trials the measurement cell killed and with faults, in full (TRIALS="-k kill")'
 	@echo 'make check  formatting, lint, types and layers'
+	@echo 'make check-capi  the C and C++ examples under sanitizers'
 	@echo 'make bench  speed against peers, with the ratio to reach beside each (BENCH=--write keeps them in docs/)'
 	@echo 'make figures  errors on public measurements, into docs/reference/results.md'
 	@echo 'make docs   write the generated pages of docs/reference again'
@@ -68,6 +69,10 @@ check: $(STAMPS)/built
 	$(BIN)/lint-imports
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --workspace --all-targets -- $(CLIPPY)
+
+# Needs a C and a C++ compiler with address and undefined-behaviour sanitizers.
+check-capi: $(STAMPS)/tools
+	TRUEARM_SANITIZE=1 $(CARGO) test --locked -p truearm-capi --test examples
 
 bench: $(STAMPS)/built $(STAMPS)/bench
 	$(BIN)/python -m benches $(BENCH)

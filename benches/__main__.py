@@ -9,7 +9,16 @@ from pathlib import Path
 
 from benches.ours import one_thread
 
-BENCHMARKS = ["kinematics", "calibration", "field", "compensation", "programs", "networks", "planning"]
+BENCHMARKS = [
+    "kinematics",
+    "calibration",
+    "field",
+    "compensation",
+    "programs",
+    "networks",
+    "planning",
+    "latency",
+]
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "performance.md"
 HEAD = """# Performance
 

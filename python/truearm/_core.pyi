@@ -332,8 +332,8 @@ class Field:
 class Conservative:
     """Bounds of the standard deviation of the flange: roots of the sums of variances.
 
-    Position (m), then rotation vector (rad). A point at the distance r from the flange deviates by the first plus
-    r times the second at most.
+    Position (m), then rotation vector (rad). A point at the distance r from the flange deviates by the first
+    plus r times the second at most.
     """
 
     def __init__(self, content: Mapping[str, Any], blocks: Sequence[dict[str, Any]]) -> None:
@@ -348,8 +348,8 @@ class Conservative:
         """Fit to exact values, and raise the fit by what fresh ones show.
 
         Args:
-            plan: angles: whether each input is one; ranges: lowest and highest value of each; together: inputs
-                that are tabulated together as well; largest: bounds that are never exceeded.
+            plan: angles: whether each input is one; ranges: lowest and highest value of each; together:
+                inputs that are tabulated together as well; largest: bounds that are never exceeded.
             fitted: Inputs (n, I) and exact values (n, 2).
             fresh: The same at other configurations.
 
@@ -481,7 +481,7 @@ class Corrector:
 
 @final
 class Stream:
-    """Corrects set-points one after the other: the correction's rate and acceleration are bounded, it ramps up and down.
+    """Corrects set-points one after the other, with a bounded rate and acceleration of the correction, and ramps.
 
     Where a set-point is missing, not finite, late or refused, the last correction is held, then ramped down.
     """
@@ -491,8 +491,8 @@ class Stream:
 
         Args:
             corrector: Corrects single set-points.
-            options: rate and acceleration, each of revolute and prismatic joints (rad and m, s); ramp, hold and
-                deadline, s.
+            options: rate and acceleration, each of revolute and prismatic joints (rad and m, s); ramp, hold
+                and deadline, s.
 
         Raises:
             CoreError: An option is not positive.
@@ -507,9 +507,9 @@ class Stream:
         """The next set-point (N,), `elapsed` seconds after the one before.
 
         Returns:
-            What to command, None before the first finite set-point; "off", "rising", "on", "holding" or "falling";
-            the share of the correction that is aimed at; how far the applied one is from it; and why it is
-            an older one, if it is.
+            What to command, None before the first finite set-point; "off", "rising", "on", "holding" or
+            "falling"; the share of the correction that is aimed at; how far the applied one is from it; and why
+            it is an older one, if it is.
         """
 
 @final

@@ -273,7 +273,7 @@ class Calibration:
         return self.stored_conservative or conservative_of(self)
 
     def flange_variances(self, q: ArrayLike, features: Features | None) -> tuple[Floats, Floats, Floats]:
-        """Inputs (n, I) of readings, and variances (n, 6) of the flange's pose now and before any measurement."""
+        """Inputs (n, I), and variances (n, 6) of the flange's pose: now, and before any measurement."""
         rows, _ = self._readings(q)
         inputs, jacobian = self._inputs(rows, features), self._jacobian(rows, features, np.eye(4), pose=True)
         covariance = self._spread.covariance(inputs, jacobian)

@@ -1,8 +1,9 @@
 """Standard deviations for controllers: quick to evaluate, and never smaller than the exact ones.
 
-The exact standard deviation of a calibration needs the measurements and takes a millisecond. For compensation and for
-controllers a calibration file carries bounds of it as tables over the configuration: one number for the
-flange's position, the root of the sum of its coordinates' variances (m), and one for its rotation vector (rad).
+The exact standard deviation of a calibration needs the measurements and takes a millisecond. For compensation
+and for controllers a calibration file carries bounds of it as tables over the configuration: one number for
+the flange's position, the root of the sum of its coordinates' variances (m), and one for its rotation vector
+(rad).
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ FEWEST_SAMPLES: Final = 1000
 QUICK_ROWS: Final = 1200
 """Measured values up to which an exact standard deviation takes less than a millisecond."""
 ENDS: Final = 0.1
-"""How far beyond a range configurations are drawn, as a share of it, before they are brought back to its ends."""
+"""Configurations are drawn so far beyond a range, as a share of it, and then brought back to its ends."""
 SEED: Final = 0
 AT_ONCE: Final = 500
 MAJOR: Final = (1, 2)
@@ -84,7 +85,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
     largest = np.maximum(PRIOR_MARGIN * prior.max(axis=0), np.maximum(fitted[1], fresh[1]).max(axis=0))
     robot = calibration.robot
     plan = {
-        "angles": [joint == "revolute" for joint in robot.joints if joint != "fixed"]
+        "angles": [joint == "revolute" for joint in robot.joints]
         + [False] * len(calibration.options.features),
         "ranges": _input_ranges(robot, reach.limits),
         "together": _together(calibration),
@@ -120,7 +121,7 @@ def unpack(content: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Conserva
 
 
 def _exact(calibration: "Calibration", drawn: Floats) -> tuple[tuple[Floats, Floats], Floats]:
-    """Inputs with exact values (n, 2), and values of the prior (n, 2), of readings and features (n, N + F)."""
+    """Inputs with exact values (n, 2), and the prior's (n, 2), of readings and features (n, N + F)."""
     joints = calibration.robot.joint_count
     names = calibration.options.features
     parts = []
@@ -133,7 +134,7 @@ def _exact(calibration: "Calibration", drawn: Floats) -> tuple[tuple[Floats, Flo
 
 def _roots(variances: Floats) -> Floats:
     """Roots (n, 2) of the sums of position's and rotation's variances (n, 6)."""
-    return np.sqrt(np.maximum(variances.reshape(-1, 2, 3).sum(axis=2), SMALLEST**2))
+    return np.asarray(np.sqrt(np.maximum(variances.reshape(-1, 2, 3).sum(axis=2), SMALLEST**2)))
 
 
 def _sample_count(calibration: "Calibration") -> int:
@@ -155,7 +156,7 @@ def _measured(calibration: "Calibration") -> Floats | None:
 def _closed_limits(robot: "Robot", measured: Floats | None) -> Floats:
     """Limits (N, 2), with a turn or the measured reach where the robot states none."""
     limits = robot.limits.copy()
-    for joint, kind in enumerate(kind for kind in robot.joints if kind != "fixed"):
+    for joint, kind in enumerate(robot.joints):
         if not np.isfinite(limits[joint]).all():
             reach = np.pi if kind == "revolute" else OPEN_REACH_M
             seen = np.zeros(2) if measured is None or kind == "revolute" else measured[joint]

@@ -69,8 +69,8 @@ class Streamed:
 class CorrectionStream:
     """Corrects the set-points of one robot, one after the other.
 
-    Where a set-point is missing, not finite, late or refused, the last correction is held for a moment and then
-    ramped down, until good set-points come again.
+    Where a set-point is missing, not finite, late or refused, the last correction is held for a moment and
+    then ramped down, until good set-points come again.
     """
 
     def __init__(

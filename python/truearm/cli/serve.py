@@ -49,7 +49,9 @@ def command(
         float, typer.Option(help="Largest standard deviation of the tool's position.")
     ] = 1.0,
     ramp_s: Annotated[float, typer.Option(help="Time of the ramp up and down.")] = 1.0,
-    hold_s: Annotated[float, typer.Option(help="How long a correction is held for want of a good one.")] = 0.1,
+    hold_s: Annotated[
+        float, typer.Option(help="How long a correction is held for want of a good one.")
+    ] = 0.1,
     deadline_s: Annotated[float, typer.Option(help="Longest time between two set-points.")] = 0.05,
     as_json: Annotated[bool, typer.Option("--json", help="Say where it listens in JSON.")] = False,
 ) -> None:
@@ -124,7 +126,7 @@ def _tool(text: str | None) -> list[float] | None:
         point = [float(part) / MM_PER_METRE for part in text.split(",")]
     except ValueError:
         point = []
-    if len(point) != 3:  # noqa: PLR2004
+    if len(point) != 3:
         raise UsageError(f'"{text}"', where="--tool-mm", rule="Three numbers in mm, such as 0,0,120.5")
     return point
 

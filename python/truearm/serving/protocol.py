@@ -46,9 +46,8 @@ class Units:
 
     def __init__(self, joints: Sequence[str]) -> None:
         """Of joints of these kinds."""
-        kinds = [joint for joint in joints if joint != "fixed"]
-        self.count = len(kinds)
-        self._shown = np.array([MM_PER_METRE if k == "prismatic" else math.degrees(1.0) for k in kinds])
+        self.count = len(joints)
+        self._shown = np.array([MM_PER_METRE if k == "prismatic" else math.degrees(1.0) for k in joints])
 
     def si(self, values: NDArray[np.float64], *, in_degrees: bool) -> NDArray[np.float64]:
         """Readings in rad and m."""

@@ -1,0 +1,92 @@
+"""Bounds of the standard deviation against exact ones at configurations they have never seen."""
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.calibration_file import read_calibration_file, write_calibration_file
+from truearm.simulation import VirtualArm
+
+JOINTS = 5
+
+
+@pytest.fixture(scope="module")
+def measured():
+    arm = VirtualArm.paper(seed=3)
+    return arm.robot, arm.measure(arm.poses(60))
+
+
+@pytest.fixture(scope="module", params=["variable", "constant"])
+def calibration(request, measured):
+    return ta.calibrate(*measured, model=request.param)
+
+
+@pytest.fixture(scope="module")
+def readings(calibration):
+    limits = calibration.robot.limits
+    return np.random.default_rng(11).uniform(limits[:, 0], limits[:, 1], (1500, len(limits)))
+
+
+def roots(calibration, q, tool):
+    return np.sqrt(np.square(calibration.pose_std(q, tool=tool)).reshape(-1, 2, 3).sum(axis=2))
+
+
+def test_it_is_never_below_the_exact_one(calibration, readings):
+    for tool in (np.zeros(3), np.array([0.05, -0.1, 0.2])):
+        bound, exact = calibration.conservative_std(readings, tool=tool), roots(calibration, readings, tool)
+        assert (bound >= exact).all()
+
+
+def test_it_is_not_far_above(calibration, readings):
+    ratio = calibration.conservative_std(readings, tool=np.zeros(3)) / roots(
+        calibration, readings, np.zeros(3)
+    )
+    assert (np.median(ratio, axis=0) < 1.8).all()
+    assert calibration.conservative.content()["looseness"] == pytest.approx(np.median(ratio, axis=0), rel=0.1)
+
+
+def test_nor_at_what_was_measured(calibration):
+    q = calibration.rows.data.readings
+    bound, exact = calibration.conservative_std(q), roots(calibration, q, None)
+    assert (bound >= exact).all()
+
+
+def test_it_is_the_same_when_read_even_without_the_measurements(calibration, readings, tmp_path):
+    for name, with_rows in (("all.calib", True), ("stripped.calib", False)):
+        calibration.save(tmp_path / name, with_rows=with_rows)
+        read = ta.Calibration.load(tmp_path / name)
+        assert np.array_equal(read.conservative_std(readings), calibration.conservative_std(readings))
+
+
+def test_a_file_without_it_works_it_out_or_says_that_it_cannot(calibration, tmp_path):
+    calibration.save(tmp_path / "new.calib")
+    arrays, content = read_calibration_file(tmp_path / "new.calib")
+    for key in ("schema", "sha256", "conservative"):
+        content.pop(key)
+    write_calibration_file(tmp_path / "old.calib", arrays, content)
+    old = ta.Calibration.load(tmp_path / "old.calib")
+    q = np.zeros(old.robot.joint_count)
+    assert np.array_equal(old.conservative_std(q), calibration.conservative_std(q))
+    write_calibration_file(tmp_path / "bare.calib", arrays, {**content, "rows": None})
+    bare = ta.Calibration.load(tmp_path / "bare.calib")
+    assert bare.has_conservative == (calibration.variable is None)
+    if not bare.has_conservative:
+        with pytest.raises(ta.WorkError, match="need the measurements"):
+            bare.conservative_std(q)
+
+
+def test_outside_the_limits_stands_the_largest_value(calibration):
+    q = calibration.robot.limits[:, 1] + np.pi / 3
+    ranges = calibration.conservative.content()["ranges"]
+    assert any(bounds is not None for bounds in ranges)
+    largest = calibration.conservative.content()["largest"]
+    assert calibration.conservative_std(q, tool=np.zeros(3)) == pytest.approx(largest)
+
+
+def test_compensation_judges_by_it(calibration):
+    q = np.array([calibration.robot.limits.mean(axis=1)])
+    found = ta.Compensator(calibration, task="axis").joints(q)
+    exact = 1e3 * roots(calibration, found.q, None)[0, 0]
+    assert 0.999 * exact <= found.std_mm[0] < 3.0 * exact
+    strict = ta.Limits(largest_std_mm=0.5 * exact)
+    assert ta.Compensator(calibration, task="axis", limits=strict).joints(q).refusals[0].code == 8

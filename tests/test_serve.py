@@ -1,0 +1,271 @@
+"""`truearm serve` as clients use and abuse it."""
+
+import asyncio
+import contextlib
+import json
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.cli import main
+from truearm.serving import Bounds, Server
+from truearm.simulation import Imperfections, VirtualArm
+from truearm.streaming import CorrectionStream
+
+PROGRAM = str(Path(sys.executable).parent / "truearm")
+HOME = [0.3, -1.2, 1.4, -0.7, 1.1, 0.2]
+TOKEN = "a-token-for-the-tests-only"
+
+
+@pytest.fixture(scope="module")
+def calib(tmp_path_factory):
+    robot = ta.Robot.load("ur5e")
+    arm = VirtualArm(robot, seed=4, imperfections=Imperfections(share=0.5))
+    path = tmp_path_factory.mktemp("serve") / "arm.calib"
+    ta.calibrate(robot, arm.measure(arm.poses(80)), model="constant").save(path)
+    return path
+
+
+@contextlib.contextmanager
+def serving(*words):
+    """A server on a free port: its port and its process."""
+    command = [PROGRAM, "serve", *map(str, words), "--port", "0", "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        said = ""
+        while not said.rstrip().endswith("}"):
+            line = process.stdout.readline()
+            assert line, process.stderr.read()
+            said += line
+        yield json.loads(said)["port"], process
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=10)
+
+
+@pytest.fixture(scope="module")
+def port(calib):
+    with serving(calib, "--ramp-s", "0.05", "--hold-s", "0.02", "--deadline-s", "0.5") as (found, _):
+        yield found
+
+
+class Client:
+    """A connection."""
+
+    def __init__(self, port):
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=5)
+        self.file = self.socket.makefile("rwb")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+    def read(self):
+        line = self.file.readline()
+        return json.loads(line) if line else None
+
+    def send(self, data):
+        self.file.write(data if isinstance(data, bytes) else json.dumps(data).encode() + b"\n")
+        self.file.flush()
+
+    def ask(self, content):
+        self.send(content)
+        return self.read()
+
+
+@pytest.fixture
+def client(port):
+    with Client(port) as found:
+        greeting = found.read()
+        assert (greeting["protocol"], greeting["joints"]) == (1, ["revolute"] * 6)
+        yield found
+
+
+def is_served(port):
+    with Client(port) as other:
+        other.read()
+        return other.ask({"q": HOME})["q"] is not None
+
+
+def settle(client, request):
+    answer = client.ask(request)
+    for _ in range(400):
+        if answer["phase"] == "on" and answer["lag"] == 0.0:
+            break
+        time.sleep(0.001)
+        answer = client.ask(request)
+    return answer
+
+
+def test_set_points_are_corrected(client, calib):
+    answer = settle(client, {"q": HOME, "id": 7})
+    expected = ta.Compensator(ta.Calibration.load(calib)).correct(HOME)
+    assert answer["id"] == 7 and answer["fault"] is None
+    assert answer["q"] == pytest.approx(expected, abs=1e-9)
+    degrees = client.ask({"q_deg": np.degrees(HOME).tolist()})
+    assert degrees["q_deg"] == pytest.approx(np.degrees(expected), abs=1e-6)
+
+
+def test_what_has_no_correction_holds_the_last_one(client):
+    before = settle(client, {"q": HOME})
+    for missing in (None, [*HOME[:5], None]):
+        held = client.ask({"q": missing})
+        assert held["phase"] == "holding" and "missing" in held["fault"]
+        assert held["q"] == pytest.approx(before["q"], abs=1e-4)
+        settle(client, {"q": HOME})
+    assert "limit" in client.ask({"q": [9.0, *HOME[1:]]})["fault"]
+
+
+def test_a_pause_is_a_missed_deadline(client):
+    settle(client, {"q": HOME})
+    time.sleep(0.6)
+    assert client.ask({"q": HOME})["fault"] == "the set-point came after the deadline"
+
+
+def test_it_is_switched_off(client):
+    settle(client, {"q": HOME})
+    assert "q" not in client.ask({"switch": "off"})
+    answer = client.ask({"q": HOME})
+    for _ in range(400):
+        if answer["phase"] == "off":
+            break
+        time.sleep(0.001)
+        answer = client.ask({"q": HOME})
+    assert answer["q"] == HOME
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (b"hello\n", "no JSON"),
+        (b"\xff\xfe\n", "no JSON"),
+        (b"[1, 2]\n", "JSON object"),
+        (b"[" * 15000 + b"\n", "no JSON"),
+        (b"{}\n", "has q, q_deg or switch"),
+        (b'{"q": [1, 2]}\n', "list of 6 numbers"),
+        (b'{"q": "x"}\n', "list of 6 numbers"),
+        (b'{"q": [1, 2, 3, 4, 5, true]}\n', "no number"),
+        (b'{"q": [1, 2, 3, 4, 5, 1' + b"0" * 400 + b"]}\n", "too large"),
+        (b'{"q": [1, 2, 3, 4, 5, 1' + b"0" * 5000 + b"]}\n", "no JSON"),
+        (b'{"q": null, "q_deg": null}\n', "not both"),
+        (b'{"switch": "maybe"}\n', "on"),
+        (b'{"q": null, "id": {"a": 1}}\n', "id is a number"),
+        (b'{"other": 1}\n', "not known"),
+        (b'{"q": "' + b"x" * 20000 + b'"}\n', "longer than"),
+        (b"x" * 40000, "longer than"),
+    ],
+)
+def test_what_is_malformed_costs_the_connection_and_nothing_else(port, line, words):
+    with Client(port) as client:
+        client.read()
+        client.send(line)
+        assert words in client.read()["error"]
+        with contextlib.suppress(ConnectionError):
+            assert client.read() is None
+    assert is_served(port)
+
+
+@contextlib.contextmanager
+def served_here(calib, **bounds):
+    """The port of a server in this process."""
+    compensator = ta.Compensator(ta.Calibration.load(calib))
+    server = Server(
+        compensator.calibration.robot, lambda: CorrectionStream(compensator), bounds=Bounds(**bounds)
+    )
+    loop = asyncio.new_event_loop()
+    running = loop.run_until_complete(server.start("127.0.0.1", 0))
+    thread = threading.Thread(target=loop.run_forever)
+    thread.start()
+    try:
+        yield running.sockets[0].getsockname()[1]
+    finally:
+        loop.call_soon_threadsafe(running.close)
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
+
+
+def test_a_flood_costs_the_connection_and_nothing_else(calib):
+    with served_here(calib, requests_per_s=20) as port, Client(port) as client:
+        client.read()
+        with contextlib.suppress(ConnectionError):
+            client.send((json.dumps({"q": HOME}).encode() + b"\n") * 2000)
+        assert is_served(port)
+        answers = [client.read() for _ in range(21)]
+        assert "q" in answers[0] and answers[-1]["error"] == "more than 20 requests a second"
+
+
+def test_who_does_not_read_loses_the_connection(port):
+    with Client(port) as client:
+        client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.socket.settimeout(0.5)
+        line = (json.dumps({"q": HOME, "id": "x" * 100}).encode() + b"\n") * 200
+        with contextlib.suppress(OSError):
+            for _ in range(300):
+                client.socket.sendall(line)
+        assert is_served(port)
+
+
+def test_too_many_connections_are_turned_away(port):
+    with contextlib.ExitStack() as stack:
+        clients = [stack.enter_context(Client(port)) for _ in range(20)]
+        greetings = [client.read() for client in clients]
+        assert sum("error" in greeting for greeting in greetings) >= 4
+    time.sleep(0.1)
+    assert is_served(port)
+
+
+def test_clients_that_vanish_leave_no_trace(port):
+    for _ in range(5):
+        client = Client(port)
+        client.send({"q": HOME})
+        client.socket.close()
+    assert is_served(port)
+
+
+def test_a_token_is_asked_for(calib, tmp_path):
+    (tmp_path / "token").write_text(TOKEN + "\n")
+    with serving(calib, "--token-file", tmp_path / "token", "--address", "0.0.0.0") as (port, _):
+        for bad in ({"token": "wrong"}, {"q": HOME}, {"token": 3}):
+            with Client(port) as client:
+                assert client.ask(bad)["error"] == "the token is wrong"
+        with Client(port) as client:
+            assert client.ask({"token": TOKEN})["protocol"] == 1
+            assert client.ask({"q": HOME})["q"] is not None
+
+
+def test_other_addresses_need_a_token(calib, tmp_path, capsys):
+    assert main(["serve", str(calib), "--address", "0.0.0.0"]) == 2
+    assert "--token-file" in capsys.readouterr().err
+    (tmp_path / "token").write_text("short")
+    assert main(["serve", str(calib), "--token-file", str(tmp_path / "token")]) == 1
+    assert "At least 16" in capsys.readouterr().err
+
+
+def test_a_port_in_use_is_said(calib, port, capsys):
+    assert main(["serve", str(calib), "--port", str(port)]) == 1
+    assert "cannot listen" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_it_cleanly(calib):
+    with serving(calib) as (port, process):
+        with Client(port) as client:
+            client.read()
+            process.send_signal(signal.SIGINT)
+            assert process.wait(timeout=10) == 0
+        assert process.stderr.read() == ""
+
+
+@pytest.mark.parametrize("option", ["--tool-mm=1,2", "--tool-mm=a,b,c", "--feature=warm"])
+def test_options_are_checked(calib, option, capsys):
+    assert main(["serve", str(calib), option]) == 2
+    assert "Traceback" not in capsys.readouterr().err

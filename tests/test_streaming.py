@@ -1,0 +1,74 @@
+"""Streams of set-points from Python."""
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.simulation import Imperfections, VirtualArm
+from truearm.streaming import CorrectionStream, StreamOptions
+
+CYCLE = 0.004
+
+
+@pytest.fixture(scope="module")
+def compensator():
+    robot = ta.Robot.load("ur5e")
+    arm = VirtualArm(robot, seed=4, imperfections=Imperfections(share=0.5))
+    calibration = ta.calibrate(robot, arm.measure(arm.poses(80)), model="constant")
+    return ta.Compensator(calibration)
+
+
+@pytest.fixture
+def home():
+    return np.array([0.3, -1.2, 1.4, -0.7, 1.1, 0.2])
+
+
+def run(stream, q, seconds):
+    return [stream.step(q, CYCLE) for _ in range(round(seconds / CYCLE))]
+
+
+def test_it_ramps_to_the_correction_of_single_waypoints(compensator, home):
+    stream = CorrectionStream(compensator)
+    steps = run(stream, home, 1.4)
+    applied = np.array([step.q - home for step in steps])
+    assert np.array_equal(applied[0], np.zeros(6)) or np.abs(applied[0]).max() < 1e-6
+    assert steps[-1].phase == "on" and steps[-1].fault is None
+    assert steps[-1].q == pytest.approx(compensator.correct(home), abs=1e-9)
+    rates = np.diff(applied, axis=0) / CYCLE
+    assert np.abs(rates).max() <= np.radians(6.0) + 1e-9
+    assert np.abs(np.diff(rates, axis=0)).max() / CYCLE <= np.radians(120.0) + 1e-6
+
+
+def test_what_has_no_correction_holds_the_last_one(compensator, home):
+    stream = CorrectionStream(compensator, StreamOptions(hold_s=0.02))
+    last = run(stream, home, 1.4)[-1].q
+    for bad, words in ((None, "missing"), (np.full(6, np.nan), "missing"), (np.zeros(5), "missing")):
+        step = stream.step(bad, CYCLE)
+        assert step.phase == "holding" and words in step.fault
+        assert step.q == pytest.approx(last, abs=1e-6)
+        stream.step(home, CYCLE)
+    beyond = np.concatenate([[7.0], home[1:]])
+    steps = run(stream, beyond, 2.0)
+    assert "limit" in steps[0].fault
+    assert [steps[k].phase for k in (0, 10, -1)] == ["holding", "falling", "off"]
+    assert np.array_equal(steps[-1].q, beyond)
+
+
+def test_nothing_comes_out_before_something_went_in(compensator):
+    step = CorrectionStream(compensator).step(None, 0.0)
+    assert step.q is None and step.fault == "there was no set-point yet"
+
+
+def test_it_is_switched_off_and_on(compensator, home):
+    stream = CorrectionStream(compensator)
+    run(stream, home, 1.4)
+    stream.switch(False)
+    steps = run(stream, home, 2.0)
+    assert steps[0].phase == "falling" and np.array_equal(steps[-1].q, home)
+    stream.switch(True)
+    assert run(stream, home, 1.4)[-1].phase == "on"
+
+
+def test_options_that_bound_nothing_are_refused(compensator):
+    with pytest.raises(ta.UsageError, match="it must be positive"):
+        CorrectionStream(compensator, StreamOptions(ramp_s=0.0))
