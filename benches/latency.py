@@ -43,7 +43,7 @@ def run() -> Results:
                 Comparison(f"{work}, 99.9 %", f"{RARE_S * 1e6:g} us", found[key]["p999"], RARE_S, 1.0),
             ]
     remarks = [
-        f"A million calls each from a Rust program through the C functions, the clock included; fitted to {name}, "
-        f"{TRAINING} poses, seed {SEED}. The peer is what a controller allows."
+        "A million calls each from a Rust program through the C functions, the clock included; fitted to "
+        f"{name}, {TRAINING} poses, seed {SEED}. The peer is what a controller allows."
     ]
     return Results("The C library, call by call", comparisons, [], remarks)

@@ -39,11 +39,13 @@ def serving(*words):
     """A server on a free port: its port and its process."""
     command = [PROGRAM, "serve", *map(str, words), "--port", "0", "--json"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    out = process.stdout
+    assert out is not None
     try:
         said = ""
         while not said.rstrip().endswith("}"):
-            line = process.stdout.readline()
-            assert line, process.stderr.read()
+            line = out.readline()
+            assert line, "the server has ended"
             said += line
         yield json.loads(said)["port"], process
     finally:
@@ -110,7 +112,8 @@ def settle(client, request):
 def test_set_points_are_corrected(client, calib):
     answer = settle(client, {"q": HOME, "id": 7})
     expected = ta.Compensator(ta.Calibration.load(calib)).correct(HOME)
-    assert answer["id"] == 7 and answer["fault"] is None
+    assert answer["id"] == 7
+    assert answer["fault"] is None
     assert answer["q"] == pytest.approx(expected, abs=1e-9)
     degrees = client.ask({"q_deg": np.degrees(HOME).tolist()})
     assert degrees["q_deg"] == pytest.approx(np.degrees(expected), abs=1e-6)
@@ -120,7 +123,8 @@ def test_what_has_no_correction_holds_the_last_one(client):
     before = settle(client, {"q": HOME})
     for missing in (None, [*HOME[:5], None]):
         held = client.ask({"q": missing})
-        assert held["phase"] == "holding" and "missing" in held["fault"]
+        assert held["phase"] == "holding"
+        assert "missing" in held["fault"]
         assert held["q"] == pytest.approx(before["q"], abs=1e-4)
         settle(client, {"q": HOME})
     assert "limit" in client.ask({"q": [9.0, *HOME[1:]]})["fault"]
@@ -201,7 +205,8 @@ def test_a_flood_costs_the_connection_and_nothing_else(calib):
             client.send((json.dumps({"q": HOME}).encode() + b"\n") * 2000)
         assert is_served(port)
         answers = [client.read() for _ in range(21)]
-        assert "q" in answers[0] and answers[-1]["error"] == "more than 20 requests a second"
+        assert "q" in answers[0]
+        assert answers[-1]["error"] == "more than 20 requests a second"
 
 
 def test_who_does_not_read_loses_the_connection(port):

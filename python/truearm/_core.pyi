@@ -481,7 +481,7 @@ class Corrector:
 
 @final
 class Stream:
-    """Corrects set-points one after the other, with a bounded rate and acceleration of the correction, and ramps.
+    """Corrects set-points one after the other; the correction changes with bounded rate and acceleration.
 
     Where a set-point is missing, not finite, late or refused, the last correction is held, then ramped down.
     """
@@ -508,8 +508,8 @@ class Stream:
 
         Returns:
             What to command, None before the first finite set-point; "off", "rising", "on", "holding" or
-            "falling"; the share of the correction that is aimed at; how far the applied one is from it; and why
-            it is an older one, if it is.
+            "falling"; the share of the correction that is aimed at; how far the applied one is from it; and
+            why it is an older one, if it is.
         """
 
 @final

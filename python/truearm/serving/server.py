@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
+from typing import Final
 
 from truearm.errors import InputError
 from truearm.robot import Robot
@@ -19,6 +20,8 @@ from truearm.serving.protocol import (
     read_request,
 )
 from truearm.streaming import CorrectionStream
+
+DISCARDED_BYTES: Final = 65_536
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,7 @@ class Server:
             await self._served(reader, writer)
         except MalformedError as error:
             self._told(f"{_peer(writer)}: {error}; connection closed")
-            await self._say_goodbye(writer, str(error))
+            await self._say_goodbye(reader, writer, str(error))
         except (OSError, EOFError):
             self._told(f"{_peer(writer)}: left")
         finally:
@@ -164,12 +167,22 @@ class Server:
         except TimeoutError:
             raise MalformedError("the answers are not read") from None
 
-    async def _say_goodbye(self, writer: asyncio.StreamWriter, why: str) -> None:
+    async def _say_goodbye(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, why: str
+    ) -> None:
+        """Say why, and take what is still coming: closing on unread bytes would tear the words away."""
         try:
             writer.write(line_of({"error": why}))
             await asyncio.wait_for(writer.drain(), self._bounds.reading_s)
+            writer.write_eof()
+            await asyncio.wait_for(_discard(reader), self._bounds.reading_s)
         except (OSError, TimeoutError):
             writer.transport.abort()
+
+
+async def _discard(reader: asyncio.StreamReader) -> None:
+    while await reader.read(DISCARDED_BYTES):
+        await asyncio.sleep(0)
 
 
 def _peer(writer: asyncio.StreamWriter) -> str:

@@ -1,0 +1,144 @@
+"""The C library reads what Python writes, and computes the same."""
+
+import ctypes
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.simulation import Imperfections, VirtualArm
+
+OK, REFUSED = 0, 2
+HOME = [0.3, -1.2, 1.4, -0.7, 1.1, 0.2]
+
+
+class Correction(ctypes.Structure):
+    """truearm_correction."""
+
+    _fields_ = [
+        ("residual_m", ctypes.c_double),
+        ("residual_rad", ctypes.c_double),
+        ("shift_m", ctypes.c_double * 3),
+        ("turn_rad", ctypes.c_double * 3),
+        ("std_m", ctypes.c_double),
+        ("reason", ctypes.c_uint32),
+        ("joint", ctypes.c_uint32),
+        ("value", ctypes.c_double),
+        ("limit", ctypes.c_double),
+    ]
+
+
+def numbers(values):
+    return (ctypes.c_double * len(values))(*values)
+
+
+class Library:
+    """The shared library with one calibration."""
+
+    def __init__(self, path: Path, calib: Path, tool: np.ndarray, joints: int = 6) -> None:
+        self.core = ctypes.CDLL(str(path))
+        self.core.truearm_joint_count.restype = ctypes.c_size_t
+        calibration, self.corrector, self.workspace = (ctypes.c_void_p() for _ in range(3))
+        message = ctypes.create_string_buffer(300)
+        status = self.core.truearm_load_file(
+            str(calib).encode(), ctypes.byref(calibration), message, ctypes.c_size_t(300)
+        )
+        assert status == OK, message.value
+        assert self.core.truearm_joint_count(calibration) == joints
+        made = ctypes.byref(self.corrector)
+        tool = numbers(tool.ravel())
+        assert self.core.truearm_corrector_new(calibration, tool, None, made, None, ctypes.c_size_t(0)) == OK
+        assert self.core.truearm_workspace_new(self.corrector, ctypes.byref(self.workspace)) == OK
+
+    def call(self, name, q, features, size, *more):
+        out = numbers([np.nan] * size)
+        sized = [ctypes.c_size_t(len(values)) for values in (q, features)]
+        status = getattr(self.core, name)(
+            self.corrector,
+            self.workspace,
+            numbers(q),
+            sized[0],
+            numbers(features),
+            sized[1],
+            out,
+            ctypes.c_size_t(size),
+            *more,
+        )
+        return status, np.array(out)
+
+    def pose(self, q, features=()):
+        status, out = self.call("truearm_predict_pose", q, features, 16)
+        assert status == OK
+        return out.reshape(4, 4)
+
+    def correct(self, q, features=()):
+        found = Correction()
+        status, out = self.call("truearm_correct", q, features, len(q), ctypes.byref(found))
+        return status, out, found
+
+
+@pytest.fixture(scope="module")
+def library(root):
+    found = [*root.glob("target/*/libtruearm.so"), *root.glob("target/*/deps/libtruearm.so")]
+    if not found:
+        pytest.skip("the C library is not built: cargo build -p truearm-capi")
+    return max(found, key=lambda path: path.stat().st_mtime)
+
+
+@pytest.fixture(scope="module")
+def data():
+    robot = ta.Robot.load("ur5e")
+    arm = VirtualArm(robot, seed=4, imperfections=Imperfections(share=0.5))
+    return robot, arm.measure(arm.poses(80))
+
+
+def tool_of(robot):
+    tool = np.eye(4)
+    tool[:3, 3] = [0.02, -0.05, 0.16]
+    return robot.tool @ tool
+
+
+@pytest.mark.parametrize("model", ["variable", "constant"])
+def test_it_computes_what_python_computes(model, data, library, tmp_path):
+    robot, measured = data
+    calibration = ta.calibrate(robot, measured, model=model)
+    calibration.save(tmp_path / "arm.calib", with_rows=False)
+    tool = tool_of(robot)
+    known = Library(library, tmp_path / "arm.calib", tool)
+    compensator = ta.Compensator(calibration)
+    draws = np.random.default_rng(2).uniform(-1.5, 1.5, (20, 6))
+    corrected = 0
+    for q in [np.array(HOME), *draws]:
+        assert known.pose(q) == pytest.approx(calibration.pose(q, tool=tool), abs=1e-12)
+        status, out, found = known.correct(q)
+        theirs = compensator.joints(q, tool=tool)
+        assert (status == REFUSED) == bool(theirs.refusals)
+        if status == OK:
+            corrected += 1
+            assert out == pytest.approx(theirs.q[0], abs=1e-12)
+            bound = calibration.conservative_std(theirs.q[0], tool=tool)[0]
+            assert found.std_m == pytest.approx(bound, rel=1e-9)
+    assert corrected > 5
+
+
+def test_a_base_that_is_corrected_is_read(library, tmp_path):
+    arm = VirtualArm.paper(seed=2)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), frame="world", model="constant")
+    calibration.save(tmp_path / "arm.calib")
+    known = Library(library, tmp_path / "arm.calib", arm.robot.tool, joints=5)
+    q = arm.robot.limits.mean(axis=1)
+    assert known.pose(q) == pytest.approx(calibration.pose(q), abs=1e-12)
+
+
+def test_features_are_passed(data, library, tmp_path):
+    robot, measured = data
+    rng = np.random.default_rng(0)
+    warm = measured.select(np.arange(len(measured)))
+    warm.features["temperature"] = rng.uniform(18.0, 30.0, len(warm))
+    calibration = ta.calibrate(robot, warm, features=("temperature",))
+    calibration.save(tmp_path / "arm.calib", with_rows=False)
+    known = Library(library, tmp_path / "arm.calib", robot.tool)
+    for degrees in (19.0, 28.0):
+        expected = calibration.pose(HOME, features={"temperature": degrees})
+        assert known.pose(HOME, [degrees]) == pytest.approx(expected, abs=1e-12)
