@@ -193,9 +193,19 @@ def served_here(calib, **bounds):
     try:
         yield running.sockets[0].getsockname()[1]
     finally:
-        loop.call_soon_threadsafe(running.close)
+        asyncio.run_coroutine_threadsafe(_ended(running), loop).result(10)
         loop.call_soon_threadsafe(loop.stop)
         thread.join()
+        loop.close()
+
+
+async def _ended(running):
+    """Close a server and what is still connected."""
+    running.close()
+    others = asyncio.all_tasks() - {asyncio.current_task()}
+    for task in others:
+        task.cancel()
+    await asyncio.gather(*others, return_exceptions=True)
 
 
 def test_a_flood_costs_the_connection_and_nothing_else(calib):

@@ -7,11 +7,14 @@ mod common;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::{BEYOND, File, HOME, JOINTS, Rig};
 
 const STRICT: [&str; 5] = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O1"];
 const SANITIZERS: [&str; 3] = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g"];
+
+static MADE: AtomicUsize = AtomicUsize::new(0);
 
 struct Example {
     program: PathBuf,
@@ -26,7 +29,8 @@ impl Example {
             return None;
         }
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let folder = std::env::temp_dir().join(format!("truearm-{}-{compiler}", std::process::id()));
+        let number = MADE.fetch_add(1, Ordering::Relaxed);
+        let folder = std::env::temp_dir().join(format!("truearm-{}-{number}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let (program, calibration) = (folder.join("example"), folder.join("arm.calib"));
         std::fs::write(&calibration, File::new().bytes()).unwrap();

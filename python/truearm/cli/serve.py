@@ -87,8 +87,10 @@ async def _serve(server: Server, address: str, port: int, listening: Callable[[s
         loop.add_signal_handler(number, ended.set)
     running = await server.start(address, port)
     listening(*running.sockets[0].getsockname()[:2])
-    async with running:
+    try:
         await ended.wait()
+    finally:
+        running.close()
 
 
 def _token(address: str, file: Path | None) -> str | None:
