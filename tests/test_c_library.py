@@ -29,6 +29,20 @@ class Correction(ctypes.Structure):
     ]
 
 
+class Options(ctypes.Structure):
+    """truearm_options."""
+
+    _fields_ = [
+        ("task", ctypes.c_uint32),
+        ("moving", ctypes.c_uint64),
+        ("largest_angle_rad", ctypes.c_double),
+        ("largest_slide_m", ctypes.c_double),
+        ("largest_shift_m", ctypes.c_double),
+        ("largest_turn_rad", ctypes.c_double),
+        ("largest_std_m", ctypes.c_double),
+    ]
+
+
 def numbers(values):
     return (ctypes.c_double * len(values))(*values)
 
@@ -48,7 +62,11 @@ class Library:
         assert self.core.truearm_joint_count(calibration) == joints
         made = ctypes.byref(self.corrector)
         tool = numbers(tool.ravel())
-        assert self.core.truearm_corrector_new(calibration, tool, None, made, None, ctypes.c_size_t(0)) == OK
+        self.core.truearm_default_options.restype = Options
+        options = self.core.truearm_default_options()
+        options.largest_std_m = np.inf
+        given = calibration, tool, ctypes.byref(options), made, message, ctypes.c_size_t(300)
+        assert self.core.truearm_corrector_new(*given) == OK, message.value
         assert self.core.truearm_workspace_new(self.corrector, ctypes.byref(self.workspace)) == OK
 
     def call(self, name, q, features, size, *more):
@@ -106,7 +124,7 @@ def test_it_computes_what_python_computes(model, data, library, tmp_path):
     calibration.save(tmp_path / "arm.calib", with_rows=False)
     tool = tool_of(robot)
     known = Library(library, tmp_path / "arm.calib", tool)
-    compensator = ta.Compensator(calibration)
+    compensator = ta.Compensator(calibration, limits=ta.Limits(largest_std_mm=None))
     draws = np.random.default_rng(2).uniform(-1.5, 1.5, (20, 6))
     corrected = 0
     for q in [np.array(HOME), *draws]:

@@ -111,6 +111,9 @@ class Server:
             await self._say_goodbye(reader, writer, str(error))
         except (OSError, EOFError):
             self._told(f"{_peer(writer)}: left")
+        except asyncio.CancelledError:
+            # The server ends. Python 3.11 prints a traceback for a connection that says it was cancelled.
+            self._told(f"{_peer(writer)}: the server ends; connection closed")
         finally:
             self._connections -= 1
             writer.close()
