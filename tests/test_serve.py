@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import queue
 import signal
 import socket
 import subprocess
@@ -192,26 +193,23 @@ def served_here(calib, **bounds):
     server = Server(
         compensator.calibration.robot, lambda: CorrectionStream(compensator), bounds=Bounds(**bounds)
     )
-    loop = asyncio.new_event_loop()
-    running = loop.run_until_complete(server.start("127.0.0.1", 0))
-    thread = threading.Thread(target=loop.run_forever)
+    ports: queue.Queue[int] = queue.Queue()
+    ends: queue.Queue[object] = queue.Queue()
+
+    async def run():
+        running = await server.start("127.0.0.1", 0)
+        ports.put(running.sockets[0].getsockname()[1])
+        while ends.empty():
+            await asyncio.sleep(0.01)
+        running.close()
+
+    thread = threading.Thread(target=lambda: asyncio.run(run()))
     thread.start()
     try:
-        yield running.sockets[0].getsockname()[1]
+        yield ports.get(timeout=10)
     finally:
-        asyncio.run_coroutine_threadsafe(_ended(running), loop).result(10)
-        loop.call_soon_threadsafe(loop.stop)
+        ends.put(None)
         thread.join()
-        loop.close()
-
-
-async def _ended(running):
-    """Close a server and what is still connected."""
-    running.close()
-    others = asyncio.all_tasks() - {asyncio.current_task()}
-    for task in others:
-        task.cancel()
-    await asyncio.gather(*others, return_exceptions=True)
 
 
 def test_a_flood_costs_the_connection_and_nothing_else(calib):
