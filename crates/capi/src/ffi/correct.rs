@@ -143,7 +143,7 @@ impl Held {
         // SAFETY: the handle lives as long as this, by the caller's promise; the turn keeps others off its memory.
         unsafe {
             check(pointer)?;
-            let turn = Turn::take(&*(&raw const (*pointer).busy))?;
+            let turn = Turn::take(&(*pointer).busy)?;
             let mut held = Self { pointer, _turn: turn };
             let (_, memory) = held.parts();
             copy_in(readings, joints, &mut memory.readings)?;

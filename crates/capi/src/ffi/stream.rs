@@ -35,7 +35,7 @@ pub unsafe extern "C" fn truearm_stream_step(
         // SAFETY: the handle is as the caller promises; the turn keeps others off its memory.
         unsafe {
             check(stream)?;
-            let _turn = Turn::take(&*(&raw const (*stream).busy))?;
+            let _turn = Turn::take(&(*stream).busy)?;
             let (core, memory) = (&mut (*stream).core, &mut (*stream).memory);
             check_array(out, out_size, core.joint_count())?;
             let given = !readings.is_null();
@@ -67,8 +67,9 @@ pub unsafe extern "C" fn truearm_stream_switch(stream: *mut StreamHandle, on: u3
         // SAFETY: the handle is as the caller promises; the turn keeps others off its memory.
         unsafe {
             check(stream)?;
-            let _turn = Turn::take(&*(&raw const (*stream).busy))?;
-            (&mut (*stream).core).switch(on != 0);
+            let _turn = Turn::take(&(*stream).busy)?;
+            let core = &mut (*stream).core;
+            core.switch(on != 0);
         }
         Ok(Status::Ok)
     })
