@@ -264,6 +264,8 @@ class Calibration:
     @property
     def has_conservative(self) -> bool:
         """Whether bounds of the standard deviation are there or can be worked out."""
+        if self.scheme is not None:
+            return False
         known = self.stored_conservative is not None or self.rows is not None
         return known or self.variable is None
 

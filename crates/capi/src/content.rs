@@ -19,6 +19,9 @@ pub struct Content {
     pub models: HashMap<String, ModelContent>,
     #[serde(default)]
     pub conservative: Option<ConservativeContent>,
+    /// Set where the model is one of the paper's schemes.
+    #[serde(default)]
+    pub scheme: Option<serde::de::IgnoredAny>,
 }
 
 #[derive(Deserialize)]

@@ -44,6 +44,9 @@ impl Loaded {
             return Err(LoadError::Schema { found: head.schema, known: SCHEMA, version: head.version });
         }
         let content: Content = container.content()?;
+        if content.scheme.is_some() {
+            return Err(incomplete("a scheme of the paper: calibrate with --model variable or constant"));
+        }
         let robot = &content.robot;
         let coupling = square(&robot.coupling)?;
         let nominal = chain(robot, false)?;

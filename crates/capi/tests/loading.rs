@@ -71,7 +71,8 @@ fn other_files_and_layouts_are_refused_in_words() {
 #[test]
 fn contents_that_contradict_themselves_are_refused() {
     type Change = fn(&mut File);
-    let changes: [(Change, &str); 9] = [
+    let changes: [(Change, &str); 10] = [
+        (|file| file.content["scheme"] = json!({"name": "fcmac"}), "scheme"),
         (|file| drop(file.arrays.remove(2)), "variable.block0.weights"),
         (|file| file.arrays[0].2[3] = f64::NAN, "finite"),
         (|file| file.arrays[2].2[3] = f64::INFINITY, "finite"),

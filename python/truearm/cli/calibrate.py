@@ -192,8 +192,9 @@ def check_directory(output: Path) -> None:
 
 def bound_std(calibration: Calibration) -> None:
     """Work out the bounds of the standard deviation that the file carries; takes some seconds."""
-    with told_stages()("bounding the standard deviation"):
-        _ = calibration.conservative
+    if calibration.has_conservative:
+        with told_stages()("bounding the standard deviation"):
+            _ = calibration.conservative
 
 
 def write_results(calibration: Calibration, output: Path, *, with_rows: bool = True) -> dict[str, Any]:
