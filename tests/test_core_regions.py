@@ -1,5 +1,9 @@
 """The compiled division of the workspace, its regions' CEPs, and the choice of their poses."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -253,3 +257,24 @@ def test_a_tree_survives_being_saved() -> None:
         regions.halve(0, 0)
     with pytest.raises(_core.CoreError, match="axis is 3"):
         regions.halve(int(regions.leaves[0]), 3)
+
+
+def test_threads_change_no_bit() -> None:
+    program = (
+        "import hashlib, numpy as np; from truearm import _core; from tests import test_core_regions as t\n"
+        "arm = t.Arm(noise_mm=0.04); problem, features = t.recorded(arm, 1000)\n"
+        "regions = _core.Regions(t.LOW, t.HIGH).evenly(20)\n"
+        "how = {'method': 'shrunk', 'prior': None}\n"
+        "fit = _core.regional_ceps(regions, problem, arm.table, arm.setup, features, how)\n"
+        "found = np.concatenate([fit.ceps.ravel(), fit.kappa, arm.divide().ceps.ravel()])\n"
+        "print(hashlib.sha256(found.tobytes()).hexdigest())"
+    )
+
+    def by(threads: int) -> str:
+        root = Path(__file__).resolve().parents[1]
+        environment = {**os.environ, "RAYON_NUM_THREADS": str(threads)}
+        command = [sys.executable, "-c", program]
+        done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout
+
+    assert by(1) == by(4)

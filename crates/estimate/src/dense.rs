@@ -4,9 +4,12 @@
 //! for a single right-hand side, which is therefore always done sequentially.
 
 use faer::linalg::cholesky::llt::{factor, inverse};
+use faer::linalg::matmul::matmul;
+use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::{Mat, MatMut, MatRef, Par};
+use faer::diag::Diag;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 /// The lower Cholesky factor L of a matrix A = L L^T, (n, n).
 #[derive(Debug, Clone)]
@@ -79,6 +82,25 @@ impl Cholesky {
         mirror_lower(&mut out);
         out
     }
+}
+
+/// `left^T right`, by one thread: tall matrices of few columns gain nothing by more, and sum in another order with each.
+pub fn transposed_product(left: MatRef<f64>, right: MatRef<f64>) -> Mat<f64> {
+    let mut out = Mat::zeros(left.ncols(), right.ncols());
+    matmul(out.as_mut(), Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
+    out
+}
+
+/// Singular values, the largest first, by one thread; `None` where they cannot be found.
+pub fn singular_values(matrix: MatRef<f64>) -> Option<Vec<f64>> {
+    let (rows, columns) = (matrix.nrows(), matrix.ncols());
+    let none = ComputeSvdVectors::No;
+    let scratch = svd_scratch::<f64>(rows, columns, none, none, Par::Seq, Default::default());
+    let mut memory = faer::dyn_stack::MemBuffer::new(scratch);
+    let stack = faer::dyn_stack::MemStack::new(&mut memory);
+    let mut values = Diag::zeros(rows.min(columns));
+    svd(matrix, values.as_mut(), None, None, Par::Seq, stack, Default::default()).ok()?;
+    Some((0..values.dim()).map(|k| values[k]).collect())
 }
 
 /// Copies the lower triangle onto the upper one.

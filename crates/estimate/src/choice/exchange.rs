@@ -6,6 +6,7 @@ use crate::choice::determinant::Present;
 use crate::choice::observability::{Criterion, Observability, observability};
 use crate::choice::pool::Pool;
 use crate::choice::spectral;
+use crate::dense::transposed_product;
 use crate::scale::scaled_jacobian;
 use crate::{Cancel, EstimateError};
 
@@ -70,7 +71,7 @@ fn choose<const M: usize>(
     let width = options.columns.len();
     let given = scaled_jacobian(options.given, rows, options.columns);
     let given_rows = Mat::from_fn(given.len() / width, width, |i, j| given[i * width + j]);
-    let normal = given_rows.transpose() * &given_rows;
+    let normal = transposed_product(given_rows.as_ref(), given_rows.as_ref());
     let mut pool = Pool::<M>::new(scaled, rows, width);
     let indices = |chosen: &[usize]| {
         let from = |line: usize| match line.checked_sub(given_rows.nrows()) {

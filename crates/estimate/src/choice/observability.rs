@@ -3,6 +3,7 @@
 use faer::Mat;
 
 use crate::EstimateError;
+use crate::dense::singular_values;
 use crate::scale::scaled_jacobian;
 
 /// What a choice of poses is to make best.
@@ -88,7 +89,7 @@ const ROUNDING: f64 = 1e-13;
 /// [`EstimateError::NotFinite`] where the matrix holds values that have no singular values.
 pub fn observability(matrix: &Mat<f64>, poses: usize) -> Result<Observability, EstimateError> {
     let failed = EstimateError::NotFinite { what: "the Jacobian of a pose", pose: 0 };
-    let mut singular = matrix.singular_values().map_err(|_| failed)?;
+    let mut singular = singular_values(matrix.as_ref()).ok_or(failed)?;
     singular.resize(matrix.ncols(), 0.0);
     let (largest, least) = (singular[0], singular[singular.len() - 1]);
     let least = if least <= ROUNDING * largest { 0.0 } else { least };

@@ -9,6 +9,7 @@ use truearm_kinematics::Chain;
 
 use crate::FieldError;
 use crate::regions::estimate::Held;
+use crate::regions::regional::undetermined;
 use crate::regions::source::{Prepared, Rows, Source, Verdict};
 use crate::regions::tree::Regions;
 use crate::regions::trend;
@@ -228,14 +229,8 @@ impl<S: Source> Work<'_, S> {
         let poses = (rows.identify.pose_count(), rows.judge.pose_count());
         self.division.batches.extend([(region, poses.0, false), (region, poses.1, true)]);
         let held = self.arm.held();
-        let ceps = held.least_squares(&self.arm.problem(&rows.identify), start).ok_or_else(|| {
-            FieldError::from(EstimateError::TooFew {
-                rows: rows.identify.measured_values(),
-                unknowns: start.len(),
-                needed: start.len().div_ceil(rows.identify.rows_per_pose().max(1)),
-                hint: format!(" (region {region})"),
-            })
-        })?;
+        let problem = self.arm.problem(&rows.identify);
+        let ceps = held.least_squares(&problem, start).ok_or_else(|| undetermined(&problem))?;
         let errors = held.errors(&self.arm.problem(&rows.judge), &ceps);
         let error = errors.into_iter().fold(f64::NAN, f64::max);
         self.record(&ceps, (kappa, error), Some(rows));

@@ -1,7 +1,7 @@
 //! Representative CEPs of one region by least squares, with the set-up held (section 3.1 of the paper).
 
-use faer::Mat;
-use faer::linalg::solvers::SolveLstsq;
+use faer::{Mat, MatRef, Par};
+use truearm_estimate::dense::{Cholesky, to_vec, transposed_product};
 use truearm_estimate::{Linearised, Point, Problem, Setup, column_unit, linearise, row_unit};
 
 /// What is held in every region.
@@ -32,7 +32,9 @@ impl Held<'_> {
     }
 
     /// CEPs (P,) that leave the least squares, positions in metres and orientations at 0.3 m, by Gauss-Newton from
-    /// `start`; `None` where there are fewer measured values than CEPs.
+    /// `start`; `None` where there are fewer measured values than CEPs or they leave a CEP undetermined.
+    ///
+    /// The steps solve normal equations: their rounding slows convergence a little and does not move the minimum.
     pub fn least_squares(&self, problem: &Problem<'_>, start: &[f64]) -> Option<Vec<f64>> {
         let mut ceps = start.to_vec();
         if problem.measurements.measured_values() < ceps.len() {
@@ -40,11 +42,11 @@ impl Held<'_> {
         }
         for _ in 0..STEPS {
             let (matrix, residual) = scaled(problem, &self.rows(problem, &ceps));
-            let step = matrix.qr().solve_lstsq(residual);
+            let step = solve(matrix.as_ref(), residual.as_ref())?;
             let mut largest = 0.0_f64;
             for (k, &column) in problem.columns.iter().enumerate() {
-                ceps[k] += step[(k, 0)] / column_unit(column);
-                largest = largest.max(step[(k, 0)].abs());
+                ceps[k] += step[k] / column_unit(column);
+                largest = largest.max(step[k].abs());
             }
             if !largest.is_finite() {
                 return None;
@@ -62,6 +64,12 @@ impl Held<'_> {
         let length = |pose: &[f64]| pose.iter().take(3).map(|r| r * r).sum::<f64>().sqrt();
         rows.residual.chunks_exact(rows.rows.max(1)).map(length).collect()
     }
+}
+
+/// Least-squares solution (P,) of matrix (r, P) x = right (r, 1); `None` where it is not determined.
+pub fn solve(matrix: MatRef<f64>, right: MatRef<f64>) -> Option<Vec<f64>> {
+    let factor = Cholesky::new(transposed_product(matrix, matrix), Par::Seq)?;
+    Some(factor.solve_vector(&to_vec(transposed_product(matrix, right).as_ref())))
 }
 
 /// Weighted rows in metres: matrix (n m, P) and residual (n m, 1).

@@ -1,12 +1,12 @@
 //! Representative CEPs of all regions of a tree from measurements.
 
-use truearm_estimate::{EstimateError, Problem, Setup, observability};
+use truearm_estimate::dense::{to_vec, transposed_product};
+use truearm_estimate::{EstimateError, Problem, Setup, column_unit, observability};
 
 use crate::FieldError;
 use crate::regions::estimate::{Held, scaled};
 use crate::regions::shrink::{Own, shrunk};
 use crate::regions::tree::Regions;
-use truearm_estimate::column_unit;
 
 /// How CEPs are estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,16 +121,16 @@ impl RegionalFit {
     ) -> Result<(), FieldError> {
         let width = problem.columns.len();
         // The model is linear at the CEPs of the whole workspace, from which those of its parts differ little.
-        let middle = held.least_squares(problem, &vec![0.0; width]).ok_or(too_few(problem))?;
+        let middle = held.least_squares(problem, &vec![0.0; width]).ok_or(undetermined(problem))?;
         let own = |region: usize| {
             let poses = if regions.is_leaf(region) { members[region].as_slice() } else { &[] };
             let set = problem.measurements.subset(poses);
             let part = Problem { measurements: &set, ..*problem };
             let (matrix, residual) = scaled(&part, &held.rows(&part, &middle));
-            let right = matrix.transpose() * &residual;
+            let right = transposed_product(matrix.as_ref(), residual.as_ref());
             Own {
-                normal: matrix.transpose() * &matrix,
-                right: (0..width).map(|k| right[(k, 0)]).collect(),
+                normal: transposed_product(matrix.as_ref(), matrix.as_ref()),
+                right: to_vec(right.as_ref()),
                 squares: residual.squared_norm_l2(),
                 rows: set.measured_values(),
             }
@@ -150,8 +150,12 @@ impl RegionalFit {
     }
 }
 
-fn too_few(problem: &Problem<'_>) -> FieldError {
+/// There are too few measured values for the CEPs, or the poses are too alike.
+pub fn undetermined(problem: &Problem<'_>) -> FieldError {
     let (rows, unknowns) = (problem.measurements.measured_values(), problem.columns.len());
+    if rows >= unknowns {
+        return FieldError::Estimate(EstimateError::Singular { unknowns, rows });
+    }
     let needed = unknowns.div_ceil(problem.measurements.rows_per_pose().max(1));
     FieldError::Estimate(EstimateError::TooFew { rows, unknowns, needed, hint: String::new() })
 }

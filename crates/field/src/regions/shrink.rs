@@ -6,7 +6,7 @@
 //! precisions run up the tree and down again, which is exact inference.
 
 use faer::{Mat, Par};
-use truearm_estimate::dense::Cholesky;
+use truearm_estimate::dense::{Cholesky, transposed_product};
 
 use crate::compass::Compass;
 use crate::regions::tree::Regions;
@@ -71,7 +71,7 @@ fn upwards(regions: &Regions, own: &[Own], spread: Spread) -> Option<(Vec<Messag
         if let Some(parent) = regions.parent(region) {
             let mut inner = precision[region].clone();
             factor.solve(inner.as_mut());
-            let passed = &precision[region] - &precision[region] * &inner;
+            let passed = &precision[region] - transposed_product(precision[region].as_ref(), inner.as_ref());
             for i in 0..width {
                 information[parent][i] += mean[i] / variance;
                 for j in 0..width {

@@ -1,11 +1,10 @@
 //! Which halving helps most, from what was measured in the whole.
 
 use faer::Mat;
-use faer::linalg::solvers::SolveLstsq;
 use truearm_estimate::MeasurementSet;
 
 use crate::regions::divide::Arm;
-use crate::regions::estimate::scaled;
+use crate::regions::estimate::{scaled, solve};
 use crate::regions::source::Rows;
 
 /// Axes by how much smaller the squares become when CEPs may differ between the halves, the best first.
@@ -59,9 +58,10 @@ fn squares_left(parts: &[Part], sign: impl Fn(&[f64]) -> f64, dimensions: usize)
             line += 1;
         }
     }
-    if lines < width {
-        return f64::INFINITY;
-    }
-    let difference = matrix.qr().solve_lstsq(&residual);
-    (residual - matrix * difference).squared_norm_l2()
+    let Some(difference) = solve(matrix.as_ref(), residual.as_ref()) else { return f64::INFINITY };
+    let left = |line: usize| {
+        let explained: f64 = difference.iter().enumerate().map(|(k, x)| matrix[(line, k)] * x).sum();
+        (residual[(line, 0)] - explained).powi(2)
+    };
+    (0..lines).map(left).sum()
 }
