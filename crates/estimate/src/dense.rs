@@ -3,12 +3,12 @@
 //! faer's results do not depend on the number of threads for the routines used here except when it solves
 //! for a single right-hand side, which is therefore always done sequentially.
 
+use faer::diag::Diag;
 use faer::linalg::cholesky::llt::{factor, inverse};
 use faer::linalg::matmul::matmul;
 use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
-use faer::diag::Diag;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 /// The lower Cholesky factor L of a matrix A = L L^T, (n, n).
