@@ -67,6 +67,7 @@ class Session:
                     "this is no session file", where=str(path), rule="truearm measure makes them"
                 )
         self.path = path
+        self._closed = False
         self._lock = FileLock(f"{path}.lock") if writing else None
         self._acquire()
         mode = "rwc" if writing else "ro"
@@ -112,6 +113,7 @@ class Session:
 
     def close(self) -> None:
         """Close the file and let others write to it."""
+        self._closed = True
         if hasattr(self, "_db"):
             self._db.close()
         if self._lock is not None:
@@ -165,7 +167,9 @@ class Session:
         self._db.execute("INSERT INTO outcomes VALUES (?, ?, ?, ?, ?)", row)
 
     def add_event(self, kind: str, message: str, step: int | None = None) -> None:
-        """Keep a remark about the process."""
+        """Keep a remark about the process; one that comes after the file is closed is dropped."""
+        if self._closed:
+            return
         self._db.execute(
             "INSERT INTO events (time_s, step, kind, message) VALUES (?, ?, ?, ?)",
             (time.time(), step, kind, message),

@@ -2,11 +2,12 @@
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Final
+from typing import Final, NoReturn
 
 from truearm.cli.console import INTERRUPTED, tell
 
@@ -34,6 +35,14 @@ def ends_promptly() -> Iterator[None]:
     finally:
         ended.set()
         signal.signal(signal.SIGINT, before)
+
+
+def end_at_once() -> NoReturn:
+    """End the process after an interrupt, without taking the interpreter down in order: all is closed."""
+    tell("Interrupted.")
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(INTERRUPTED)
 
 
 def _end_unless(ended: threading.Event) -> None:

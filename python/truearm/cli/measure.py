@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from truearm.cli.console import print_json, say, say_wrapped, tell
+from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
 
 if TYPE_CHECKING:
@@ -47,14 +48,14 @@ def command(
     if dry_run:
         _print_rehearsal(rehearse(known, wanted), as_json=as_json)
         return
-    with open_session(output, known, wanted) as session:
-        try:
+    try:
+        with open_session(output, known, wanted) as session:
             with Teller() as teller:
                 end = run(Process(known, session, teller.tell))
-        except KeyboardInterrupt:
-            tell(f"The session is in {output}; the same command goes on with it.")
-            raise
-        found = summary_of(session)
+            found = summary_of(session)
+    except KeyboardInterrupt:
+        tell(f"The session is in {output}; the same command goes on with it.")
+        end_at_once()
     if as_json:
         print_json({"end": end, "session": str(output), **found})
         return
