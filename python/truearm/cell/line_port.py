@@ -113,6 +113,15 @@ class LinePort:
             self._take()
         return self._lines.popleft()
 
+    def pause(self, seconds: float) -> None:
+        """Wait.
+
+        Raises:
+            StoppedError: If another thread interrupted.
+        """
+        if self._interrupted.wait(seconds):
+            raise stopped(self.device, self.address)
+
     def drain(self) -> None:
         """Forget what has come and was not asked for."""
         self._take_waiting()

@@ -182,6 +182,10 @@ class RvM2:
         seconds = MOTION_MARGIN * self._seconds(step)
         self._still_at = time.monotonic() + seconds
         self._locate(self._guesses, self._port.limit_s + seconds)
+        if np.array_equal(self._known_count(), before):
+            # Lost, or only late: sent again too early it would be done twice.
+            self._port.pause(self._port.limit_s)
+            self._locate([before, before + step], self._port.limit_s + seconds)
         self._still_at = 0.0
 
     def _seconds(self, step: Tenths) -> float:
