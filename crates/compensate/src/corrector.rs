@@ -19,7 +19,7 @@ const LONGEST_STEP: f64 = 0.5;
 /// Longest step where they have a tight one: enough to find out what they would have to be.
 const SHORT_STEP: f64 = 0.05;
 /// With fewer joints than the task has numbers, turns weigh so much less that the position is met first.
-const POSITION_FIRST: f64 = 1e-3;
+const POSITION_FIRST: f64 = 1e-4;
 
 /// What is corrected, and how far.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -3,7 +3,7 @@
 use truearm_kinematics::Chain;
 
 use crate::error::CompensateError;
-use crate::newton::{LEVER, Plan};
+use crate::newton::Plan;
 use crate::refusal::{Reason, Refusal};
 
 /// Bounds of a correction; infinity switches one off.
@@ -76,7 +76,7 @@ impl Limits {
 impl Limits {
     /// Whether the tool stays too far from its target, m and rad.
     pub(crate) fn refuse_residual(&self, plan: &Plan, residual: [f64; 2]) -> Option<Refusal> {
-        let turn = if plan.turn_weight < LEVER { self.largest_turn } else { self.residual_turn };
+        let turn = if plan.position_first() { self.largest_turn } else { self.residual_turn };
         Refusal::above(Reason::PositionNotReached, residual[0], self.residual)
             .or_else(|| Refusal::above(Reason::OrientationNotReached, residual[1], turn))
     }

@@ -39,6 +39,13 @@ pub(crate) struct Plan {
     pub longest: f64,
 }
 
+impl Plan {
+    /// Whether there are too few joints to meet all of the task.
+    pub fn position_first(&self) -> bool {
+        self.turn_weight < LEVER
+    }
+}
+
 /// What a search writes to.
 #[derive(Debug, Clone)]
 pub(crate) struct Search {
@@ -111,12 +118,27 @@ impl Kernel for Toward<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> [Lane; 2] {
-        let Self { aimed, plan, target, alone, search } = self;
-        match plan.task {
-            Task::Pose => approach::<I, PoseGoal, 6>(aimed, plan, target, alone, search),
-            Task::Axis => approach::<I, AxisGoal, 5>(aimed, plan, target, alone, search),
-            Task::Position => approach::<I, PositionGoal, 3>(aimed, plan, target, alone, search),
+        match self.plan.task {
+            Task::Pose => self.meet::<I, PoseGoal, 6>(),
+            Task::Axis => self.meet::<I, AxisGoal, 5>(),
+            Task::Position => self.meet::<I, PositionGoal, 3>(),
         }
+    }
+}
+
+impl Toward<'_> {
+    /// The task's rows; then, where they cannot all be met, the position from there once more and alone.
+    #[inline(always)]
+    fn meet<I: Isa, G: Goal<M>, const M: usize>(self) -> [Lane; 2] {
+        let Self { aimed, plan, target, alone, search } = self;
+        let left = approach::<I, G, M>(aimed, plan, target, alone, search);
+        if !plan.position_first() {
+            return left;
+        }
+        let [position, _] = approach::<I, PositionGoal, 3>(aimed, plan, target, alone, search);
+        let frame = aimed.end::<I>(&search.best, alone, &mut search.model);
+        let turn = squared::<I>(&G::error::<I>(&frame, target)[3..]);
+        [position, turn.sqrt()]
     }
 }
 

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Scene, apart, correct, readings, seven_axis, six_axis, unbounded};
+use common::{Scene, apart, correct, five_axis, readings, seven_axis, six_axis, unbounded};
 use truearm_compensate::{Options, Task};
 use truearm_kinematics::Transform;
 
@@ -14,7 +14,8 @@ const WAYPOINTS: usize = 200;
 fn accepted(scene: &Scene, options: Options, check: impl Fn(usize, &[f64], &[f64])) {
     let (q, n) = (readings(&scene.chain, WAYPOINTS, 2), scene.chain.joint_count());
     let found = correct(&scene.corrector(options), &q, 1);
-    assert!(found.refused.len() < WAYPOINTS / 10, "{} refused", found.refused.len());
+    let refused = &found.refused;
+    assert!(refused.len() < WAYPOINTS / 10, "{} refused: {:?}", refused.len(), refused.first());
     for (i, (from, to)) in q.chunks_exact(n).zip(found.readings.chunks_exact(n)).enumerate() {
         if to[0].is_finite() {
             check(i, from, to);
@@ -105,6 +106,32 @@ fn null_direction(scene: &Scene, q: &[f64]) -> Vec<f64> {
         rows.push(row.iter().map(|x| x / length).collect());
     }
     rows.pop().unwrap()
+}
+
+#[test]
+fn five_axes_meet_the_position_and_come_near_the_orientation() {
+    let scene = Scene::new(five_axis(), 1e-3);
+    let position = scene.corrector(options(Task::Position, None));
+    let workspace = std::cell::RefCell::new(position.workspace());
+    let tilt = |a: &Transform, b: &Transform| {
+        let (a, b) = (axis(a), axis(b));
+        (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
+    };
+    let turn = |a: &Transform, b: &Transform| apart(a, b).1;
+    let measures: [(Task, &dyn Fn(&Transform, &Transform) -> f64); 2] =
+        [(Task::Pose, &turn), (Task::Axis, &tilt)];
+    for (task, left) in measures {
+        accepted(&scene, options(task, None), |i, from, to| {
+            let (meant, real) = (scene.meant(from)[0], scene.real(to)[0]);
+            assert!(distance(&meant, &real) < MET, "waypoint {i}: {:e}", distance(&meant, &real));
+            let mut other = vec![0.0; 5];
+            position.correct(from, &[], &mut other, &mut workspace.borrow_mut());
+            if other[0].is_finite() {
+                let (nearest, careless) = (left(&meant, &real), left(&meant, &scene.real(&other)[0]));
+                assert!(nearest <= careless * 1.01 + 1e-6, "waypoint {i}: {nearest:e} beside {careless:e}");
+            }
+        });
+    }
 }
 
 #[test]
