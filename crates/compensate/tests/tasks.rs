@@ -10,6 +10,9 @@ use truearm_kinematics::Transform;
 const MET: f64 = 1e-9;
 const WAYPOINTS: usize = 200;
 
+/// How far two poses are apart in what a task asks for.
+type Measure<'a> = &'a dyn Fn(&Transform, &Transform) -> f64;
+
 /// Runs a task over random waypoints and shows each accepted one: index, program's readings and corrected ones.
 fn accepted(scene: &Scene, options: Options, check: impl Fn(usize, &[f64], &[f64])) {
     let (q, n) = (readings(&scene.chain, WAYPOINTS, 2), scene.chain.joint_count());
@@ -118,8 +121,7 @@ fn five_axes_meet_the_position_and_come_near_the_orientation() {
         (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
     };
     let turn = |a: &Transform, b: &Transform| apart(a, b).1;
-    let measures: [(Task, &dyn Fn(&Transform, &Transform) -> f64); 2] =
-        [(Task::Pose, &turn), (Task::Axis, &tilt)];
+    let measures: [(Task, Measure<'_>); 2] = [(Task::Pose, &turn), (Task::Axis, &tilt)];
     for (task, left) in measures {
         accepted(&scene, options(task, None), |i, from, to| {
             let (meant, real) = (scene.meant(from)[0], scene.real(to)[0]);
