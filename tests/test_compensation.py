@@ -118,7 +118,10 @@ def test_the_papers_arm_with_joint_errors_comes_to_the_calibrations_residual():
     """Equation (6) as joint errors: compensated, the arm is off by what the calibration did not find."""
     imperfections = Imperfections(non_geometric="joint", noise_mm=0.0)
     arm = VirtualArm.paper(seed=1, imperfections=imperfections)
-    data = arm.measure(arm.poses(150))
+    table = arm.measure_table(arm.poses(150))
+    world = arm.world_from_base
+    table[["x", "y", "z"]] = (table[["x", "y", "z"]].to_numpy() - world[:3, 3]) @ world[:3, :3]
+    data = ta.Measurements.from_dataframe(table)
     calibration = ta.calibrate(arm.robot, data, frame="world", refit=False)
     q = arm.poses(60, seed=9)
     limits = ta.Limits(largest_mm=None, largest_deg=None, largest_joint_deg=None, change_mm_per_mm=None,
