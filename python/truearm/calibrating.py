@@ -31,6 +31,7 @@ from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
 from truearm.splitting import Split, split_rows
+from truearm.uncertainty import VariableSpread
 from truearm.unexplained import unexplained
 from truearm.validation import Validation
 
@@ -73,6 +74,7 @@ def calibrate(
         order = np.random.default_rng(chosen.split.seed).permutation(len(given))
         hyper = _kept_hyper(trained)
         final = fit_rows(task, given.select(order), hyper)
+    variable = _variable_details(task, final, final if hyper is None else trained)
     return Calibration(
         robot=robot,
         options=chosen,
@@ -81,7 +83,7 @@ def calibrate(
         models=final.models(task.arm),
         identifiability=final.identifiability,
         constant=ConstantDetails.of(final.identifiability.determined, final.constant),
-        variable=_variable_details(task, final, final if hyper is None else trained),
+        variable=variable,
         validation=validation,
         rows=FittedRows.of(final, sides(len(given), split)[order], task.selection),
         data_hash=given.hash(),
@@ -89,6 +91,7 @@ def calibrate(
         scheme=None if final.scheme is None else final.scheme.details,
         notices=(*notices, *_open_setup(task, final.identifiability)),
         seconds=trained.seconds,
+        fitted_spread=_fitted_spread(task, final, variable),
     )
 
 
@@ -141,6 +144,13 @@ def _open_setup(task: Task, found: Identifiability) -> list[Notice]:
         "target are not harmed, but where the base stands in the world is not known."
     )
     return [Notice("open_setup", text)]
+
+
+def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> VariableSpread | None:
+    """The posterior of the field's fit, which a large set would take long to find again."""
+    if fits.variable is None or details is None:
+        return None
+    return VariableSpread(list(task.arm.candidates.columns), fits.variable.posterior, details.inflation)
 
 
 def _kept_hyper(trained: Fits) -> dict[str, list[float]] | None:

@@ -63,6 +63,7 @@ class Calibration:
         seconds: Time of the fits that were validated; empty for a calibration that was read.
         scheme: More about one of the paper's schemes; None where it is none.
         stored_conservative: Bounds of the standard deviation as the file held them.
+        fitted_spread: The posterior as the fit left it; None for a calibration that was read.
     """
 
     robot: Robot
@@ -81,6 +82,7 @@ class Calibration:
     seconds: Mapping[str, float] = field(default_factory=dict)
     scheme: SchemeDetails | None = None
     stored_conservative: Conservative | None = None
+    fitted_spread: Spread | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> "Calibration":
@@ -296,6 +298,8 @@ class Calibration:
 
     @cached_property
     def _spread(self) -> Spread:
+        if self.fitted_spread is not None:
+            return self.fitted_spread
         if self.scheme is not None:
             raise WorkError(
                 "standard deviations are not known",
