@@ -90,7 +90,7 @@ def newton_on_pinocchio(nominal, arm, q):
 def toolbox_arm():
     """The true arm as roboticstoolbox sees it, whose ik_LM is C++."""
     import roboticstoolbox  # noqa: PLC0415 - it need not be installed
-    from spatialmath import SE3  # noqa: PLC0415
+    from spatialmath import SE3  # noqa: PLC0415 - it comes with the toolbox
 
     links = [
         roboticstoolbox.RevoluteDH(offset=theta, d=d, a=a, alpha=alpha)

@@ -79,7 +79,5 @@ def survives(language, text, robot, frames=""):
     try:
         rewritten(language, text, robot, frames=frames)
     except InputError as error:
-        found = error
-    else:
-        return
-    assert found.where, str(found)
+        return bool(error.where)
+    return True

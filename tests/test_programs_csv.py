@@ -116,4 +116,4 @@ def test_mutilated_paths_end_in_a_listing_or_an_error(robot, data):
     start = data.draw(st.integers(0, len(sample)))
     end = data.draw(st.integers(start, min(len(sample), start + 60)))
     put = data.draw(st.text(st.sampled_from(',"\n #0.5-eq1x'), max_size=12))
-    survives(CSV, sample[:start] + put + sample[end:], robot)
+    assert survives(CSV, sample[:start] + put + sample[end:], robot)

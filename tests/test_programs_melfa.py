@@ -247,7 +247,7 @@ def test_mutilated_programs_end_in_a_listing_or_an_error(robot, sample, data):
     start = data.draw(st.integers(0, len(sample)))
     end = data.draw(st.integers(start, min(len(sample), start + 60)))
     put = data.draw(st.text(st.sampled_from("()=,;'\" \n0.5-*+PJMov&H"), max_size=12))
-    survives(MELFA, sample[:start] + put + sample[end:], robot)
+    assert survives(MELFA, sample[:start] + put + sample[end:], robot)
 
 
 def test_the_mark_keeps_line_numbers(robot, sample):

@@ -288,7 +288,7 @@ def test_mutilated_programs_end_in_a_listing_or_an_error(robot, sample, data):
     start = data.draw(st.integers(0, len(sample)))
     end = data.draw(st.integers(start, min(len(sample), start + 80)))
     put = data.draw(st.text(st.sampled_from("/POSMNJLP[]{}:;,='\n 0.5-*UFTN"), max_size=12))
-    survives(TP, sample[:start] + put + sample[end:], robot, FRAMES)
+    assert survives(TP, sample[:start] + put + sample[end:], robot, FRAMES)
 
 
 def test_what_is_no_listing_is_an_error_with_its_place(robot):

@@ -322,15 +322,15 @@ def test_mutilated_programs_end_in_a_listing_or_an_error(robot, sample, data):
     start = data.draw(st.integers(0, len(sample)))
     end = data.draw(st.integers(start, min(len(sample), start + 60)))
     put = data.draw(st.text(st.sampled_from("()[]{},:=\n#\"'pq0.5-e $def end if movej"), max_size=12))
-    survives(UR, sample[:start] + put + sample[end:], robot)
+    assert survives(UR, sample[:start] + put + sample[end:], robot)
 
 
 @settings(max_examples=40)
 @given(st.text(st.characters(max_codepoint=255, exclude_characters="\x00"), max_size=200))
 def test_any_text_ends_in_a_listing_or_an_error(robot, text):
-    survives(UR, text, robot)
+    assert survives(UR, text, robot)
 
 
 @pytest.mark.parametrize("text", ["(" * 5000, "if x:\n" * 5000, "movej(" + "-" * 5000, "x = " + "a[" * 3000])
 def test_deep_nesting_is_no_traceback(robot, text):
-    survives(UR, text, robot)
+    assert survives(UR, text, robot)

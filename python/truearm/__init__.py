@@ -83,7 +83,7 @@ _HOME: Final = {
 }
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public name
     if name not in _HOME:
         raise AttributeError(f"module 'truearm' has no attribute '{name}'")
     return getattr(import_module(f"truearm.{_HOME[name]}"), name)
