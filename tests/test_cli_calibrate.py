@@ -122,7 +122,7 @@ def test_files_are_set_ups_of_their_own(folder, capsys):
 
 
 def test_progress_of_what_takes_longer_goes_to_stderr(folder, capsys, monkeypatch):
-    monkeypatch.setattr("truearm.cli.progress.PATIENCE_S", 0.001)
+    monkeypatch.setattr("truearm.cli.display.PATIENCE_S", 0.001)
     assert main(["calibrate", "rv-m2", "arm.csv", "-o", "out", "--json"]) == 0
     printed = capsys.readouterr()
     json.loads(printed.out)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from truearm._core import Setup, fit_constant
 from truearm.calibration import Calibration
 from truearm.core_set import Use, core_set, rotations, select
+from truearm.defaults import SEED
 from truearm.errors import InputError, Notice, UsageError, list_names
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.judging import judge, model_inputs
@@ -17,7 +18,6 @@ from truearm.measurements import Measurements
 from truearm.models import ArmModel
 from truearm.plausibility import check_against
 from truearm.registration import register
-from truearm.splitting import DEFAULT_SEED
 from truearm.validation import Errors
 
 Floats = NDArray[np.float64]
@@ -40,7 +40,7 @@ class EvaluationOptions:
         judge_target: Measured target, from 1, at which errors are judged.
     """
 
-    seed: int = DEFAULT_SEED
+    seed: int = SEED
     use: Use | None = None
     frame_rows: int | None = None
     keep_tool: bool = False

@@ -6,6 +6,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
+from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
 from truearm.errors import UsageError
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
@@ -33,11 +34,11 @@ class Limits:
         joint_limits: Whether corrected readings must stay within the robot's limits.
     """
 
-    largest_joint_deg: float | None = 3.0
+    largest_joint_deg: float | None = LARGEST_JOINT_DEG
     largest_slide_mm: float | None = 10.0
-    largest_mm: float | None = 5.0
-    largest_deg: float | None = 1.0
-    largest_std_mm: float | None = 1.0
+    largest_mm: float | None = LARGEST_MM
+    largest_deg: float | None = LARGEST_DEG
+    largest_std_mm: float | None = LARGEST_STD_MM
     change_mm_per_mm: float | None = 0.05
     change_mrad_per_rad: float | None = 50.0
     residual_mm: float = 1e-6

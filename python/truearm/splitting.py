@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.measurements import Measurements
 
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-DEFAULT_HOLDOUT: Final = 0.3
-DEFAULT_SEED: Final = 7
 RANGE_FORM: Final = re.compile(r"q([1-9]\d*):(low|high):(.+)")
 
 
@@ -75,8 +74,8 @@ class SplitRule:
         holdout_range: Tail of one joint.
     """
 
-    holdout: float = DEFAULT_HOLDOUT
-    seed: int = DEFAULT_SEED
+    holdout: float = HOLDOUT
+    seed: int = SEED
     train_size: int | None = None
     split_by: tuple[str, ...] = ()
     holdout_range: HoldoutRange | None = None

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import CoreError, Stream
 from truearm.compensation import Compensator
+from truearm.defaults import DEADLINE_S, HOLD_S, RAMP_S
 from truearm.errors import UsageError
 from truearm.units import MM_PER_METRE
 
@@ -32,9 +33,9 @@ class StreamOptions:
     rate_mm_s: float = 20.0
     acceleration_deg_s2: float = 120.0
     acceleration_mm_s2: float = 500.0
-    ramp_s: float = 1.0
-    hold_s: float = 0.1
-    deadline_s: float = 0.05
+    ramp_s: float = RAMP_S
+    hold_s: float = HOLD_S
+    deadline_s: float = DEADLINE_S
 
     def core(self) -> dict[str, object]:
         """The core's options, SI."""

@@ -1,7 +1,8 @@
 """The command line: `truearm COMMAND`, one module a command, loaded when it is called.
 
 To add a command, write a module with a function `command` whose signature and docstring are its
-options and its help, and name it in :data:`COMMANDS`.
+options and its help, and name it in :data:`COMMANDS`. What is heavy is imported inside of functions: neither
+help nor completion may wait for it.
 """
 
 import sys
@@ -9,6 +10,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from truearm.cli import console
+from truearm.cli.display import DISPLAY
 from truearm.cli.lazy import Entry, build
 
 COMMANDS: Final = (
@@ -28,6 +30,15 @@ COMMANDS: Final = (
     Entry("compensate", "truearm.cli.compensate", "Rewrite a robot program for the calibrated arm."),
     Entry("study", "truearm.cli.study", "The paper's simulations, run again."),
 )
+HELP: Final = """Robot arm calibration with Denavit-Hartenberg parameters that vary over the workspace.
+
+Each command has examples: truearm COMMAND --help.
+
+Examples:
+  truearm demo
+  truearm calibrate ur10 measurements.csv -o result
+  truearm evaluate result/calibration.calib another_day.csv
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,9 +49,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        return build(COMMANDS)(given)
+        return build(COMMANDS, HELP)(given)
     except (Exception, KeyboardInterrupt) as error:
+        DISPLAY.clear()
         status = console.exit_status(error)
         if status is None:
             raise
         return status
+    finally:
+        DISPLAY.clear()

@@ -3,23 +3,29 @@
 import json
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from truearm.calibrating import calibrate
-from truearm.calibration import Calibration
-from truearm.cli.console import print_json, say, say_wrapped, warn
-from truearm.cli.error_tables import print_errors
+from truearm.cli.arguments import (
+    AngleUnit,
+    AsJson,
+    LengthUnit,
+    MeasurementFiles,
+    OutputDirectory,
+    RobotName,
+    Use,
+)
+from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
-from truearm.cli.progress import told_stages
+from truearm.cli.progress import Stages, told_stages
+from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError
 from truearm.files import write_whole
-from truearm.measurements import Measurements
-from truearm.options import Options
-from truearm.robot import Robot
 from truearm.scheme_options import SchemeOptions
-from truearm.splitting import DEFAULT_HOLDOUT, DEFAULT_SEED
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
 
 SCHEME = SchemeOptions()
 CALIBRATION_NAME = "calibration.calib"
@@ -28,17 +34,13 @@ OUTLIERS_NAMED = 5
 
 
 def command(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A library name, a TOML file or a URDF (FILE.urdf#TIP).")
-    ],
-    measurements: Annotated[
-        list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
-    ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")],
+    robot: RobotName,
+    measurements: MeasurementFiles,
+    output: OutputDirectory,
     holdout: Annotated[
-        float | None, typer.Option(help=f"Share of the rows that is held out.  [default: {DEFAULT_HOLDOUT}]")
+        float | None, typer.Option(help=f"Share of the rows that is held out.  [default: {HOLDOUT}]")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the split.")] = DEFAULT_SEED,
+    seed: Annotated[int, typer.Option(help="Seed of the split.")] = SEED,
     train_size: Annotated[
         int | None, typer.Option(metavar="N", help="Training rows of each file.  [default: all others]")
     ] = None,
@@ -51,10 +53,7 @@ def command(
             metavar="qJ:low|high:SHARE", help="Hold out the rows with the lowest or highest readings."
         ),
     ] = None,
-    use: Annotated[
-        str | None,
-        typer.Option(metavar="position|pose|targets", help="What to use.  [default: all that was measured]"),
-    ] = None,
+    use: Use = None,
     judge_target: Annotated[
         int, typer.Option(metavar="K", help="Judge at this target; another than 1 takes no part in the fit.")
     ] = 1,
@@ -78,12 +77,8 @@ def command(
     strip: Annotated[
         bool, typer.Option("--strip", help="Leave the measurements out of the file, for controllers.")
     ] = False,
-    length_unit: Annotated[
-        str | None, typer.Option(metavar="mm|m", help="Unit of columns that name none.")
-    ] = None,
-    angle_unit: Annotated[
-        str | None, typer.Option(metavar="deg|rad", help="Unit of joint columns that name none.")
-    ] = None,
+    length_unit: LengthUnit = None,
+    angle_unit: AngleUnit = None,
     scheme_joints: Annotated[
         str | None,
         typer.Option(metavar="J,J", help="Schemes: joints that are divided.  [default: 1,2,3]"),
@@ -113,14 +108,24 @@ def command(
     repeatability_mm: Annotated[
         float | None, typer.Option(metavar="MM", help="Of the arm; errors are told in parts of it too.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
     degree: Annotated[int, typer.Option(hidden=True)] = 2,
     threads: Annotated[int | None, typer.Option(hidden=True, min=1)] = None,
 ) -> None:
     """Calibrate an arm and judge the calibration on poses that took no part in it.
 
     Writes DIR/calibration.calib, fitted to all rows after the errors were judged, and DIR/summary.json.
+
+    Examples:
+      truearm calibrate ur10 measurements.csv -o result
+      truearm calibrate arm.toml monday.csv tuesday.csv -o result
+      truearm calibrate ur10 m.csv -o result --model constant --seed 3
     """
+    from truearm.calibrating import calibrate
+    from truearm.measurements import Measurements
+    from truearm.options import Options
+    from truearm.robot import Robot
+
     options = Options.of(
         holdout=_holdout(holdout, holdout_range),
         seed=seed,
@@ -150,9 +155,10 @@ def command(
         measurements, length_unit=length_unit, angle_unit=angle_unit, joints=arm.joints
     )
     check_directory(output)
+    stages = told_stages(f"calibrate {arm.name} {model}", len(data))
     with ends_promptly():
-        calibration = calibrate(arm, data, options, threads=threads, stages=told_stages())
-        bound_std(calibration)
+        calibration = calibrate(arm, data, options, threads=threads, stages=stages)
+        bound_std(calibration, stages)
     warn(calibration.notices)
     summary = write_results(calibration, output, with_rows=not strip)
     if as_json:
@@ -160,8 +166,10 @@ def command(
         return
     print_results(calibration)
     print_places(output)
-    say("Judge it on other measurements:")
-    say(f"  truearm evaluate {output / CALIBRATION_NAME} OTHER.csv")
+    suggest(
+        f"truearm evaluate {output / CALIBRATION_NAME} OTHER.csv",
+        f"truearm compensate {output / CALIBRATION_NAME} PROGRAM --dry-run",
+    )
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:
@@ -169,7 +177,7 @@ def _holdout(share: float | None, holdout_range: str | None) -> float:
         raise UsageError(
             "--holdout and --holdout-range both say how much is held out", way_out="Give one of them"
         )
-    return DEFAULT_HOLDOUT if share is None else share
+    return HOLDOUT if share is None else share
 
 
 def _numbers(joints: str | None) -> tuple[int, ...]:
@@ -190,14 +198,14 @@ def check_directory(output: Path) -> None:
         raise InputError("no permission to write here", where=str(there), way_out="Name another with -o")
 
 
-def bound_std(calibration: Calibration) -> None:
+def bound_std(calibration: "Calibration", stages: Stages) -> None:
     """Work out the bounds of the standard deviation that the file carries; takes some seconds."""
     if calibration.has_conservative:
-        with told_stages()("bounding the standard deviation"):
+        with stages("bounding the standard deviation"):
             _ = calibration.conservative
 
 
-def write_results(calibration: Calibration, output: Path, *, with_rows: bool = True) -> dict[str, Any]:
+def write_results(calibration: "Calibration", output: Path, *, with_rows: bool = True) -> dict[str, Any]:
     """Write both files to a directory, which is made if needed; the content of summary.json."""
     summary = calibration.summary
     output.mkdir(parents=True, exist_ok=True)
@@ -212,8 +220,10 @@ def print_places(output: Path) -> None:
     say(f"Summary:     {output / SUMMARY_NAME}")
 
 
-def print_results(calibration: Calibration) -> None:
+def print_results(calibration: "Calibration") -> None:
     """Print what was determined, the errors, and what stands out."""
+    from truearm.cli.error_tables import print_errors
+
     validation, summary = calibration.validation, calibration.summary
     trained = f"fitted to {validation.n_train} rows, judged on {validation.n_holdout} others"
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
@@ -229,7 +239,7 @@ def print_results(calibration: Calibration) -> None:
         say(f"After that fitted to all {len(calibration.rows.data)} rows.")
 
 
-def print_determined(calibration: Calibration) -> None:
+def print_determined(calibration: "Calibration") -> None:
     """Say which parameters the measurements determine, and what the others cannot be told from."""
     found = calibration.identifiability
     say(f"The poses determine {found.rank} of {found.parameters} parameters of the arm.")
@@ -250,7 +260,7 @@ def _by_reason(names: tuple[str, ...], sentences: tuple[str, ...]) -> dict[str, 
     return grouped
 
 
-def _print_scheme(calibration: Calibration, ratios: dict[str, float] | None) -> None:
+def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -> None:
     """Say how the workspace was divided, how training ended, and how errors compare with repeatability."""
     details = calibration.scheme
     if details is not None and details.regions:
@@ -265,7 +275,7 @@ def _print_scheme(calibration: Calibration, ratios: dict[str, float] | None) -> 
         say(f"Mean error in parts of the repeatability: {words}.")
 
 
-def _print_outliers(outliers: list[dict[str, Any]], calibration: Calibration) -> None:
+def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
     if not outliers:
         return
     several = calibration.rows is not None and len(calibration.rows.data.files) > 1

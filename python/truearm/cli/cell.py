@@ -4,6 +4,13 @@ from typing import Final
 
 from truearm.cli.lazy import Entry
 
+HELP: Final = """Cell files to begin with, a check of a cell's devices, and a virtual cell.
+
+Examples:
+  truearm cell example rv-m2 -o cell.toml
+  truearm cell simulate cell.toml --speed 20 -o virtual.toml
+  truearm cell check virtual.toml
+"""
 COMMANDS: Final = (
     Entry("example", "truearm.cli.cell_example", "Write a cell file to begin with."),
     Entry("check", "truearm.cli.cell_check", "Connect to the devices of a cell."),

@@ -1,23 +1,20 @@
 """`truearm cell check`: connect to the devices of a cell."""
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
-from truearm.cli.console import print_json, say
+from truearm.cli.arguments import AsJson, CellFile
+from truearm.cli.console import print_json, say, suggest
 
 
 def command(
-    cell: Annotated[Path, typer.Argument(metavar="CELL", help="A cell file.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    cell: CellFile,
+    as_json: AsJson = False,
 ) -> None:
     """Connect to the devices of a cell and ask them where they are; nothing moves but what connecting moves.
 
-    Example: truearm cell check cell.toml
+    Examples:
+      truearm cell check cell.toml
     """
-    from truearm.cell.cell_file import Cell  # noqa: PLC0415
-    from truearm.cell.protocols import Connected  # noqa: PLC0415
+    from truearm.cell.cell_file import Cell
+    from truearm.cell.protocols import Connected
 
     known = Cell.load(cell)
     with Connected(known.sensor, known.robot):
@@ -28,3 +25,4 @@ def command(
     say(f"{known.sensor.name} at {known.sensor.address} answers.")
     say(f"{known.robot.name} at {known.robot.address} answers; its joints:")
     say("  " + ", ".join(f"{reading:.4f}" for reading in readings))
+    suggest(f"truearm measure {cell} poses.csv --dry-run")

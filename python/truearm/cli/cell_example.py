@@ -5,23 +5,25 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.console import print_json, say
+from truearm.cli.arguments import AsJson
+from truearm.cli.console import print_json, say, suggest
 from truearm.errors import InputError, UsageError, did_you_mean
 
 
 def command(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="rv-m2, ur, tracker or playback.")],
+    name: Annotated[str, typer.Argument(metavar="rv-m2|ur|tracker|playback", help="For which devices.")],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="Where the cell file goes.")
     ] = Path("cell.toml"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a cell file to begin with, all keys of which docs/reference/cell-file.md explains.
 
-    Example: truearm cell example rv-m2 -o cell.toml
+    Examples:
+      truearm cell example rv-m2 -o cell.toml
     """
-    from truearm.cell.examples import EXAMPLES, example  # noqa: PLC0415
-    from truearm.files import write_whole  # noqa: PLC0415
+    from truearm.cell.examples import EXAMPLES, example
+    from truearm.files import write_whole
 
     if name not in EXAMPLES:
         way_out = did_you_mean(name, EXAMPLES)
@@ -33,5 +35,6 @@ def command(
     write_whole(output, example(name))
     if as_json:
         print_json({"cell": str(output)})
-    else:
-        say(f"Cell file: {output}")
+        return
+    say(f"Cell file: {output}")
+    suggest(f"truearm cell simulate {output}", f"truearm cell check {output}")

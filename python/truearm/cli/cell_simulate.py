@@ -7,14 +7,15 @@ from typing import Annotated, Final
 
 import typer
 
-from truearm.cli.console import print_json, say, tell
+from truearm.cli.arguments import AsJson, CellFile
+from truearm.cli.console import print_json, say, suggest, tell
 from truearm.errors import UsageError
 
 FAULTS: Final = "lost, delayed, duplicated, garbled, missed, outlier, restart, emergency_stop"
 
 
 def command(
-    cell: Annotated[Path, typer.Argument(metavar="CELL", help="A cell file.")],
+    cell: CellFile,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -31,22 +32,24 @@ def command(
             metavar="KIND=SHARE", help="Make a share of the messages or contacts fail, as lost=0.05."
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Start the devices of a cell file as virtual ones, each a process behind a pseudo-terminal or TCP port.
 
     A cell file with their addresses is written; the devices are served until Ctrl-C.
 
-    Example: truearm cell simulate cell.toml --speed 20 --fault lost=0.05 -o virtual.toml
+    Examples:
+      truearm cell simulate cell.toml -o virtual.toml
+      truearm cell simulate cell.toml --speed 20 --fault lost=0.05
     """
     target = output or cell.with_suffix(".virtual.toml")
     changes = _changes(speed, seed, fault or [])
-    import tomli_w  # noqa: PLC0415
+    import tomli_w
 
-    from truearm.cell.cell_file import parsed  # noqa: PLC0415
-    from truearm.cell.virtual.launch import VirtualCell  # noqa: PLC0415
-    from truearm.cli.until_interrupted import until_interrupted  # noqa: PLC0415
-    from truearm.files import read_text, write_whole  # noqa: PLC0415
+    from truearm.cell.cell_file import parsed
+    from truearm.cell.virtual.launch import VirtualCell
+    from truearm.cli.until_interrupted import until_interrupted
+    from truearm.files import read_text, write_whole
 
     if target.resolve() == cell.resolve():
         raise UsageError("this is the cell file itself", where=str(target), way_out="Name another with -o")
@@ -60,7 +63,9 @@ def command(
             print_json({"cell": str(target)})
         else:
             say(f"The virtual cell is ready. Its cell file: {target}")
-            say(f"Try next, in another terminal: truearm measure {target} poses.csv -o session.db")
+            suggest(
+                f"truearm measure {target} poses.csv -o session.db", when="Try next, in another terminal:"
+            )
         sys.stdout.flush()
         until_interrupted(threading.Event())
     tell("The virtual cell has ended.")

@@ -6,27 +6,20 @@ from typing import Annotated, Any, Literal, get_args
 
 import typer
 
-from truearm.calibration import Calibration
-from truearm.cli.console import print_json, print_table, say, say_wrapped, warn
+import truearm as ta
+from truearm.cli.arguments import AsJson, CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm
+from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
-from truearm.compensation import Compensator
+from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
 from truearm.errors import UsageError
 from truearm.files import write_whole
-from truearm.limits import Limits, Task
-from truearm.programs.compensating import compensate_program
-from truearm.programs.densify import Spacing
-from truearm.programs.report import counts, report_of, table_rows, unified_diff
-from truearm.programs.rewriting import Choices, Rewritten, describe
-from truearm.robot import Robot
 
 OnRefusal = Literal["stop", "keep-nominal"]
-ROWS_SHOWN = 100
-LISTED_SHOWN = 30
 
 
 def command(
-    calibration: Annotated[Path, typer.Argument(metavar="CALIB", help="A calibration file.")],
+    calibration: CalibFile,
     program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="The program, or one of its files.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="OUT", help="Where it goes: a file or directory.")
@@ -58,21 +51,17 @@ def command(
     moving: Annotated[
         str | None, typer.Option(metavar="1,2,3", help="Joints that may change.  [default: all]")
     ] = None,
-    feature: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="A feature that the calibration needs.")
-    ] = None,
+    feature: Feature = None,
     on_refusal: Annotated[
         str,
         typer.Option(metavar="stop|keep-nominal", help="What becomes of targets that cannot be corrected."),
     ] = "stop",
-    largest_mm: Annotated[float, typer.Option("--largest-mm", help="Largest shift of the tool.")] = 5.0,
-    largest_deg: Annotated[float, typer.Option("--largest-deg", help="Largest turn of the tool.")] = 1.0,
+    largest_mm: LargestMm = LARGEST_MM,
+    largest_deg: LargestDeg = LARGEST_DEG,
     largest_joint_deg: Annotated[
         float, typer.Option("--largest-joint-deg", help="Largest change of a joint.")
-    ] = 3.0,
-    largest_std_mm: Annotated[
-        float, typer.Option("--largest-std-mm", help="Largest standard deviation of the calibration.")
-    ] = 1.0,
+    ] = LARGEST_JOINT_DEG,
+    largest_std_mm: LargestStdMm = LARGEST_STD_MM,
     densify_mm: Annotated[
         float | None,
         typer.Option("--densify-mm", metavar="MM", help="Insert waypoints on lines that deviate by more."),
@@ -86,34 +75,42 @@ def command(
     force: Annotated[
         bool, typer.Option("--force", help="Go on with a program that was compensated already.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Rewrite a robot program so that the calibrated arm's tool goes where the author meant it to go.
 
     Only numbers of targets change; what cannot be changed with certainty is left as it is and listed.
 
-    Example: truearm compensate arm.calib weld.src -o out/ --controller nominal --frames frames.toml
+    Examples:
+      truearm compensate arm.calib weld.script --dry-run
+      truearm compensate arm.calib weld.src -o out/ --controller nominal
+      truearm compensate arm.calib pick.mod -o out/ --frames frames.toml
     """
+    from truearm.cli.rewritten import print_rewritten
+    from truearm.limits import Task
+    from truearm.programs.densify import Spacing
+    from truearm.programs.report import report_of
+
     if output is None and not dry_run:
         raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
-    limits = Limits(
+    limits = ta.Limits(
         largest_mm=largest_mm,
         largest_deg=largest_deg,
         largest_joint_deg=largest_joint_deg,
         largest_std_mm=largest_std_mm,
     )
     spacing = None if densify_mm is None else Spacing.of(densify_mm, least_spacing_mm)
-    choices = Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language)
-    compensator = Compensator(
-        Calibration.load(calibration),
-        programming=None if programming is None else Robot.load(programming),
+    choices = ta.Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language)
+    compensator = ta.Compensator(
+        ta.Calibration.load(calibration),
+        programming=None if programming is None else ta.Robot.load(programming),
         task=_one_of("--task", task, Task),
         moving=_joints(moving),
         limits=limits,
         features=_features(feature),
     )
     with ends_promptly(), told_stages()("compensation"):
-        done = compensate_program(
+        done = ta.compensate_program(
             program,
             compensator,
             controller=controller,
@@ -129,38 +126,18 @@ def command(
     if as_json:
         print_json(report_of(done, paths))
     else:
-        _print(done, dry_run=dry_run)
+        print_rewritten(done, dry_run=dry_run)
         for path in paths:
             say(f"Written: {path}")
+        _suggest(calibration, program, dry_run=dry_run)
 
 
-def _print(done: Rewritten, *, dry_run: bool) -> None:
-    """Say what was changed and what was not."""
-    found = counts(done)
+def _suggest(calibration: Path, program: Path, *, dry_run: bool) -> None:
     if dry_run:
-        _print_dry(done)
-    verb = "would be changed" if dry_run else "changed"
-    say_wrapped(
-        f"{done.program.language.name}: {found['changed']} of {found['targets']} targets {verb}, "
-        f"{found['kept']} kept as they were after a refusal, {found['listed']} left as they are."
-    )
-    if done.changed.any():
-        moved = done.correction_mm[done.changed]
-        say_wrapped(f"Corrections: {moved.mean():.3f} mm mean, {moved.max():.3f} mm at most.")
-    for title, lines in (("Kept after a refusal:", done.kept), ("Left as they are:", done.listed)):
-        if lines:
-            say(title)
-            say(describe(done.program, list(lines), LISTED_SHOWN))
-
-
-def _print_dry(done: Rewritten) -> None:
-    columns = ("where", "target", "shift mm", "turn mrad", "std mm")
-    print_table(columns, table_rows(done, ROWS_SHOWN), left=(0, 1))
-    hidden = int(done.changed.sum()) - ROWS_SHOWN
-    if hidden > 0:
-        say(f"... and {hidden} more; --report has all")
-    for line in unified_diff(done):
-        say(line)
+        suggest(f"truearm compensate {calibration} {program} -o OUT")
+    else:
+        when = "Run it slowly at first. Whether the arm is as it was calibrated tells:"
+        suggest(f"truearm evaluate {calibration} MEASURED.csv", when=when)
 
 
 def _one_of(option: str, given: str, choices: Any) -> Any:  # noqa: ANN401

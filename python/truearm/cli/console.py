@@ -1,10 +1,13 @@
 """What commands share: printing for people and programs, and errors as exit statuses."""
 
 import json
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
+
+import typer
 
 from truearm.errors import Notice, TruearmError, UsageError
 
@@ -33,10 +36,22 @@ def tell(text: str) -> None:
     sys.stderr.write(f"{text}\n")
 
 
+def suggest(*commands: str, when: str = "Try next:") -> None:
+    """Name the commands that come next at the end of a command's results, one a line."""
+    say(when)
+    for command in commands:
+        say(f"  {command}")
+
+
 def warn(notices: Iterable[Notice]) -> None:
     """Print notices on stderr."""
     for notice in notices:
-        tell(f"Warning: {notice}")
+        tell(f"{_coloured('Warning:', typer.colors.YELLOW)} {notice}")
+
+
+def on_terminal() -> bool:
+    """Whether stderr is a terminal that can be written over."""
+    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def print_json(value: Any) -> None:  # noqa: ANN401
@@ -55,9 +70,9 @@ def print_table(
         title: Line above it.
         left: Columns to set flush left; the others are flush right.
     """
-    from rich.box import SIMPLE_HEAD  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
-    from rich.text import Text  # noqa: PLC0415
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=SIMPLE_HEAD, title=title or None, title_justify="left", pad_edge=False)
     for position, heading in enumerate(columns):
@@ -70,14 +85,14 @@ def print_table(
 def exit_status(error: BaseException) -> int | None:
     """Say an error on stderr; its exit status, or None if it is not one that people can act on."""
     if isinstance(error, TruearmError) or type(error).__module__ == "truearm._core":
-        tell(f"Error: {error}")
+        _tell_error(str(error))
         return USAGE if isinstance(error, UsageError) else FAILED
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else ""
-        tell(f"Error: {place}{error.strerror or error}.")
+        _tell_error(f"{place}{error.strerror or error}.")
         return FAILED
     if isinstance(error, MemoryError):
-        tell("Error: not enough memory for this; use fewer measurements.")
+        _tell_error("not enough memory for this; use fewer measurements.")
         return FAILED
     if isinstance(error, KeyboardInterrupt):
         tell("Interrupted.")
@@ -85,8 +100,19 @@ def exit_status(error: BaseException) -> int | None:
     return None
 
 
+def _tell_error(text: str) -> None:
+    tell(f"{_coloured('Error:', typer.colors.RED)} {text}")
+
+
+def _coloured(word: str, colour: str) -> str:
+    """The word in colour where stderr is a terminal and nobody asked for none (https://no-color.org)."""
+    return (
+        typer.style(word, fg=colour, bold=True) if on_terminal() and not os.environ.get("NO_COLOR") else word
+    )
+
+
 def _console() -> "Console":
-    from rich.console import Console  # noqa: PLC0415
+    from rich.console import Console
 
     console = Console(highlight=False)
     return Console(highlight=False, width=min(console.width, WIDTH))

@@ -1,31 +1,21 @@
 """`truearm evaluate`: errors of a calibration on other measurements."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from truearm.calibration import Calibration
-from truearm.cli.console import print_json, say, warn
-from truearm.cli.error_tables import print_errors
+from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, MeasurementFiles, Use
+from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.evaluation import EvaluationOptions, evaluate
-from truearm.measurements import Measurements
+from truearm.defaults import SEED
 
 
 def command(
-    calibration: Annotated[
-        Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
-    ],
-    measurements: Annotated[
-        list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
-    ],
-    seed: Annotated[int, typer.Option(help="Seed of the draw of frame rows.")] = 7,
-    use: Annotated[
-        str | None,
-        typer.Option(metavar="position|pose|targets", help="What to use.  [default: all that was measured]"),
-    ] = None,
+    calibration: CalibFile,
+    measurements: MeasurementFiles,
+    seed: Annotated[int, typer.Option(help="Seed of the draw of frame rows.")] = SEED,
+    use: Use = None,
     judge_target: Annotated[int, typer.Option(metavar="K", help="Judge at this target.")] = 1,
     frame_rows: Annotated[
         int | None,
@@ -37,18 +27,23 @@ def command(
     keep_frames: Annotated[
         bool, typer.Option("--keep-frames", help="Keep frame and tool, and judge all rows.")
     ] = False,
-    length_unit: Annotated[
-        str | None, typer.Option(metavar="mm|m", help="Unit of columns that name none.")
-    ] = None,
-    angle_unit: Annotated[
-        str | None, typer.Option(metavar="deg|rad", help="Unit of joint columns that name none.")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    length_unit: LengthUnit = None,
+    angle_unit: AngleUnit = None,
+    as_json: AsJson = False,
 ) -> None:
     """Judge a calibration on measurements of another day or another set-up.
 
     Some rows find where the device and the tool are now, for each model alone; the others are judged.
+
+    Examples:
+      truearm evaluate result/calibration.calib another_day.csv
+      truearm evaluate result/calibration.calib other.csv --keep-tool --json
     """
+    from truearm.calibration import Calibration
+    from truearm.cli.error_tables import print_errors
+    from truearm.evaluation import EvaluationOptions, evaluate
+    from truearm.measurements import Measurements
+
     options = EvaluationOptions(
         seed=seed,
         use=use,  # type: ignore[arg-type]
@@ -70,3 +65,4 @@ def command(
     how = "frame and tool kept" if keep_frames else f"{found.n_frame} rows found the frame"
     say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
     print_errors(found.errors, f"{found.n_judged} rows")
+    suggest(f"truearm compensate {calibration} PROGRAM --dry-run")

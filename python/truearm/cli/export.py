@@ -1,23 +1,23 @@
 """`truearm export`: a calibration for other software."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
-from truearm.calibration import Calibration
-from truearm.cli.console import print_json, say, say_wrapped
-from truearm.exporting import Options, export
-from truearm.exporting.field_grid import features_of
+from truearm.cli.arguments import AsJson, CalibFile
+from truearm.cli.console import print_json, say, say_wrapped, suggest
+
+READ_AS_ROBOT: Final = ("dh-toml", "urdf")
 
 
 def command(
-    calibration: Annotated[
-        Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
-    ],
+    calibration: CalibFile,
     to: Annotated[
         str,
-        typer.Option("--to", metavar="FORMAT", help="urdf, ur-yaml, dh-toml, dh-json, dh-csv, field-csv."),
+        typer.Option(
+            "--to", metavar="urdf|ur-yaml|dh-toml|dh-json|dh-csv|field-csv", help="What is written."
+        ),
     ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="The file to write.")],
     urdf: Annotated[
@@ -46,7 +46,7 @@ def command(
         list[str] | None, typer.Option(metavar="NAME=NUMBER", help="field-csv: a feature to sample at.")
     ] = None,
     std: Annotated[bool, typer.Option("--std", help="field-csv: add standard deviations.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a calibration for other software.
 
@@ -54,12 +54,15 @@ def command(
     are compared before it is written. field-csv samples the whole calibration on a grid of readings. What a
     file cannot hold is said in it and here.
 
-      truearm export result/calibration.calib --to urdf -o arm.urdf
-
-      truearm export result/calibration.calib --to urdf --urdf ur10.urdf#tool0 -o ur10_calibrated.urdf
-
-      truearm export result/calibration.calib --to field-csv --grid q2=-90:0:19,q3=0:90:19 -o field.csv
+    Examples:
+      truearm export arm.calib --to dh-toml -o arm.toml
+      truearm export arm.calib --to urdf --urdf ur10.urdf#tool0 -o new.urdf
+      truearm export arm.calib --to field-csv --grid q2=-90:0:19 -o field.csv
     """
+    from truearm.calibration import Calibration
+    from truearm.exporting import Options, export
+    from truearm.exporting.field_grid import features_of
+
     options = Options(
         urdf=urdf,
         kinematics_hash=kinematics_hash,
@@ -80,3 +83,5 @@ def command(
     if made.rows is not None:
         say(f"{made.rows} samples.")
     say(f"Written: {output}")
+    if to in READ_AS_ROBOT:
+        suggest(f"truearm robots {output}")

@@ -5,12 +5,10 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.console import print_json, tell
+from truearm.cli.arguments import AsJson
+from truearm.cli.console import print_json, say_wrapped, suggest
 from truearm.errors import UsageError
 from truearm.files import write_whole
-from truearm.importing import ImportPlan, import_table, unused_columns
-from truearm.reading import quoted_delimiter
-from truearm.rotation_columns import RotationColumns
 
 DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
@@ -44,12 +42,19 @@ def command(
     decimal: Annotated[str | None, typer.Option(help='Decimal mark: "." or ",".')] = None,
     skip_lines: Annotated[int, typer.Option(min=0, help="Lines above the header.")] = 0,
     encoding: Annotated[str, typer.Option(help="Encoding of the text.")] = "utf-8",
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a measurement file in rad and m from a table with other columns, units or marks.
 
     Nothing is guessed: what is not plain CSV in our columns and units has to be stated.
+
+    Examples:
+      truearm import raw.csv -o m.csv --joint-unit deg --length-unit mm
+      truearm import raw.txt -o m.csv --map q1=J1:deg --map x=px:mm
     """
+    from truearm.importing import ImportPlan, import_table, unused_columns
+    from truearm.rotation_columns import RotationColumns
+
     _check_choices(joint_unit, length_unit, decimal)
     if output.exists() and raw.exists() and output.samefile(raw):
         raise UsageError("the output is the table itself", where=str(output), way_out="Name another file")
@@ -71,9 +76,10 @@ def command(
         names = [str(name) for name in frame.columns]
         print_json({"output": str(output), "rows": len(frame), "columns": names, "left_out": left_out})
         return
-    tell(f"{output}: {len(frame)} rows, {', '.join(frame.columns)}.")
+    say_wrapped(f"{output}: {len(frame)} rows, {', '.join(frame.columns)}.")
     if left_out:
-        tell(f"Left out: {', '.join(left_out)}. Keep them with --keep.")
+        say_wrapped(f"Left out: {', '.join(left_out)}. Keep them with --keep.")
+    suggest(f"truearm calibrate ROBOT {output} -o result")
 
 
 def _pairs(options: list[str], option: str) -> dict[str, str]:
@@ -99,6 +105,8 @@ def _delimiter(text: str | None) -> str | None:
         return None
     mark = DELIMITER_WORDS.get(text, text)
     if len(mark) != 1:
+        from truearm.reading import quoted_delimiter
+
         raise UsageError(
             f'"{text}" is no delimiter',
             where="--delimiter",

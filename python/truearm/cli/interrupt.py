@@ -10,6 +10,7 @@ from types import FrameType
 from typing import Final, NoReturn
 
 from truearm.cli.console import INTERRUPTED, tell
+from truearm.cli.display import put_away
 
 GRACE_S: Final = 0.6
 
@@ -39,6 +40,7 @@ def ends_promptly() -> Iterator[None]:
 
 def end_at_once() -> NoReturn:
     """End the process after an interrupt, without taking the interpreter down in order: all is closed."""
+    put_away()
     tell("Interrupted.")
     sys.stdout.flush()
     sys.stderr.flush()
@@ -47,5 +49,6 @@ def end_at_once() -> NoReturn:
 
 def _end_unless(ended: threading.Event) -> None:
     if not ended.wait(GRACE_S):
+        put_away()
         tell("Interrupted.")
         os._exit(INTERRUPTED)

@@ -1,22 +1,29 @@
 """Commands that are imported when they are called, so that help and completion are quick."""
 
+import inspect
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-INTERRUPTED_BY_TYPER = 130
+from truearm.cli.arguments import offer_choices
+
+INTERRUPTED_BY_TYPER: Final = 130
+EXAMPLES: Final = re.compile(r"\n\n(?=Examples:\n)")
+AS_IT_STANDS: Final = "\n\n\b\n"
 
 
 @dataclass(frozen=True)
 class Entry:
     """A command of the table: its name, its module, and one line of help.
 
-    The module has a function `command`, or a table COMMANDS of commands below it.
+    The module has a function `command`, or a table COMMANDS of commands below it, whose help its docstring
+    `HELP` is. The lines below "Examples:" of a help text are shown as they stand.
     """
 
     name: str
@@ -33,19 +40,23 @@ class LazyCommand(TyperCommand):
 
     def make_context(self, info_name: str | None, args: list[str], *more: Any, **extra: Any) -> Any:  # noqa: ANN401
         """The context of the real command."""
-        return self._load().make_context(info_name, args, *more, **extra)
+        return self.load().make_context(info_name, args, *more, **extra)
 
-    def _load(self) -> Any:  # noqa: ANN401
+    def load(self) -> Any:  # noqa: ANN401
+        """The real command."""
         module = import_module(self._entry.module)
         if hasattr(module, "COMMANDS"):
-            return group(module.COMMANDS, _summarised(self._entry.summary), name=self._entry.name)
+            return group(module.COMMANDS, _nothing, help_text=module.HELP, name=self._entry.name)
+        offer_choices(module.command)
         application = typer.Typer(add_completion=False, rich_markup_mode=None)
-        application.command(self._entry.name)(module.command)
+        application.command(self._entry.name, help=_shown(module.command.__doc__))(module.command)
         return typer.main.get_command(application)
 
 
-def group(entries: Sequence[Entry], callback: Callable[..., None], *, name: str | None = None) -> Any:  # noqa: ANN401
-    """A command that is a table of commands; `callback` has its own options and its help."""
+def group(
+    entries: Sequence[Entry], callback: Callable[..., None], *, help_text: str, name: str | None = None
+) -> Any:  # noqa: ANN401
+    """A command that is a table of commands; `callback` has its own options."""
 
     class Group(TyperGroup):
         def __init__(self, **attributes: Any) -> None:
@@ -56,15 +67,19 @@ def group(entries: Sequence[Entry], callback: Callable[..., None], *, name: str 
             return list(self.commands)
 
     application = typer.Typer(
-        name=name, cls=Group, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+        name=name,
+        cls=Group,
+        add_completion=name is None,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
     )
-    application.callback(no_args_is_help=True)(callback)
+    application.callback(no_args_is_help=True, help=_shown(help_text))(callback)
     return typer.main.get_command(application)
 
 
-def build(entries: Sequence[Entry]) -> Callable[[list[str]], int]:
+def build(entries: Sequence[Entry], help_text: str) -> Callable[[list[str]], int]:
     """The program over a table of commands: takes the words behind its name, returns the exit status."""
-    program = group(entries, _program)
+    program = group(entries, _program, help_text=help_text)
 
     def run(arguments: list[str]) -> int:
         try:
@@ -78,12 +93,13 @@ def build(entries: Sequence[Entry]) -> Callable[[list[str]], int]:
     return run
 
 
-def _summarised(summary: str) -> Callable[[], None]:
-    def described() -> None:
-        return None
+def _shown(text: str | None) -> str:
+    """Help as it is shown: paragraphs are filled, lines of examples stay."""
+    return EXAMPLES.sub(AS_IT_STANDS, inspect.cleandoc(text or ""))
 
-    described.__doc__ = summary
-    return described
+
+def _nothing() -> None:
+    return None
 
 
 def _print_version(asked: bool) -> None:
@@ -98,4 +114,4 @@ def _program(
         typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit."),
     ] = False,
 ) -> None:
-    """Robot arm calibration with Denavit-Hartenberg parameters that vary over the workspace."""
+    return None

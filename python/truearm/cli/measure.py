@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.cli.console import print_json, say, say_wrapped, tell
+from truearm.cli.arguments import AsJson, CellFile
+from truearm.cli.console import print_json, say, say_wrapped, suggest, tell
 from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    cell: Annotated[Path, typer.Argument(metavar="CELL", help="A cell file: arm, devices and their ports.")],
+    cell: CellFile,
     poses: Annotated[
         Path, typer.Argument(metavar="POSES", help="CSV file of joint readings to measure, in their order.")
     ],
@@ -25,7 +26,7 @@ def command(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would be done; nothing moves.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Measure poses with the robot and the sensor of a cell.
 
@@ -33,20 +34,24 @@ def command(
     before the next motion starts: after Ctrl-C, a fault or a loss of power the same command goes on where it
     was. Ctrl-C stops the robot, retracts the sensor and ends within 2 s.
 
-    Example: truearm measure cell.toml poses.csv -o session.db
+    Examples:
+      truearm measure cell.toml poses.csv --dry-run
+      truearm measure cell.toml poses.csv -o session.db
     """
-    from truearm.cell.cell_file import Cell  # noqa: PLC0415
-    from truearm.cell.measuring import Process  # noqa: PLC0415
-    from truearm.cell.opening import open_session  # noqa: PLC0415
-    from truearm.cell.poses_file import Poses  # noqa: PLC0415
-    from truearm.cell.rehearsal import rehearse  # noqa: PLC0415
-    from truearm.cell.running import run  # noqa: PLC0415
-    from truearm.cell.summary import summary_of  # noqa: PLC0415
+    from truearm.cell.cell_file import Cell
+    from truearm.cell.measuring import Process
+    from truearm.cell.opening import open_session
+    from truearm.cell.poses_file import Poses
+    from truearm.cell.rehearsal import rehearse
+    from truearm.cell.running import run
+    from truearm.cell.summary import summary_of
 
     known = Cell.load(cell)
     wanted = Poses.read_csv(poses, known.arm)
     if dry_run:
         _print_rehearsal(rehearse(known, wanted), as_json=as_json)
+        if not as_json:
+            suggest(f"truearm measure {cell} {poses} -o {output}")
         return
     try:
         with open_session(output, known, wanted) as session:
@@ -60,7 +65,7 @@ def command(
         print_json({"end": end, "session": str(output), **found})
         return
     say_wrapped(f"{end[0].upper()}{end[1:]}: {found['measured']} of {found['poses']} poses measured.")
-    say(f"Try next: truearm session export {output} -o measurements.csv")
+    suggest(f"truearm session export {output} -o measurements.csv")
 
 
 def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from truearm.cli.console import print_json, print_table, say, say_wrapped
+from truearm.cli.arguments import AsJson, RobotName
+from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
+from truearm.cli.progress import told_stages
 from truearm.errors import UsageError
 
 if TYPE_CHECKING:
@@ -17,9 +19,7 @@ ORDERS: Final = ("short", "paper")
 
 
 def command(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A library name, a TOML file or a URDF (FILE.urdf#TIP).")
-    ],
+    robot: RobotName,
     count: Annotated[int, typer.Option("-n", "--count", metavar="N", help="Poses to fit to.")] = 60,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="CSV", help="Where the poses go.")] = Path(
         "poses.csv"
@@ -38,7 +38,7 @@ def command(
     picture: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the poses, as PNG or SVG.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Choose the poses that determine an arm's parameters best, from candidates that can be measured.
 
@@ -46,13 +46,15 @@ def command(
     from lower and higher joint readings in turn, in an order from low to high. The expected accuracy for
     several numbers of poses helps to choose N.
 
-    Example: truearm plan rv-m2 -n 60 --cell cell.toml -o poses.csv
+    Examples:
+      truearm plan ur10 -n 100 -o poses.csv
+      truearm plan rv-m2 -n 60 --cell cell.toml -o poses.csv
     """
-    from truearm.cell.cell_file import Cell  # noqa: PLC0415
-    from truearm.cell.plan import PlanOptions, plan_poses  # noqa: PLC0415
-    from truearm.cell.plan_files import draw, write  # noqa: PLC0415
-    from truearm.planning.choosing import CRITERIA  # noqa: PLC0415
-    from truearm.robot import Robot  # noqa: PLC0415
+    from truearm.cell.cell_file import Cell
+    from truearm.cell.plan import PlanOptions, plan_poses
+    from truearm.cell.plan_files import draw, write
+    from truearm.planning.choosing import CRITERIA
+    from truearm.robot import Robot
 
     if criterion not in CRITERIA or order not in ORDERS:
         wrong, known = (criterion, CRITERIA) if criterion not in CRITERIA else (order, ORDERS)
@@ -62,12 +64,16 @@ def command(
     known_cell = None if cell is None else Cell.load(cell)
     arm = Robot.load(robot) if known_cell is None else known_cell.arm
     options = PlanOptions(count, criterion, seed, order, sigma_mm)  # type: ignore[arg-type]
-    with ends_promptly():
+    with ends_promptly(), told_stages()("choosing poses"):
         plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
     write(plan, output)
     if picture is not None:
         draw(plan, picture)
     _print(plan, output, order, as_json=as_json)
+    if not as_json and cell is not None:
+        suggest(f"truearm measure {cell} {output} --dry-run")
+    elif not as_json:
+        suggest(f"truearm calibrate {robot} MEASUREMENTS.csv -o result", when="Measure them; then:")
 
 
 def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
@@ -90,7 +96,8 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
         f"{purposes['repeat']} once more: {output}"
     )
     before, after = plan.choice.before, plan.choice.after
-    say(f"Condition number {before['kappa']:.1f} at random, {after['kappa']:.1f} chosen (columns at 300 mm).")
+    kappa = f"{before['kappa']:.1f} at random, {after['kappa']:.1f} chosen"
+    say_wrapped(f"Condition number {kappa} (columns at 300 mm).")
     paper, short = plan.seconds["paper"], plan.seconds["short"]
     say(f"Motion: {paper:.0f} s in the paper's order, {short:.0f} s in the shorter one.")
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]

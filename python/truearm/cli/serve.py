@@ -5,19 +5,18 @@ import ipaddress
 import signal
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.calibration import Calibration
+from truearm.cli.arguments import CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm
 from truearm.cli.console import print_json, say, tell
-from truearm.compensation import Compensator
+from truearm.defaults import DEADLINE_S, HOLD_S, LARGEST_DEG, LARGEST_MM, LARGEST_STD_MM, RAMP_S
 from truearm.errors import InputError, UsageError
 from truearm.files import read_text
-from truearm.limits import Limits
-from truearm.serving import Server
-from truearm.streaming import CorrectionStream, StreamOptions
-from truearm.units import MM_PER_METRE
+
+if TYPE_CHECKING:
+    from truearm.serving import Server
 
 LOOPBACK = "127.0.0.1"
 DEFAULT_PORT = 7227
@@ -25,9 +24,7 @@ SHORTEST_TOKEN = 16
 
 
 def command(
-    calibration: Annotated[
-        Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
-    ],
+    calibration: CalibFile,
     port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port; 0 takes a free one.")] = DEFAULT_PORT,
     address: Annotated[
         str, typer.Option(help="Address to listen on; another than loopback needs a token.")
@@ -39,28 +36,31 @@ def command(
         str | None,
         typer.Option(metavar="X,Y,Z", help="Tool point in the flange frame.  [default: the robot file's]"),
     ] = None,
-    feature: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Value of a feature that the calibration needs."),
-    ] = None,
-    largest_mm: Annotated[float, typer.Option(help="Largest shift of the tool.")] = 5.0,
-    largest_deg: Annotated[float, typer.Option(help="Largest turn of the tool.")] = 1.0,
-    largest_std_mm: Annotated[
-        float, typer.Option(help="Largest standard deviation of the tool's position.")
-    ] = 1.0,
-    ramp_s: Annotated[float, typer.Option(help="Time of the ramp up and down.")] = 1.0,
+    feature: Feature = None,
+    largest_mm: LargestMm = LARGEST_MM,
+    largest_deg: LargestDeg = LARGEST_DEG,
+    largest_std_mm: LargestStdMm = LARGEST_STD_MM,
+    ramp_s: Annotated[float, typer.Option(help="Time of the ramp up and down.")] = RAMP_S,
     hold_s: Annotated[
         float, typer.Option(help="How long a correction is held for want of a good one.")
-    ] = 0.1,
-    deadline_s: Annotated[float, typer.Option(help="Longest time between two set-points.")] = 0.05,
+    ] = HOLD_S,
+    deadline_s: Annotated[float, typer.Option(help="Longest time between two set-points.")] = DEADLINE_S,
     as_json: Annotated[bool, typer.Option("--json", help="Say where it listens in JSON.")] = False,
 ) -> None:
     """Correct the set-points of controllers that cannot link the C library.
 
     Newline-delimited JSON over TCP; each connection is one robot's stream. Ctrl-C ends it.
 
-    Example: truearm serve arm/calibration.calib --port 7227
+    Examples:
+      truearm serve controller.calib
+      truearm serve controller.calib --port 0 --largest-mm 3 --json
     """
+    from truearm.calibration import Calibration
+    from truearm.compensation import Compensator
+    from truearm.limits import Limits
+    from truearm.serving import Server
+    from truearm.streaming import CorrectionStream, StreamOptions
+
     token = _token(address, token_file)
     known = Calibration.load(calibration)
     limits = Limits(largest_mm=largest_mm, largest_deg=largest_deg, largest_std_mm=largest_std_mm)
@@ -81,7 +81,7 @@ def command(
     asyncio.run(_serve(server, address, port, listening))
 
 
-async def _serve(server: Server, address: str, port: int, listening: Callable[[str, int], None]) -> None:
+async def _serve(server: "Server", address: str, port: int, listening: Callable[[str, int], None]) -> None:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
@@ -124,6 +124,8 @@ def _is_loopback(address: str) -> bool:
 def _tool(text: str | None) -> list[float] | None:
     if text is None:
         return None
+    from truearm.units import MM_PER_METRE
+
     try:
         point = [float(part) / MM_PER_METRE for part in text.split(",")]
     except ValueError:

@@ -5,24 +5,26 @@ from typing import Annotated
 
 import typer
 
-from truearm.cli.console import print_json, say
+from truearm.cli.arguments import AsJson, SessionFile
+from truearm.cli.console import print_json, say, suggest
 
 
 def command(
-    session: Annotated[Path, typer.Argument(metavar="SESSION", help="A file that truearm measure wrote.")],
+    session: SessionFile,
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="CSV", help="Where the measurements go.")
     ] = Path("measurements.csv"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write the accepted measurements of a session, one row a pose; it may be under way.
 
-    Example: truearm session export session.db -o measurements.csv
+    Examples:
+      truearm session export session.db -o measurements.csv
     """
-    from truearm.cell.accepted import accepted_table  # noqa: PLC0415
-    from truearm.cell.session import Session  # noqa: PLC0415
-    from truearm.errors import WorkError  # noqa: PLC0415
-    from truearm.files import write_whole  # noqa: PLC0415
+    from truearm.cell.accepted import accepted_table
+    from truearm.cell.session import Session
+    from truearm.errors import WorkError
+    from truearm.files import write_whole
 
     with Session(session, writing=False) as known:
         table, arm = accepted_table(known), str(known.meta("arm")["name"]).lower()
@@ -33,4 +35,4 @@ def command(
         print_json({"measurements": str(output), "rows": len(table)})
         return
     say(f"{len(table)} measurements: {output}")
-    say(f"Try next: truearm calibrate {arm} {output} -o calibrated")
+    suggest(f"truearm calibrate {arm} {output} -o result")

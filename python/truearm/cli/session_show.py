@@ -1,11 +1,11 @@
 """`truearm session show`: what a session file holds."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from truearm.cli.console import print_json, print_table, say, say_wrapped
+from truearm.cli.arguments import AsJson, SessionFile
+from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.errors import UsageError
 
 if TYPE_CHECKING:
@@ -15,17 +15,19 @@ MOST_SHOWN: Final = 20
 
 
 def command(
-    session: Annotated[Path, typer.Argument(metavar="SESSION", help="A file that truearm measure wrote.")],
+    session: SessionFile,
     pose: Annotated[
         int | None, typer.Option(metavar="K", help="Show all readings of pose K, with their history.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Show what a session holds; it may be under way.
 
-    Example: truearm session show session.db --pose 17
+    Examples:
+      truearm session show session.db
+      truearm session show session.db --pose 17
     """
-    from truearm.cell.session import Session  # noqa: PLC0415
+    from truearm.cell.session import Session
 
     with Session(session, writing=False) as known:
         if pose is not None:
@@ -35,7 +37,7 @@ def command(
 
 
 def _show(session: "Session", *, as_json: bool) -> None:
-    from truearm.cell.summary import summary_of  # noqa: PLC0415
+    from truearm.cell.summary import summary_of
 
     found = summary_of(session)
     if as_json:
@@ -60,6 +62,8 @@ def _show(session: "Session", *, as_json: bool) -> None:
     if found["events"]:
         counts = ", ".join(f"{count} {kind}" for kind, count in found["events"].items())
         say_wrapped(f"Events: {counts}. The last: {found['last_event']}")
+    if found["measured"]:
+        suggest(f"truearm session export {session.path} -o measurements.csv")
 
 
 def _stretch(row: dict[str, Any]) -> list[str]:
@@ -89,7 +93,7 @@ def _show_pose(session: "Session", pose: int, *, as_json: bool) -> None:
 
 
 def _reading(row: dict[str, Any]) -> list[str]:
-    import json  # noqa: PLC0415
+    import json
 
     point = ["" if row[key] is None else f"{1e3 * row[key]:.3f}" for key in ("x_m", "y_m", "z_m")]
     if not row["valid"]:

@@ -4,6 +4,11 @@ from typing import Final
 
 from truearm.cli.lazy import Entry
 
+HELP: Final = """Simulations and comparisons that anybody can run again.
+
+Examples:
+  truearm study paper -o study --seeds 1 --figure 6
+"""
 COMMANDS: Final = (
     Entry("paper", "truearm.cli.study_paper", "The paper's simulations, reproduced and measured."),
 )

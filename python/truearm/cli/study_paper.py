@@ -1,13 +1,13 @@
 """`truearm study paper`: every simulation of the paper's section 6, over seeds."""
 
 import json
-from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
+from truearm.cli.arguments import AsJson, OutputDirectory
 from truearm.cli.calibrate import check_directory
-from truearm.cli.console import print_json, print_table, say
+from truearm.cli.console import print_json, print_table, say, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.errors import UsageError
@@ -19,13 +19,13 @@ PAGE_NAME: Final = "paper.md"
 
 
 def command(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")],
+    output: OutputDirectory,
     figure: Annotated[
         list[str] | None,
         typer.Option(metavar="|".join(FIGURES), help="One of them; may be repeated.  [default: all]"),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="How many virtual arms.")] = 20,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Reproduce the paper's simulations on its virtual arm and say where they agree.
 
@@ -33,9 +33,11 @@ def command(
     quantiles over the seeds), DIR/paper.md (what the paper states beside what comes out, and the readings
     chosen), and the panels of the first seed as PNG and SVG.
 
-    Twenty seeds take less than half an hour on two cores, one takes a minute or two:
+    Twenty seeds take less than half an hour on two cores, one takes a minute or two.
 
-        truearm study paper -o study --seeds 1 --figure 6
+    Examples:
+      truearm study paper -o study --seeds 1 --figure 6
+      truearm study paper -o study
     """
     chosen = tuple(figure) if figure else FIGURES
     for name in chosen:
@@ -44,7 +46,7 @@ def command(
                 f'there is no figure "{name}"', where="--figure", rule=f"Of {', '.join(FIGURES)}"
             )
     check_directory(output)
-    from truearm.studies.paper_results import conduct_study, save_pictures  # noqa: PLC0415
+    from truearm.studies.paper_results import conduct_study, save_pictures
 
     with ends_promptly():
         study = conduct_study(range(seeds), chosen, told_stages())
@@ -62,6 +64,8 @@ def command(
     print_table(("claim, median over the seeds", "", "to reach", ""), rows, left=(0, 2))
     for path in (output / PAGE_NAME, output / JSON_NAME, *files):
         say(f"Written: {path}")
+    if figure:
+        suggest(f"truearm study paper -o {output}", when="All figures over twenty arms:")
 
 
 def _word(reached: bool | None) -> str:

@@ -45,9 +45,10 @@ def beta_is_lost(robot: RobotData) -> list[str]:
     rows = np.flatnonzero(robot.table[:, BETA]) + 1
     if not len(rows):
         return []
+    verb = "has" if len(rows) == 1 else "have"
     largest = np.degrees(np.abs(robot.table[:, BETA]).max())
     return [
-        f"{list_rows(rows.tolist(), 'link').capitalize()} of the table have beta, Hayati's turn about y "
+        f"{list_rows(rows.tolist(), 'link').capitalize()} of the table {verb} beta, Hayati's turn about y "
         f"between nearly parallel axes, up to {largest:.4f} deg. Software with four parameters a link has no "
         "place for it: it must not be left out there"
     ]

@@ -1,0 +1,81 @@
+"""Arguments and options that several commands have, and what a shell offers for them."""
+
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated, Any, Final, TypeAlias, get_type_hints
+
+import typer
+from typer.models import ParameterInfo
+
+from truearm.library import library_names
+
+CHOICE: Final = re.compile(r"[a-z0-9][a-z0-9_-]*")
+ROBOT_HELP: Final = "A library name, a TOML file or a URDF (FILE.urdf#TIP)."
+
+
+def robots_like(incomplete: str) -> list[str]:
+    """Names of the library that begin so; files are offered by the shell where there is none."""
+    return [name for name in library_names() if name.startswith(incomplete.lower())]
+
+
+def words_like(words: Iterable[str]) -> Callable[[str], list[str]]:
+    """What a shell offers for a parameter that takes one of `words`."""
+    known = list(words)
+    return lambda incomplete: [word for word in known if word.startswith(incomplete)]
+
+
+RobotName: TypeAlias = Annotated[
+    str, typer.Argument(metavar="ROBOT", help=ROBOT_HELP, autocompletion=robots_like)
+]
+CalibFile: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="CALIB", help="A file that truearm calibrate wrote.")
+]
+MeasurementFiles: TypeAlias = Annotated[
+    list[Path], typer.Argument(metavar="MEASUREMENTS...", help="CSV files, each a set-up of its own.")
+]
+CellFile: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="CELL", help="A cell file: arm, devices and their ports.")
+]
+SessionFile: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="SESSION", help="A file that truearm measure wrote.")
+]
+OutputDirectory: TypeAlias = Annotated[
+    Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")
+]
+AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")]
+LengthUnit: TypeAlias = Annotated[
+    str | None, typer.Option(metavar="mm|m", help="Unit of columns that name none.")
+]
+AngleUnit: TypeAlias = Annotated[
+    str | None, typer.Option(metavar="deg|rad", help="Unit of joint columns that name none.")
+]
+Use: TypeAlias = Annotated[
+    str | None,
+    typer.Option(metavar="position|pose|targets", help="What to use.  [default: all that was measured]"),
+]
+
+Feature: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME=VALUE", help="Value of a feature that the calibration needs; repeat."),
+]
+LargestMm: TypeAlias = Annotated[float, typer.Option(help="Largest shift of the tool.")]
+LargestDeg: TypeAlias = Annotated[float, typer.Option(help="Largest turn of the tool.")]
+LargestStdMm: TypeAlias = Annotated[
+    float, typer.Option(help="Largest standard deviation of the tool's position.")
+]
+
+
+def offer_choices(function: Callable[..., Any]) -> None:
+    """Let a shell offer the words of metavars such as "mm|m" for the parameters of a command."""
+    for hint in get_type_hints(function, include_extras=True).values():
+        for stated in getattr(hint, "__metadata__", ()):
+            if isinstance(stated, ParameterInfo) and stated.autocompletion is None:
+                words = choices_of(str(stated.metavar or ""))
+                stated.autocompletion = words_like(words) if words else None
+
+
+def choices_of(metavar: str) -> list[str]:
+    """The words that a metavar lists; none where it stands for something else."""
+    parts = metavar.split("|")
+    return [part for part in parts if CHOICE.fullmatch(part)] if len(parts) > 1 else []
