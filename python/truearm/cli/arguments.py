@@ -44,6 +44,14 @@ OutputDirectory: TypeAlias = Annotated[
     Path, typer.Option("-o", "--output", metavar="DIR", help="Where the results go.")
 ]
 AsJson: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON on stdout and nothing else.")]
+Scheduler: TypeAlias = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Work on the Dask cluster with this scheduler: tcp://HOST:8786."),
+]
+Workers: TypeAlias = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=1, help="Local processes at the most.  [default: one a processor]"),
+]
 LengthUnit: TypeAlias = Annotated[
     str | None, typer.Option(metavar="mm|m", help="Unit of columns that name none.")
 ]

@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 import typer
 
-from truearm.cli.arguments import AsJson, OutputDirectory
+from truearm.cli.arguments import AsJson, OutputDirectory, Scheduler, Workers
 from truearm.cli.calibrate import check_directory
 from truearm.cli.console import print_json, print_table, say, suggest
 from truearm.cli.interrupt import ends_promptly
@@ -25,6 +25,8 @@ def command(
         typer.Option(metavar="|".join(FIGURES), help="One of them; may be repeated.  [default: all]"),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="How many virtual arms.")] = 20,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
     """Reproduce the paper's simulations on its virtual arm and say where they agree.
@@ -38,6 +40,7 @@ def command(
     Examples:
       truearm study paper -o study --seeds 1 --figure 6
       truearm study paper -o study
+      truearm study paper -o study --scheduler tcp://10.0.0.5:8786
     """
     chosen = tuple(figure) if figure else FIGURES
     for name in chosen:
@@ -49,7 +52,9 @@ def command(
     from truearm.studies.paper_results import conduct_study, save_pictures
 
     with ends_promptly():
-        study = conduct_study(range(seeds), chosen, told_stages())
+        study = conduct_study(
+            range(seeds), chosen, told_stages(), scheduler=scheduler, workers=workers
+        )
     output.mkdir(parents=True, exist_ok=True)
     files = save_pictures(study, output)
     write_whole(output / JSON_NAME, json.dumps(study.result, indent=1, allow_nan=False) + "\n")

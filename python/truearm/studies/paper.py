@@ -1,7 +1,7 @@
 """The paper's simulations, section 6: each figure for one seed, and all of them over seeds."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final
@@ -36,6 +36,7 @@ from truearm.studies.setting import (
     path_of,
     straight,
 )
+from truearm.workers import check_workers, run_tasks
 
 Floats = NDArray[np.float64]
 Stages = Callable[[str], AbstractContextManager[Any]]
@@ -103,31 +104,55 @@ class Seed:
 
 
 def run(
-    seeds: Sequence[int], figures: Sequence[str], stages: Stages = no_stages
+    seeds: Sequence[int],
+    figures: Sequence[str],
+    stages: Stages = no_stages,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
 ) -> tuple[Result, dict[str, Drawn]]:
     """Results of figures over seeds, for paper.json, and what is drawn of the first seed.
+
+    The first seed is done here, for the others use what it finds; they are done over local processes or a
+    cluster.
 
     Args:
         seeds: Seeds of the arms.
         figures: Of FIGURES.
         stages: Called with the name of each stage; gives a context manager that surrounds it.
+        scheduler: Address of a Dask scheduler, as in run_tasks.
+        workers: Local processes at the most, as in run_tasks.
 
     Raises:
         UsageError: If there is no such figure or no seed.
+        Exception: What a seed raised.
     """
     unknown = [name for name in figures if name not in FIGURES]
     if unknown or not seeds:
         what = f'there is no figure "{unknown[0]}"' if unknown else "no seed is given"
         raise UsageError(what, rule=f"Figures are {', '.join(FIGURES)}; at least one seed is needed")
+    check_workers(scheduler, workers)
     kept: dict[str, Kept] = {}
-    found: list[Result] = []
-    drawn: dict[str, Drawn] = {}
-    for position, number in enumerate(seeds):
-        with stages(f"seed {position + 1} of {len(seeds)}"):
-            seed = Seed(number, kept, stages)
-            found.append({key: part for name in figures for key, part in RUNS[name](seed).items()})
-            drawn = drawn or seed.drawn
-    return {"seeds": list(seeds), "each_seed": found, **over_seeds(found)}, drawn
+    with stages(f"seed 1 of {len(seeds)}"):
+        first = Seed(seeds[0], kept, stages)
+        found = {0: _each(first, figures)}
+    others = [(number, kept, tuple(figures)) for number in seeds[1:]]
+    with closing(run_tasks(_elsewhere, others, scheduler=scheduler, workers=workers)) as finished:
+        for position in range(1, len(seeds)):
+            with stages(f"seed {position + 1} of {len(seeds)}"):
+                done = next(finished)
+            found[1 + done.index] = done.result()
+    each = [found[position] for position in range(len(seeds))]
+    return {"seeds": list(seeds), "each_seed": each, **over_seeds(each)}, first.drawn
+
+
+def _each(seed: Seed, figures: Sequence[str]) -> Result:
+    return {key: part for name in figures for key, part in RUNS[name](seed).items()}
+
+
+def _elsewhere(item: tuple[int, dict[str, Kept], tuple[str, ...]]) -> Result:
+    number, kept, figures = item
+    return _each(Seed(number, kept, no_stages), figures)
 
 
 def figure6(seed: Seed) -> Result:

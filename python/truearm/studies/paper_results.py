@@ -35,13 +35,19 @@ class PaperStudy:
         return page(self.result)
 
 
-def conduct_study(seeds: Sequence[int], figures: Sequence[str], stages: Stages = no_stages) -> PaperStudy:
+def conduct_study(
+    seeds: Sequence[int],
+    figures: Sequence[str],
+    stages: Stages = no_stages,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> PaperStudy:
     """Run figures over seeds, and hold them against the paper's statements and the figures to reach.
 
-    Raises:
-        UsageError: If there is no such figure or no seed.
+    Arguments and errors are those of :func:`truearm.studies.paper.run`.
     """
-    result, drawn = run(seeds, figures, stages)
+    result, drawn = run(seeds, figures, stages, scheduler=scheduler, workers=workers)
     each = result.pop("each_seed")
     result |= {"claims": judged(each), "statements": checked(result)}
     return PaperStudy(result, drawn)
