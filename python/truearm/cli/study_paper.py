@@ -52,9 +52,7 @@ def command(
     from truearm.studies.paper_results import conduct_study, save_pictures
 
     with ends_promptly():
-        study = conduct_study(
-            range(seeds), chosen, told_stages(), scheduler=scheduler, workers=workers
-        )
+        study = conduct_study(range(seeds), chosen, told_stages(), scheduler=scheduler, workers=workers)
     output.mkdir(parents=True, exist_ok=True)
     files = save_pictures(study, output)
     write_whole(output / JSON_NAME, json.dumps(study.result, indent=1, allow_nan=False) + "\n")

@@ -68,7 +68,7 @@ def check_scheduler(scheduler: str) -> None:
             aside.submit(asyncio.run, _greet(scheduler)).result()
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
-            f"no Dask scheduler answers: {error or f'nothing within {CONNECT_S:g} s'}",
+            f"no Dask scheduler answers: {str(error) or f'nothing within {CONNECT_S:g} s'}",
             where=scheduler,
             rule="An address such as tcp://10.0.0.5:8786 is needed",
             way_out="Start one with: dask scheduler; or leave it out to use this machine",
