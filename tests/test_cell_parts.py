@@ -141,11 +141,12 @@ def test_the_gap_between_link_and_column_is_that_of_the_nearest_points():
     sizes = ClearanceSection(link_radius_mm=10.0, column_radius_mm=10.0, column_mm=400.0)
     clearance = Clearance(arm, arm.tool, panel, sizes)
     stretched = np.array([[0.0, 0.0, -1e-9, 0.0, 0.0]])
-    links = np.concatenate([arm.base[None, :3, 3], clearance._links(stretched)[0]])
+    places = clearance.places(stretched, np.eye(4))
+    links = places.links[0]
     outermost = links[np.argmax(np.linalg.norm(links[:, :2], axis=1))]
     middle = panel.axes[:, :2] @ (0.5 * panel.area_m)
     above = outermost + np.array([0.0, 0.2, 0.1])
-    gap = clearance.gap(stretched, np.eye(4), (above - middle)[None])
+    gap = clearance.gaps(places, (above - middle)[None])[0, 0]
     assert gap == pytest.approx(0.2 - 0.02, abs=2e-3)
-    through = clearance.gap(stretched, np.eye(4), (outermost + np.array([0.0, 0.0, 0.1]) - middle)[None])
-    assert through < 0.0
+    through = clearance.gaps(places, (outermost + np.array([0.0, 0.0, 0.1]) - middle)[None])
+    assert through[0, 0] < 0.0

@@ -21,6 +21,13 @@ FROM (SELECT * FROM outcomes JOIN steps USING (step)
 JOIN readings r USING (step)
 WHERE r.valid ORDER BY o.step, r.attempt
 """
+LAST_CHECK = """
+SELECT f.step, f.attempts, c.step, c.attempts
+FROM (SELECT * FROM outcomes JOIN steps USING (step)
+      WHERE outcome = 'measured' AND kind = 'check' ORDER BY step DESC LIMIT 1) c
+JOIN (SELECT * FROM outcomes JOIN steps USING (step)
+      WHERE outcome = 'measured' AND kind = 'registration') f USING (pose)
+"""
 COLUMNS = (
     "step", "pose", "purpose", "approach", "attempts", "time_s", "attempt", "joints", "x", "y", "z",
     "qw", "qx", "qy", "qz", "sigma", "temperature_c", "features",
@@ -51,6 +58,21 @@ def accepted_table(session: Session, kind: str = "pose", *, most: int | None = N
 def measurements_of(session: Session, *, most: int | None = None, where: str = "session") -> Measurements:
     """The accepted poses as Measurements of one set-up."""
     return Measurements.from_dataframe(_kept(accepted_table(session, most=most)), name=where)
+
+
+def points_of_last_check(session: Session) -> tuple[Floats, Floats] | None:
+    """The point (3,) of the pose checked last, as first measured for the frame, and as checked, m."""
+    rows = session.rows(LAST_CHECK)
+    if not rows:
+        return None
+    first, check = (_mean_point(session, step, attempts) for step, attempts in (rows[0][:2], rows[0][2:]))
+    return first, check
+
+
+def _mean_point(session: Session, step: int, attempts: str) -> Floats:
+    accepted = json.loads(attempts)
+    points = [each.point for each in session.readings_of(step) if each.attempt in accepted]
+    return np.asarray(np.mean([point for point in points if point is not None], axis=0))
 
 
 def points_and_joints(session: Session, kind: str) -> tuple[list[int], Floats, Floats]:

@@ -1,5 +1,6 @@
 """The cell file: which arm, which devices at which ports, and how to measure."""
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -181,12 +182,16 @@ class Cell:
         """Nominal points of the target (n, 3) in the base frame, m, of readings (n, N)."""
         return np.asarray((self._flange(readings) @ self.flange_from_target)[:, :3, 3])
 
-    def pointing_in_base(self, readings: Floats) -> Floats:
-        """Nominal direction of the tool (3,) in the base frame, from flange to target, of readings (N,)."""
-        lever = self.flange_from_target[:3, 3]
-        length = float(np.linalg.norm(lever))
+    def target_in_base(self, readings: Floats) -> tuple[Floats, Floats]:
+        """Nominal target (3,) in the base frame, m, and direction of the tool there (3,), of readings (N,).
+
+        The direction is that from flange to target, or the flange's z where they coincide.
+        """
+        base_from_flange = self._flange(readings[None])[0]
+        turn, lever = base_from_flange[:3, :3], self.flange_from_target[:3, 3]
+        length = math.hypot(*lever)
         along = lever / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-        return np.asarray(self._flange(readings[None])[0, :3, :3] @ along)
+        return base_from_flange[:3, 3] + turn @ lever, turn @ along
 
     def _flange(self, readings: Floats) -> Floats:
         return self.arm.flange_chain.pose(self.arm.joints_from_readings(readings))

@@ -59,13 +59,15 @@ class SerialChannel:
             )
         except SERIAL_ERRORS as error:
             raise _unavailable(device, port, error, limit_s) from None
+        self._limit_s = limit_s
 
     def read(self, *, wait: bool = True) -> bytes:
         """See Channel."""
         try:
-            if not select.select([self._port], [], [], SLICE_S if wait else 0.0)[0]:
+            number = self._port.fileno()
+            if not select.select([number], [], [], SLICE_S if wait else 0.0)[0]:
                 return b""
-            data = os.read(self._port.fileno(), CHUNK)
+            data = os.read(number, CHUNK)
         except (*SERIAL_ERRORS, ValueError) as error:  # ValueError: closed in mid-wait
             raise ConnectionEndedError(str(error)) from None
         if not data:
@@ -73,10 +75,14 @@ class SerialChannel:
         return data
 
     def write(self, data: bytes) -> None:
-        """See Channel."""
+        """See Channel. What the port does not take within its limit ends the connection."""
         try:
-            self._port.write(data)
-        except SERIAL_ERRORS as error:
+            number = self._port.fileno()
+            while len(data) > (sent := _sent(number, data)):
+                data = data[sent:]
+                if not select.select([], [number], [], self._limit_s)[1]:
+                    raise ConnectionEndedError(f"nothing could be sent within {self._limit_s:g} s")
+        except (*SERIAL_ERRORS, ValueError) as error:
             raise ConnectionEndedError(str(error)) from None
 
     def close(self) -> None:
@@ -149,6 +155,14 @@ def open_channel(
         host, _, port = address.removeprefix("tcp://").rpartition(":")
         return TcpChannel(device, host, int(port), limit_s)
     return SerialChannel(device, address, baud, limit_s, frame=frame)
+
+
+def _sent(number: int, data: bytes) -> int:
+    """How much of `data` a descriptor that does not block took at once."""
+    try:
+        return os.write(number, data)
+    except BlockingIOError:
+        return 0
 
 
 def _unavailable(device: str, port: str, error: Exception, limit_s: float) -> PortUnavailableError:

@@ -1,5 +1,6 @@
 """How far the arm's links are from the column that carries the panel, under nominal kinematics."""
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from truearm._core import Chain
 from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.panel import Panel
+from truearm.parameters import A, D
 from truearm.robot import Robot
 from truearm.units import to_si
 
@@ -16,6 +18,19 @@ Floats = NDArray[np.float64]
 SHORTEST_LINK_M: Final = 1e-6
 # How far the plate reaches beyond the effective area.
 RIM_M: Final = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where an arm's links and tool are at places of the arm, in the table's frame, m.
+
+    Attributes:
+        links: Ends of the links that have a length (n, K + 1, 3), the base first.
+        tool: Middle and end of the tool (n, 2, 3).
+    """
+
+    links: Floats
+    tool: Floats
 
 
 class Clearance:
@@ -33,52 +48,49 @@ class Clearance:
         self._chains = [
             Chain(arm.convention, list(arm.joints[:k]), np.array(arm.table[:k]), arm.base, np.eye(4))
             for k in range(1, arm.joint_count + 1)
+            if arm.joints[k - 1] == "prismatic" or np.abs(arm.table[k - 1, [D, A]]).max() > SHORTEST_LINK_M
         ]
 
-    def tool_gap(self, readings: Floats, world_from_base: Floats, carriages: Floats) -> float:
-        """The smallest distance of the tool from the plate, m; negative below its face. As for gap."""
-        values, panel, smallest = self._arm.joints_from_readings(readings), self._panel, np.inf
-        for chain in self._tool:
-            points = chain.position(values) @ world_from_base[:3, :3].T + world_from_base[:3, 3]
-            seen = (points[:, None] - carriages - panel.offset_m) @ panel.axes
-            beside = np.maximum(-RIM_M - seen[..., :2], seen[..., :2] - panel.area_m - RIM_M).max(axis=-1)
-            smallest = min(smallest, float(np.maximum(seen[..., 2], beside).min()))
-        return smallest
-
-    def gap(self, readings: Floats, world_from_base: Floats, carriages: Floats) -> float:
-        """The smallest gap between links and column, m; negative where they meet.
-
-        Args:
-            readings: Places of the arm (n, N), readings.
-            world_from_base: Where the base stands in the table's frame (4, 4).
-            carriages: Places of the carriage (m, 3), each combined with every place of the arm, m.
-        """
-        links = self._links(readings) @ world_from_base[:3, :3].T + world_from_base[:3, 3]
-        top = carriages + self._panel.offset_m + self._panel.axes[:, :2] @ (0.5 * self._panel.area_m)
-        spans = np.linalg.norm(np.diff(links[0], axis=0), axis=1) > SHORTEST_LINK_M
-        begin = links[:, :-1][:, spans].reshape(-1, 1, 3)
-        along = np.diff(links, axis=1)[:, spans].reshape(-1, 1, 3)
-        return (
-            float(_between(begin, along, top[None], -self._column * self._panel.normal).min()) - self._radii
-        )
-
-    def _links(self, readings: Floats) -> Floats:
-        """Origins (n, N + 1, 3) of the base and of all links, in the base frame."""
+    def places(self, readings: Floats, world_from_base: Floats) -> Places:
+        """Where links and tool are at readings (n, N) of an arm whose base stands at a frame (4, 4)."""
         values = self._arm.joints_from_readings(readings)
         base = np.broadcast_to(self._arm.base[:3, 3], (len(values), 3))
-        columns = [np.ascontiguousarray(values[:, : k + 1]) for k in range(len(self._chains))]
-        ends = [chain.position(part) for chain, part in zip(self._chains, columns, strict=True)]
-        return np.stack([base, *ends], axis=1)
+        links = [
+            chain.position(np.ascontiguousarray(values[:, : chain.joint_count])) for chain in self._chains
+        ]
+        tool = [chain.position(values) for chain in self._tool]
+        turn, shift = world_from_base[:3, :3].T, world_from_base[:3, 3]
+        placed = np.stack([base, *links, *tool], axis=1) @ turn + shift
+        return Places(placed[:, :-2], placed[:, -2:])
+
+    def tool_gaps(self, places: Places, carriages: Floats) -> Floats:
+        """Distances of the tool from the plate (n, m), m; negative below its face. As for gaps."""
+        panel = self._panel
+        seen = (places.tool[:, :, None] - (carriages + panel.offset_m)) @ panel.axes
+        beside = np.maximum(-RIM_M - seen[..., :2], seen[..., :2] - (panel.area_m + RIM_M)).max(axis=-1)
+        return np.asarray(np.maximum(seen[..., 2], beside).min(axis=1))
+
+    def gaps(self, places: Places, carriages: Floats) -> Floats:
+        """Gaps between links and column (n, m), m; negative where they meet.
+
+        Args:
+            places: Where the arm is (n).
+            carriages: Places of the carriage (m, 3), each combined with every place of the arm, m.
+        """
+        panel, links = self._panel, places.links
+        top = carriages + panel.offset_m + panel.axes[:, :2] @ (0.5 * panel.area_m)
+        begin, along = links[:, :-1, None], np.diff(links, axis=1)[:, :, None]
+        return np.asarray(_between(begin, along, top, -self._column * panel.normal).min(axis=1) - self._radii)
 
 
 def _between(begin: Floats, along: Floats, top: Floats, down: Floats) -> Floats:
-    """Distances (k, m) between segments from `begin` (k, 1, 3) and from `top` (1, m, 3).
+    """Distances (n, K, m) between segments from `begin` (n, K, 1, 3) and from `top` (m, 3).
 
     Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
 
     Args:
         begin: Where the first ones begin.
-        along: From there to their ends (k, 1, 3).
+        along: From there to their ends (n, K, 1, 3).
         top: Where the second ones begin.
         down: From there to their ends, the same for all (3,).
     """
@@ -89,7 +101,7 @@ def _between(begin: Floats, along: Floats, top: Floats, down: Floats) -> Floats:
     parallel = crossing <= 0.0
     s = np.where(parallel, 0.0, (ab * to_b - to_a * bb) / np.where(parallel, 1.0, crossing))
     t = np.clip((ab * np.clip(s, 0.0, 1.0) + to_b) / bb, 0.0, 1.0)
-    s = np.clip((ab * t - to_a) / aa, 0.0, 1.0)
+    s = np.clip((ab * t - to_a) / np.maximum(aa, SHORTEST_LINK_M**2), 0.0, 1.0)
     nearest = apart + s[..., None] * along - t[..., None] * down
     return np.asarray(np.sqrt(_dot(nearest, nearest)))
 

@@ -73,19 +73,19 @@ class Crew:
         if carriage is None or here is None or world_from_base is None:
             raise RefusedError("where arm and table are is not known", where="the cell")
         paths = Paths(self._clearance_of(table), world_from_base, expected.radius_m)
-        end = table.carriage_for(expected)
-        if self._cell.file.process.together and paths.free([here, *way], [carriage, end]):
-            self._together(way, expected)
-            return
+        end, direct = table.carriage_for(expected), paths.along([here, *way])
         low, under = table.released(carriage), table.released(end)
         detours = [(way, [table.lowered(carriage, depth)]) for depth in DEPTHS_M]
         detours += [(way, [low]), (way, [low, under]), ([self._refuge, *way], [low])]
         for first, over in detours:
-            if (
-                paths.free([here], [carriage, *over])
-                and paths.free([here, *first], [over[-1]])
-                and paths.free([way[-1]], [over[-1], end])
-            ):
+            arm = direct if first is way else paths.along([here, *first])
+            together, down, meanwhile, up = paths.margins(
+                arm, [[carriage, end], [carriage, *over], [over[-1]], [over[-1], end]]
+            )
+            if self._cell.file.process.together and together.min() > 0.0:
+                self._together(first, expected)
+                return
+            if min(down[0].min(), meanwhile.min(), up[-1].min()) > 0.0:
                 for place in over:
                     table.go_to(place)
                 self._along(first)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truearm.cell.session import Stored
 
 Floats = NDArray[np.float64]
+Point = tuple[float, ...]
 
 REPEATS_WHEN_SUSPICIOUS: Final = 1
 
@@ -57,11 +58,11 @@ def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict
     reading more.
     """
     valid = [(reading, reading.point) for reading in readings if reading.valid and reading.point is not None]
-    points = [point for _, point in valid]
+    points = [tuple(point.tolist()) for _, point in valid]
     agreeing = _largest_cluster(points, rules.agree_m)
     far = (
         bool(agreeing)
-        and _distance(np.mean([points[k] for k in agreeing], axis=0), expected) > rules.likely_m
+        and math.dist(mean_point([points[k] for k in agreeing]), expected.tolist()) > rules.likely_m
     )
     needed = rules.contacts + (REPEATS_WHEN_SUSPICIOUS if far else 0)
     if len(agreeing) >= needed and 2 * len(agreeing) > len(points):
@@ -70,11 +71,17 @@ def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict
     return Verdict("again" if len(readings) < rules.attempts else "give up", (), reason, far)
 
 
-def _largest_cluster(points: Sequence[Floats], within: float) -> list[int]:
+def mean_point(points: Sequence[Point]) -> Point:
+    """The mean of points."""
+    x, y, z = (math.fsum(column) / len(points) for column in zip(*points, strict=True))
+    return (x, y, z)
+
+
+def _largest_cluster(points: Sequence[Point], within: float) -> list[int]:
     """Numbers of the most points that are all within a distance of one of them, the first such."""
     best: list[int] = []
     for centre in points:
-        near = [k for k, point in enumerate(points) if _distance(point, centre) <= within]
+        near = [k for k, point in enumerate(points) if math.dist(point, centre) <= within]
         if len(near) > len(best):
             best = near
     return best
@@ -86,7 +93,3 @@ def _reason(made: int, valid: int, agreeing: int, *, far: bool) -> str:
     if agreeing < valid:
         return f"{valid} readings, of which {agreeing} agree"
     return "far from the prediction" if far else ""
-
-
-def _distance(a: Floats, b: Floats) -> float:
-    return math.dist(a, b)

@@ -1,5 +1,6 @@
 """The measurement process: every step of a session, one after another, whatever goes wrong."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -9,11 +10,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.accepted import points_and_joints
+from truearm.cell.accepted import points_and_joints, points_of_last_check
 from truearm.cell.cell_file import Cell
 from truearm.cell.crew import Crew
 from truearm.cell.device_errors import DeviceError, PortUnavailableError, RefusedError, StoppedError
-from truearm.cell.judge import Rules, Verdict, judge
+from truearm.cell.judge import Rules, Verdict, judge, mean_point
 from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.registering import register_cell
@@ -26,6 +27,7 @@ Floats = NDArray[np.float64]
 
 DONE: Final = "all poses are done"
 ACCURATE: Final = "the target accuracy is met"
+DONE_STEPS: Final = "SELECT coalesce(max(step), -1) + 1 FROM outcomes"
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class Process:
     def __init__(self, cell: Cell, session: Session, report: Callable[[Progress], None]) -> None:
         self._cell, self._session, self._report = cell, session, report
         self._process = cell.file.process
+        self._agree_m = to_si(self._process.agree_mm, "mm")
         self._prediction = Prediction(cell)
         self._crew = Crew(cell, session.add_event)
         self._halted = threading.Event()
@@ -63,7 +66,8 @@ class Process:
         self._poses = session.rows("SELECT count(*) FROM steps WHERE kind = 'pose'")[0][0]
         self._boundaries = boundaries(self._process.stretch, self._poses)
         self._measured = session.measured_poses()
-        self._began, self._done_before = time.monotonic(), self._done()
+        self._done = self._done_before = int(session.rows(DONE_STEPS)[0][0])
+        self._began = time.monotonic()
 
     def run(self) -> str:
         """Measure until all is done, or well enough; says which.
@@ -97,7 +101,7 @@ class Process:
 
     def _steps(self) -> str:
         while (step := self._session.next_step()) is not None:
-            if step.kind != "registration" and self._session.registration() is None:
+            if step.kind != "registration" and not self._prediction.is_registered:
                 self._register()
             measured = self._do(step)
             if step.kind == "check":
@@ -109,8 +113,7 @@ class Process:
     def _do(self, step: Step) -> bool:
         """Measure a step until its readings can be believed, or it is given up; whether it is measured."""
         expected = self._prediction.expected(step)
-        agree_m = to_si(self._process.agree_mm, "mm")
-        rules = Rules(self._process.contacts, self._process.attempts, agree_m, expected.radius_m)
+        rules = Rules(self._process.contacts, self._process.attempts, self._agree_m, expected.radius_m)
         readings, placed, joints = self._session.readings_of(step.step), False, step.readings
         verdict = judge(readings, expected.point_in_world, rules)
         self._decide(step, verdict)
@@ -139,6 +142,9 @@ class Process:
         self, step: Step, reading: Reading, joints: Floats, expected: Floats, verdict: Verdict, attempt: int
     ) -> None:
         """A reading, and the outcome if that is it, on disk together."""
+        if verdict.decision == "again":
+            self._session.add_reading(step.step, attempt, reading, joints, expected)
+            return
         with self._session.together():
             self._session.add_reading(step.step, attempt, reading, joints, expected)
             self._decide(step, verdict)
@@ -150,6 +156,7 @@ class Process:
             self._session.add_outcome(step.step, "skipped", reason=verdict.reason)
 
     def _skip(self, step: Step, reason: str) -> None:
+        self._done = step.step + 1
         self._session.add_outcome(step.step, "skipped", reason=reason)
         self._session.add_event("skipped", reason, step.step)
 
@@ -246,11 +253,10 @@ class Process:
 
     def _check_drift(self) -> None:
         """Raise if the last check of the first contact shows that something has moved."""
-        _, _, checks = points_and_joints(self._session, "check")
-        _, _, first = points_and_joints(self._session, "registration")
-        if not (len(checks) and len(first)):
+        points = points_of_last_check(self._session)
+        if points is None:
             return
-        off_mm = MM_PER_METRE * float(np.linalg.norm(checks[-1] - first[0]))
+        off_mm = MM_PER_METRE * math.dist(*points)
         if off_mm > self._process.drift_mm:
             raise WorkError(
                 f"the first contact is now {off_mm:.2f} mm from where it was",
@@ -260,21 +266,18 @@ class Process:
             )
 
     def _tell(self, step: Step, readings: list[Stored], verdict: Verdict, expected: Floats) -> None:
+        self._done = step.step + 1
         if verdict.decision == "give up":
             self._say(f"{step.kind} {step.pose + 1} skipped: {verdict.reason}")
             return
         points = [r.point for r in readings if r.attempt in verdict.attempts and r.point is not None]
-        residual_mm = MM_PER_METRE * float(np.linalg.norm(np.mean(points, axis=0) - expected))
+        residual_mm = MM_PER_METRE * math.dist(mean_point([point.tolist() for point in points]), expected)
         self._say(f"{step.kind} {step.pose + 1} stored, {residual_mm:.3f} mm from the prediction")
 
     def _say(self, text: str) -> None:
-        done = self._done()
-        new = done - self._done_before
-        left_s = (self._total - done) * (time.monotonic() - self._began) / new if new else None
-        self._report(Progress(done, self._total, text, left_s))
-
-    def _done(self) -> int:
-        return int(self._session.rows("SELECT coalesce(max(step), -1) + 1 FROM outcomes")[0][0])
+        new = self._done - self._done_before
+        left_s = (self._total - self._done) * (time.monotonic() - self._began) / new if new else None
+        self._report(Progress(self._done, self._total, text, left_s))
 
 
 def _stored(attempt: int, reading: Reading) -> Stored:

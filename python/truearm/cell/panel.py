@@ -1,5 +1,6 @@
 """The touch panel on its carriage: from counts to points in the table's frame, and back."""
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -49,8 +50,7 @@ class Panel:
 
     def point(self, carriage: Floats, counts: Floats) -> Floats:
         """The point in the table's frame (3,) that the panel shows at `counts` (2,), m."""
-        u, v = counts * self.area_m / self.counts
-        return np.asarray(carriage + self.offset_m + self.axes[:, 0] * u + self.axes[:, 1] * v)
+        return np.asarray(carriage + self.offset_m + self.axes[:, :2] @ (counts * self.area_m / self.counts))
 
     def seen(self, carriage: Floats, point: Floats) -> Floats:
         """A point in the table's frame as the panel sees it (3,): along u, along v, above its face; m."""
@@ -72,4 +72,4 @@ class Panel:
 
     def angle(self, pointing: Floats) -> float:
         """Angle between the face and a pin along a unit vector (3,), rad; positive from the front."""
-        return float(np.arcsin(np.clip(-pointing @ self.normal, -1.0, 1.0)))
+        return math.asin(min(1.0, max(-1.0, -float(pointing @ self.normal))))

@@ -1,12 +1,13 @@
 """Whether arm and table keep apart on their ways, under nominal kinematics."""
 
+import math
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.clearance import Clearance
+from truearm.cell.clearance import Clearance, Places
 
 Floats = NDArray[np.float64]
 
@@ -23,24 +24,37 @@ class Paths:
         """Set up for a frame (4, 4) and how far predicted points may be off."""
         self._clearance, self._frame, self._uncertain_m = clearance, world_from_base, uncertain_m
 
-    def free(self, arm: list[Floats], table: list[Floats]) -> bool:
-        """Whether they keep apart at any moment, however fast one or the other goes.
+    def along(self, stops: list[Floats]) -> Places:
+        """Places of the arm on straight lines between its joints, through readings (N,) one after another."""
+        return self._clearance.places(_along(stops, ARM_STEP_RAD), self._frame)
+
+    def margins(self, arm: Places, table: list[list[Floats]]) -> list[Floats]:
+        """How much farther than they have to they keep apart, however fast one or the other goes.
 
         Args:
-            arm: Readings (N,) that the arm goes through, in straight lines between the joints.
-            table: Places (3,) that the carriage goes through.
+            arm: Where the arm is on its way (n).
+            table: Ways of the carriage, each as places (3,) that it goes through.
+
+        Returns:
+            For each way of the carriage the margins (n, m) over its m places, m; they keep apart where all are
+            positive.
         """
-        places, carriages = _along(arm, ARM_STEP_RAD), _along(table, TABLE_STEP_M)
-        if self._clearance.tool_gap(places, self._frame, carriages) <= TOOL_MARGIN_M + self._uncertain_m:
-            return False
-        gap = self._clearance.gap(places, self._frame, carriages)
-        return gap > self._clearance.margin_m + self._uncertain_m
+        ways = [_along(stops, TABLE_STEP_M) for stops in table]
+        carriages, clearance = np.concatenate(ways), self._clearance
+        tool = clearance.tool_gaps(arm, carriages) - TOOL_MARGIN_M
+        links = clearance.gaps(arm, carriages) - clearance.margin_m
+        margins = np.minimum(tool, links) - self._uncertain_m
+        ends = np.cumsum([len(way) for way in ways])
+        return [margins[:, end - len(way) : end] for way, end in zip(ways, ends.tolist(), strict=True)]
 
 
 def _along(stops: list[Floats], step: float) -> Floats:
     """Places (n, k) along straight lines through stops (k,), none farther than `step` from the next."""
-    places = [np.asarray(stops[0])[None]]
-    for a, b in pairwise(stops):
-        count = int(np.ceil(np.abs(b - a).max() / step)) + 1
-        places.append(a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a))
-    return np.vstack(places)
+    # Few short rows: plain numbers are quicker than arrays.
+    listed = [stop.tolist() for stop in stops]
+    places = [listed[0]]
+    for a, b in pairwise(listed):
+        count = math.ceil(max(abs(y - x) for x, y in zip(a, b, strict=True)) / step) + 1
+        shares = [k / count for k in range(1, count + 1)]
+        places += [[x + share * (y - x) for x, y in zip(a, b, strict=True)] for share in shares]
+    return np.array(places)

@@ -33,17 +33,13 @@ class Prediction:
         if world is not None:
             turned = np.radians(world.uncertain_deg) * REACH_M
             self.radius_m += to_si(world.uncertain_mm, "mm") + float(turned)
+        self.is_registered = False
         self._calibration: Calibration | None = None
         self._group = ""
 
-    @property
-    def likely_m(self) -> float:
-        """How far a reading may be from its prediction before it is suspicious."""
-        return self.radius_m
-
     def register(self, world_from_base: Floats, residual_m: float) -> None:
         """Take over the registered frame."""
-        self.world_from_base = world_from_base
+        self.world_from_base, self.is_registered = world_from_base, True
         expected = to_si(self._cell.file.process.expected_mm, "mm")
         self.radius_m = max(expected, SIGMAS * residual_m)
 
@@ -52,18 +48,13 @@ class Prediction:
         self._calibration, self._group = calibration, calibration.groups[0]
         self.radius_m = max(LEAST_RADIUS_M, self._cell.file.process.suspicious * error_m)
 
-    def point(self, readings: Floats) -> Floats | None:
-        """The point (3,) of readings (N,) in the world; None while nothing is known of the frame."""
-        if self._calibration is not None:
-            return self._calibration.position(readings, group=self._group, target=1)
-        if self.world_from_base is None:
-            return None
-        point = self._cell.targets_in_base(readings[None])[0]
-        return np.asarray(self.world_from_base[:3, :3] @ point + self.world_from_base[:3, 3])
-
     def expected(self, step: Step) -> Expected:
         """What the sensor is prepared for; where nothing is known, the middle of nowhere with no bound."""
-        point, direction = self.point(step.readings), self._cell.pointing_in_base(step.readings)
-        if point is None or self.world_from_base is None:
+        nominal, direction = self._cell.target_in_base(step.readings)
+        if self.world_from_base is None:
             return Expected(step.readings, np.zeros(3), np.inf, direction)
-        return Expected(step.readings, point, self.radius_m, self.world_from_base[:3, :3] @ direction)
+        turn, shift = self.world_from_base[:3, :3], self.world_from_base[:3, 3]
+        point = turn @ nominal + shift
+        if self._calibration is not None:
+            point = self._calibration.position(step.readings, group=self._group, target=1)
+        return Expected(step.readings, point, self.radius_m, turn @ direction)

@@ -65,7 +65,8 @@ def problem_of(cell: Cell, prediction: Prediction, step: Step) -> str:
     except RefusedError as error:
         return f"{error.what}. {error.rule}"
     clearance = Clearance(cell.arm, cell.flange_from_target, cell.sensor.panel, cell.file.clearance)
-    gap = clearance.gap(step.readings[None], prediction.world_from_base, carriage[None])
+    places = clearance.places(step.readings[None], prediction.world_from_base)
+    gap = float(clearance.gaps(places, carriage[None])[0, 0])
     if gap < clearance.margin_m:
         return f"link and table come within {1e3 * gap:.0f} mm"
     return ""

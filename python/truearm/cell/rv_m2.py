@@ -41,6 +41,7 @@ Tenths = NDArray[np.int64]
 READOUT_TOLERANCE: Final = 0.11
 TRIES: Final = 8
 MOTION_MARGIN: Final = 1.5
+FRESH_S: Final = 0.05
 
 
 class RvM2:
@@ -72,9 +73,11 @@ class RvM2:
         )
         self._count: Tenths | None = None
         self._guesses: list[Tenths] = []
+        self._low, self._high = np.rint(arm.limits.T / (0.1 * RADIANS_PER_DEGREE))
         self._leg = max(1, round(10.0 * settings.leg_s * movemaster.SPEEDS_DEG_S[settings.speed]))
         self._busy = threading.RLock()
         self._still_at = 0.0
+        self._seen_at = -np.inf
         self._silences = 0
 
     @property
@@ -119,10 +122,14 @@ class RvM2:
         self.move_joints(Inverse(self._arm).near(base_from_flange, self.read_joints()))
 
     def read_joints(self) -> Floats:
-        """See Robot. Counted from the origin and checked against the controller's Cartesian read-out."""
+        """See Robot. Counted from the origin and checked against the controller's Cartesian read-out.
+
+        A motion ends with such a check, which is good for FRESH_S.
+        """
         with self._busy:
             count = self._known_count()
-            self._locate([count], self._port.limit_s)
+            if time.monotonic() - self._seen_at > FRESH_S:
+                self._locate([count], self._port.limit_s)
             return readings_of(self._known_count())
 
     def stop(self) -> None:
@@ -161,10 +168,10 @@ class RvM2:
         return self._count
 
     def _check_limits(self, target: Tenths) -> None:
-        low, high = np.rint(self._arm.limits.T / (0.1 * RADIANS_PER_DEGREE))
-        beyond = np.flatnonzero((target < low) | (target > high))
-        if beyond.size:
-            joint = int(beyond[0])
+        low, high = self._low, self._high
+        outside = (target < low) | (target > high)
+        if outside.any():
+            joint = int(outside.argmax())
             raise RefusedError(
                 f"joint {joint + 1} at {target[joint] / 10:.1f} deg",
                 where=self._port.where,
@@ -176,9 +183,9 @@ class RvM2:
         before = self._known_count()
         share = min(1.0, self._leg / float(np.abs(target - before).max()))
         step = np.rint(share * (target - before)).astype(np.int64)
-        self._port.drain()
         self._port.send(f"MJ {movemaster.listed(step)}")
         self._count, self._guesses = None, [before + step, before, before + 2 * step]
+        self._seen_at = -np.inf
         seconds = MOTION_MARGIN * self._seconds(step)
         self._still_at = time.monotonic() + seconds
         self._locate(self._guesses, self._port.limit_s + seconds)
@@ -246,7 +253,7 @@ class RvM2:
         nominal = movemaster.whereabouts(self._arm, readings_of(count))
         fits = bool(np.abs(nominal - 0.1 * seen).max() <= READOUT_TOLERANCE)
         if fits:
-            self._silences = 0
+            self._silences, self._seen_at = 0, time.monotonic()
         return fits
 
     def _check_error(self) -> None:

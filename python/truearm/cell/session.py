@@ -24,6 +24,7 @@ from truearm.rotations import quaternion_from_matrix
 
 Floats = NDArray[np.float64]
 
+ADD_READING: Final = f"INSERT INTO readings VALUES ({','.join('?' * 20)})"
 MAGIC: Final = b"SQLite format 3\x00"
 
 
@@ -158,8 +159,7 @@ class Session:
         head = (step, attempt, reading.time_s, _listed(joints))
         quality = (reading.sigma_m, int(reading.valid), reading.reason)
         tail = (reading.temperature_c, json.dumps(reading.features), reading.raw)
-        values = (*head, *point, *turn, *quality, *expected.tolist(), *tail)
-        self._db.execute(f"INSERT INTO readings VALUES ({','.join('?' * len(values))})", values)  # noqa: S608
+        self._db.execute(ADD_READING, (*head, *point, *turn, *quality, *expected.tolist(), *tail))
 
     def add_outcome(self, step: int, outcome: str, *, reason: str = "", attempts: Sequence[int] = ()) -> None:
         """Keep what became of a step, and which of its readings are the accepted ones."""

@@ -7,6 +7,7 @@ number, and the table does it once.
 The world is the table's frame.
 """
 
+import math
 import threading
 import time
 from typing import Annotated, Final, Literal
@@ -96,6 +97,7 @@ class TablePanel:
         self._number = 0
         self._travel_m = 0.0
         self._carriage: Floats | None = None
+        self._placed: tuple[Expected, Floats] | None = None
         self._busy = threading.RLock()
 
     @property
@@ -127,6 +129,11 @@ class TablePanel:
             RefusedError: If the panel cannot be there, is too small for what is expected, or the pin would
                 touch it at too small an angle.
         """
+        if self._placed is None or self._placed[0] is not expected:
+            self._placed = expected, self._carriage_for(expected)
+        return self._placed[1]
+
+    def _carriage_for(self, expected: Expected) -> Floats:
         panel, standoff = self.panel, expected.radius_m + STANDOFF_MARGIN_M
         if 2.0 * expected.radius_m > panel.area_m.min():
             raise RefusedError(
@@ -172,9 +179,9 @@ class TablePanel:
         now, sigma_m = time.time(), to_si(self._settings.sigma_mm, "mm")
         if answer == "NONE":
             return Reading(None, sigma_m, now, False, answer, "no contact")
-        numbers = _numbers(answer, ANSWER_NUMBERS, self._port.where)
-        point = self.panel.point(to_si(numbers[:3], "mm"), numbers[3:5])
-        return Reading(point, sigma_m, now, True, answer, temperature_c=float(numbers[5]))
+        *place, u, v, temperature_c = _numbers(answer, ANSWER_NUMBERS, self._port.where)
+        point = self.panel.point(to_si(np.array(place), "mm"), np.array([u, v]))
+        return Reading(point, sigma_m, now, True, answer, temperature_c=temperature_c)
 
     def release(self) -> None:
         """See Sensor. The panel goes back along its normal to the end of the table's range."""
@@ -214,8 +221,8 @@ class TablePanel:
     def _move(self, carriage: Floats) -> None:
         if self._carriage is None:
             raise DeviceError("not connected", where=self._port.where, way_out="Connect it first")
-        way_mm = MM_PER_METRE * float(np.linalg.norm(carriage - self._carriage))
-        x, y, z = MM_PER_METRE * carriage
+        way_mm = MM_PER_METRE * math.dist(carriage, self._carriage)
+        x, y, z = (MM_PER_METRE * carriage).tolist()
         self._ask(f"MOVE {x:.3f} {y:.3f} {z:.3f}", self._limit(way_mm / self._settings.speed_mm_s))
         self._carriage = carriage
 
@@ -270,15 +277,15 @@ class TablePanel:
         raise DeviceError(what, where=where)
 
 
-def _numbers(text: str, count: int, where: str) -> Floats:
+def _numbers(text: str, count: int, where: str) -> list[float]:
     try:
-        numbers = np.array([float(part) for part in text.split()])
+        numbers = [float(part) for part in text.split()]
     except ValueError:
-        numbers = np.empty(0)
-    if len(numbers) != count or not np.isfinite(numbers).all():
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
         raise DeviceError(f'"{text}" was answered', where=where, rule=f"{count} numbers were expected")
     return numbers
 
 
 def _point(text: str, where: str) -> Floats:
-    return to_si(_numbers(text, 3, where), "mm")
+    return to_si(np.array(_numbers(text, 3, where)), "mm")

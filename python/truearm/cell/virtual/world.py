@@ -56,7 +56,7 @@ class World:
             0
         ]
         point = self.world_from_base @ base_from_target[:, 3]
-        return point[:3], self.world_from_base[:3, :3] @ self.cell.pointing_in_base(q[0])
+        return point[:3], self.world_from_base[:3, :3] @ self.cell.target_in_base(q[0])[1]
 
     def touch(self, travel_m: float, now: float) -> Touch | None:
         """Bring the panel up by `travel_m` at the most; None if it feels nothing."""
@@ -92,11 +92,12 @@ class World:
             return
         until = max(now, self.arm.ends(), self.table.ends())
         moments = np.linspace(now, until, MOMENTS)
-        for moment in moments:
-            readings, carriage = self.arm.at(moment)[None], self.table.at(moment)[None]
-            links = self.clearance.gap(readings, self.world_from_base, carriage)
-            tool = self.clearance.tool_gap(readings, self.world_from_base, carriage)
-            if min(links, tool) < 0.0:
+        readings, carriages = (
+            np.array([mover.at(moment) for moment in moments]) for mover in (self.arm, self.table)
+        )
+        places = self.clearance.places(readings, self.world_from_base)
+        for gaps in (self.clearance.gaps, self.clearance.tool_gaps):
+            if np.diag(gaps(places, carriages)).min() < 0.0:
                 self.shared.count(COLLISIONS)
                 self.emergency_stop(now)
                 return
