@@ -113,9 +113,10 @@ class Process:
     def _do(self, step: Step) -> bool:
         """Measure a step until its readings can be believed, or it is given up; whether it is measured."""
         expected = self._prediction.expected(step)
-        rules = Rules(self._process.contacts, self._process.attempts, self._agree_m, expected.radius_m)
+        point, likely_m = self._prediction.point(expected), self._prediction.likely_m
+        rules = Rules(self._process.contacts, self._process.attempts, self._agree_m, likely_m)
         readings, placed, joints = self._session.readings_of(step.step), False, step.readings
-        verdict = judge(readings, expected.point_in_world, rules)
+        verdict = judge(readings, point, rules)
         self._decide(step, verdict)
         while verdict.decision == "again":
             self._raise_if_halted()
@@ -132,10 +133,10 @@ class Process:
                 continue
             self._recoveries = 0
             readings.append(_stored(len(readings) + 1, reading))
-            verdict = judge(readings, expected.point_in_world, rules)
-            self._keep(step, reading, joints, expected.point_in_world, verdict, len(readings))
+            verdict = judge(readings, point, rules)
+            self._keep(step, reading, joints, point, verdict, len(readings))
             placed = reading.valid and not verdict.suspicious
-        self._tell(step, readings, verdict, expected.point_in_world)
+        self._tell(step, readings, verdict, point)
         return verdict.decision == "accept"
 
     def _keep(

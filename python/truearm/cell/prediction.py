@@ -15,25 +15,33 @@ Floats = NDArray[np.float64]
 
 REACH_M: Final = 1.0
 SIGMAS: Final = 4.0
-LEAST_RADIUS_M: Final = 1e-3
+LEAST_LIKELY_M: Final = 1e-3
 
 
 class Prediction:
     """Predicts points of the target in the sensor's frame, and how far off they may be.
 
-    First from the guess of the cell file, then from the registered frame and the nominal arm, then from the
-    calibration so far.
+    The sensor is sent where the nominal arm has its target, in the frame of the cell file first, then in the
+    registered one: ways of arm and table are tried under the same kinematics. Readings are judged by the
+    calibration so far, as soon as there is one.
+
+    Attributes:
+        world_from_base: Where the base stands (4, 4), as well as is known; None where nothing is.
+        is_registered: Whether that comes from contacts.
+        radius_m: How far the target may be from where the nominal arm has it.
+        likely_m: How far a reading may be from what is predicted without being suspicious.
     """
 
     def __init__(self, cell: Cell) -> None:
         self._cell = cell
         world, process = cell.file.world, cell.file.process
         self.world_from_base: Floats | None = None if world is None else world.transform()
+        self.is_registered = False
         self.radius_m = to_si(process.expected_mm, "mm")
         if world is not None:
             turned = np.radians(world.uncertain_deg) * REACH_M
             self.radius_m += to_si(world.uncertain_mm, "mm") + float(turned)
-        self.is_registered = False
+        self.likely_m = self.radius_m
         self._calibration: Calibration | None = None
         self._group = ""
 
@@ -41,12 +49,12 @@ class Prediction:
         """Take over the registered frame."""
         self.world_from_base, self.is_registered = world_from_base, True
         expected = to_si(self._cell.file.process.expected_mm, "mm")
-        self.radius_m = max(expected, SIGMAS * residual_m)
+        self.radius_m = self.likely_m = max(expected, SIGMAS * residual_m)
 
     def learn(self, calibration: Calibration, error_m: float) -> None:
         """Take over a calibration, whose errors reach to `error_m` on poses it has not seen."""
         self._calibration, self._group = calibration, calibration.groups[0]
-        self.radius_m = max(LEAST_RADIUS_M, self._cell.file.process.suspicious * error_m)
+        self.likely_m = max(LEAST_LIKELY_M, self._cell.file.process.suspicious * error_m)
 
     def expected(self, step: Step) -> Expected:
         """What the sensor is prepared for; where nothing is known, the middle of nowhere with no bound."""
@@ -54,7 +62,10 @@ class Prediction:
         if self.world_from_base is None:
             return Expected(step.readings, np.zeros(3), np.inf, direction)
         turn, shift = self.world_from_base[:3, :3], self.world_from_base[:3, 3]
-        point = turn @ nominal + shift
-        if self._calibration is not None:
-            point = self._calibration.position(step.readings, group=self._group, target=1)
-        return Expected(step.readings, point, self.radius_m, turn @ direction)
+        return Expected(step.readings, turn @ nominal + shift, self.radius_m, turn @ direction)
+
+    def point(self, expected: Expected) -> Floats:
+        """The point (3,) by which a reading is judged."""
+        if self._calibration is None:
+            return expected.point_in_world
+        return self._calibration.position(expected.readings, group=self._group, target=1)

@@ -24,7 +24,7 @@ from truearm.rotations import quaternion_from_matrix
 
 Floats = NDArray[np.float64]
 
-ADD_READING: Final = f"INSERT INTO readings VALUES ({','.join('?' * 20)})"
+ADD_READING: Final = "INSERT INTO readings VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)"
 MAGIC: Final = b"SQLite format 3\x00"
 
 
