@@ -38,7 +38,7 @@ PYTHON ?= $(shell $(FIND_PYTHON))
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
-	@echo 'make demo   calibrate a virtual RV-M2 and show what it gained'
+	@echo 'make demo   the paper's cell in small: plan, measure, calibrate, compensate (a minute)'
 	@echo 'make test   Rust and Python tests'
 	@echo 'make trials the measurement cell killed and with faults, in full (TRIALS="-k kill")'
 	@echo 'make check  formatting, lint, types and layers'

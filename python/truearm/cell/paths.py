@@ -36,8 +36,7 @@ class Paths:
             table: Ways of the carriage, each as places (3,) that it goes through.
 
         Returns:
-            For each way of the carriage the margins (n, m) over its m places, in metres; they keep apart where
-            all are positive.
+            For each way of the carriage the margins (n, m) over its m places, m; apart where positive.
         """
         ways = [_along(stops, TABLE_STEP_M) for stops in table]
         carriages, clearance = np.concatenate(ways), self._clearance

@@ -33,18 +33,41 @@ class Touch:
     counts: Floats
 
 
+def true_arm(cell: Cell) -> VirtualArm:
+    """The arm that a virtual cell has in place of the nominal one.
+
+    Raises:
+        InputError: If [simulate.arm] describes none.
+    """
+    settings = cell.file.simulate
+    content = dict(settings.arm or {}) | {"robot": cell.arm.to_toml()}
+    content.setdefault("seed", settings.seed)
+    return VirtualArm.from_dict(content, where="simulate, arm")
+
+
+def true_frame(cell: Cell, truth: VirtualArm) -> Floats:
+    """Where the base really stands (4, 4): the cell file's guess, off by what is asked for."""
+    settings = cell.file.simulate
+    if cell.file.world is None:
+        return np.asarray(truth.world_from_base)
+    rng = np.random.default_rng([settings.seed, DRAWN_FRAME])
+    turn = np.radians(settings.frame_error_deg) * _direction(rng, 3)
+    shift = to_si(settings.frame_error_mm, "mm") * _direction(rng, 3)
+    off = transform_from_parts(np.zeros(3), quaternion_from_rotation_vector(turn[None])[0])
+    off[:3, 3] = shift
+    return np.asarray(cell.file.world.transform() @ off)
+
+
 class World:
     """The virtual cell as it truly is, from one of its processes."""
 
     def __init__(self, cell: Cell, state: Path) -> None:
         self.cell, self.shared = cell, Shared(state)
         self.settings = cell.file.simulate
-        content = dict(self.settings.arm or {}) | {"robot": cell.arm.to_toml()}
-        content.setdefault("seed", self.settings.seed)
-        self.truth = VirtualArm.from_dict(content, where="simulate, arm")
+        self.truth = true_arm(cell)
         self.arm = Mover(self.shared, ARM, cell.arm.joint_count)
         self.table = Mover(self.shared, TABLE, 3)
-        self.world_from_base = self._true_frame()
+        self.world_from_base = true_frame(cell, self.truth)
         panel = cell.sensor.panel if isinstance(cell.sensor, TablePanel) else None
         self.clearance = None if panel is None else _clearance(cell, panel)
 
@@ -121,18 +144,6 @@ class World:
         phase = np.array([1.0, 2.0, 3.0]) + self.settings.seed
         waves = np.sin(2.0 * np.pi * TABLE_WAVES_PER_M * carriage + phase)
         return np.asarray(carriage + to_si(self.settings.table_mm, "mm") * waves)
-
-    def _true_frame(self) -> Floats:
-        """Where the base really stands: the cell file's guess, off by what is asked for."""
-        if self.cell.file.world is None:
-            return np.asarray(self.truth.world_from_base)
-        guess = self.cell.file.world.transform()
-        rng = np.random.default_rng([self.settings.seed, DRAWN_FRAME])
-        turn = np.radians(self.settings.frame_error_deg) * _direction(rng, 3)
-        shift = to_si(self.settings.frame_error_mm, "mm") * _direction(rng, 3)
-        off = transform_from_parts(np.zeros(3), quaternion_from_rotation_vector(turn[None])[0])
-        off[:3, 3] = shift
-        return np.asarray(guess @ off)
 
     def _noise(self, now: float) -> np.random.Generator:
         """Random numbers of the next contact; of the place of the arm alone where asked for."""
