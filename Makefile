@@ -22,7 +22,7 @@ unexport CONDA_PREFIX
 CLIPPY := -D warnings -D clippy::too_many_lines -A clippy::needless_range_loop
 
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -path '*/src/*') $(wildcard crates/*/Cargo.toml)
-PY_PATHS := python tests benches docs
+PY_PATHS := python tests benches docs examples
 
 # The first interpreter that is new enough and can make a virtual environment.
 define FIND_PYTHON
@@ -34,7 +34,7 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help setup demo test trials check check-capi bench docs figures rust-test py-test clean
+.PHONY: help setup demo test trials check check-capi bench docs site figures rust-test py-test clean
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
@@ -46,6 +46,7 @@ help:
 	@echo 'make bench  speed against peers, with the ratio to reach beside each (BENCH=--write keeps them in docs/)'
 	@echo 'make figures  errors on public measurements, into docs/reference/results.md'
 	@echo 'make docs   write the generated pages of docs/reference again'
+	@echo 'make site   the documentation as a site, into build/site'
 
 demo: $(STAMPS)/built
 	$(BIN)/truearm demo
@@ -79,7 +80,16 @@ bench: $(STAMPS)/built $(STAMPS)/bench
 
 docs: $(STAMPS)/built
 	$(BIN)/python docs/make_cli.py
+	$(BIN)/python docs/make_docstrings.py
+	$(BIN)/python docs/make_header_page.py
+	$(BIN)/python docs/make_schemas.py
+	$(BIN)/python docs/make_notebook.py
 	$(BIN)/python docs/make_picture.py
+
+# Any warning is an error: links, headings and code blocks are checked. It opens from disk without a network.
+site: $(STAMPS)/site
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -c docs/site -b html docs build/site
+	@echo "The site: build/site/index.html"
 
 setup: $(STAMPS)/built
 
@@ -105,6 +115,10 @@ $(STAMPS)/tools: pyproject.toml $(STAMPS)/venv
 	@minor="$$($(CARGO) --version | cut -d. -f2)"; [ "$$minor" -ge 89 ] || { \
 	  echo "truearm needs Rust 1.89 or newer; $$($(CARGO) --version) was found. Try: rustup update stable" >&2; exit 1; }
 	$(PIP) install --group dev
+	@touch $@
+
+$(STAMPS)/site: pyproject.toml $(STAMPS)/venv
+	$(PIP) install --group docs
 	@touch $@
 
 $(STAMPS)/bench: pyproject.toml $(STAMPS)/venv

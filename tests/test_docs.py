@@ -2,25 +2,39 @@
 
 A fenced block is run when its first line says so: ```python run or ```bash run. The blocks of a page are run
 in order in a directory of their own; Python blocks share their names. Before the first block the directory
-holds measurements.csv and another_day.csv of a virtual UR10.
+holds measurements.csv and another_day.csv of a virtual UR10. Blocks of TOML and JSON are read. What is
+neither says why: ```bash shown: REASON.
 """
 
 import importlib.util
+import json
 import os
 import re
 import subprocess
 import sys
+import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import truearm as ta
+from truearm.cell.cell_file import CellFile
+from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
+from truearm.cell.schema import checked
 from truearm.cli import COMMANDS
+from truearm.programs.frames import FramesFile
 from truearm.robot import Robot
+from truearm.robot_file import RobotFile
 from truearm.simulation import VirtualArm
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    ROOT / "examples" / "README.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 FENCE = re.compile(r"^( *)```(\w+) run\n(.*?)^\1```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 TRAINING_POSES, OTHER_POSES = 80, 30
@@ -74,6 +88,50 @@ def run_bash(text):
     assert done.returncode == 0, f"{text}\n{done.stdout}\n{done.stderr}"
 
 
+def fences_of(page) -> Iterator[tuple[str, str]]:
+    """First line, without its marks, and text of every fenced block."""
+    first: str | None = None
+    lines: list[str] = []
+    for line in page.read_text().splitlines():
+        mark = re.match(r" *```(.*)", line)
+        if mark and first is None:
+            first, lines = mark[1].strip(), []
+        elif mark:
+            yield first or "", "\n".join(lines)
+            first = None
+        else:
+            lines.append(line)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_block_is_run_or_read_or_says_why_not(page):
+    for first, text in fences_of(page):
+        language, _, how = first.partition(" ")
+        if language == "toml":
+            check_toml(tomllib.loads(text), name_of(page))
+        elif language == "json":
+            json.loads(text)
+        elif language == "text":
+            commands = re.findall(r"^(?:\$ )?(?:truearm|make|cargo|pip|python) .*", text, re.MULTILINE)
+            assert page.name == "cli.md" or commands == [], "a block of commands is run, or says why not"
+        else:
+            assert language in ("python", "bash", "c"), f"```{first}"
+            assert how == "run" or re.fullmatch(r"shown: \w.+", how), f"```{first}: run, or shown: REASON"
+
+
+def check_toml(content, where):
+    """What is a whole file of truearm, or a section of a cell file, has to be right."""
+    if "convention" in content:
+        checked(RobotFile, content, where=where)
+    elif "arm" in content:
+        checked(CellFile, content, where=where)
+    elif "format" in content:
+        checked(FramesFile, content, where=where)
+    for key, known in (("robot", ROBOTS), ("sensor", SENSORS)):
+        if key in content:
+            driver_and_settings(content[key], known, where=where)
+
+
 def test_there_are_examples():
     assert sum(len(blocks_of(page)) for page in PAGES) > 10
 
@@ -110,10 +168,17 @@ def test_every_decision_is_listed():
         assert re.match(rf"# {record.name[:4]}: \w", record.read_text()), record
 
 
-def test_command_line_reference_is_current(monkeypatch):
+@pytest.mark.parametrize("name", ["make_cli", "make_docstrings", "make_header_page", "make_notebook"])
+def test_generated_pages_are_current(name, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    maker = load_script("make_cli")
-    assert maker.PAGE.read_text() == maker.page(), "run: python docs/make_cli.py"
+    maker = load_script(name)
+    assert maker.PAGE.read_text() == maker.page(), f"run: make docs, or python docs/{name}.py"
+
+
+def test_schemas_are_current():
+    maker = load_script("make_schemas")
+    found = {path.name: path.read_text() for path in maker.FOLDER.glob("*.json")}
+    assert found == {name: maker.text_of(schema) for name, schema in maker.schemas().items()}, "make docs"
 
 
 def test_every_command_is_in_the_reference():
@@ -133,9 +198,10 @@ def test_every_key_of_a_summary_is_explained(tables):
 
 
 def test_every_public_name_is_in_the_python_reference():
-    page = (ROOT / "docs" / "reference" / "python-api.md").read_text()
-    for name in ta.__all__:
-        assert re.search(rf"\b{name}\b", page), name
+    for page in ("python-api", "python-docstrings"):
+        text = (ROOT / "docs" / "reference" / f"{page}.md").read_text()
+        for name in ta.__all__:
+            assert re.search(rf"\b{name}\b", text), name
 
 
 def load_script(name):

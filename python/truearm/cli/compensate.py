@@ -22,7 +22,7 @@ def command(
     calibration: CalibFile,
     program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="The program, or one of its files.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="OUT", help="Where it goes: a file or directory.")
+        str | None, typer.Option("-o", "--output", metavar="OUT", help="A file, or a directory: DIR/.")
     ] = None,
     report: Annotated[
         Path | None, typer.Option("--report", metavar="FILE", help="Write a report in JSON.")
@@ -119,7 +119,7 @@ def command(
             tell=told_progress(),
         )
     warn(done.notices)
-    paths = [] if dry_run or output is None else done.save(output)
+    paths = [] if dry_run or output is None else done.save(_place(output))
     if report is not None:
         content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
         write_whole(report, f"{content}\n")
@@ -130,6 +130,14 @@ def command(
         for path in paths:
             say(f"Written: {path}")
         _suggest(calibration, program, dry_run=dry_run)
+
+
+def _place(output: str) -> Path:
+    """The path of an output; a directory, named by a slash at its end, is made if needed."""
+    place = Path(output)
+    if output.endswith("/"):
+        place.mkdir(parents=True, exist_ok=True)
+    return place
 
 
 def _suggest(calibration: Path, program: Path, *, dry_run: bool) -> None:
