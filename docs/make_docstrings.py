@@ -27,7 +27,7 @@ MODULES = {
 }
 SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields):$")
 ITEM = re.compile(r"^ {4}(\*{0,2}[\w., ]+): (.*)$")
-STARS = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
+STARS: dict[Any, str] = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
 ROLE = re.compile(r":\w+:`~?\.?([^`]+)`")
 
 

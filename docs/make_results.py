@@ -18,6 +18,11 @@ README = ROOT / "README.md"
 MODELS = ("nominal", "constant", "variable")
 FIRST_SEED = 7
 IN_README = ("c400", "b400", "irb400", "ur5", "ac2b")
+SOURCES = {
+    "UR10": ("three set-ups A, B and C, laser tracker with T-Mac", "christianlandgraf/ipa-robot-accuracy"),
+    "IRB 120": ("laser tracker", "icelinker/Robot-Calibration-LaserTracker"),
+    "UR5": ("positions, instrument not stated", "1351210328/GTPN_GTCN"),
+}
 HEAD = """# Results on real arms
 
 Position error in mm on rows that took no part in fitting or choosing, from public measurements made by
@@ -28,9 +33,6 @@ coordinates lies within the 95 % intervals that were given for them.
 
 The data, q1 ... q6 in rad and x y z in m, from their authors' repositories:
 
-- UR10, three set-ups A, B and C, laser tracker with T-Mac: christianlandgraf/ipa-robot-accuracy
-- IRB 120, laser tracker: icelinker/Robot-Calibration-LaserTracker
-- UR5: 1351210328/GTPN_GTCN
 """
 
 
@@ -41,7 +43,8 @@ def main() -> int:
     found = read_cases(parser.parse_args().out)
     if not found:
         parser.error("there are no results; run: python -m benches.figures OUT")
-    PAGE.write_text("\n".join([HEAD, first_seed_table(found), "", seeds_table(found), ""]))
+    sources = "\n".join(f"- {arm}, {how}: {_linked(place)}" for arm, (how, place) in SOURCES.items())
+    PAGE.write_text("\n".join([HEAD + sources, "", first_seed_table(found), "", seeds_table(found), ""]))
     short = {name: case for name, case in found.items() if name in IN_README}
     written = re.sub(
         r"(<!-- results -->\n).*?(<!-- end of results -->)",
@@ -121,8 +124,11 @@ def seeds_table(cases: dict[str, dict[str, Any]]) -> str:
 
 def readme_table(cases: dict[str, dict[str, Any]]) -> str:
     """Means of the three models for the first seed."""
+    sources = ", ".join(f"{arm} {_linked(place)}" for arm, (_, place) in SOURCES.items())
     lines = [
-        "Mean position error in mm on held-out poses, seed 7; [data and more](docs/reference/results.md).",
+        "Mean position error in mm on held-out poses that took no part in fitting, seed 7;",
+        "[95 %, maximum, other seeds and left-out regions](docs/reference/results.md).",
+        f"Measured by others and published: {sources}.",
         "",
         "| data | nominal | constant | variable |",
         "|---|---|---|---|",
@@ -132,6 +138,10 @@ def readme_table(cases: dict[str, dict[str, Any]]) -> str:
         means = [f"{errors[model]['mean_mm']:.3f}" if model in errors else "" for model in MODELS]
         lines.append(f"| {case['title']} | {' | '.join(means)} |")
     return "\n".join(lines)
+
+
+def _linked(repository: str) -> str:
+    return f"[{repository}](https://github.com/{repository})"
 
 
 if __name__ == "__main__":
