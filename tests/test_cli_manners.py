@@ -38,6 +38,7 @@ def leaves(entries=COMMANDS, before=()):
 LEAVES = list(leaves())
 TABLES = sorted({words[:-1] for words, _ in LEAVES})
 BY_WORDS = dict(LEAVES)
+SERVICES = {("serve",)}  # they run until they are ended
 
 
 def help_of(words, capsys):
@@ -63,6 +64,12 @@ def test_help_has_examples_that_are_right(words, capsys):
         known = next(known for known in BY_WORDS if list(known) == given[: len(known)])
         assert known[: len(words)] == words
         LazyCommand(BY_WORDS[known]).load().make_context(known[-1], given[len(known) :])
+
+
+@pytest.mark.parametrize("words", [words for words in BY_WORDS if words not in SERVICES], ids=" ".join)
+def test_every_command_names_the_next_one(words):
+    source = Path(str(import_module(BY_WORDS[words].module).__file__)).read_text()
+    assert "suggest(" in source
 
 
 @pytest.mark.parametrize("words", BY_WORDS, ids=" ".join)
@@ -124,6 +131,16 @@ def completed(line, folder):
 def test_bash_completes(line, offered, tmp_path):
     (tmp_path / "m.csv").write_text("")
     assert completed(line, tmp_path) == offered
+
+
+def test_completion_installs_itself(tmp_path):
+    environment = {**os.environ, "HOME": str(tmp_path)}
+    script = f"{shlex.quote(str(PROGRAM))} --install-completion; exit $?"
+    done = subprocess.run(
+        ["bash", "-c", script], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "truearm" in (tmp_path / ".bashrc").read_text()
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
@@ -285,3 +302,4 @@ def test_results_fit_80_columns_and_name_the_next_command(measured, capsys):
         printed = capsys.readouterr().out
         assert following in printed, words
         assert max(map(len, printed.splitlines())) <= console.WIDTH, words
+        assert "\x1b" not in printed, "no colours where stdout is no terminal"
