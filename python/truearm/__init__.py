@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from truearm.programs.rewriting import Choices, Rewritten
     from truearm.robot import Robot
     from truearm.splitting import HoldoutRange, SplitRule
+    from truearm.updating import Update, UpdateOptions, roll_back, update
 
 __all__ = [
     "Calibration",
@@ -48,11 +49,15 @@ __all__ = [
     "Robot",
     "SplitRule",
     "TruearmError",
+    "Update",
+    "UpdateOptions",
     "UsageError",
     "WorkError",
     "calibrate",
     "compensate_program",
     "evaluate",
+    "roll_back",
+    "update",
 ]
 
 _HOME: Final = {
@@ -80,6 +85,10 @@ _HOME: Final = {
     "Robot": "robot",
     "HoldoutRange": "splitting",
     "SplitRule": "splitting",
+    "Update": "updating",
+    "UpdateOptions": "updating",
+    "roll_back": "updating",
+    "update": "updating",
 }
 
 

@@ -390,6 +390,17 @@ class Posterior:
         With `setup` (n, m, s), by the unknowns of all set-ups, their part is added.
         """
 
+    def joint_covariance(
+        self,
+        inputs: NDArray[np.float64],
+        jacobian: NDArray[np.float64],
+        setup: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Covariance (n m, n m) of the rows of all configurations together; arguments as for `covariance`."""
+
+    def repeatability(self, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Covariance (n, m, m) of what joints miss anew at every pose, carried to jacobian (n, m, P)."""
+
     def prior(self, inputs: NDArray[np.float64], jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variances (n, m) of jacobian (n, m, P) times parameters before any measurement."""
 
@@ -639,6 +650,50 @@ def linearise(
         problem: Of points or poses, not of distances.
         parameters: (L, 5), or (n, L, 5) where they vary.
         setup: Frames and targets.
+    """
+
+def setup_jacobian(problem: Problem, parameters: NDArray[np.float64], setup: Setup) -> NDArray[np.float64]:
+    """Derivatives (n, m, W) of the prediction with respect to the unknowns of each pose's own set-up.
+
+    These are shift and turn of world_from_base from the right (unless the world is known), the targets'
+    points in the flange frame, and the turn of flange_from_target from the right (if it was measured). Base
+    frame.
+    """
+
+def step_setup(problem: Problem, setup: Setup, step: NDArray[np.float64]) -> Setup:
+    """The set-up after a step (G, W) of the unknowns of `setup_jacobian`."""
+
+def choose_informative(
+    covariance: NDArray[np.float64], candidates: Mapping[str, Any], count: int
+) -> tuple[list[int], list[float]]:
+    """Candidates, one after the other, that leave the targets the least variance. Honours Ctrl-C.
+
+    Args:
+        covariance: (c m + t, c m + t) of what c candidates would show, m entries each, then of t targets.
+        candidates: noise (c, m, m) of the measurements; points (c, 3); apart, the distance that they are
+            chosen at from one another, as long as there are such.
+        count: How many.
+
+    Returns:
+        Indices, and the sum of the targets' variances before the first choice and after each.
+    """
+
+def choose_telling(
+    changed: NDArray[np.float64],
+    unchanged: NDArray[np.float64],
+    candidates: Mapping[str, Any],
+    count: int,
+) -> tuple[list[int], list[float]]:
+    """Candidates, one after the other, that tell most about what may have changed. Honours Ctrl-C.
+
+    Args:
+        changed: Covariance (c m, c m) of what the candidates would show if the changes have happened.
+        unchanged: The same without them.
+        candidates: As for `choose_informative`.
+        count: How many.
+
+    Returns:
+        Indices, and the information about the changes, nat, before the first choice and after each.
     """
 
 @final

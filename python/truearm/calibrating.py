@@ -31,7 +31,7 @@ from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
 from truearm.splitting import Split, split_rows
-from truearm.uncertainty import VariableSpread
+from truearm.uncertainty import VariableSpread, noises_of
 from truearm.unexplained import unexplained
 from truearm.validation import Validation
 
@@ -150,7 +150,8 @@ def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> V
     """The posterior of the field's fit, which a large set would take long to find again."""
     if fits.variable is None or details is None:
         return None
-    return VariableSpread(list(task.arm.candidates.columns), fits.variable.posterior, details.inflation)
+    columns = list(task.arm.candidates.columns)
+    return VariableSpread(columns, fits.variable.posterior, details.inflation, noises_of(details.hyper))
 
 
 def _kept_hyper(trained: Fits) -> dict[str, list[float]] | None:

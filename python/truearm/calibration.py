@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from truearm import calibration_content
 from truearm._core import Chain, Conservative
 from truearm.arrays import as_rows
-from truearm.calibration_file import read_calibration_file, write_calibration_file
+from truearm.calibration_file import calibration_bytes, parse_calibration
 from truearm.conservative import conservative_of
 from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.endpoints import Endpoint, at_target, at_tool
 from truearm.errors import Notice, WorkError
+from truearm.files import read_bytes, write_whole
 from truearm.fitted_rows import FittedRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
@@ -25,11 +26,12 @@ from truearm.inputs import feature_columns
 from truearm.limits import Task
 from truearm.models import CONSTANT, ArmModel
 from truearm.options import Options
+from truearm.revision import Revision
 from truearm.robot import Robot
 from truearm.scheme_fitting import SchemeDetails
 from truearm.solving import solve
 from truearm.summary import summarise
-from truearm.uncertainty import ConstantSpread, Spread, VariableSpread
+from truearm.uncertainty import ConstantSpread, Spread, UpdatedSpread, VariableSpread
 from truearm.validation import Validation
 
 Floats = NDArray[np.float64]
@@ -64,6 +66,9 @@ class Calibration:
         scheme: More about one of the paper's schemes; None where it is none.
         stored_conservative: Bounds of the standard deviation as the file held them.
         fitted_spread: The posterior as the fit left it; None for a calibration that was read.
+        revision: What an update changed, with the calibration before it; None where there was none. Then
+            `rows` are those of the update.
+        file: Content of the file it was read from; None for one that was not.
     """
 
     robot: Robot
@@ -83,6 +88,8 @@ class Calibration:
     scheme: SchemeDetails | None = None
     stored_conservative: Conservative | None = None
     fitted_spread: Spread | None = None
+    revision: Revision | None = None
+    file: bytes | None = None
 
     @classmethod
     def load(cls, path: str | Path) -> "Calibration":
@@ -92,8 +99,13 @@ class Calibration:
             InputError: If there is no such file, it is none of ours, is cut short or altered, or has a
                 layout that this version does not know.
         """
-        arrays, content = read_calibration_file(Path(path))
-        return cls(**calibration_content.unpack(arrays, content, where=str(path)))
+        return cls.from_bytes(read_bytes(Path(path)), where=str(path))
+
+    @classmethod
+    def from_bytes(cls, data: bytes, *, where: str) -> "Calibration":
+        """The calibration of a file's content; `where` is named in errors, which are those of `load`."""
+        arrays, content = parse_calibration(data, where)
+        return cls(**calibration_content.unpack(arrays, content, where=where), file=data)
 
     def save(self, path: str | Path, *, with_rows: bool = True) -> None:
         """Write a calibration file, completely or not at all.
@@ -103,13 +115,35 @@ class Calibration:
             with_rows: Whether to keep the measurements; without them a variable model has no exact
                 standard deviations, but keeps their bounds.
         """
-        arrays, content = calibration_content.pack(self, with_rows=with_rows)
-        write_calibration_file(Path(path), arrays, content)
+        write_whole(Path(path), self.to_bytes(with_rows=with_rows))
+
+    def to_bytes(self, *, with_rows: bool = True) -> bytes:
+        """What `save` writes."""
+        return calibration_bytes(*calibration_content.pack(self, with_rows=with_rows))
 
     @cached_property
     def arm(self) -> IdentifiedArm:
         """The arm with what of it was identified."""
         return IdentifiedArm(self.robot, self.options.frame, self.options.parallel_within_deg)
+
+    @cached_property
+    def predecessor(self) -> "Calibration | None":
+        """The calibration before the update; None where there was no update.
+
+        Raises:
+            WorkError: If it was left out of the file.
+        """
+        if self.revision is None:
+            return None
+        return Calibration.from_bytes(self.revision.before(self.robot.name), where="the calibration before")
+
+    @property
+    def learned_from(self) -> FittedRows | None:
+        """The rows that constants and field were learned from; None where they were left out of the file."""
+        if self.revision is None:
+            return self.rows
+        known = None if self.revision.file is None else self.predecessor
+        return None if known is None else known.learned_from
 
     @property
     def model(self) -> ArmModel:
@@ -129,7 +163,7 @@ class Calibration:
     def parameters(self, q: ArrayLike, *, features: Features | None = None) -> Floats:
         """Absolute parameters of the links, (n, N, 5), or (N, 5) for one reading."""
         rows, single = self._readings(q)
-        found = self.model.parameters(self._inputs(rows, features))[:, self.arm.links]
+        found = self.model.parameters(self.field_inputs(rows, features))[:, self.arm.links]
         return found[0] if single else found
 
     def position(
@@ -259,7 +293,7 @@ class Calibration:
             WorkError: If the file has neither bounds nor the rows to work them out from.
         """
         rows, single = self._readings(q)
-        found = self.conservative.std(self._inputs(rows, features))
+        found = self.conservative.std(self.field_inputs(rows, features))
         found[:, 0] += np.linalg.norm(at_tool(self.robot, tool)[:3, 3]) * found[:, 1]
         return found[0] if single else found
 
@@ -279,16 +313,23 @@ class Calibration:
     def flange_variances(self, q: ArrayLike, features: Features | None) -> tuple[Floats, Floats, Floats]:
         """Inputs (n, I), and variances (n, 6) of the flange's pose: now, and before any measurement."""
         rows, _ = self._readings(q)
-        inputs, jacobian = self._inputs(rows, features), self._jacobian(rows, features, np.eye(4), pose=True)
-        covariance = self._spread.covariance(inputs, jacobian)
-        return inputs, np.einsum("nii->ni", covariance), self._spread.prior(inputs, jacobian)
+        inputs, jacobian = (
+            self.field_inputs(rows, features),
+            self._jacobian(rows, features, np.eye(4), pose=True),
+        )
+        covariance = self.spread.covariance(inputs, jacobian)
+        return inputs, np.einsum("nii->ni", covariance), self.spread.prior(inputs, jacobian)
 
     def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)
         jacobian = self._jacobian(rows, features, tool, pose=pose)
-        covariance = self._spread.covariance(self._inputs(rows, features), jacobian)
+        covariance = self.spread.covariance(self.field_inputs(rows, features), jacobian)
         found: Floats = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
         return found[0] if single else found
+
+    def chain_jacobian(self, q: ArrayLike, features: Features | None = None) -> Floats:
+        """Derivatives (n, 3, 5 L) of the tool's point by all parameters of the chain, a base row included."""
+        return self._jacobian(self._readings(q)[0], features, None, pose=False)
 
     def _jacobian(
         self, rows: Floats, features: Features | None, tool: ArrayLike | None, *, pose: bool
@@ -297,7 +338,12 @@ class Calibration:
         return chain.parameter_jacobian(*self._at(rows, features), pose=pose)
 
     @cached_property
-    def _spread(self) -> Spread:
+    def spread(self) -> Spread:
+        """What is uncertain about the arm's parameters.
+
+        Raises:
+            WorkError: If it is not known: the rows were left out of the file, or a scheme does not tell it.
+        """
         if self.fitted_spread is not None:
             return self.fitted_spread
         if self.scheme is not None:
@@ -308,18 +354,21 @@ class Calibration:
             )
         if self.variable is None:
             return ConstantSpread.of(self)
+        if self.predecessor is not None:
+            return UpdatedSpread.of(self, self.predecessor.spread)
         return VariableSpread.of(self)
 
     def _readings(self, q: ArrayLike) -> tuple[Floats, bool]:
         return as_rows(q, self.robot.joint_count, what=f"joint readings of {self.robot.name}")
 
-    def _inputs(self, rows: Floats, features: Features | None) -> Floats:
+    def field_inputs(self, rows: Floats, features: Features | None) -> Floats:
+        """Inputs (n, I) of the field at readings (n, N): joint values, then features."""
         columns = feature_columns(features, self.options.features, len(rows))
         return np.hstack([self.robot.joints_from_readings(rows), columns])
 
     def _at(self, rows: Floats, features: Features | None) -> tuple[Floats, Floats]:
         """Joint values (n, N) and parameters (n, L, 5) of readings."""
-        inputs = self._inputs(rows, features)
+        inputs = self.field_inputs(rows, features)
         return np.ascontiguousarray(inputs[:, : self.robot.joint_count]), self.model.parameters(inputs)
 
     def _endpoint(self, tool: ArrayLike | None, group: str | None, target: int | None) -> Endpoint:

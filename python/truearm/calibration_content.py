@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm import conservative, rows_content, schemes
+from truearm import conservative, revision, rows_content, schemes
 from truearm._core import Field, Setup
 from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
@@ -49,11 +49,14 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         "data_sha256": calibration.data_hash,
         "rows": None,
         "conservative": None,
+        "update": None,
     }
     if calibration.has_conservative:
         content["conservative"] = conservative.pack(calibration.conservative, arrays)
     if with_rows and calibration.rows is not None:
         content["rows"] = rows_content.pack(calibration.rows, calibration.options.features, arrays)
+    if calibration.revision is not None:
+        content["update"] = revision.pack(calibration.revision, arrays, whole=with_rows)
     return arrays, content
 
 
@@ -99,6 +102,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "data_hash": content["data_sha256"],
         "version": content["version"],
         "stored_conservative": None if bounds is None else conservative.unpack(bounds, arrays),
+        "revision": revision.unpack(content["update"], arrays) if content.get("update") else None,
     }
 
 

@@ -37,23 +37,40 @@ def write_calibration_file(path: Path, arrays: Arrays, content: Mapping[str, Any
     Raises:
         InputError: If the directory does not exist or may not be written to.
     """
+    write_whole(path, calibration_bytes(arrays, content))
+
+
+def calibration_bytes(arrays: Arrays, content: Mapping[str, Any]) -> bytes:
+    """What a file of arrays and JSON values holds."""
     text = json.dumps(
         {"schema": SCHEMA, "sha256": NO_DIGEST, **content}, allow_nan=False, separators=(",", ":")
     )
     contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     data = save(contiguous, {METADATA_KEY: text})
     before, _, behind = data.partition(NO_DIGEST.encode())
-    write_whole(path, before + hashlib.sha256(data).hexdigest().encode() + behind)
+    return before + hashlib.sha256(data).hexdigest().encode() + behind
 
 
 def read_calibration_file(path: Path) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and JSON values of a file.
 
     Raises:
-        InputError: If there is no such file, it is none of ours, is cut short or altered in any byte, or
-            has a layout that this version does not know.
+        InputError: If there is no such file, or as for :func:`parse_calibration`.
     """
-    data, where = read_bytes(path), str(path)
+    return parse_calibration(read_bytes(path), str(path))
+
+
+def parse_calibration(data: bytes, where: str) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and JSON values of a file's content.
+
+    Args:
+        data: The content.
+        where: Named in errors.
+
+    Raises:
+        InputError: If it is none of ours, is cut short or altered in any byte, or has a layout that this
+            version does not know.
+    """
     header = _header(data, where)
     content = _content(header, where)
     _check_schema(content, where)

@@ -138,7 +138,8 @@ def _roots(variances: Floats) -> Floats:
 
 
 def _sample_count(calibration: "Calibration") -> int:
-    rows = 0 if calibration.rows is None else calibration.rows.residual.size
+    learned = calibration.learned_from
+    rows = 0 if learned is None else learned.residual.size
     if calibration.variable is None or rows <= QUICK_ROWS:
         return SAMPLES
     return max(FEWEST_SAMPLES, SAMPLES * QUICK_ROWS // rows)
@@ -146,9 +147,9 @@ def _sample_count(calibration: "Calibration") -> int:
 
 def _measured(calibration: "Calibration") -> Floats | None:
     """Lowest and highest reading and feature of the measurements, (N + F, 2)."""
-    if calibration.rows is None:
+    if calibration.learned_from is None:
         return None
-    data = calibration.rows.data
+    data = calibration.learned_from.data
     columns = np.hstack([data.readings, feature_values(data, calibration.options.features)])
     return np.column_stack([columns.min(axis=0), columns.max(axis=0)])
 

@@ -1,5 +1,6 @@
-"""Covariance of what a calibration predicts: the arm's part, without noise and set-up."""
+"""Covariance of what a calibration predicts: the arm's part, and together with set-up and noise."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
@@ -16,9 +17,11 @@ if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 LENGTHS: Final = (1, 2)
 """Places of d and a among a link's parameters."""
+AXES: Final = 3
 
 
 class Spread(Protocol):
@@ -30,24 +33,41 @@ class Spread(Protocol):
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) of the same before any measurement."""
 
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m) of the same of all inputs with one another.
+
+        With `setup` (n, m, S), derivatives by the unknowns of all set-ups that were fitted, their part is
+        added. m is a multiple of three.
+        """
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """Covariance (n, m, m) of what a measurement shows anew; `orientation` (m,) tells rows in rad."""
+
 
 @dataclass(frozen=True, eq=False)
 class ConstantSpread:
-    """Constants: one covariance for the whole arm."""
+    """Constants: one covariance for the whole arm, and behind it of the set-ups."""
 
     columns: list[int]
-    of_constants: Floats
+    of_all: Floats
     before: Floats
+    noises: tuple[float, float]
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "ConstantSpread":
         """That of a calibration's constant model."""
         columns = task_of(calibration).columns(calibration.constant.names)
-        size = len(columns)
         length, angle, scaled = calibration.options.prior
         scale = calibration.constant.prior_scale if scaled else 1.0
         before = scale * np.where(np.isin(np.array(columns) % 5, LENGTHS), length, angle)
-        return cls(columns, calibration.constant.covariance[:size, :size], before**2)
+        details = calibration.constant
+        return cls(columns, details.covariance, before**2, (details.noise_m, details.noise_rad))
+
+    @property
+    def of_constants(self) -> Floats:
+        """Covariance of the constants alone."""
+        size = len(self.columns)
+        return self.of_all[:size, :size]
 
     def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Covariance (n, m, m), the same rule everywhere."""
@@ -58,6 +78,19 @@ class ConstantSpread:
         """Variances (n, m) that the prior of the constants gives."""
         return np.asarray(np.square(jacobian[:, :, self.columns]) @ self.before)
 
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m), from that of constants and set-up."""
+        rows = jacobian[:, :, self.columns].reshape(-1, len(self.columns))
+        if setup is not None:
+            rows = np.hstack([rows, setup.reshape(len(rows), -1)])
+        size = rows.shape[1]
+        return np.asarray(rows @ self.of_all[:size, :size] @ rows.T)
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """What no constant explains, alike everywhere."""
+        noise = np.diag(np.where(orientation, self.noises[1], self.noises[0]) ** 2)
+        return np.repeat(noise[None], len(jacobian), axis=0)
+
 
 @dataclass(frozen=True, eq=False)
 class VariableSpread:
@@ -66,6 +99,7 @@ class VariableSpread:
     columns: list[int]
     posterior: Posterior
     inflation: float
+    noises: tuple[float, float]
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "VariableSpread":
@@ -91,7 +125,7 @@ class VariableSpread:
         columns = list(calibration.arm.candidates.columns)
         point = calibration.models[CONSTANT]
         posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
-        return cls(columns, posterior, details.inflation)
+        return cls(columns, posterior, details.inflation, noises_of(details.hyper))
 
     def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Covariance (n, m, m) at inputs (n, I)."""
@@ -102,6 +136,73 @@ class VariableSpread:
         """Variances (n, m) that constants and field have before any measurement."""
         chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
         return self.posterior.prior(np.ascontiguousarray(inputs), chosen) * self.inflation**2
+
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m), exact."""
+        parts = jacobian.shape[1] // AXES
+        chosen = jacobian[:, :, self.columns].reshape(-1, AXES, len(self.columns))
+        own = None if setup is None else np.ascontiguousarray(setup.reshape(len(chosen), AXES, -1))
+        found = self.posterior.joint_covariance(
+            np.repeat(inputs, parts, axis=0), np.ascontiguousarray(chosen), own
+        )
+        return np.asarray(found * self.inflation**2)
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """Noise of the instrument, and what joints miss anew."""
+        chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
+        instrument = np.diag(np.where(orientation, self.noises[1], self.noises[0]) ** 2)
+        return np.asarray(self.posterior.repeatability(chosen) + instrument) * self.inflation**2
+
+
+@dataclass(frozen=True, eq=False)
+class UpdatedSpread:
+    """A calibration whose offsets were estimated again: what was uncertain before, and what they are now.
+
+    Attributes:
+        before: Of the calibration that was updated.
+        offsets: Derivatives (5 L, u) of the arm's parameters by what was estimated of the arm.
+        of_all: Covariance (u + S, u + S) of that and of all set-ups' unknowns, after the update.
+    """
+
+    before: Spread
+    offsets: Floats
+    of_all: Floats
+
+    @classmethod
+    def of(cls, calibration: "Calibration", before: Spread) -> "UpdatedSpread":
+        """That of an updated calibration."""
+        revision = calibration.revision
+        if revision is None:
+            raise WorkError("this calibration was not updated", rule="Only an updated one has this spread")
+        return cls(before, revision.directions, revision.covariance)
+
+    def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Covariance (n, m, m); both parts counted in full, though they have something in common."""
+        size = self.offsets.shape[1]
+        moved = jacobian @ self.offsets
+        own = moved @ self.of_all[:size, :size] @ moved.transpose(0, 2, 1)
+        return self.before.covariance(inputs, jacobian) + np.asarray(own)
+
+    def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
+        """Variances (n, m) before any measurement."""
+        return self.before.prior(inputs, jacobian)
+
+    def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
+        """Covariance (n m, n m)."""
+        rows = (jacobian @ self.offsets).reshape(-1, self.offsets.shape[1])
+        if setup is not None:
+            rows = np.hstack([rows, setup.reshape(len(rows), -1)])
+        size = rows.shape[1]
+        return self.before.joint(inputs, jacobian) + np.asarray(rows @ self.of_all[:size, :size] @ rows.T)
+
+    def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
+        """As before."""
+        return self.before.noise(jacobian, orientation)
+
+
+def noises_of(hyper: Mapping[str, Sequence[float]]) -> tuple[float, float]:
+    """Noise of positions in m and of orientations in rad among a field's hyper-parameters."""
+    return hyper["noise_position"][0], hyper["noise_orientation"][0]
 
 
 def task_of(calibration: "Calibration") -> Task:

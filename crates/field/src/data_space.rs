@@ -4,7 +4,10 @@
 //! `s = (S^T K^-1 S)^-1 S^T K^-1 r`, `alpha = K^-1 (r - S s)`, and the weights are prior covariance times
 //! excitations times Jacobian times alpha (universal kriging; Rasmussen and Williams 2006, section 2.7).
 
+use std::ops::Range;
+
 use faer::{Mat, MatMut, MatRef};
+use rayon::prelude::*;
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, parallelism};
 
@@ -187,19 +190,55 @@ impl DataSpace {
         out
     }
 
-    fn batch_covariance(&self, query: &Query, poses: std::ops::Range<usize>, out: &mut [f64]) {
+    fn batch_covariance(&self, query: &Query, poses: Range<usize>, out: &mut [f64]) {
+        let rows = query.rows;
+        let (learned, lost) = self.reduced(query, poses.clone());
+        for (index, pose) in poses.enumerate() {
+            let excited = self.model.cells.excite(query.values_of(pose));
+            let priors = self.model.variances(&excited, &excited);
+            for i in 0..rows {
+                for j in 0..rows {
+                    let (a, b) = (index * rows + i, index * rows + j);
+                    let prior = query.prior(pose, (i, j), &priors);
+                    let learned = learned.col(a).transpose() * learned.col(b);
+                    let setup = lost.col(a).transpose() * lost.col(b);
+                    out[(pose * rows + i) * rows + j] = prior - learned + setup;
+                }
+            }
+        }
+    }
+
+    /// Covariance (n m, n m) of all rows of a query with one another.
+    pub fn joint(&self, query: &Query) -> Mat<f64> {
+        let (learned, lost) = self.reduced(query, 0..query.poses());
+        let excited: Vec<Excited> =
+            (0..query.poses()).map(|pose| self.model.cells.excite(query.values_of(pose))).collect();
+        let mut joint = product(learned.transpose(), learned.as_ref()) * faer::Scale(-1.0);
+        joint += product(lost.transpose(), lost.as_ref());
+        let prior = |a: usize| -> Vec<f64> {
+            let covariance = |b| query.cross((a, b), &self.model.variances(&excited[a], &excited[b]));
+            (0..=a).flat_map(covariance).collect()
+        };
+        let priors: Vec<Vec<f64>> = (0..query.poses()).into_par_iter().map(prior).collect();
+        for (a, blocks) in priors.iter().enumerate() {
+            add_blocks(&mut joint, query.rows, a, blocks);
+        }
+        joint
+    }
+
+    /// What the rows of some configurations have in common with the training rows (R, k), and with the set-up's
+    /// unknowns (s, k): learned^T learned is taken from their prior covariance, lost^T lost added to it.
+    fn reduced(&self, query: &Query, poses: Range<usize>) -> (Mat<f64>, Mat<f64>) {
         let training = &self.model.training;
         let (rows, width) = (query.rows, training.setup_width);
         let mut cross = Mat::zeros(training.row_count(), poses.len() * rows);
-        let mut priors = Vec::new();
         for (index, pose) in poses.clone().enumerate() {
             let excited = self.model.cells.excite(query.values_of(pose));
             self.cross(&excited, query.jacobian_of(pose), cross.as_mut().subcols_mut(index * rows, rows));
-            priors.push(self.model.variances(&excited, &excited));
         }
         let mut lost = product(self.spread.transpose(), cross.as_ref()) * faer::Scale(-1.0);
         if let Some(setup) = query.setup {
-            for (index, pose) in poses.clone().enumerate() {
+            for (index, pose) in poses.enumerate() {
                 for (i, line) in
                     setup[pose * rows * width..(pose + 1) * rows * width].chunks_exact(width).enumerate()
                 {
@@ -209,17 +248,7 @@ impl DataSpace {
         }
         self.factor.solve_lower(cross.as_mut());
         self.inner.solve_lower(lost.as_mut());
-        for (index, pose) in poses.enumerate() {
-            for i in 0..rows {
-                for j in 0..rows {
-                    let (a, b) = (index * rows + i, index * rows + j);
-                    let prior = query.prior(pose, (i, j), &priors[index]);
-                    let learned = cross.col(a).transpose() * cross.col(b);
-                    let setup = lost.col(a).transpose() * lost.col(b);
-                    out[(pose * rows + i) * rows + j] = prior - learned + setup;
-                }
-            }
-        }
+        (cross, lost)
     }
 
     /// Covariance of all training rows with the rows (m, P) of one configuration: (R, m).
@@ -232,6 +261,21 @@ impl DataSpace {
                 let entries = training.jacobian_row(row);
                 for (k, own) in rows.chunks_exact(columns).enumerate() {
                     out[(row, k)] = (0..columns).map(|p| entries[p] * variances[p] * own[p]).sum();
+                }
+            }
+        }
+    }
+}
+
+/// Adds the blocks (m, m) of a configuration with those up to it to a symmetric matrix, on both sides of its diagonal.
+fn add_blocks(joint: &mut Mat<f64>, rows: usize, pose: usize, blocks: &[f64]) {
+    for (other, block) in blocks.chunks_exact(rows * rows).enumerate() {
+        for i in 0..rows {
+            for j in 0..rows {
+                let (a, b) = (pose * rows + i, other * rows + j);
+                joint[(a, b)] += block[i * rows + j];
+                if other != pose {
+                    joint[(b, a)] += block[i * rows + j];
                 }
             }
         }

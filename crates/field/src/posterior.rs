@@ -74,9 +74,32 @@ impl Query<'_> {
     pub fn prior(&self, pose: usize, (i, j): (usize, usize), variances: &[f64]) -> f64 {
         let rows = self.jacobian_of(pose);
         let columns = self.widths.1;
-        let (a, b) = (&rows[i * columns..(i + 1) * columns], &rows[j * columns..(j + 1) * columns]);
-        a.iter().zip(b).zip(variances).map(|((x, y), v)| x * y * v).sum()
+        weighted(&rows[i * columns..(i + 1) * columns], &rows[j * columns..(j + 1) * columns], variances)
     }
+
+    /// Prior covariance (m, m) of the rows of two configurations, given the columns' covariances between them.
+    pub fn cross(&self, (a, b): (usize, usize), covariances: &[f64]) -> Vec<f64> {
+        let (left, right) = (self.jacobian_of(a), self.jacobian_of(b));
+        let columns = self.widths.1;
+        let pairs = left.chunks_exact(columns).flat_map(|x| right.chunks_exact(columns).map(move |y| (x, y)));
+        pairs.map(|(x, y)| weighted(x, y, covariances)).collect()
+    }
+
+    /// Whether all arrays have the lengths that they need.
+    fn check(&self, setup_width: usize) -> Result<(), FieldError> {
+        let length = |what, found, expected| {
+            if found == expected { Ok(()) } else { Err(FieldError::Length { what, found, expected }) }
+        };
+        length("values", self.values.len(), self.poses() * self.widths.0)?;
+        length("jacobian", self.jacobian.len(), self.poses() * self.rows * self.widths.1)?;
+        self.setup
+            .map_or(Ok(()), |setup| length("setup", setup.len(), self.poses() * self.rows * setup_width))
+    }
+}
+
+/// `sum of a b v`.
+fn weighted(a: &[f64], b: &[f64], variances: &[f64]) -> f64 {
+    a.iter().zip(b).zip(variances).map(|((x, y), v)| x * y * v).sum()
 }
 
 impl Posterior {
@@ -177,17 +200,7 @@ impl Posterior {
         setup: Option<&[f64]>,
         rows: usize,
     ) -> Result<Vec<f64>, FieldError> {
-        let training = self.training();
-        let query =
-            Query { values, jacobian, setup, rows, widths: (training.inputs.len(), training.columns.len()) };
-        let length = |what, found, expected| {
-            if found == expected { Ok(()) } else { Err(FieldError::Length { what, found, expected }) }
-        };
-        length("values", values.len(), query.poses() * training.inputs.len())?;
-        length("jacobian", jacobian.len(), query.poses() * rows * training.columns.len())?;
-        if let Some(setup) = setup {
-            length("setup", setup.len(), query.poses() * rows * training.setup_width)?;
-        }
+        let query = self.query(values, jacobian, setup, rows)?;
         let mut covariance = match self {
             Self::Data(space) => space.covariance(&query),
             Self::Weight(space) => space.covariance(&query),
@@ -204,18 +217,55 @@ impl Posterior {
         Ok(covariance)
     }
 
+    /// Covariance (n m, n m) of the same rows of all configurations with one another, row-major.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn joint_covariance(
+        &self,
+        values: &[f64],
+        jacobian: &[f64],
+        setup: Option<&[f64]>,
+        rows: usize,
+    ) -> Result<Vec<f64>, FieldError> {
+        let query = self.query(values, jacobian, setup, rows)?;
+        let mut joint = match self {
+            Self::Data(space) => space.joint(&query),
+            Self::Weight(space) => space.joint(&query),
+        };
+        for pose in 0..query.poses() {
+            let beyond = self.model().beyond(query.values_of(pose));
+            for k in 0..rows * rows {
+                let (i, j) = (k / rows, k % rows);
+                joint[(pose * rows + i, pose * rows + j)] += query.prior(pose, (i, j), &beyond);
+            }
+        }
+        let scale = self.model().hyper.extrapolation.powi(2);
+        let size = joint.nrows();
+        Ok((0..size * size).map(|k| scale * joint[(k / size, k % size)]).collect())
+    }
+
+    fn query<'a>(
+        &self,
+        values: &'a [f64],
+        jacobian: &'a [f64],
+        setup: Option<&'a [f64]>,
+        rows: usize,
+    ) -> Result<Query<'a>, FieldError> {
+        let training = self.training();
+        let widths = (training.inputs.len(), training.columns.len());
+        let query = Query { values, jacobian, setup, rows, widths };
+        query.check(training.setup_width)?;
+        Ok(query)
+    }
+
     /// Variances of `J* CEP(q*)` before any measurement, (n, m).
     ///
     /// # Errors
     /// [`FieldError::Length`].
     pub fn prior(&self, values: &[f64], jacobian: &[f64], rows: usize) -> Result<Vec<f64>, FieldError> {
-        let (model, training) = (self.model(), self.training());
-        let widths = (training.inputs.len(), training.columns.len());
-        let query = Query { values, jacobian, setup: None, rows, widths };
-        let expected = query.poses() * rows * widths.1;
-        if jacobian.len() != expected {
-            return Err(FieldError::Length { what: "jacobian", found: jacobian.len(), expected });
-        }
+        let model = self.model();
+        let query = self.query(values, jacobian, None, rows)?;
         let scale = model.hyper.extrapolation.powi(2);
         let mut out = Vec::with_capacity(query.poses() * rows);
         for pose in 0..query.poses() {

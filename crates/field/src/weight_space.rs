@@ -257,22 +257,10 @@ impl WeightSpace {
     }
 
     pub fn covariance(&self, query: &Query) -> Vec<f64> {
-        let plans = self.model.plans();
-        let parts = self.parts();
-        let rows = Rows { space: &parts, plans: &plans };
         let mut out = vec![0.0; query.poses() * query.rows * query.rows];
-        let width = self.model.training.setup_width;
         for first in (0..query.poses()).step_by(BATCH) {
             let last = (first + BATCH).min(query.poses());
-            let mut reduced = Mat::zeros((last - first) * query.rows, self.width);
-            for pose in first..last {
-                let setup =
-                    query.setup.map(|s| &s[pose * query.rows * width..(pose + 1) * query.rows * width]);
-                let target = reduced.as_mut().subrows_mut((pose - first) * query.rows, query.rows);
-                rows.fill(query.values_of(pose), query.jacobian_of(pose), setup, target);
-            }
-            let mut reduced = reduced.transpose().to_owned();
-            self.factor.solve_lower(reduced.as_mut());
+            let reduced = self.reduced(query, first..last);
             for pose in first..last {
                 for i in 0..query.rows {
                     for j in 0..query.rows {
@@ -284,6 +272,29 @@ impl WeightSpace {
             }
         }
         out
+    }
+
+    /// Covariance (n m, n m) of all rows of a query with one another.
+    pub fn joint(&self, query: &Query) -> Mat<f64> {
+        let reduced = self.reduced(query, 0..query.poses());
+        product(reduced.transpose(), reduced.as_ref())
+    }
+
+    /// Rows of some configurations by unknowns of unit variance, (u, k).
+    fn reduced(&self, query: &Query, poses: std::ops::Range<usize>) -> Mat<f64> {
+        let plans = self.model.plans();
+        let parts = self.parts();
+        let rows = Rows { space: &parts, plans: &plans };
+        let width = self.model.training.setup_width;
+        let mut filled = Mat::zeros(poses.len() * query.rows, self.width);
+        for (index, pose) in poses.enumerate() {
+            let setup = query.setup.map(|s| &s[pose * query.rows * width..(pose + 1) * query.rows * width]);
+            let target = filled.as_mut().subrows_mut(index * query.rows, query.rows);
+            rows.fill(query.values_of(pose), query.jacobian_of(pose), setup, target);
+        }
+        let mut reduced = filled.transpose().to_owned();
+        self.factor.solve_lower(reduced.as_mut());
+        reduced
     }
 }
 

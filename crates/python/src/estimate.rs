@@ -1,11 +1,13 @@
 //! `_core.fit_constant` and its companions: constants, set-up, identifiability, residuals.
 
 use numpy::ndarray::Array3;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use truearm_estimate::{
-    ConstantFit as Core, ConstantOptions, FrameMode, Noise, Point, Prior, Problem, Robust,
-    fit_constant as fit, identifiability as identify, linearise as linear, residuals as left_over,
+    ConstantFit as Core, ConstantOptions, FrameMode, Layout, Linearised, Noise, Point, Prior, Problem,
+    Robust, fit_constant as fit, identifiability as identify, linearise as linear, residuals as left_over,
 };
 
 use crate::chain::Chain;
@@ -229,6 +231,53 @@ pub fn linearise<'py>(
     parameters: PyReadonlyArrayDyn<'py, f64>,
     setup: &Setup,
 ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>)> {
+    let rows = linearised(py, problem, &parameters, setup)?;
+    let poses = problem.core().measurements.pose_count();
+    let shape = (poses, rows.rows, problem.core().columns.len());
+    Ok((array3(py, rows.arm, shape)?, matrix(py, &rows.residual, rows.rows)))
+}
+
+/// Derivatives with respect to the unknowns of each pose's own set-up, (n, m, W), base frame.
+#[pyfunction]
+pub fn setup_jacobian<'py>(
+    py: Python<'py>,
+    problem: &IdentificationProblem,
+    parameters: PyReadonlyArrayDyn<'py, f64>,
+    setup: &Setup,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let rows = linearised(py, problem, &parameters, setup)?;
+    let width = Layout::new(&problem.core()).group_width();
+    array3(py, rows.setup, (problem.core().measurements.pose_count(), rows.rows, width))
+}
+
+/// The set-up after a step (G, W) of its unknowns.
+#[pyfunction]
+pub fn step_setup(
+    problem: &IdentificationProblem,
+    setup: &Setup,
+    step: PyReadonlyArray2<'_, f64>,
+) -> PyResult<Setup> {
+    let core = problem.core();
+    let layout = Layout::new(&core);
+    let wanted = [setup.core().groups.len(), layout.group_width()];
+    if step.shape() != wanted || wanted[0] != layout.groups {
+        let shape = step.shape();
+        return Err(CoreError::new_err(format!(
+            "step has shape {shape:?}, it must be {wanted:?} for {} groups",
+            layout.groups
+        )));
+    }
+    let mut all = vec![0.0; layout.len()];
+    step.as_array().iter().zip(&mut all[layout.arm..]).for_each(|(value, place)| *place = *value);
+    Ok(Setup::wrap(layout.step_setup(setup.core(), &all)))
+}
+
+fn linearised(
+    py: Python<'_>,
+    problem: &IdentificationProblem,
+    parameters: &PyReadonlyArrayDyn<'_, f64>,
+    setup: &Setup,
+) -> PyResult<Linearised> {
     let values: Vec<f64> = parameters.as_array().iter().copied().collect();
     let core = problem.core();
     let (size, poses) = (core.chain.parameter_count(), core.measurements.pose_count());
@@ -239,9 +288,15 @@ pub fn linearise<'py>(
         )));
     }
     let point = Point { parameters: &values, setup: setup.core() };
-    let rows = py.detach(|| linear(&core, point));
-    let shape = (poses, rows.rows, core.columns.len());
-    let jacobian = Array3::from_shape_vec(shape, rows.arm)
+    Ok(py.detach(|| linear(&core, point)))
+}
+
+fn array3<'py>(
+    py: Python<'py>,
+    values: Vec<f64>,
+    shape: (usize, usize, usize),
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let array = Array3::from_shape_vec(shape, values)
         .map_err(|error| CoreError::new_err(format!("the Jacobian: {error}")))?;
-    Ok((jacobian.into_pyarray(py), matrix(py, &rows.residual, rows.rows)))
+    Ok(array.into_pyarray(py))
 }

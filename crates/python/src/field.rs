@@ -458,4 +458,39 @@ impl Posterior {
             quick(py, || self.core().covariance(&inputs, &jacobian, setup_columns.as_deref(), rows))?;
         array3(py, values, (poses, rows, rows))
     }
+
+    /// Covariance (n m, n m) of the rows of all configurations with one another; arguments as for `covariance`.
+    #[pyo3(signature = (inputs, jacobian, setup=None))]
+    fn joint_covariance<'py>(
+        &self,
+        py: Python<'py>,
+        inputs: PyReadonlyArray2<'py, f64>,
+        jacobian: PyReadonlyArray3<'py, f64>,
+        setup: Option<PyReadonlyArray3<'py, f64>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
+        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
+        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
+        let setup: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
+        let values = quick(py, || self.core().joint_covariance(&inputs, &jacobian, setup.as_deref(), rows))?;
+        Ok(matrix(py, &values, poses * rows))
+    }
+
+    /// Covariance (n, m, m) of what joints do not repeat, carried to rows of Jacobians (n, m, P).
+    fn repeatability<'py>(
+        &self,
+        py: Python<'py>,
+        jacobian: PyReadonlyArray3<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
+        let entries: Vec<f64> = jacobian.as_array().iter().copied().collect();
+        let columns = self.core().training().columns.len();
+        if jacobian.shape()[2] != columns {
+            return Err(CoreError::new_err(format!(
+                "jacobian has {} columns, the posterior {columns}",
+                jacobian.shape()[2]
+            )));
+        }
+        array3(py, self.core().repeatability(&entries, rows), (poses, rows, rows))
+    }
 }

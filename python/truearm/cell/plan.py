@@ -1,4 +1,4 @@
-"""Which poses to measure: those that determine most, others to judge by, and some twice, in a good order."""
+"""Which poses to measure: those that determine most, others to judge by, and some again, in a good order."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from truearm.cell.session import Step
 from truearm.errors import WorkError
 from truearm.identified import IdentifiedArm
 from truearm.planning.choosing import Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
+from truearm.planning.spreading import fill
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -25,6 +26,7 @@ POOL_PER_NUMBER: Final = 3
 LEAST_POOL: Final = 400
 MOST_DRAWS: Final = 200_000
 UNLIMITED_RAD: Final = np.pi
+REPEAT: Final = "repeat"
 JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
 JOINT_SPEED_RAD_S: Final = 1.0
 PRIOR_M: Final = 2e-3
@@ -86,26 +88,30 @@ def plan_poses(
     """
     flange_from_target = arm.tool if cell is None else cell.flange_from_target
     size = max(LEAST_POOL, POOL_PER_POSE * options.count, POOL_PER_NUMBER * max(numbers, default=0))
-    pool = _pool(arm, cell, size, options.seed)
+    pool = measurable_pool(arm, cell, size, options.seed)
     wanted = ChoiceOptions(criterion=options.criterion, tool=flange_from_target)
     identified = IdentifiedArm(arm)
     choice = choose(identified, pool, options.count, wanted)
     rows, purposes = _with_others(pool, choice.rows)
-    points = _targets(arm, pool[rows], flange_from_target)
-    orders = {
-        "paper": paper_order(points),
-        "short": short_order(points, pool[rows], JOINT_SPEED_RAD_S),
-    }
-    order = orders[options.order]
-    readings = pool[rows][order]
-    approach = np.where(np.arange(len(order)) % 2 == 0, 1, -1)
+    points = targets_of(arm, pool[rows], flange_from_target)
+    orders = both_orders(points, pool[rows])
+    repeats = max(LEAST_REPEATED, round(REPEATED_SHARE * options.count))
+    poses, measured = in_order(pool[rows], purposes, orders[options.order], min(repeats, options.count))
     return Plan(
-        Poses(readings, approach, tuple(purposes[k] for k in order)),
-        points[order],
+        poses,
+        points[measured],
         choice,
         {name: motion_seconds(pool[rows], each, JOINT_SPEED_RAD_S) for name, each in orders.items()},
         {n: expected_mm(identified, pool, n, wanted, options.sigma_mm) for n in numbers},
     )
+
+
+def both_orders(points: Floats, readings: Floats) -> dict[str, NDArray[np.int64]]:
+    """The paper's order of targets (n, 3) and readings (n, N), and a shorter one, by name."""
+    return {
+        "paper": paper_order(points),
+        "short": short_order(points, readings, JOINT_SPEED_RAD_S),
+    }
 
 
 def expected_mm(
@@ -130,7 +136,7 @@ def expected_mm(
 SETUP_UNKNOWNS: Final = 9
 
 
-def _pool(arm: Robot, cell: Cell | None, size: int, seed: int) -> Floats:
+def measurable_pool(arm: Robot, cell: Cell | None, size: int, seed: int) -> Floats:
     """Readings (size, N) drawn evenly within the limits, all of which can be measured."""
     rng = np.random.default_rng(seed)
     low, high = np.clip(arm.limits.T, -UNLIMITED_RAD, UNLIMITED_RAD)
@@ -153,26 +159,44 @@ def _pool(arm: Robot, cell: Cell | None, size: int, seed: int) -> Floats:
 
 
 def _with_others(pool: Floats, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:
-    """Rows of the pool: chosen ones, others spread over the space, and some of the chosen ones once more."""
-    judged = _spread(pool, chosen, max(LEAST_JUDGED, round(JUDGED_SHARE * len(chosen))))
-    again = chosen[:: max(1, len(chosen) // max(LEAST_REPEATED, round(REPEATED_SHARE * len(chosen))))]
-    purposes = ["train"] * len(chosen) + ["validate"] * len(judged) + ["repeat"] * len(again)
-    return np.concatenate([chosen, judged, again]), purposes
+    """Rows of the pool: chosen ones, and others spread over the space."""
+    free = np.setdiff1d(np.arange(len(pool)), chosen)
+    judged = free[fill(pool[free], max(LEAST_JUDGED, round(JUDGED_SHARE * len(chosen))))]
+    return np.concatenate([chosen, judged]), ["train"] * len(chosen) + ["validate"] * len(judged)
 
 
-def _spread(pool: Floats, taken: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Rows far from one another, each the farthest from those before; none of the taken ones."""
-    free = np.setdiff1d(np.arange(len(pool)), taken)
-    span = np.ptp(pool, axis=0)
-    scaled = pool[free] / np.where(span > 0.0, span, 1.0)
-    picked = [int(np.argmin(np.linalg.norm(scaled - scaled.mean(axis=0), axis=1)))]
-    nearest = np.full(len(free), np.inf)
-    for _ in range(min(count, len(free)) - 1):
-        nearest = np.minimum(nearest, np.linalg.norm(scaled - scaled[picked[-1]], axis=1))
-        picked.append(int(np.argmax(nearest)))
-    return free[picked]
+def in_order(
+    readings: Floats, purposes: Sequence[str], order: NDArray[np.int64], repeats: int
+) -> tuple[Poses, NDArray[np.int64]]:
+    """Poses in an order, approached from both sides in turn, and some of them three times.
+
+    A repeated pose is approached from the other side at once, which shows hysteresis before anything drifts;
+    and at the end from its first side, which shows repeatability and warm-up.
+
+    Args:
+        readings: Of the poses (n, N).
+        purposes: Of the poses.
+        order: In which they are measured (n,).
+        repeats: How many poses are repeated, spread evenly over the order of those that train.
+
+    Returns:
+        The poses, and the number of each in `readings`.
+    """
+    sides = np.where(np.arange(len(order)) % 2 == 0, 1, -1)
+    trained = [k for k, pose in enumerate(order) if purposes[pose] == "train"]
+    again = {trained[k] for k in np.linspace(0, len(trained) - 1, repeats).round().astype(int)}
+    steps: list[tuple[int, int, str]] = []
+    for k, pose in enumerate(order):
+        steps.append((int(pose), int(sides[k]), purposes[pose]))
+        if k in again:
+            steps.append((int(pose), -int(sides[k]), REPEAT))
+    steps += [(int(order[k]), int(sides[k]), REPEAT) for k in sorted(again)]
+    rows = np.array([step[0] for step in steps], dtype=np.int64)
+    approach = np.array([step[1] for step in steps], dtype=np.int64)
+    return Poses(readings[rows], approach, tuple(step[2] for step in steps)), rows
 
 
-def _targets(arm: Robot, readings: Floats, flange_from_target: Floats) -> Floats:
+def targets_of(arm: Robot, readings: Floats, flange_from_target: Floats) -> Floats:
+    """Target points (n, 3) in the base frame at readings (n, N)."""
     poses = arm.flange_chain.pose(arm.joints_from_readings(readings)) @ flange_from_target
     return np.asarray(poses[:, :3, 3])

@@ -7,19 +7,25 @@ import numpy as np
 import pandas as pd
 
 from truearm.cell.plan import Plan
+from truearm.cell.proposed import Proposed
 from truearm.files import write_whole
 
-COLOURS: Final = {"train": "tab:blue", "validate": "tab:orange", "repeat": "tab:green"}
+COLOURS: Final = {
+    "train": "tab:blue",
+    "validate": "tab:orange",
+    "repeat": "tab:green",
+    "acceptance": "tab:red",
+}
 
 
-def write(plan: Plan, path: Path) -> None:
+def write(plan: Plan | Proposed, path: Path) -> None:
     """Write the poses: q1 ... qN in rad and m, approach, purpose."""
     columns = {f"q{j + 1}": column for j, column in enumerate(plan.poses.readings.T)}
     table = pd.DataFrame(columns | {"approach": plan.poses.approach, "purpose": plan.poses.purpose})
     write_whole(path, table.to_csv(index=False, lineterminator="\n"))
 
 
-def draw(plan: Plan, path: Path) -> None:
+def draw(plan: Plan | Proposed, path: Path) -> None:
     """Draw the targets from above and from the side, in the base frame, with the way between them."""
     from matplotlib.figure import Figure  # noqa: PLC0415
 
@@ -30,6 +36,8 @@ def draw(plan: Plan, path: Path) -> None:
         axes.plot(millimetres[:, a], millimetres[:, b], color="0.8", linewidth=0.6)
         for purpose, colour in COLOURS.items():
             chosen = millimetres[purposes == purpose]
+            if not len(chosen):
+                continue
             axes.plot(chosen[:, a], chosen[:, b], "o", color=colour, markersize=4, label=purpose)
         axes.set_xlabel(f"{'xyz'[a]} mm")
         axes.set_ylabel(f"{'xyz'[b]} mm")

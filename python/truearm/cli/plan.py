@@ -1,11 +1,12 @@
 """`truearm plan`: choose measurement poses."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from truearm.cli.arguments import AsJson, RobotName
+from truearm.cli.arguments import ROBOT_HELP, AsJson, robots_like
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
@@ -13,13 +14,21 @@ from truearm.errors import UsageError
 
 if TYPE_CHECKING:
     from truearm.cell.plan import Plan
+    from truearm.cell.proposed import Proposed
 
 NUMBERS: Final = (20, 40, 60, 100, 200)
 ORDERS: Final = ("short", "paper")
 
 
 def command(
-    robot: RobotName,
+    robot: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="ROBOT",
+            help=f"{ROBOT_HELP} With --from it is known.",
+            autocompletion=robots_like,
+        ),
+    ] = None,
     count: Annotated[int, typer.Option("-n", "--count", metavar="N", help="Poses to fit to.")] = 60,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="CSV", help="Where the poses go.")] = Path(
         "poses.csv"
@@ -30,6 +39,20 @@ def command(
     criterion: Annotated[
         str, typer.Option(metavar="d|kappa|o1..o5", help="What is best: determinant, condition, an index.")
     ] = "d",
+    next_count: Annotated[
+        int | None,
+        typer.Option("--next", metavar="N", help="The N poses that a calibration would learn most from."),
+    ] = None,
+    acceptance: Annotated[
+        int | None, typer.Option(metavar="N", help="The N poses that check a calibration best.")
+    ] = None,
+    known: Annotated[
+        Path | None, typer.Option("--from", metavar="CALIB", help="--next, --acceptance: the calibration.")
+    ] = None,
+    group: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="--next, --acceptance: set-up to measure in.  [default: the last]"),
+    ] = None,
     order: Annotated[
         str, typer.Option(metavar="short|paper", help="In which order they are measured.")
     ] = "short",
@@ -42,13 +65,18 @@ def command(
 ) -> None:
     """Choose the poses that determine an arm's parameters best, from candidates that can be measured.
 
-    A quarter as many are added to judge by, spread over the space, and a tenth are measured twice. They come
-    from lower and higher joint readings in turn, in an order from low to high. The expected accuracy for
-    several numbers of poses helps to choose N.
+    A quarter as many are added to judge by, spread over the space, and a tenth are repeated: at once from
+    the other side, and at the end. They come from lower and higher joint readings in turn, in an order from
+    low to high. The expected accuracy for several numbers of poses helps to choose N.
+
+    With --from CALIB: --next proposes the poses that reduce the expected error over the workspace most given
+    what is known already; --acceptance those that show best whether the calibration still holds.
 
     Examples:
       truearm plan ur10 -n 100 -o poses.csv
       truearm plan rv-m2 -n 60 --cell cell.toml -o poses.csv
+      truearm plan --next 20 --from arm/calibration.calib -o more.csv
+      truearm plan --acceptance 10 --from arm/calibration.calib -o check.csv
     """
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import PlanOptions, plan_poses
@@ -57,10 +85,19 @@ def command(
     from truearm.robot import Robot
 
     if criterion not in CRITERIA or order not in ORDERS:
-        wrong, known = (criterion, CRITERIA) if criterion not in CRITERIA else (order, ORDERS)
-        raise UsageError(f'"{wrong}" is not known', rule=f"One of {', '.join(known)}")
-    if count < 1:
-        raise UsageError(f"{count} poses", where="--count", rule="At least one")
+        wrong, allowed = (criterion, CRITERIA) if criterion not in CRITERIA else (order, ORDERS)
+        raise UsageError(f'"{wrong}" is not known', rule=f"One of {', '.join(allowed)}")
+    asked = {"--next": next_count, "--acceptance": acceptance, "--count": count}
+    for name, number in asked.items():
+        if number is not None and number < 1:
+            raise UsageError(f"{number} poses", where=name, rule="At least one")
+    if known is not None or next_count is not None or acceptance is not None:
+        _propose(
+            _Asked(robot, known, next_count, acceptance, group, cell, seed, order), output, picture, as_json
+        )
+        return
+    if robot is None:
+        raise UsageError("no robot is named", rule="truearm plan ROBOT, or with --from CALIB")
     known_cell = None if cell is None else Cell.load(cell)
     arm = Robot.load(robot) if known_cell is None else known_cell.arm
     options = PlanOptions(count, criterion, seed, order, sigma_mm)  # type: ignore[arg-type]
@@ -74,6 +111,79 @@ def command(
         suggest(f"truearm measure {cell} {output} --dry-run")
     elif not as_json:
         suggest(f"truearm calibrate {robot} MEASUREMENTS.csv -o result", when="Measure them; then:")
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What is to be proposed."""
+
+    robot: str | None
+    calibration: Path | None
+    next_count: int | None
+    acceptance: int | None
+    group: str | None
+    cell: Path | None
+    seed: int
+    order: str
+
+
+def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -> None:
+    from truearm.calibration import Calibration
+    from truearm.cell.cell_file import Cell
+    from truearm.cell.plan_files import draw, write
+    from truearm.cell.proposed import (
+        ProposalOptions,
+        check_same_arm,
+        propose_acceptance,
+        propose_next,
+    )
+    from truearm.robot import Robot
+
+    if asked.calibration is None or (asked.next_count is None) == (asked.acceptance is None):
+        raise UsageError(
+            "--next and --acceptance propose poses from a calibration",
+            rule="truearm plan --next N --from CALIB, or --acceptance N --from CALIB",
+        )
+    calibration = Calibration.load(asked.calibration)
+    if asked.robot is not None:
+        check_same_arm(calibration, Robot.load(asked.robot))
+    cell = None if asked.cell is None else Cell.load(asked.cell)
+    if cell is not None:
+        check_same_arm(calibration, cell.arm)
+    choose = propose_next if asked.acceptance is None else propose_acceptance
+    options = ProposalOptions(asked.next_count or asked.acceptance or 0, asked.seed, asked.order, asked.group)
+    with ends_promptly():
+        proposed = choose(calibration, options, cell=cell)
+    write(proposed, output)
+    if picture is not None:
+        draw(proposed, picture)
+    if as_json:
+        print_json({"poses": str(output), "order": asked.order, **proposed.to_dict()})
+        return
+    _print_proposed(proposed, output)
+    if asked.acceptance is not None:
+        suggest(f"truearm update {asked.calibration} MEASUREMENTS.csv", when="Measure them; then:")
+
+
+def _print_proposed(proposed: "Proposed", output: Path) -> None:
+    told = proposed.to_dict()
+    say(f"{told['count']} poses: {output}")
+    say(_motion(proposed.seconds))
+    if "noticed" not in told:
+        before, after = told["expected_before_mm"], told["expected_after_mm"][-1]
+        say_wrapped(
+            f"Expected standard deviation of the tool's position over the workspace: {before:.3f} mm now, "
+            f"{after:.3f} mm when these are measured too."
+        )
+        return
+    say("Smallest change that is noticed in 95 of 100 cases:")
+    rows = [[name, f"{value:.4f}"] for name, value in told["noticed"].items()]
+    print_table(("offset of joint in deg (mm), tool in mm", ""), rows)
+
+
+def _motion(seconds: "dict[str, float]") -> str:
+    paper, short = seconds["paper"], seconds["short"]
+    return f"Motion: {paper:.0f} s in the paper's order, {short:.0f} s in the shorter one."
 
 
 def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
@@ -93,13 +203,12 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
         return
     say_wrapped(
         f"{purposes['train']} poses to fit to, {purposes['validate']} to judge by, "
-        f"{purposes['repeat']} once more: {output}"
+        f"{purposes['repeat']} repeated: {output}"
     )
     before, after = plan.choice.before, plan.choice.after
     kappa = f"{before['kappa']:.1f} at random, {after['kappa']:.1f} chosen"
     say_wrapped(f"Condition number {kappa} (columns at 300 mm).")
-    paper, short = plan.seconds["paper"], plan.seconds["short"]
-    say(f"Motion: {paper:.0f} s in the paper's order, {short:.0f} s in the shorter one.")
+    say(_motion(plan.seconds))
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]
     say("Expected standard deviation of the calibrated position:")
     print_table(("poses", "mm"), rows)

@@ -137,8 +137,8 @@ def _axis(text: str) -> tuple[int, Axis]:
 def _ranges(calibration: Calibration) -> list[tuple[float, float]]:
     """Lowest and highest reading of each joint, deg or mm: of the rows, else of the limits."""
     robot = calibration.robot
-    if calibration.rows is not None:
-        q = calibration.rows.data.readings
+    if calibration.learned_from is not None:
+        q = calibration.learned_from.data.readings
         low, high = q.min(axis=0), q.max(axis=0)
     else:
         reach = np.array([UNLIMITED[kind] for kind in robot.joints])

@@ -3,6 +3,7 @@
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod evidence;
+mod greedy;
 mod oracle;
 mod posterior;
 mod sets;

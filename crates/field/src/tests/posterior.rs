@@ -21,16 +21,16 @@ fn weight_space(training: &Training, joints: usize, degree: usize) -> Posterior 
     Posterior::Weight(Box::new(WeightSpace::new(model, &Cancel::default()).unwrap()))
 }
 
-fn both(training: &Training, joints: usize) -> [Posterior; 2] {
+pub fn spaces(training: &Training, joints: usize) -> [Posterior; 2] {
     [data_space(training, joints, 2), weight_space(training, joints, 2)]
 }
 
 /// The sets with their number of joints: positions; poses, groups, own sigma and weight; prismatic joint and feature.
-fn sets() -> [(Training, usize); 3] {
+pub fn sets() -> [(Training, usize); 3] {
     [(positions(22), 6), (poses_in_two_groups(18), 6), (line_inputs(16), 4)]
 }
 
-fn close(found: &[f64], wanted: &[f64], share: f64, what: &str) {
+pub fn close(found: &[f64], wanted: &[f64], share: f64, what: &str) {
     let size = wanted.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     assert_eq!(found.len(), wanted.len());
     for (k, (a, b)) in found.iter().zip(wanted).enumerate() {
@@ -46,7 +46,7 @@ fn varying(solution: &Solution, training: &Training, values: &[f64]) -> Vec<f64>
 }
 
 /// Configurations among the data, and one beyond it.
-fn queries(training: &Training) -> Vec<Vec<f64>> {
+pub fn queries(training: &Training) -> Vec<Vec<f64>> {
     let mut random = Random::new(3);
     let mut inside = |_| {
         let (a, b) = (training.values_of(1), training.values_of(2));
@@ -84,7 +84,7 @@ fn solution_is_that_of_the_covariance_written_out() {
 #[test]
 fn covariance_is_that_of_the_covariance_written_out() {
     for (training, joints) in sets() {
-        for (posterior, share) in both(&training, joints).iter().zip([1e-6, 2e-3]) {
+        for (posterior, share) in spaces(&training, joints).iter().zip([1e-6, 2e-3]) {
             let model = posterior.model();
             let oracle = Oracle::new(&training, &model.hyper, OfCells(model));
             let rows = training.rows(1);
@@ -105,7 +105,7 @@ fn covariance_is_that_of_the_covariance_written_out() {
 }
 
 /// The same prior, cells included, on fewer poses.
-fn without(model: &Model, pose: usize) -> Posterior {
+pub fn space_without(model: &Model, pose: usize) -> Posterior {
     let kept: Vec<usize> = (0..model.training.pose_count()).filter(|&other| other != pose).collect();
     let training = model.training.select(&kept);
     let by_column = crate::pairs::ByColumn::new(&training);
@@ -116,7 +116,7 @@ fn without(model: &Model, pose: usize) -> Posterior {
 /// Residual of a pose that took no part, and its standardised square at full weight.
 fn refitted(posterior: &Posterior, pose: usize) -> (Vec<f64>, f64) {
     let (model, training) = (posterior.model(), posterior.training());
-    let fewer = without(model, pose);
+    let fewer = space_without(model, pose);
     let solution = fewer.solve(&fewer.training().residual).unwrap();
     let field = varying(&solution, training, training.values_of(pose));
     let ceps: Vec<f64> = field.iter().zip(&solution.constant).map(|(a, b)| a + b).collect();
@@ -148,7 +148,7 @@ fn squares(left_out: &LeaveOneOut, training: &Training, pose: usize) -> f64 {
 #[test]
 fn leaving_one_out_is_refitting_without_it() {
     for (training, joints) in sets() {
-        for (posterior, share) in both(&training, joints).iter().zip([1e-6, 2e-3]) {
+        for (posterior, share) in spaces(&training, joints).iter().zip([1e-6, 2e-3]) {
             let left_out = posterior.leave_one_out(&training.residual).unwrap();
             assert!(left_out.sampled.iter().all(|sampled| *sampled));
             for pose in (0..training.pose_count()).filter(|&pose| !training.rows(pose).is_empty()).step_by(3)
@@ -185,7 +185,7 @@ fn other_weights_are_a_new_start() {
     for pose in [2, 5, 6] {
         reweighted.weight[training.rows(pose)].fill(1e-3);
     }
-    for (posterior, anew) in both(&training, 6).into_iter().zip(both(&reweighted, 6)) {
+    for (posterior, anew) in spaces(&training, 6).into_iter().zip(spaces(&reweighted, 6)) {
         let changed = posterior.reweighed(reweighted.weight.clone(), &Cancel::default()).unwrap();
         assert_eq!(changed.training().weight, reweighted.weight);
         let (a, b) = (changed.solve(&training.residual).unwrap(), anew.solve(&training.residual).unwrap());
@@ -199,7 +199,7 @@ fn other_weights_are_a_new_start() {
 #[test]
 fn arrays_that_do_not_fit_are_refused() {
     let training = positions(12);
-    for posterior in both(&training, 6) {
+    for posterior in spaces(&training, 6) {
         let jacobian = vec![0.0; 3 * training.columns.len()];
         assert!(posterior.covariance(&[0.0; 7], &jacobian, None, 3).is_err());
         assert!(posterior.covariance(&[0.0; 6], &jacobian[1..], None, 3).is_err());

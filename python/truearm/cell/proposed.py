@@ -1,0 +1,135 @@
+"""Poses that a calibration proposes, in a good order: to learn more, or to check that it still holds."""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.cell.cell_file import Cell
+from truearm.cell.ordering import motion_seconds
+from truearm.cell.plan import (
+    JOINT_SPEED_RAD_S,
+    LEAST_POOL,
+    POOL_PER_POSE,
+    both_orders,
+    in_order,
+    measurable_pool,
+    targets_of,
+)
+from truearm.cell.poses_file import Poses
+from truearm.errors import UsageError
+from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
+from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+
+WORKSPACE: Final = 300
+"""Poses at which the expected error counts."""
+MOST_CANDIDATES: Final = 600
+
+
+@dataclass(frozen=True)
+class ProposalOptions:
+    """What is proposed.
+
+    Attributes:
+        count: How many poses.
+        seed: Seed of the candidates, and of the workspace.
+        order: "short" or "paper".
+        group: Set-up in which they will be measured; the calibration's last one by default.
+    """
+
+    count: int
+    seed: int = 0
+    order: str = "short"
+    group: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Proposed:
+    """Proposed poses in their order.
+
+    Attributes:
+        poses: With purpose "train" or "acceptance", approached from both sides in turn.
+        points: Targets in the base frame (n, 3), m.
+        seconds: Motion time in the paper's and in the short order.
+        found: What was chosen, and what is expected of it.
+    """
+
+    poses: Poses
+    points: Floats
+    seconds: dict[str, float]
+    found: NextPoses | Acceptance
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values: motion times, and the expected deviations or what is noticed."""
+        told: dict[str, Any] = {"count": len(self.poses), "motion_s": self.seconds}
+        if isinstance(self.found, NextPoses):
+            expected = self.found.expected_mm
+            return told | {
+                "expected_before_mm": float(expected[0]),
+                "expected_after_mm": expected[1:].tolist(),
+            }
+        return told | {"noticed": self.found.noticed, "information_nat": self.found.information[1:].tolist()}
+
+
+def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Cell | None = None) -> Proposed:
+    """The poses that reduce the expected error over what can be measured most.
+
+    Args:
+        calibration: What is known already.
+        options: How many.
+        cell: Cell whose sensor has to reach the poses; joint limits alone without one.
+
+    Raises:
+        WorkError: If the sensor reaches too few poses, or the calibration has no standard deviations.
+    """
+    candidates = _candidates(calibration, options, cell)
+    workspace = measurable_pool(calibration.robot, cell, WORKSPACE, options.seed + 1)
+    found = next_poses(candidates, workspace, options.count)
+    return _ordered(candidates, found, found.rows, "train", options, cell)
+
+
+def propose_acceptance(
+    calibration: Calibration, options: ProposalOptions, *, cell: Cell | None = None
+) -> Proposed:
+    """The poses that check the calibration best; arguments and errors as for propose_next."""
+    candidates = _candidates(calibration, options, cell)
+    found = acceptance_poses(candidates, options.count)
+    return _ordered(candidates, found, found.rows, "acceptance", options, cell)
+
+
+def check_same_arm(calibration: Calibration, arm: Robot) -> None:
+    """Raise UsageError where a calibration is of another arm."""
+    known = calibration.robot
+    if known.table.shape != arm.table.shape or not np.allclose(known.table, arm.table):
+        raise UsageError(
+            f"the calibration is of {known.name}",
+            rule=f"The poses are for {arm.name}, whose Denavit-Hartenberg table is another",
+            way_out="Name the robot that was calibrated, or leave it out",
+        )
+
+
+def _candidates(calibration: Calibration, options: ProposalOptions, cell: Cell | None) -> Candidates:
+    size = min(max(LEAST_POOL, POOL_PER_POSE * options.count), max(MOST_CANDIDATES, 2 * options.count))
+    pool = measurable_pool(calibration.robot, cell, size, options.seed)
+    return Candidates(calibration, pool, options.group)
+
+
+def _ordered(
+    candidates: Candidates,
+    found: NextPoses | Acceptance,
+    rows: NDArray[np.int64],
+    purpose: str,
+    options: ProposalOptions,
+    cell: Cell | None,
+) -> Proposed:
+    arm = candidates.calibration.robot
+    readings = candidates.readings[rows]
+    points = targets_of(arm, readings, arm.tool if cell is None else cell.flange_from_target)
+    orders = both_orders(points, readings)
+    poses, measured = in_order(readings, [purpose] * len(rows), orders[options.order], 0)
+    seconds = {name: motion_seconds(readings, each, JOINT_SPEED_RAD_S) for name, each in orders.items()}
+    return Proposed(poses, points[measured], seconds, found)

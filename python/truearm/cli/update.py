@@ -1,0 +1,196 @@
+"""`truearm update`: an old calibration and a few new poses: what moved, and what still holds."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, Use
+from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
+from truearm.cli.interrupt import ends_promptly
+from truearm.cli.progress import told_stages
+from truearm.errors import UsageError
+
+if TYPE_CHECKING:
+    from truearm.updating import Update
+
+CALIBRATION_NAME: Final = "calibration.calib"
+REPORT_NAME: Final = "update.json"
+SUFFIX: Final = ".calib"
+VERDICTS: Final = {
+    "holds": "The old calibration still holds.",
+    "moved": "Offsets or tool moved. The field still fits, so the updated calibration replaces the old one.",
+    "field": "The field itself no longer fits: offsets, frame and tool do not explain what was measured. "
+    "Measure again and calibrate.",
+}
+
+
+def command(
+    calibration: CalibFile,
+    measurements: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="MEASUREMENTS...", help="CSV files of 10 to 20 poses, each a set-up."),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="NEW.calib|DIR", help="Where the updated calibration goes."),
+    ] = None,
+    keep_frame: Annotated[
+        bool, typer.Option("--keep-frame", help="The device stands where it stood: tells joint 1 too.")
+    ] = False,
+    keep_tool: Annotated[
+        bool, typer.Option("--keep-tool", help="The target sits where it sat: tells the last joint too.")
+    ] = False,
+    new_tool: Annotated[
+        bool, typer.Option("--new-tool", help="It is another target: it shows nothing of the arm.")
+    ] = False,
+    offset_deg: Annotated[
+        float, typer.Option(metavar="DEG", help="How far an offset may have changed (standard deviation).")
+    ] = 1.0,
+    tool_mm: Annotated[float, typer.Option(metavar="MM", help="The same of the target on the tool.")] = 5.0,
+    level: Annotated[
+        float, typer.Option(metavar="SHARE", help="Of unchanged arms that are not said to hold.")
+    ] = 0.01,
+    use: Use = None,
+    roll_back: Annotated[
+        bool, typer.Option("--roll-back", help="Write the calibration as it was before, bit for bit.")
+    ] = False,
+    length_unit: LengthUnit = None,
+    angle_unit: AngleUnit = None,
+    as_json: AsJson = False,
+) -> None:
+    """Take a calibration over to an arm that was re-mastered, repaired or run into something.
+
+    From 10 to 20 poses it estimates joint offsets, frame and tool again, and keeps the field. It says what
+    moved, whether the old calibration still holds, and whether its field does. The new file holds the old
+    one too.
+
+    Examples:
+      truearm plan --acceptance 15 --from arm.calib -o poses.csv
+      truearm update arm.calib measured.csv -o arm-new.calib
+      truearm update --roll-back arm-new.calib -o arm-old.calib
+    """
+    files = measurements or []
+    if roll_back:
+        _roll_back(calibration, files, output, as_json=as_json)
+        return
+    if not files:
+        raise UsageError("no measurements were given", rule="truearm update CALIB MEASUREMENTS...")
+    place = None if output is None else _free_place(output)
+
+    from truearm.calibration import Calibration
+    from truearm.measurements import Measurements
+    from truearm.updating import UpdateOptions, update
+
+    options = UpdateOptions(
+        offset_deg=offset_deg,
+        tool_mm=tool_mm,
+        keep_frame=keep_frame,
+        keep_tool=keep_tool,
+        new_tool=new_tool,
+        level=level,
+        use=use,  # type: ignore[arg-type]
+    )
+    known = Calibration.load(calibration)
+    data = Measurements.read_files(
+        files, length_unit=length_unit, angle_unit=angle_unit, joints=known.robot.joints
+    )
+    with ends_promptly():
+        found = update(known, data, options, stages=told_stages())
+        if place is not None:
+            _write(found, place)
+    warn(found.notices)
+    if as_json:
+        print_json({"calibration": None if place is None else str(place), **found.to_dict()})
+        return
+    _print(found)
+    if place is not None:
+        say(f"Updated calibration: {place}")
+    _suggest(found, calibration, place)
+
+
+def _roll_back(updated: Path, files: list[Path], output: Path | None, *, as_json: bool) -> None:
+    from truearm.updating import roll_back
+
+    if files or output is None:
+        raise UsageError(
+            "measurements were given" if files else "-o is missing",
+            rule="truearm update --roll-back NEW.calib -o OLD.calib",
+        )
+    digest = roll_back(updated, output)
+    if as_json:
+        print_json({"calibration": str(output), "sha256": digest})
+        return
+    say(f"{output}: the calibration before the update, SHA-256 {digest}.")
+
+
+def _free_place(output: Path) -> Path:
+    """The file to write; nothing may be there, since nothing is overwritten."""
+    place = output if output.suffix == SUFFIX else output / CALIBRATION_NAME
+    if place.exists():
+        raise UsageError(
+            "there is a file already",
+            where=str(place),
+            rule="An update overwrites nothing",
+            way_out="Name another file with -o",
+        )
+    return place
+
+
+def _write(found: "Update", place: Path) -> None:
+    from truearm.files import write_whole
+
+    if found.calibration.has_conservative:
+        with told_stages()("bounding the standard deviation"):
+            _ = found.calibration.conservative
+    place.parent.mkdir(parents=True, exist_ok=True)
+    found.calibration.save(place)
+    if place.name == CALIBRATION_NAME:
+        text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
+        write_whole(place.parent / REPORT_NAME, text + "\n")
+
+
+def _suggest(found: "Update", old: Path, place: Path | None) -> None:
+    """What to do next."""
+    if found.verdict == "field":
+        suggest(f"truearm plan --next 20 --from {old} -o poses.csv", when="Poses that teach most:")
+    elif place is not None:
+        suggest(f"truearm update --roll-back {place} -o OLD.calib", when="Back to the old one:")
+    elif found.verdict == "moved":
+        suggest(f"truearm update {old} MEASUREMENTS -o NEW.calib", when="Nothing was written. To do so:")
+
+
+def _print(found: "Update") -> None:
+    say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {VERDICTS[found.verdict]}")
+    rows = []
+    for entry in found.offsets:
+        words = "moved" if entry.moved else ""
+        if not entry.told:
+            words = f"not told from the {entry.confounded}" if entry.confounded else "not told"
+        rows.append(
+            [
+                str(entry.joint),
+                f"{entry.change:+.4f} {entry.unit}",
+                f"{entry.std:.4f}",
+                f"{entry.p:.3g}",
+                words,
+            ]
+        )
+    print_table(("joint", "offset changed by", "std error", "p", ""), rows, left=(0, 4))
+    for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
+        for motion in motions:
+            turn = "" if motion.angle_deg is None else f" and {motion.angle_deg:.4f} deg"
+            judged = "found anew" if motion.p is None else f"p {motion.p:.3g}{', moved' * motion.moved}"
+            say(f"{name} of {motion.group}: {motion.largest_mm:.3f} mm{turn} ({judged}).")
+    print_table(
+        ("error at left-out poses, mm", "mean", "RMS", "largest"),
+        [
+            [name, f"{e.position.mean:.3f}", f"{e.position.rms:.3f}", f"{e.position.max:.3f}"]
+            for name, e in (("old calibration", found.before), ("updated", found.after))
+        ],
+    )
+    say(
+        f"An unchanged arm shows such a change with p = {found.changed.p:.3g}, "
+        f"and such a rest with p = {found.rest.p:.3g}."
+    )

@@ -1,0 +1,113 @@
+"""The poses that check an old calibration best: those that show most of what is likely to have changed."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import choose_telling
+from truearm.planning.spreading import fill, least_distance
+from truearm.proposing.candidates import Candidates
+from truearm.proposing.next_poses import check_count
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.updating import UpdateOptions
+from truearm.updating.unknowns import arm_directions, arm_std, setup_std
+
+Floats = NDArray[np.float64]
+
+PAYLOAD_RAD: Final = 3e-4
+"""What another payload bends a joint by where its weight has the longest lever."""
+APART: Final = 0.5
+"""Chosen points are at least this part as far apart as so many that fill the workspace evenly."""
+NOTICED: Final = 2.576 + 1.645
+"""Standard errors of a change that a test at 1 % notices in 95 of 100 cases."""
+
+
+@dataclass(frozen=True, eq=False)
+class Acceptance:
+    """Chosen candidates.
+
+    Attributes:
+        rows: Of the candidates (count,), the most telling first.
+        information: About all changes together, nat, before the first and after each (count + 1,).
+        noticed: The smallest change that is noticed in 95 of 100 cases: of each joint's offset in deg or mm
+            ("joint1" ...), and of the target on the tool in mm ("tool"). A joint that cannot be told from the
+            frame or the tool is not named.
+    """
+
+    rows: NDArray[np.int64]
+    information: Floats
+    noticed: dict[str, float]
+
+
+def acceptance_poses(candidates: Candidates, count: int, options: UpdateOptions | None = None) -> Acceptance:
+    """Choose `count` candidates that tell most about offsets, frame, tool and payload, and lie apart.
+
+    The criterion is the mutual information of what they show and what may have changed: log det of the
+    changes' covariance before over after (D-optimal), where field, noise and set-up scatter as the
+    calibration expects.
+
+    Args:
+        candidates: What can be measured.
+        count: How many.
+        options: How far things may have moved, as in update.
+
+    Raises:
+        WorkError: As for next_poses.
+    """
+    check_count(candidates, count)
+    chosen = options or UpdateOptions()
+    columns, names = _columns(candidates, chosen)
+    unchanged = candidates.covariance()
+    flat = columns.reshape(len(unchanged), -1)
+    evenly = candidates.points[fill(candidates.points, count)]
+    apart = APART * least_distance(evenly) if count > 1 else 0.0
+    core = {"noise": candidates.noise, "points": np.ascontiguousarray(candidates.points), "apart": apart}
+    rows, values = choose_telling(unchanged + flat @ flat.T, unchanged, core, count)
+    picked = np.array(rows, dtype=np.int64)
+    return Acceptance(picked, np.array(values), _noticed(candidates, unchanged, columns, names, picked))
+
+
+def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, list[str]]:
+    """Derivatives (c, m, k) of what is measured by changes of a prior standard deviation; their names."""
+    calibration = candidates.calibration
+    arm = calibration.arm
+    directions, names = arm_directions(arm)
+    offsets = candidates.jacobian @ directions
+    joints = arm.robot.joint_count
+    torque = arm.robot.joint_jacobian(candidates.readings)[:, 2, :]
+    largest = np.abs(torque).max(axis=0)
+    turning = np.flatnonzero((largest > 1e-6) & (np.array(arm.robot.joints) == "revolute"))
+    bent = offsets[:, :, turning] * (torque / np.where(largest > 0.0, largest, 1.0))[:, None, turning]
+    std = np.array([arm_std(arm, name, options) for name in names])
+    setup = candidates.setup * setup_std(arm, calibration.selection, options, known=True)
+    whole = np.concatenate([offsets * std, setup, PAYLOAD_RAD * bent], axis=2)
+    frame = [] if arm.world_is_known else ["frame"] * 6
+    tool = ["tool"] * (setup.shape[2] - len(frame))
+    return whole, [*names[:joints], *names[joints:], *frame, *tool, *(f"payload{k + 1}" for k in turning)]
+
+
+def _noticed(
+    candidates: Candidates, unchanged: Floats, columns: Floats, names: list[str], rows: NDArray[np.int64]
+) -> dict[str, float]:
+    size = columns.shape[1]
+    places = (rows[:, None] * size + np.arange(size)).reshape(-1)
+    spread = unchanged[np.ix_(places, places)].copy()
+    for k, row in enumerate(rows):
+        own = slice(k * size, (k + 1) * size)
+        spread[own, own] += candidates.noise[row]
+    scaled = columns[rows].reshape(len(places), -1)
+    precision = scaled.T @ np.linalg.solve(spread, scaled) + np.eye(scaled.shape[1])
+    std = np.sqrt(np.diag(np.linalg.inv(precision)))
+    found: dict[str, float] = {}
+    arm, options = candidates.calibration.arm, UpdateOptions()
+    for k, name in enumerate(names):
+        if name.startswith("joint") and std[k] < 0.5:
+            prismatic = arm.robot.joints[int(name.removeprefix("joint")) - 1] == "prismatic"
+            unit = MM_PER_METRE if prismatic else 1.0 / RADIANS_PER_DEGREE
+            found[name] = float(NOTICED * std[k] * arm_std(arm, name, options) * unit)
+    tool = [k for k, name in enumerate(names) if name == "tool"][:3]
+    if tool and max(std[tool]) < 0.5:
+        found["tool"] = float(NOTICED * max(std[tool]) * options.tool_mm)
+    return found

@@ -1,0 +1,142 @@
+"""Candidate poses as a calibration sees them: derivatives, uncertainty and noise of what they would show."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import MeasurementSet, Problem, linearise, setup_jacobian
+from truearm.calibration import Calibration
+from truearm.errors import UsageError, WorkError, list_names
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+AXES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """c poses that can be measured, in a set-up of the calibration.
+
+    Attributes:
+        calibration: What is known.
+        readings: Of the poses (c, N).
+        group: Set-up they would be measured in; the calibration's last one by default.
+        features: A number for each feature; the middle of what was measured by default.
+    """
+
+    calibration: Calibration
+    readings: Floats
+    group: str | None = None
+    features: Mapping[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        known = self.calibration.groups
+        if self.group is not None and self.group not in known:
+            raise UsageError(f'there is no set-up "{self.group}"', rule=f"There are {list_names(known)}")
+        if self.calibration.selection.distances:
+            raise WorkError(
+                "this calibration was made from distances",
+                rule="Poses are proposed where points are measured",
+            )
+
+    def __len__(self) -> int:
+        return len(self.readings)
+
+    def values(self, readings: Floats) -> Floats:
+        """Inputs (n, I) of the field at readings (n, N)."""
+        return self.calibration.field_inputs(readings, self._feature_values)
+
+    @cached_property
+    def points(self) -> Floats:
+        """The tool's points (c, 3) in the base frame, m."""
+        return self.calibration.position(self.readings, features=self._feature_values)
+
+    @cached_property
+    def jacobian(self) -> Floats:
+        """Derivatives (c, m, 5 L) of what is measured by the chain's parameters, base frame."""
+        return linearise(self._problem, self._parameters, self.calibration.model.setup)[0]
+
+    @cached_property
+    def setup(self) -> Floats:
+        """Derivatives (c, m, W) of it by the unknowns of the set-up."""
+        return setup_jacobian(self._problem, self._parameters, self.calibration.model.setup)
+
+    @cached_property
+    def noise(self) -> Floats:
+        """Covariance (c, m, m) of what a measurement shows anew."""
+        found = self.calibration.spread.noise(self.jacobian, self.orientation)
+        return np.ascontiguousarray(found)
+
+    @property
+    def orientation(self) -> Mask:
+        """Which of the m measured values are rotations."""
+        selection = self.calibration.selection
+        turns = AXES if selection.orientation else 0
+        return np.array([False] * (AXES * len(selection.targets)) + [True] * turns)
+
+    def covariance(self, others: Floats | None = None) -> Floats:
+        """Covariance of what candidates would show, without noise, and of the tool's points at others (t, N).
+
+        Returns:
+            (c m + 3 t, c m + 3 t), the arm's and, of the candidates, the set-up's part.
+        """
+        width = self.jacobian.shape[2]
+        rows = self.jacobian.reshape(-1, AXES, width)
+        own = self._setup_in_all().reshape(len(rows), AXES, -1)
+        inputs = np.repeat(self.values(self.readings), self.jacobian.shape[1] // AXES, axis=0)
+        if others is not None:
+            tool = self.calibration.chain_jacobian(others, self._feature_values)
+            rows = np.concatenate([rows, tool])
+            own = np.concatenate([own, np.zeros((len(tool), *own.shape[1:]))])
+            inputs = np.vstack([inputs, self.values(others)])
+        return np.ascontiguousarray(self.calibration.spread.joint(inputs, rows, own))
+
+    @property
+    def _number(self) -> int:
+        groups = self.calibration.groups
+        return len(groups) - 1 if self.group is None else groups.index(self.group)
+
+    @cached_property
+    def _feature_values(self) -> Mapping[str, float]:
+        names = self.calibration.options.features
+        given = self.features or {}
+        learned = self.calibration.learned_from
+        if learned is None and any(name not in given for name in names):
+            raise WorkError(
+                f"the features {list_names(names)} are not known",
+                rule="The measurements were left out of this file",
+                way_out="Use the file that still has them",
+            )
+        middle = {} if learned is None else {n: float(learned.data.features[n].median()) for n in names}
+        return {name: given.get(name, middle.get(name, 0.0)) for name in names}
+
+    @cached_property
+    def _parameters(self) -> Floats:
+        return self.calibration.model.parameters(self.values(self.readings))
+
+    @cached_property
+    def _problem(self) -> Problem:
+        arm, selection, count = self.calibration.arm, self.calibration.selection, len(self)
+        measured = MeasurementSet(
+            {
+                "joints": arm.robot.joints_from_readings(self.readings),
+                "group": np.full(count, self._number, dtype=np.int64),
+                "targets": np.zeros((count, len(selection.targets), AXES)),
+                "rotations": np.repeat(np.eye(AXES)[None], count, axis=0) if selection.orientation else None,
+                "sigma": np.zeros(count),
+                "weight": np.ones(count),
+                "distances": [],
+            }
+        )
+        return Problem(arm.flange_chain, measured, list(range(arm.table.size)), arm.world_is_known)
+
+    def _setup_in_all(self) -> Floats:
+        """Derivatives (c, m, S) by the unknowns of all set-ups."""
+        width, groups = self.setup.shape[2], len(self.calibration.groups)
+        found = np.zeros((*self.setup.shape[:2], groups * width))
+        found[:, :, self._number * width : (self._number + 1) * width] = self.setup
+        return found

@@ -1,0 +1,60 @@
+"""The poses that reduce the expected error over the workspace most, given what is known already."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import choose_informative
+from truearm.errors import WorkError
+from truearm.proposing.candidates import Candidates
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class NextPoses:
+    """Chosen candidates.
+
+    Attributes:
+        rows: Of the candidates (count,), the one that teaches most first.
+        expected_mm: Expected standard deviation of the tool's position over the workspace, root of the mean
+            of the sum over x, y and z, before the first and after each (count + 1,).
+    """
+
+    rows: NDArray[np.int64]
+    expected_mm: Floats
+
+
+def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPoses:
+    """Choose `count` candidates one after the other, each that which leaves the workspace the least variance.
+
+    The variance is the exact Gaussian posterior's, of constants, field and set-up together, after the
+    candidates before were measured (A-optimal over the workspace; active learning of Cohn 1996). It needs no
+    measured values, only poses. The hyper-parameters stay as they are.
+
+    Args:
+        candidates: What can be measured.
+        workspace: Readings (t, N) at which the error counts.
+        count: How many.
+
+    Raises:
+        WorkError: If there are too few candidates, or the calibration has no standard deviations: it is
+            stripped, or of a scheme.
+    """
+    check_count(candidates, count)
+    core = {"noise": candidates.noise, "points": np.ascontiguousarray(candidates.points), "apart": 0.0}
+    rows, variance = choose_informative(candidates.covariance(workspace), core, count)
+    expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(workspace))
+    return NextPoses(np.array(rows, dtype=np.int64), expected)
+
+
+def check_count(candidates: Candidates, count: int) -> None:
+    """Raise WorkError unless there are `count` candidates."""
+    if not 0 < count <= len(candidates):
+        raise WorkError(
+            f"{count} poses are to be chosen from {len(candidates)}",
+            rule="At least one, and no more than there are",
+            way_out="Draw more candidates, or ask for another number",
+        )

@@ -1,0 +1,253 @@
+"""Update a calibration with 10 to 20 new poses: what moved, and whether the old one still holds."""
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaincc
+
+from truearm.calibration import Calibration
+from truearm.core_set import select
+from truearm.errors import InputError, Notice, UsageError, WorkError, list_names
+from truearm.fitted_rows import OVERWHELMING
+from truearm.fitting import Stages, Task, no_stages
+from truearm.measurements import Measurements
+from truearm.plausibility import check_against
+from truearm.updating.chi_square import ChiSquare, change_test, rest_test
+from truearm.updating.estimating import Estimate, estimate, left_out, surprise
+from truearm.updating.moved import Motion, Offset, motions, offsets
+from truearm.updating.options import UpdateOptions
+from truearm.updating.scene import Scene
+from truearm.updating.unknowns import Unknowns
+from truearm.updating.updated import updated
+from truearm.validation import Errors, Statistics
+
+Floats = NDArray[np.float64]
+Verdict = Literal["holds", "moved", "field"]
+
+MOST_OUTLIERS: Final = 0.2
+IMPLAUSIBLE: Final = 5.0
+"""An offset so many prior standard deviations off is not believed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Update:
+    """What new measurements say about an old calibration.
+
+    Attributes:
+        calibration: With offsets, frames and tools estimated again; the old one is kept in it.
+        verdict: "holds": the old calibration still does. "moved": offsets or tool changed, and the field
+            still fits. "field": what is left is more than field and noise may leave.
+        level: Share of unchanged arms that are not said to hold.
+        offsets: Of the joints.
+        frames: Motions of the set-ups' frames, where the calibration knows them.
+        tools: Motions of the targets, where the calibration knows them.
+        changed: The test of offsets and tool.
+        rest: The test of what is left.
+        before: Errors of the old calibration at each pose, its frame found from the others.
+        after: The same with offsets and tool found from the others too.
+        n_poses: Poses that were measured.
+        outliers: Data rows that were left out.
+        notices: What the user should know.
+    """
+
+    calibration: Calibration
+    verdict: Verdict
+    level: float
+    offsets: tuple[Offset, ...]
+    frames: tuple[Motion, ...]
+    tools: tuple[Motion, ...]
+    changed: ChiSquare
+    rest: ChiSquare
+    before: Errors
+    after: Errors
+    n_poses: int
+    outliers: tuple[int, ...]
+    notices: tuple[Notice, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values, without the calibration and the notices."""
+        return {
+            "verdict": self.verdict,
+            "level": self.level,
+            "n_poses": self.n_poses,
+            "outliers": list(self.outliers),
+            "offsets": [entry.to_dict() for entry in self.offsets],
+            "frames": [entry.to_dict() for entry in self.frames],
+            "tools": [entry.to_dict() for entry in self.tools],
+            "changed": self.changed.to_dict(),
+            "rest": self.rest.to_dict(),
+            "before": self.before.to_dict(),
+            "after": self.after.to_dict(),
+        }
+
+
+def update(
+    calibration: Calibration,
+    data: Measurements,
+    options: UpdateOptions | None = None,
+    *,
+    stages: Stages = no_stages,
+    **more: Any,
+) -> Update:
+    """Take a calibration over to the arm as it is now, after re-mastering, a crash or a change of motor.
+
+    Offsets of the joints, frames and tools are estimated again under wide Gaussian priors; the field stays,
+    and what it leaves uncertain is correlated noise.
+
+    Args:
+        calibration: With its measurements.
+        data: New measurements of the same arm, of 10 to 20 poses all over the workspace.
+        options: What may have moved; defaults without them.
+        stages: Called with the name of each stage; gives a context manager that surrounds it.
+        **more: The same options as keywords, such as keep_frame=True.
+
+    Raises:
+        UsageError: If options contradict each other or the data.
+        InputError: If the data cannot be of this arm, or has too few rows.
+        WorkError: If the calibration is stripped or of a scheme, or what it finds is not plausible.
+    """
+    chosen = options if options is not None else UpdateOptions(**more)
+    notices = check_against(data, calibration.robot)
+    data = data.deduplicated()
+    task = _task(calibration, data, chosen, stages)
+    unknowns = Unknowns.of(calibration, task, chosen)
+    _check_kept(calibration, task, unknowns, chosen)
+    _check_enough(data, task, unknowns)
+    with stages("asking what the calibration expects"):
+        _ = calibration.spread
+    with stages("finding what moved"):
+        kept, outliers = _without_outliers(calibration, task, data, unknowns)
+        scene = Scene(task, data.select(kept), calibration.model, unknowns)
+        return _told(calibration, scene, chosen, data, kept, (*notices, *_outlier_notices(data, outliers)))
+
+
+def _told(
+    calibration: Calibration,
+    scene: Scene,
+    options: UpdateOptions,
+    data: Measurements,
+    kept: NDArray[np.int64],
+    notices: tuple[Notice, ...],
+) -> Update:
+    unknowns = scene.unknowns
+    start = scene.start()
+    spread = scene.covariance(calibration, start)
+    found = estimate(scene, spread, start, unknowns.free)
+    still = estimate(scene, spread, scene.unchanged(start), unknowns.free & unknowns.nuisance)
+    changed, rest = change_test(still, unknowns), rest_test(found, unknowns)
+    each = options.level / 2.0
+    verdict: Verdict = "field" if rest.p < each else "moved" if changed.p < each else "holds"
+    joints = offsets(scene, found, options.level)
+    _check_plausible(scene, found)
+    frames, tools = motions(scene, found, options.level)
+    before = _errors(scene, still, spread, unknowns.free & unknowns.nuisance)
+    after = _errors(scene, found, spread, unknowns.free)
+    out = np.setdiff1d(np.arange(len(data)), kept)
+    told = Update(
+        calibration, verdict, options.level, joints, frames, tools, changed, rest, before, after,
+        len(data), tuple(data.rows[out].tolist()), notices,
+    )  # fmt: skip
+    new = updated(calibration, scene, found, after, np.ones(len(scene.data)), told.to_dict())
+    return Update(**{**vars(told), "calibration": new})
+
+
+def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, stages: Stages) -> Task:
+    if calibration.scheme is not None:
+        raise WorkError(
+            f"this calibration is of the scheme {calibration.model_name}",
+            rule="An update needs standard deviations, and schemes do not tell them",
+            way_out="Calibrate with --model variable or constant",
+        )
+    selection = select(data, options.use)
+    where = ", ".join(data.files)
+    if selection.distances or calibration.selection.distances:
+        raise InputError("distances were measured, not points", where=where, rule="An update needs points")
+    if calibration.arm.world_is_known and len(data.groups) > 1:
+        raise InputError(f"there are {len(data.groups)} set-ups", where=where, rule="The world is one")
+    return Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
+
+
+def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:
+    asked = [name for name in ("keep_frame", "keep_tool") if getattr(options, name)]
+    strange = [g for g, known in zip(task.groups, unknowns.known, strict=True) if known is None]
+    if asked and strange:
+        raise UsageError(
+            f"the calibration knows no frame and tool of set-up {list_names(strange)} that could be kept",
+            rule=f"It knows {list_names(calibration.groups)}, with what was measured there",
+            way_out='Name the set-up that is meant in a column "group", or leave '
+            f"{' and '.join('--' + name.replace('_', '-') for name in asked)} out",
+        )
+
+
+def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
+    scene_values = 3 * int(np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2).sum())
+    if task.selection.orientation and data.orientations is not None:
+        scene_values += 3 * int(np.isfinite(data.orientations).all(axis=1).sum())
+    wanted = int(unknowns.free.sum())
+    if scene_values > wanted:
+        return
+    per_pose = max(scene_values // max(len(data), 1), 1)
+    raise InputError(
+        f"{scene_values} measured values in {len(data)} poses cannot tell {wanted} unknowns of offsets, "
+        "frame and tool",
+        where=", ".join(data.files),
+        rule="There must be more measured values than unknowns",
+        way_out=f"Measure at least {wanted // per_pose + 1} poses; 10 to 20 are a good number: "
+        "truearm plan --acceptance 15",
+    )
+
+
+def _without_outliers(
+    calibration: Calibration, task: Task, data: Measurements, unknowns: Unknowns
+) -> tuple[NDArray[np.int64], list[int]]:
+    """Rows without those that no other row supports, the worst one taken out first; and these."""
+    kept, out = np.arange(len(data)), list[int]()
+    while True:
+        scene = Scene(task, data.select(kept), calibration.model, unknowns)
+        start = scene.start()
+        spread = scene.covariance(calibration, start)
+        found = estimate(scene, spread, start, unknowns.free)
+        squares, freedom = surprise(found.linear, spread, unknowns.std, unknowns.free)
+        likely = gammaincc(freedom / 2.0, squares / 2.0)
+        worst = int(np.argmin(likely))
+        if likely[worst] > OVERWHELMING or len(out) >= int(MOST_OUTLIERS * len(data)):
+            return kept, out
+        out.append(int(kept[worst]))
+        kept = np.delete(kept, worst)
+
+
+def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:
+    if not outliers:
+        return []
+    which = np.isin(np.arange(len(data)), outliers)
+    text = f"No other pose supports what was measured in {data.row_names(which)}: left out."
+    return [Notice("outliers", text, tuple(data.rows[which].tolist()))]
+
+
+def _check_plausible(scene: Scene, found: Estimate) -> None:
+    ratios = np.abs(found.state.arm) / scene.unknowns.std[: len(found.state.arm)]
+    names = scene.unknowns.arm_names
+    wild = [n for n, r in zip(names, ratios, strict=True) if r > IMPLAUSIBLE and n.startswith("joint")]
+    if wild:
+        raise WorkError(
+            f"the offset of {wild[0]} would have changed by {ratios[names.index(wild[0])]:.0f} times what is "
+            "allowed for",
+            where=", ".join(scene.data.files),
+            rule=f"Up to {IMPLAUSIBLE:g} times --offset-deg is believed",
+            way_out="Check that these are measurements of this arm; after a larger change give a larger "
+            "--offset-deg",
+        )
+
+
+def _errors(scene: Scene, found: Estimate, spread: Floats, free: NDArray[np.bool_]) -> Errors:
+    """Errors at left-out poses: of the first target, and of the orientation."""
+    left = np.full(scene.seen.shape, np.nan)
+    left[scene.seen] = left_out(found.linear, spread, scene.unknowns.std, free)
+    points = np.linalg.norm(left[:, :3], axis=1)
+    position = Statistics.of(points[np.isfinite(points)])
+    if not scene.task.selection.orientation:
+        return Errors(position)
+    turns = np.linalg.norm(left[:, -3:], axis=1)
+    return Errors(position, Statistics.of(turns[np.isfinite(turns)]))

@@ -1,0 +1,122 @@
+"""Gaussian estimate of what moved: correlated noise, wide priors, linearised until it stands still."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from truearm.errors import WorkError
+from truearm.updating.scene import Linear, Scene, State
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MOST_STEPS: Final = 30
+STANDS_STILL: Final = 1e-6
+"""In prior standard deviations."""
+MOST_PARTS: Final = 30
+"""Values are left out in so many parts at the most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A state, linearised there.
+
+    Attributes:
+        state: The values.
+        linear: Residuals and derivatives.
+        covariance: Of all unknowns (u, u); zero for those that are kept.
+        factor: Lower Cholesky factor (R, R) of the residuals' covariance.
+    """
+
+    state: State
+    linear: Linear
+    covariance: Floats
+    factor: Floats
+
+
+def estimate(scene: Scene, spread: Floats, state: State, free: Mask) -> Estimate:
+    """The most likely values of the unknowns that are `free` (u,), from a state on.
+
+    Gauss-Newton on `r^T V^-1 r + x^T P^-1 x`: V (R, R) is what an unchanged arm may scatter by, field, noise
+    and kept set-ups; P the prior's variances.
+
+    Raises:
+        WorkError: If V is not positive definite, or the steps do not come to a standstill.
+    """
+    factor = factored(spread)
+    std = scene.unknowns.std
+    for _ in range(MOST_STEPS):
+        linear = scene.linear(state)
+        step = solved(linear, factor, std, free)
+        state = scene.moved(state, step)
+        if np.abs(step[free] / std[free]).max(initial=0.0) < STANDS_STILL:
+            break
+    else:
+        raise WorkError(
+            f"offsets, frame and tool did not settle in {MOST_STEPS} steps",
+            where=", ".join(scene.data.files),
+            way_out="Check that the measurements are of this arm, and their units",
+        )
+    linear = scene.linear(state)
+    covariance = np.zeros((len(std), len(std)))
+    scaled = _whitened(linear.jacobian[:, free] * std[free], factor)
+    inverse = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
+    covariance[np.ix_(free, free)] = inverse * np.outer(std[free], std[free])
+    return Estimate(state, linear, covariance, factor)
+
+
+def factored(spread: Floats) -> Floats:
+    """Lower Cholesky factor.
+
+    Raises:
+        WorkError: If there is none.
+    """
+    try:
+        return np.asarray(np.linalg.cholesky(spread))
+    except np.linalg.LinAlgError:
+        raise WorkError(
+            "the calibration's spread at these poses is not positive definite",
+            way_out="Look for poses that were measured several times without noise",
+        ) from None
+
+
+def solved(linear: Linear, factor: Floats, std: Floats, free: Mask) -> Floats:
+    """The step (u,) to the most likely values of the free unknowns."""
+    scaled = _whitened(linear.jacobian[:, free] * std[free], factor)
+    right = scaled.T @ _whitened(linear.residual, factor) - linear.departure[free] / std[free]
+    step = np.zeros(len(std))
+    step[free] = std[free] * np.linalg.solve(scaled.T @ scaled + np.eye(scaled.shape[1]), right)
+    return step
+
+
+def left_out(linear: Linear, spread: Floats, std: Floats, free: Mask) -> Floats:
+    """Residuals (R,) of each pose's values when the free unknowns are found from the others."""
+    poses = np.unique(linear.pose)
+    found = np.empty_like(linear.residual)
+    for part in range(min(MOST_PARTS, len(poses))):
+        out = np.isin(linear.pose, poses[part::MOST_PARTS])
+        rest = Linear(linear.residual[~out], linear.jacobian[~out], linear.departure, linear.pose[~out])
+        step = solved(rest, factored(spread[np.ix_(~out, ~out)]), std, free)
+        found[out] = linear.residual[out] - linear.jacobian[out] @ step
+    return found
+
+
+def surprise(linear: Linear, spread: Floats, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:
+    """Of each pose (n,) how unlikely it is given all others: squared standardised length, and its values."""
+    scaled = linear.jacobian[:, free] * std[free]
+    whole = cho_factor(spread + scaled @ scaled.T, lower=True)
+    inverse = cho_solve(whole, np.eye(len(spread)))
+    pull = inverse @ (linear.residual + linear.jacobian[:, free] @ linear.departure[free])
+    poses = np.unique(linear.pose)
+    squares = np.empty(len(poses))
+    for k, pose in enumerate(poses):
+        own = linear.pose == pose
+        squares[k] = pull[own] @ np.linalg.solve(inverse[np.ix_(own, own)], pull[own])
+    return squares, np.array([int((linear.pose == pose).sum()) for pose in poses])
+
+
+def _whitened(values: Floats, factor: Floats) -> Floats:
+    return np.asarray(solve_triangular(factor, values, lower=True))

@@ -1,0 +1,170 @@
+"""What moved, in numbers for people: offsets of joints, frames and tools."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.updating.chi_square import normal_p, wald
+from truearm.updating.estimating import Estimate
+from truearm.updating.scene import Scene
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOLD: Final = 0.5
+"""An offset is told when its standard error is below this share of the prior's deviation."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """The change of a joint's offset: what is added to its reading.
+
+    Attributes:
+        joint: From 1.
+        unit: "deg" or "mm".
+        change: In that unit.
+        std: Standard error in that unit.
+        p: How often an unmoved joint shows as large a change.
+        moved: Whether that is too rare.
+        told: Whether the poses tell it at all.
+        confounded: What it cannot be told from: "frame", "tool", "frame and tool", or "" for the others.
+    """
+
+    joint: int
+    unit: str
+    change: float
+    std: float
+    p: float
+    moved: bool
+    told: bool
+    confounded: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How far a frame or a tool moved.
+
+    Attributes:
+        group: Name of the set-up.
+        shift_mm: Of the frame's origin in its own axes, or of each target in the flange's (k, 3).
+        shift_std_mm: Standard errors of it.
+        turn_deg: Rotation vector (3,); None where it is not known.
+        turn_std_deg: Standard errors of it.
+        p: How often an unmoved one shows as much; None for what was found anew.
+        moved: Whether that is too rare.
+    """
+
+    group: str
+    shift_mm: tuple[tuple[float, ...], ...]
+    shift_std_mm: tuple[tuple[float, ...], ...]
+    turn_deg: tuple[float, ...] | None
+    turn_std_deg: tuple[float, ...] | None
+    p: float | None
+    moved: bool
+
+    @property
+    def largest_mm(self) -> float:
+        """Length of the largest shift."""
+        return float(np.linalg.norm(self.shift_mm, axis=1).max(initial=0.0))
+
+    @property
+    def angle_deg(self) -> float | None:
+        """Angle of the turn."""
+        return None if self.turn_deg is None else float(np.linalg.norm(self.turn_deg))
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return asdict(self)
+
+
+def offsets(scene: Scene, found: Estimate, level: float) -> tuple[Offset, ...]:
+    """Changes of all joints' offsets; the level is shared among them."""
+    kinds = scene.task.arm.robot.joints
+    std = np.sqrt(np.diag(found.covariance))
+    result = []
+    for joint, kind in enumerate(kinds):
+        scale, unit = (MM_PER_METRE, "mm") if kind == "prismatic" else (1.0 / RADIANS_PER_DEGREE, "deg")
+        change, error = float(found.state.arm[joint]), float(std[joint])
+        told = bool(error < TOLD * scene.unknowns.std[joint])
+        p = normal_p(change / error)
+        confounded = "" if told else _confounded(scene, found, joint)
+        moved = told and p < level / len(kinds)
+        result.append(Offset(joint + 1, unit, scale * change, scale * error, p, moved, told, confounded))
+    return tuple(result)
+
+
+def motions(scene: Scene, found: Estimate, level: float) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
+    """Motions of the frames, and of the tools, of the set-ups that the calibration knows."""
+    frames, tools = [], []
+    judged = _Judged(scene, found, level)
+    for number, group in enumerate(scene.task.groups):
+        place = scene.unknowns.group(number)
+        frame, tool = scene.motion(found.state, number)
+        if frame is not None:
+            frames.append(judged.motion(group, frame, slice(place.start, place.start + len(frame)), 1))
+        if tool is not None:
+            own = slice(place.stop - len(tool), place.stop)
+            tools.append(judged.motion(group, tool, own, len(scene.task.selection.targets)))
+    return tuple(frames), tuple(tools)
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """Changes of the set-ups' unknowns, and whether they are too large to be chance."""
+
+    scene: Scene
+    found: Estimate
+    level: float
+
+    def motion(self, group: str, change: Floats, place: slice, points: int) -> Motion:
+        """That of a frame or a tool: `points` shifts, then a turn if there is one."""
+        covariance = self.found.covariance[place, place]
+        std = np.sqrt(np.diag(covariance))
+        tested = bool((std > 0.0).all()) and not self.scene.unknowns.nuisance[place].any()
+        p = wald(change, covariance).p if tested else None
+        has_turn = len(change) > 3 * points
+        return Motion(
+            group,
+            _rows(MM_PER_METRE * change[: 3 * points]),
+            _rows(MM_PER_METRE * std[: 3 * points]),
+            _degrees(change[3 * points :]) if has_turn else None,
+            _degrees(std[3 * points :]) if has_turn else None,
+            p,
+            p is not None and p < self.level,
+        )
+
+
+def _confounded(scene: Scene, found: Estimate, joint: int) -> str:
+    """Of frame and tool what would have to be known for an offset to be told."""
+    unknowns = scene.unknowns
+    parts: Sequence[tuple[str, Mask]] = (
+        ("frame", unknowns.frame),
+        ("tool", unknowns.tool),
+        ("frame and tool", unknowns.frame | unknowns.tool),
+    )
+    for name, chosen in parts:
+        known = chosen & (np.diag(found.covariance) > 0.0)
+        if not known.any():
+            continue
+        across = found.covariance[joint, known]
+        inner = found.covariance[np.ix_(known, known)]
+        left = found.covariance[joint, joint] - across @ np.linalg.solve(inner, across)
+        if np.sqrt(max(left, 0.0)) < TOLD * unknowns.std[joint]:
+            return name
+    return ""
+
+
+def _rows(values: Floats) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(row) for row in values.reshape(-1, 3).tolist())
+
+
+def _degrees(values: Floats) -> tuple[float, ...]:
+    return tuple((values / RADIANS_PER_DEGREE).tolist())

@@ -1,0 +1,42 @@
+"""How a calibration is updated."""
+
+from dataclasses import dataclass
+
+from truearm.core_set import Use
+from truearm.errors import UsageError
+
+
+@dataclass(frozen=True)
+class UpdateOptions:
+    """What may have moved, and how far.
+
+    Attributes:
+        offset_deg: Standard deviation of the change of a revolute joint's offset.
+        offset_mm: The same of a prismatic joint.
+        tool_mm: The same of each coordinate of the measured target in the flange frame.
+        tool_deg: The same of the orientation of the target, about each axis.
+        keep_frame: Whether the measuring device stands where it stood; else its frame is found anew.
+        keep_tool: Whether the target sits where it sat.
+        new_tool: Whether it is another target, or was taken off: what it shows of itself then says nothing.
+        level: Share of the unchanged arms of which it may be said that something changed.
+        use: What of the measurements to use, as in calibrate.
+    """
+
+    offset_deg: float = 1.0
+    offset_mm: float = 2.0
+    tool_mm: float = 5.0
+    tool_deg: float = 1.0
+    keep_frame: bool = False
+    keep_tool: bool = False
+    new_tool: bool = False
+    level: float = 0.01
+    use: Use | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("offset_deg", "offset_mm", "tool_mm", "tool_deg"):
+            if not getattr(self, name) > 0.0:
+                raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
+        if not 0.0 < self.level < 1.0:
+            raise UsageError(f"{self.level}", where="level", rule="Between 0 and 1, such as 0.01")
+        if self.keep_tool and self.new_tool:
+            raise UsageError("the tool is kept, and it is new", rule="Give one of keep_tool and new_tool")

@@ -1,0 +1,176 @@
+"""New measurements against a calibration: residuals, derivatives, and how they may scatter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.spatial.transform import Rotation
+
+from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
+from truearm.calibration import Calibration
+from truearm.core_set import core_set, rotations
+from truearm.fitting import Task, core_errors, fit_options
+from truearm.judging import model_inputs
+from truearm.measurements import Measurements
+from truearm.models import ArmModel
+from truearm.rotations import rigid_inverse
+from truearm.updating.unknowns import OPEN, Unknowns
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Values of the unknowns: of the arm (a,), and the set-ups."""
+
+    arm: Floats
+    setup: Setup
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """R measured values at a state, base frame.
+
+    Attributes:
+        residual: Measured minus predicted (R,), m and rad.
+        jacobian: Derivatives (R, u) of the prediction by the unknowns.
+        departure: How far the unknowns are from what was known before (u,); zero where nothing was.
+        pose: Pose of each value (R,).
+    """
+
+    residual: Floats
+    jacobian: Floats
+    departure: Floats
+    pose: NDArray[np.int64]
+
+
+class Scene:
+    """The rows of an update under one model of a calibration."""
+
+    def __init__(self, task: Task, data: Measurements, model: ArmModel, unknowns: Unknowns) -> None:
+        self.task, self.data, self.unknowns = task, data, unknowns
+        self._model = model
+        self.inputs = model_inputs(task.arm, data, task.options.features)
+        self.parameters = model.parameters(self.inputs)
+        self.measured = core_set(task.arm.robot, data, task.selection, task.groups)
+        self.problem: Problem = task.problem(self.measured, range(task.arm.table.size))
+        self.number = np.array([task.groups.index(name) for name in data.group])
+        self.orientation = np.array([False] * (3 * len(task.selection.targets)) + [True] * self._turns)
+        self.seen = self._seen()
+
+    def start(self) -> State:
+        """Nothing moved but set-ups; parts of them that are kept are as they were."""
+        with core_errors(self.data):
+            found = fit_constant(
+                self.task.problem(self.measured, []), fit_options(self.task, parameters=self.parameters)
+            ).setup
+        return State(np.zeros(len(self.unknowns.arm_names)), self._with_known(found, self.unknowns.free))
+
+    def unchanged(self, state: State) -> State:
+        """The state in which only what says nothing about a change may differ from what was known."""
+        return State(np.zeros_like(state.arm), self._with_known(state.setup, self.unknowns.nuisance))
+
+    def moved(self, state: State, step: Floats) -> State:
+        """The state after a step (u,)."""
+        count = len(state.arm)
+        turned = step[count:].reshape(len(self.task.groups), -1)
+        return State(state.arm + step[:count], step_setup(self.problem, state.setup, turned))
+
+    def linear(self, state: State) -> Linear:
+        """Residuals and derivatives at a state."""
+        unknowns = self.unknowns
+        change = (unknowns.directions @ state.arm).reshape(-1, 5)
+        parameters = np.ascontiguousarray(self.parameters + change)
+        arm, residual = linearise(self.problem, parameters, state.setup)
+        own = setup_jacobian(self.problem, parameters, state.setup)
+        jacobian = np.zeros((*residual.shape, len(unknowns.std)))
+        jacobian[:, :, : len(state.arm)] = arm @ unknowns.directions
+        for k in range(len(self.task.groups)):
+            rows = self.number == k
+            jacobian[rows, :, unknowns.group(k)] = own[rows]
+        seen = self.seen
+        pose = np.repeat(np.arange(len(residual)), residual.shape[1]).reshape(residual.shape)
+        return Linear(residual[seen], jacobian[seen], self.departure(state), pose[seen])
+
+    def departure(self, state: State) -> Floats:
+        """How far the unknowns (u,) of a state are from what was known; zero where nothing was."""
+        found = np.zeros(len(self.unknowns.std))
+        found[: len(state.arm)] = state.arm
+        for k, number in enumerate(self.unknowns.known):
+            if number is not None:
+                found[self.unknowns.group(k)] = self._departure_of(state.setup, k, number)
+        found[self.unknowns.std >= OPEN] = 0.0
+        return found
+
+    def motion(self, state: State, number: int) -> tuple[Floats | None, Floats | None]:
+        """How far frame (6,) and tool of set-up `number` are from the calibration's; None where unknown."""
+        known = self.unknowns.known[number]
+        if known is None:
+            return None, None
+        moved = self._departure_of(state.setup, number, known)
+        frame = 0 if self.task.arm.world_is_known else 6
+        return (moved[:frame] if frame else None), moved[frame:]
+
+    def covariance(self, calibration: Calibration, state: State) -> Floats:
+        """Covariance (R, R) of the residuals of an unchanged arm, without what is found anew."""
+        jacobian, _ = linearise(self.problem, self.parameters, state.setup)
+        spread = calibration.spread
+        whole = spread.joint(self.inputs, jacobian, self._known_setup_jacobian(calibration, state))
+        anew = spread.noise(jacobian, self.orientation)
+        own = np.zeros(len(self.data)) if self.data.sigma_m is None else np.nan_to_num(self.data.sigma_m)
+        whole += block_diag(*(anew + (own[:, None, None] ** 2) * np.diag(~self.orientation)))
+        seen = self.seen.reshape(-1)
+        return np.asarray(whole[np.ix_(seen, seen)])
+
+    @property
+    def _turns(self) -> int:
+        return 3 if self.task.selection.orientation else 0
+
+    def _seen(self) -> Mask:
+        """Which values (n, m) were measured."""
+        points = np.isfinite(self.data.targets[:, list(self.task.selection.targets)])
+        seen = np.repeat(np.logical_and.reduce(points, axis=2), 3, axis=1)
+        turned = np.isfinite(rotations(self.data)[:, 0, :1])
+        return np.hstack([seen, np.repeat(turned, self._turns, axis=1)])
+
+    def _with_known(self, setup: Setup, free: Mask) -> Setup:
+        """A set-up with the known parts put in where they are not free."""
+        frames, targets, rotations = setup.frames, setup.targets, setup.rotations
+        known = self._model.setup
+        for k, number in enumerate(self.unknowns.known):
+            place = self.unknowns.group(k)
+            if number is None:
+                continue
+            frame, tool = self.unknowns.frame[place], self.unknowns.tool[place]
+            if frame.any() and not free[place][frame].any():
+                frames[k] = known.frames[number]
+            if not free[place][tool].any():
+                targets[k], rotations[k] = known.targets[number], known.rotations[number]
+        return Setup(frames, targets, rotations, setup.anchors)
+
+    def _departure_of(self, setup: Setup, k: int, number: int) -> Floats:
+        known, parts = self._model.setup, []
+        if not self.task.arm.world_is_known:
+            between = rigid_inverse(known.frames[number]) @ setup.frames[k]
+            parts += [between[:3, 3], Rotation.from_matrix(between[:3, :3]).as_rotvec()]
+        parts.append((setup.targets[k] - known.targets[number]).reshape(-1))
+        if self._turns:
+            turn = known.rotations[number].T @ setup.rotations[k]
+            parts.append(Rotation.from_matrix(turn).as_rotvec())
+        return np.concatenate(parts)
+
+    def _known_setup_jacobian(self, calibration: Calibration, state: State) -> Floats | None:
+        """Derivatives (n, m, S) by the calibration's own set-ups, as far as they are not found anew."""
+        if all(number is None for number in self.unknowns.known):
+            return None
+        own = setup_jacobian(self.problem, self.parameters, state.setup)
+        width = own.shape[2]
+        found = np.zeros((*own.shape[:2], len(calibration.groups) * width))
+        for k, number in enumerate(self.unknowns.known):
+            if number is not None:
+                rows = self.number == k
+                tied = self.unknowns.std[self.unknowns.group(k)] < OPEN
+                found[rows, :, number * width : (number + 1) * width] = own[rows] * tied
+        return found

@@ -1,0 +1,138 @@
+"""What is estimated again: offsets of the joints, the base where the world is known, and set-ups."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.core_set import Selection
+from truearm.fitting import Task
+from truearm.identified import IdentifiedArm
+from truearm.parameters import KIND_COUNT, KINDS, THETA, D
+from truearm.units import to_si
+from truearm.updating.options import UpdateOptions
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FRAME_UNKNOWNS: Final = 6
+OPEN: Final = 1.0
+"""What is found anew is known to a metre and a radian, as in the fits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """u unknowns: of the arm first, then those of each set-up: frame, targets, orientation of the target.
+
+    Attributes:
+        directions: Derivatives (5 L, a) of the chain's parameters by the a unknowns of the arm.
+        arm_names: Their names: joint1 ..., then base_theta ... .
+        std: Prior standard deviations (u,), m and rad; zero for what is kept.
+        frame: Which are of frames (u,).
+        tool: Which are of targets and their orientation (u,).
+        known: For each set-up of the update the number of the calibration's it may be compared with, or None.
+    """
+
+    directions: Floats
+    arm_names: tuple[str, ...]
+    std: Floats
+    frame: Mask
+    tool: Mask
+    known: tuple[int | None, ...]
+
+    @classmethod
+    def of(cls, calibration: Calibration, task: Task, options: UpdateOptions) -> "Unknowns":
+        """Those of an update of a calibration with measurements of a task."""
+        arm = task.arm
+        directions, names = arm_directions(arm)
+        known = tuple(counterpart(calibration, group) for group in task.groups)
+        comparable = calibration.selection == task.selection
+        groups = [
+            setup_std(arm, task.selection, options, known=comparable and number is not None)
+            for number in known
+        ]
+        std = np.concatenate([[arm_std(arm, name, options) for name in names], *groups])
+        frame = np.zeros(len(std), dtype=np.bool_)
+        width = len(groups[0])
+        for k in range(len(groups)):
+            first = len(names) + k * width
+            frame[first : first + (0 if arm.world_is_known else FRAME_UNKNOWNS)] = True
+        tool = ~frame
+        tool[: len(names)] = False
+        return cls(directions, names, std, frame, tool, known if comparable else (None,) * len(known))
+
+    @property
+    def arm(self) -> Mask:
+        """Which are of the arm (u,)."""
+        return ~(self.frame | self.tool)
+
+    @property
+    def free(self) -> Mask:
+        """Which are estimated (u,)."""
+        return np.asarray(self.std > 0.0)
+
+    @property
+    def nuisance(self) -> Mask:
+        """Which say nothing about what changed (u,): what is found anew, and the base of a known world."""
+        base = np.array([name.startswith("base") for name in self.arm_names])
+        found = self.std >= OPEN
+        found[: len(base)] |= base
+        return found
+
+    def group(self, number: int) -> slice:
+        """Where the unknowns of a set-up stand."""
+        width = (len(self.std) - len(self.arm_names)) // len(self.known)
+        first = len(self.arm_names) + number * width
+        return slice(first, first + width)
+
+
+def counterpart(calibration: Calibration, group: str) -> int | None:
+    """The calibration's set-up that one of the update is compared with: of that name, or the only one."""
+    if group in calibration.groups:
+        return calibration.groups.index(group)
+    return 0 if len(calibration.groups) == 1 else None
+
+
+def offset_columns(arm: IdentifiedArm) -> list[int]:
+    """The parameter of each moving joint that its reading is added to, among the chain's (5 L)."""
+    rows = [row for row, kind in enumerate(arm.joints) if kind != "fixed"]
+    return [KIND_COUNT * row + (D if arm.joints[row] == "prismatic" else THETA) for row in rows]
+
+
+def arm_directions(arm: IdentifiedArm) -> tuple[Floats, tuple[str, ...]]:
+    """Derivatives (5 L, a) of the chain's parameters by offsets of readings and the base; their names."""
+    columns = offset_columns(arm)
+    names = [f"joint{k + 1}" for k in range(len(columns))]
+    base = list(range(KIND_COUNT)) if arm.world_is_known else []
+    found = np.zeros((arm.table.size, len(columns) + len(base)))
+    found[columns, : len(columns)] = arm.robot.coupling
+    found[base, len(columns) + np.arange(len(base))] = 1.0
+    return found, (*names, *(f"base_{KINDS[kind]}" for kind in base))
+
+
+def arm_std(arm: IdentifiedArm, name: str, options: UpdateOptions) -> float:
+    """Prior standard deviation of one of the arm's unknowns, rad or m."""
+    if name.startswith("base"):
+        return OPEN
+    prismatic = arm.robot.joints[int(name.removeprefix("joint")) - 1] == "prismatic"
+    return to_si(options.offset_mm, "mm") if prismatic else to_si(options.offset_deg, "deg")
+
+
+def setup_std(arm: IdentifiedArm, selection: Selection, options: UpdateOptions, *, known: bool) -> Floats:
+    """Prior standard deviations (W,) of the unknowns of a set-up; zero for what is kept.
+
+    Args:
+        arm: The arm.
+        selection: What is measured.
+        options: What may have moved.
+        known: Whether the calibration knows the set-up's tool.
+    """
+    frame = np.full(0 if arm.world_is_known else FRAME_UNKNOWNS, 0.0 if options.keep_frame else OPEN)
+    points = np.full(3 * len(selection.targets), to_si(options.tool_mm, "mm"))
+    turn = np.full(3 if selection.orientation else 0, to_si(options.tool_deg, "deg"))
+    tool = np.concatenate([points, turn])
+    if options.new_tool or not known:
+        tool[:] = OPEN
+    return np.concatenate([frame, np.zeros_like(tool) if options.keep_tool else tool])

@@ -1,0 +1,119 @@
+"""The calibration after an update: offsets and set-ups are new, all else is as it was."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import fit_constant
+from truearm.calibration import Calibration
+from truearm.details import ConstantDetails
+from truearm.fitted_rows import TRAINED, FittedRows
+from truearm.fitting import core_errors, fit_options
+from truearm.judging import judge, model_inputs
+from truearm.models import NOMINAL, ArmModel
+from truearm.revision import Revision
+from truearm.uncertainty import UpdatedSpread
+from truearm.updating.estimating import Estimate
+from truearm.updating.scene import Scene
+from truearm.validation import Errors, Validation
+
+Floats = NDArray[np.float64]
+
+
+def updated(
+    calibration: Calibration,
+    scene: Scene,
+    found: Estimate,
+    held_out: Errors,
+    weight: Floats,
+    report: Mapping[str, Any],
+) -> Calibration:
+    """The calibration with what was found put in.
+
+    Args:
+        calibration: As it was.
+        scene: The measurements, all of which were used.
+        found: Values of the unknowns.
+        held_out: Errors of poses that were left out.
+        weight: Of each row (n,); zero for outliers that were left out.
+        report: What the update said.
+    """
+    task, unknowns = scene.task, scene.unknowns
+    change = (unknowns.directions @ found.state.arm).reshape(-1, 5)
+    models = {name: _model(calibration, scene, found, name, change) for name in calibration.models}
+    trained = judge(task, models, scene.data, scene.data)
+    file = calibration.to_bytes() if calibration.file is None else calibration.file
+    revision = Revision.of(report, unknowns.directions, found.covariance, file)
+    new = replace(
+        calibration,
+        groups=tuple(task.groups),
+        selection=task.selection,
+        models=models,
+        constant=_constant(calibration, scene, found),
+        validation=Validation(
+            len(scene.data), len(scene.data), {**trained, calibration.model_name: held_out}, trained
+        ),
+        rows=_rows(scene, found, weight),
+        data_hash=scene.data.hash(),
+        version=version("truearm"),
+        notices=(),
+        seconds={},
+        stored_conservative=None,
+        fitted_spread=None,
+        revision=revision,
+        file=None,
+    )
+    if calibration.variable is None:
+        return new
+    return replace(new, fitted_spread=UpdatedSpread.of(new, calibration.spread))
+
+
+def _model(calibration: Calibration, scene: Scene, found: Estimate, name: str, change: Floats) -> ArmModel:
+    """A model in the new set-ups; those of others than the one that predicts are fitted to the same rows."""
+    old = calibration.models[name]
+    constants = old.constants if name == NOMINAL else old.constants + change
+    model = ArmModel(np.ascontiguousarray(constants), old.setup, old.field, old.scheme)
+    if name == calibration.model_name:
+        return replace(model, setup=found.state.setup)
+    task = scene.task
+    parameters = model.parameters(model_inputs(task.arm, scene.data, task.options.features))
+    with core_errors(scene.data):
+        setup = fit_constant(task.problem(scene.measured, []), fit_options(task, parameters=parameters)).setup
+    return replace(model, setup=setup)
+
+
+def _constant(calibration: Calibration, scene: Scene, found: Estimate) -> ConstantDetails:
+    """Details of the constants whose covariance holds that of the new offsets, and of the new set-ups."""
+    old, arm = calibration.constant, calibration.arm
+    before = [
+        c for c, name in zip(arm.candidates.columns, arm.candidates.names, strict=True) if name in old.names
+    ]
+    directions, count = scene.unknowns.directions, len(scene.unknowns.arm_names)
+    moved = np.flatnonzero(np.abs(directions).sum(axis=1))
+    asked = dict(zip(arm.candidates.columns, arm.candidates.names, strict=True))
+    columns = sorted(set(before) | {int(c) for c in moved if int(c) in asked})
+    whole = np.zeros((len(columns) + len(found.covariance) - count,) * 2)
+    places = [columns.index(c) for c in before]
+    whole[np.ix_(places, places)] = old.covariance[: len(before), : len(before)]
+    carry = np.zeros((len(whole), len(found.covariance)))
+    carry[: len(columns), :count] = directions[columns]
+    carry[len(columns) :, count:] = np.eye(len(found.covariance) - count)
+    whole += carry @ found.covariance @ carry.T
+    return replace(old, names=tuple(asked[c] for c in columns), covariance=whole)
+
+
+def _rows(scene: Scene, found: Estimate, weight: Floats) -> FittedRows:
+    residual = np.zeros(scene.seen.shape)
+    residual[scene.seen] = found.linear.residual
+    return FittedRows(
+        scene.data,
+        np.full(len(scene.data), TRAINED, dtype=np.int64),
+        weight,
+        residual,
+        np.zeros(len(scene.data)),
+        np.linalg.norm(residual[:, :3], axis=1),
+    )
