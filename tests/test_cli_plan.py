@@ -21,7 +21,7 @@ def test_a_plan_for_a_cell_can_be_measured_there(tmp_path, capsys, monkeypatch):
     words = ["plan", "rv-m2", "-n", "20", "--cell", "cell.toml", "--picture", "poses.png", "--json"]
     assert main(words) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["purposes"] == {"train": 20, "validate": 5, "repeat": 4}
+    assert told["purposes"] == {"train": 20, "validate": 5, "repeat": 6}
     assert told["after"]["log_det"] > told["before"]["log_det"]
     assert told["motion_s"]["short"] <= told["motion_s"]["paper"]
     expected = list(told["expected_mm"].values())
@@ -32,11 +32,20 @@ def test_a_plan_for_a_cell_can_be_measured_there(tmp_path, capsys, monkeypatch):
     assert set(poses.approach) == {1, -1}
     assert rehearse(cell, poses).refused == []
     table = pd.read_csv("poses.csv")
-    joints = [f"q{j}" for j in range(1, 6)]
-    again = table[table["purpose"] == "repeat"][joints]
-    assert (
-        again.apply(tuple, axis=1).isin(table[table["purpose"] == "train"][joints].apply(tuple, axis=1)).all()
-    )
+    assert_repeats(table, [f"q{j}" for j in range(1, 6)])
+
+
+def assert_repeats(table, joints):
+    """Each repeated pose comes at once from the other side, and at the end from its first side."""
+    poses = table[joints].apply(tuple, axis=1)
+    repeated = table["purpose"] == "repeat"
+    for pose in poses[repeated].unique():
+        first, again, last = np.flatnonzero(poses == pose)
+        assert table["purpose"][first] == "train"
+        assert again == first + 1
+        assert table["approach"][again] == -table["approach"][first]
+        assert table["approach"][last] == table["approach"][first]
+        assert repeated[last:].all()
 
 
 def test_both_orders_go_from_low_to_high_once_through_all():

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 CALIBRATION_NAME: Final = "calibration.calib"
 REPORT_NAME: Final = "update.json"
 SUFFIX: Final = ".calib"
+LEAST_TOLD: Final = 1e-6
+"""Smaller probabilities say no more."""
 VERDICTS: Final = {
     "holds": "The old calibration still holds.",
     "moved": "Offsets or tool moved. The field still fits, so the updated calibration replaces the old one.",
@@ -165,23 +167,20 @@ def _print(found: "Update") -> None:
     say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {VERDICTS[found.verdict]}")
     rows = []
     for entry in found.offsets:
-        words = "moved" if entry.moved else ""
-        if not entry.told:
-            words = f"not told from the {entry.confounded}" if entry.confounded else "not told"
-        rows.append(
-            [
-                str(entry.joint),
-                f"{entry.change:+.4f} {entry.unit}",
-                f"{entry.std:.4f}",
-                f"{entry.p:.3g}",
-                words,
-            ]
-        )
+        name = str(entry.joint)
+        if entry.std is None or entry.p is None:
+            from_what = f" from the {entry.confounded}" if entry.confounded else ""
+            rows.append([name, "held", "", "", f"not told{from_what}"])
+            continue
+        change = f"{entry.change:+.4f} {entry.unit}"
+        rows.append([name, change, f"{entry.std:.4f}", _probability(entry.p), "moved" if entry.moved else ""])
     print_table(("joint", "offset changed by", "std error", "p", ""), rows, left=(0, 4))
     for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
         for motion in motions:
             turn = "" if motion.angle_deg is None else f" and {motion.angle_deg:.4f} deg"
-            judged = "found anew" if motion.p is None else f"p {motion.p:.3g}{', moved' * motion.moved}"
+            judged = (
+                "found anew" if motion.p is None else f"p {_probability(motion.p)}{', moved' * motion.moved}"
+            )
             say(f"{name} of {motion.group}: {motion.largest_mm:.3f} mm{turn} ({judged}).")
     print_table(
         ("error at left-out poses, mm", "mean", "RMS", "largest"),
@@ -190,7 +189,11 @@ def _print(found: "Update") -> None:
             for name, e in (("old calibration", found.before), ("updated", found.after))
         ],
     )
-    say(
-        f"An unchanged arm shows such a change with p = {found.changed.p:.3g}, "
-        f"and such a rest with p = {found.rest.p:.3g}."
+    say_wrapped(
+        f"An unchanged arm shows such a change with p {_probability(found.changed.p)}, "
+        f"and such a rest with p {_probability(found.rest.p)}."
     )
+
+
+def _probability(p: float) -> str:
+    return f"{p:.2g}" if p >= LEAST_TOLD else f"< {LEAST_TOLD:g}"

@@ -1,11 +1,11 @@
 """Update a calibration with 10 to 20 new poses: what moved, and whether the old one still holds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincc
+from scipy.special import gammainccinv
 
 from truearm.calibration import Calibration
 from truearm.core_set import select
@@ -16,7 +16,7 @@ from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.updating.chi_square import ChiSquare, change_test, rest_test
 from truearm.updating.estimating import Estimate, estimate, left_out, surprise
-from truearm.updating.moved import Motion, Offset, motions, offsets
+from truearm.updating.moved import Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
 from truearm.updating.scene import Scene
 from truearm.updating.unknowns import Unknowns
@@ -118,39 +118,63 @@ def update(
     with stages("asking what the calibration expects"):
         _ = calibration.spread
     with stages("finding what moved"):
+        held = _held(calibration, Scene(task, data, calibration.model, unknowns))
+        unknowns = unknowns.holding(held)
         kept, outliers = _without_outliers(calibration, task, data, unknowns)
         scene = Scene(task, data.select(kept), calibration.model, unknowns)
-        return _told(calibration, scene, chosen, data, kept, (*notices, *_outlier_notices(data, outliers)))
+        found = _Found(calibration, scene, chosen, held)
+        return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
 
 
-def _told(
-    calibration: Calibration,
-    scene: Scene,
-    options: UpdateOptions,
-    data: Measurements,
-    kept: NDArray[np.int64],
-    notices: tuple[Notice, ...],
-) -> Update:
-    unknowns = scene.unknowns
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A calibration, the measurements that count, and the joints whose offsets they do not tell."""
+
+    calibration: Calibration
+    scene: Scene
+    options: UpdateOptions
+    held: dict[int, str]
+
+    def told(self, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
+        """What the measurements say."""
+        scene, unknowns, level = self.scene, self.scene.unknowns, self.options.level
+        start = scene.start()
+        spread = scene.covariance(self.calibration, start)
+        found = estimate(scene, spread, start, unknowns.free)
+        _check_plausible(scene, found)
+        anew = unknowns.free & unknowns.nuisance
+        still = estimate(scene, spread, scene.unchanged(start), anew)
+        changed, rest = change_test(still, unknowns), rest_test(found, unknowns)
+        frames, tools = motions(scene, found, level)
+        told = Update(
+            calibration=self.calibration,
+            verdict=_verdict(changed, rest, level),
+            level=level,
+            offsets=offsets(scene, found, self.held, level),
+            frames=frames,
+            tools=tools,
+            changed=changed,
+            rest=rest,
+            before=_errors(scene, still, spread, anew),
+            after=_errors(scene, found, spread, unknowns.free),
+            n_poses=len(scene.data) + len(outliers),
+            outliers=tuple(outliers),
+            notices=notices,
+        )
+        return replace(told, calibration=updated(self.calibration, scene, found, told.after, told.to_dict()))
+
+
+def _verdict(changed: ChiSquare, rest: ChiSquare, level: float) -> Verdict:
+    """What two tests, which share the level, say together."""
+    if rest.p < level / 2.0:
+        return "field"
+    return "moved" if changed.p < level / 2.0 else "holds"
+
+
+def _held(calibration: Calibration, scene: Scene) -> dict[int, str]:
+    """Joints, from 0, whose offsets the poses do not tell, and what from."""
     start = scene.start()
-    spread = scene.covariance(calibration, start)
-    found = estimate(scene, spread, start, unknowns.free)
-    still = estimate(scene, spread, scene.unchanged(start), unknowns.free & unknowns.nuisance)
-    changed, rest = change_test(still, unknowns), rest_test(found, unknowns)
-    each = options.level / 2.0
-    verdict: Verdict = "field" if rest.p < each else "moved" if changed.p < each else "holds"
-    joints = offsets(scene, found, options.level)
-    _check_plausible(scene, found)
-    frames, tools = motions(scene, found, options.level)
-    before = _errors(scene, still, spread, unknowns.free & unknowns.nuisance)
-    after = _errors(scene, found, spread, unknowns.free)
-    out = np.setdiff1d(np.arange(len(data)), kept)
-    told = Update(
-        calibration, verdict, options.level, joints, frames, tools, changed, rest, before, after,
-        len(data), tuple(data.rows[out].tolist()), notices,
-    )  # fmt: skip
-    new = updated(calibration, scene, found, after, np.ones(len(scene.data)), told.to_dict())
-    return Update(**{**vars(told), "calibration": new})
+    return untold(scene, scene.covariance(calibration, start), start)
 
 
 def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, stages: Stages) -> Task:
@@ -172,6 +196,8 @@ def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, 
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:
     asked = [name for name in ("keep_frame", "keep_tool") if getattr(options, name)]
     strange = [g for g, known in zip(task.groups, unknowns.known, strict=True) if known is None]
+    if options.keep_frame and task.arm.world_is_known:
+        raise UsageError("the frame is kept", rule="With the world as frame the base is part of the arm")
     if asked and strange:
         raise UsageError(
             f"the calibration knows no frame and tool of set-up {list_names(strange)} that could be kept",
@@ -202,20 +228,24 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
 def _without_outliers(
     calibration: Calibration, task: Task, data: Measurements, unknowns: Unknowns
 ) -> tuple[NDArray[np.int64], list[int]]:
-    """Rows without those that no other row supports, the worst one taken out first; and these."""
+    """Rows without those that no other row supports, the worst one taken out first; and these.
+
+    Where they would be too many, it is not the rows that are wrong: all are kept.
+    """
     kept, out = np.arange(len(data)), list[int]()
-    while True:
+    while len(out) <= MOST_OUTLIERS * len(data):
         scene = Scene(task, data.select(kept), calibration.model, unknowns)
         start = scene.start()
         spread = scene.covariance(calibration, start)
         found = estimate(scene, spread, start, unknowns.free)
         squares, freedom = surprise(found.linear, spread, unknowns.std, unknowns.free)
-        likely = gammaincc(freedom / 2.0, squares / 2.0)
-        worst = int(np.argmin(likely))
-        if likely[worst] > OVERWHELMING or len(out) >= int(MOST_OUTLIERS * len(data)):
+        score = squares / (2.0 * gammainccinv(freedom / 2.0, OVERWHELMING))
+        worst = int(np.argmax(score))
+        if score[worst] <= 1.0:
             return kept, out
         out.append(int(kept[worst]))
         kept = np.delete(kept, worst)
+    return np.arange(len(data)), []
 
 
 def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:
@@ -227,13 +257,13 @@ def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:
 
 
 def _check_plausible(scene: Scene, found: Estimate) -> None:
-    ratios = np.abs(found.state.arm) / scene.unknowns.std[: len(found.state.arm)]
-    names = scene.unknowns.arm_names
-    wild = [n for n, r in zip(names, ratios, strict=True) if r > IMPLAUSIBLE and n.startswith("joint")]
-    if wild:
+    joints = scene.task.arm.robot.joint_count
+    std = np.maximum(scene.unknowns.std[:joints], np.finfo(np.float64).tiny)
+    ratios = np.abs(found.state.arm[:joints]) / std
+    wild = int(np.argmax(ratios))
+    if ratios[wild] > IMPLAUSIBLE:
         raise WorkError(
-            f"the offset of {wild[0]} would have changed by {ratios[names.index(wild[0])]:.0f} times what is "
-            "allowed for",
+            f"joint {wild + 1} would be off by {ratios[wild]:.0f} times what is allowed for",
             where=", ".join(scene.data.files),
             rule=f"Up to {IMPLAUSIBLE:g} times --offset-deg is believed",
             way_out="Check that these are measurements of this arm; after a larger change give a larger "

@@ -61,11 +61,16 @@ def estimate(scene: Scene, spread: Floats, state: State, free: Mask) -> Estimate
             way_out="Check that the measurements are of this arm, and their units",
         )
     linear = scene.linear(state)
+    return Estimate(state, linear, posterior(linear, factor, std, free), factor)
+
+
+def posterior(linear: Linear, factor: Floats, std: Floats, free: Mask) -> Floats:
+    """Covariance (u, u) of the unknowns, zero for those that are not free."""
     covariance = np.zeros((len(std), len(std)))
     scaled = _whitened(linear.jacobian[:, free] * std[free], factor)
     inverse = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
     covariance[np.ix_(free, free)] = inverse * np.outer(std[free], std[free])
-    return Estimate(state, linear, covariance, factor)
+    return covariance
 
 
 def factored(spread: Floats) -> Floats:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 from truearm.updating.chi_square import normal_p, wald
-from truearm.updating.estimating import Estimate
-from truearm.updating.scene import Scene
+from truearm.updating.estimating import Estimate, factored, posterior
+from truearm.updating.scene import Scene, State
+from truearm.updating.unknowns import Unknowns
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,18 +28,18 @@ class Offset:
         joint: From 1.
         unit: "deg" or "mm".
         change: In that unit.
-        std: Standard error in that unit.
-        p: How often an unmoved joint shows as large a change.
+        std: Standard error in that unit; None where it is not told.
+        p: How often an unmoved joint shows as large a change; None where it is not told.
         moved: Whether that is too rare.
-        told: Whether the poses tell it at all.
+        told: Whether the poses tell it; where they do not, the offset is held as it was.
         confounded: What it cannot be told from: "frame", "tool", "frame and tool", or "" for the others.
     """
 
     joint: int
     unit: str
     change: float
-    std: float
-    p: float
+    std: float | None
+    p: float | None
     moved: bool
     told: bool
     confounded: str = ""
@@ -76,6 +77,11 @@ class Motion:
         return float(np.linalg.norm(self.shift_mm, axis=1).max(initial=0.0))
 
     @property
+    def kept(self) -> bool:
+        """Whether it was not estimated."""
+        return not np.any(self.shift_std_mm)
+
+    @property
     def angle_deg(self) -> float | None:
         """Angle of the turn."""
         return None if self.turn_deg is None else float(np.linalg.norm(self.turn_deg))
@@ -85,19 +91,45 @@ class Motion:
         return asdict(self)
 
 
-def offsets(scene: Scene, found: Estimate, level: float) -> tuple[Offset, ...]:
-    """Changes of all joints' offsets; the level is shared among them."""
+def untold(scene: Scene, spread: Floats, state: State) -> dict[int, str]:
+    """Joints, from 0, whose offsets the poses do not tell, and what they cannot be told from.
+
+    It depends on the poses and on what may have moved, not on what was measured.
+
+    Args:
+        scene: The measurements.
+        spread: Covariance (R, R) of the residuals of an unchanged arm.
+        state: Where derivatives are taken.
+    """
+    unknowns = scene.unknowns
+    covariance = posterior(scene.linear(state), factored(spread), unknowns.std, unknowns.free)
+    joints = range(scene.task.arm.robot.joint_count)
+    error = np.sqrt(np.diag(covariance))
+    return {
+        joint: _confounded(unknowns, covariance, joint)
+        for joint in joints
+        if error[joint] >= TOLD * unknowns.std[joint]
+    }
+
+
+def offsets(scene: Scene, found: Estimate, held: dict[int, str], level: float) -> tuple[Offset, ...]:
+    """Changes of all joints' offsets, those that are `held` for not being told among them.
+
+    The level is shared among the joints.
+    """
     kinds = scene.task.arm.robot.joints
     std = np.sqrt(np.diag(found.covariance))
     result = []
     for joint, kind in enumerate(kinds):
         scale, unit = (MM_PER_METRE, "mm") if kind == "prismatic" else (1.0 / RADIANS_PER_DEGREE, "deg")
+        if joint in held:
+            result.append(Offset(joint + 1, unit, 0.0, None, None, False, False, held[joint]))
+            continue
         change, error = float(found.state.arm[joint]), float(std[joint])
-        told = bool(error < TOLD * scene.unknowns.std[joint])
         p = normal_p(change / error)
-        confounded = "" if told else _confounded(scene, found, joint)
-        moved = told and p < level / len(kinds)
-        result.append(Offset(joint + 1, unit, scale * change, scale * error, p, moved, told, confounded))
+        result.append(
+            Offset(joint + 1, unit, scale * change, scale * error, p, p < level / len(kinds), told=True)
+        )
     return tuple(result)
 
 
@@ -142,21 +174,20 @@ class _Judged:
         )
 
 
-def _confounded(scene: Scene, found: Estimate, joint: int) -> str:
+def _confounded(unknowns: Unknowns, covariance: Floats, joint: int) -> str:
     """Of frame and tool what would have to be known for an offset to be told."""
-    unknowns = scene.unknowns
     parts: Sequence[tuple[str, Mask]] = (
         ("frame", unknowns.frame),
         ("tool", unknowns.tool),
         ("frame and tool", unknowns.frame | unknowns.tool),
     )
     for name, chosen in parts:
-        known = chosen & (np.diag(found.covariance) > 0.0)
+        known = chosen & unknowns.free
         if not known.any():
             continue
-        across = found.covariance[joint, known]
-        inner = found.covariance[np.ix_(known, known)]
-        left = found.covariance[joint, joint] - across @ np.linalg.solve(inner, across)
+        across = covariance[joint, known]
+        inner = covariance[np.ix_(known, known)]
+        left = covariance[joint, joint] - across @ np.linalg.solve(inner, across)
         if np.sqrt(max(left, 0.0)) < TOLD * unknowns.std[joint]:
             return name
     return ""

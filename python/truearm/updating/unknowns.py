@@ -1,6 +1,7 @@
 """What is estimated again: offsets of the joints, the base where the world is known, and set-ups."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -80,6 +81,12 @@ class Unknowns:
         found = self.std >= OPEN
         found[: len(base)] |= base
         return found
+
+    def holding(self, numbers: Iterable[int]) -> "Unknowns":
+        """The same with some unknowns of the arm held where they were."""
+        std = self.std.copy()
+        std[list(numbers)] = 0.0
+        return replace(self, std=std)
 
     def group(self, number: int) -> slice:
         """Where the unknowns of a set-up stand."""

@@ -29,7 +29,6 @@ def updated(
     scene: Scene,
     found: Estimate,
     held_out: Errors,
-    weight: Floats,
     report: Mapping[str, Any],
 ) -> Calibration:
     """The calibration with what was found put in.
@@ -39,7 +38,6 @@ def updated(
         scene: The measurements, all of which were used.
         found: Values of the unknowns.
         held_out: Errors of poses that were left out.
-        weight: Of each row (n,); zero for outliers that were left out.
         report: What the update said.
     """
     task, unknowns = scene.task, scene.unknowns
@@ -57,7 +55,7 @@ def updated(
         validation=Validation(
             len(scene.data), len(scene.data), {**trained, calibration.model_name: held_out}, trained
         ),
-        rows=_rows(scene, found, weight),
+        rows=_rows(scene, found),
         data_hash=scene.data.hash(),
         version=version("truearm"),
         notices=(),
@@ -106,13 +104,13 @@ def _constant(calibration: Calibration, scene: Scene, found: Estimate) -> Consta
     return replace(old, names=tuple(asked[c] for c in columns), covariance=whole)
 
 
-def _rows(scene: Scene, found: Estimate, weight: Floats) -> FittedRows:
+def _rows(scene: Scene, found: Estimate) -> FittedRows:
     residual = np.zeros(scene.seen.shape)
     residual[scene.seen] = found.linear.residual
     return FittedRows(
         scene.data,
         np.full(len(scene.data), TRAINED, dtype=np.int64),
-        weight,
+        np.ones(len(scene.data)),
         residual,
         np.zeros(len(scene.data)),
         np.linalg.norm(residual[:, :3], axis=1),

@@ -1,0 +1,83 @@
+"""`truearm update` as people run it."""
+
+import json
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.remastered import remastered_table
+from truearm.cli import main
+from truearm.simulation import VirtualArm
+
+SHIFT = np.array([0.0, 0.6, 0.0, 0.9, 0.0])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("update")
+    arm = VirtualArm.paper(seed=2)
+    ta.calibrate(arm.robot, arm.measure(arm.poses(60))).save(place / "old.calib")
+    remastered_table(arm, arm.poses(15, seed=9), SHIFT, seed=9).to_csv(place / "moved.csv", index=False)
+    arm.measure_table(arm.poses(15, seed=8), seed=8).to_csv(place / "same.csv", index=False)
+    return place
+
+
+@pytest.fixture(autouse=True)
+def there(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+
+
+def test_an_update_is_told_written_and_rolled_back(folder, capsys):
+    assert main(["update", "old.calib", "moved.csv", "-o", "new.calib"]) == 0
+    told = capsys.readouterr().out
+    assert "Offsets or tool moved." in told
+    assert "not told from the frame" in told
+    assert "truearm update --roll-back new.calib" in told
+    assert max(map(len, told.splitlines())) <= 80
+    assert main(["update", "--roll-back", "new.calib", "-o", "back.calib"]) == 0
+    assert "SHA-256" in capsys.readouterr().out
+    assert (folder / "back.calib").read_bytes() == (folder / "old.calib").read_bytes()
+    assert main(["update", "old.calib", "moved.csv", "-o", "new.calib"]) == 2
+    assert "overwrites nothing" in capsys.readouterr().err
+    assert main(["strip", "new.calib", "-o", "small.calib"]) == 0
+    capsys.readouterr()
+    assert main(["update", "--roll-back", "small.calib", "-o", "never.calib"]) == 1
+    assert "left out when the file was stripped" in capsys.readouterr().err
+    assert not (folder / "never.calib").exists()
+
+
+def test_without_output_nothing_is_written(folder, capsys):
+    before = sorted(folder.iterdir())
+    assert main(["update", "old.calib", "same.csv"]) == 0
+    assert "The old calibration still holds." in capsys.readouterr().out
+    assert sorted(folder.iterdir()) == before
+
+
+def test_json_says_it_to_programs(folder, capsys):
+    assert main(["update", "old.calib", "moved.csv", "-o", "result", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"] == "moved"
+    assert told["calibration"] == "result/calibration.calib"
+    assert [entry["moved"] for entry in told["offsets"]] == [False, True, False, True, False]
+    assert json.loads((folder / "result" / "update.json").read_text())["verdict"] == "moved"
+    assert main(["update", "result/calibration.calib", "--roll-back", "-o", "b.calib", "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)) == {"calibration", "sha256"}
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["old.calib"], 2, "no measurements were given"),
+        (["old.calib", "--roll-back"], 2, "-o is missing"),
+        (["old.calib", "same.csv", "--roll-back", "-o", "x.calib"], 2, "measurements were given"),
+        (["old.calib", "--roll-back", "-o", "x.calib"], 2, "was not updated"),
+        (["same.csv", "same.csv"], 1, "no calibration file"),
+        (["none.calib", "same.csv"], 1, "no such file"),
+        (["old.calib", "same.csv", "--keep-tool", "--new-tool"], 2, "Give one of"),
+        (["old.calib", "same.csv", "--level", "2"], 2, "Between 0 and 1"),
+    ],
+)
+def test_wrong_use_is_told(words, status, message, capsys):
+    assert main(["update", *words]) == status
+    assert message in capsys.readouterr().err

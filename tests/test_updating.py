@@ -1,0 +1,272 @@
+"""Updating a calibration after re-mastering, a crash or a change of motor, on virtual arms."""
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.remastered import remastered, remastered_table
+from truearm._core import setup_jacobian, step_setup
+from truearm.simulation import Imperfections, VirtualArm
+from truearm.updating.chi_square import ChiSquare
+
+SHIFT = np.array([0.0, 0.6, -0.2, 0.9, 0.0])
+TOOL_MM = (0.6, -0.5, 0.6)
+
+
+@pytest.fixture(scope="module")
+def known():
+    arm = VirtualArm.paper(seed=2)
+    return arm, ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
+
+
+@pytest.fixture(scope="module")
+def moved(known):
+    arm, calibration = known
+    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9, tool_mm=TOOL_MM)
+    return data, ta.update(calibration, data)
+
+
+def error_mm(calibration, arm, shift, tool_mm=(0.0, 0.0, 0.0)):
+    """Mean error of predictions of the target at fresh poses in the calibration's only set-up."""
+    fresh = remastered(arm, arm.poses(200, seed=77), shift, seed=78, tool_mm=tool_mm)
+    return ta.evaluate(calibration, fresh, keep_frames=True).errors[calibration.model_name].position.mean
+
+
+def std_mm(calibration, q):
+    """Standard deviation of the tool's position, all coordinates together."""
+    return 1e3 * np.linalg.norm(calibration.position_std(q), axis=1)
+
+
+def check_offset(offset, truth, errors=4.0):
+    """The change of an offset is found within some standard errors, which are small."""
+    assert offset.std is not None
+    assert abs(offset.change - truth) < errors * offset.std < 0.2
+
+
+def test_what_moved_is_found_and_the_error_comes_back(known, moved):
+    arm, calibration = known
+    _, found = moved
+    assert found.verdict == "moved"
+    for offset, shift in zip(found.offsets[1:4], SHIFT[1:4], strict=True):
+        assert offset.told
+        assert offset.moved
+        check_offset(offset, shift)
+    assert found.tools[0].moved
+    own = error_mm(calibration, arm, np.zeros(5))
+    assert error_mm(calibration, arm, SHIFT, TOOL_MM) > 10.0 * own
+    assert error_mm(found.calibration, arm, SHIFT, TOOL_MM) < 1.4 * own
+    assert found.after.position.mean < 0.1 * found.before.position.mean
+
+
+def test_what_cannot_be_told_is_said(moved):
+    _, found = moved
+    assert not found.offsets[0].told
+    assert found.offsets[0].confounded == "frame"
+    assert found.offsets[4].confounded == "tool"
+    assert found.offsets[0].change == 0.0
+    assert found.offsets[0].std is None
+
+
+def test_a_device_and_a_target_that_stayed_tell_the_first_and_last_joint(known):
+    arm, calibration = known
+    shift = np.array([0.4, 0.0, 0.0, 0.0, -0.8])
+    data = remastered(arm, arm.poses(15, seed=9), shift, seed=9)
+    found = ta.update(calibration, data, keep_frame=True, keep_tool=True)
+    assert found.verdict == "moved"
+    assert [offset.moved for offset in found.offsets] == [True, False, False, False, True]
+    for offset, truth in zip(found.offsets, shift, strict=True):
+        check_offset(offset, truth)
+    assert found.frames[0].largest_mm < 1e-9
+
+
+def test_unchanged_arms_are_said_to_hold_at_the_stated_rate(known):
+    arm, calibration = known
+    verdicts = [
+        ta.update(calibration, arm.measure(arm.poses(15, seed=100 + k), seed=k), level=0.05).verdict
+        for k in range(12)
+    ]
+    assert verdicts.count("holds") >= 10  # of 12 at 5 %: nine or fewer in 2 of 100 cases
+    data = arm.measure(arm.poses(15, seed=9), seed=9)
+    assert error_mm(ta.update(calibration, data).calibration, arm, np.zeros(5)) < 0.15
+
+
+def test_another_field_is_noticed(known):
+    _, calibration = known
+    other = VirtualArm.paper(seed=2, imperfections=Imperfections(share=0.5))
+    found = ta.update(calibration, other.measure(other.poses(15, seed=9), seed=9))
+    assert found.verdict == "field"
+    assert found.rest.p < 1e-3
+    assert found.outliers == ()
+
+
+def test_a_gross_error_is_left_out_and_named(known):
+    arm, calibration = known
+    table = remastered_table(arm, arm.poses(15, seed=9), SHIFT, seed=9)
+    table.loc[3, "x"] += 0.02
+    found = ta.update(calibration, ta.Measurements.from_dataframe(table))
+    assert found.outliers == (4,)
+    assert found.verdict == "moved"
+    assert any("row 4" in str(notice) for notice in found.notices)
+    assert error_mm(found.calibration, arm, SHIFT) < 0.2
+
+
+def test_constants_are_updated_too(known):
+    arm, _ = known
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
+    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9)
+    found = ta.update(calibration, data)
+    assert found.verdict == "moved"
+    own = error_mm(calibration, arm, np.zeros(5))
+    assert error_mm(found.calibration, arm, SHIFT) < 1.4 * own
+    q = arm.poses(20, seed=4)
+    assert (std_mm(found.calibration, q) > 0.98 * std_mm(calibration, q)).all()
+
+
+def test_orientation_and_its_target_are_updated():
+    arm = VirtualArm.paper(seed=2)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(50), orientation=True), model="constant")
+    table = arm.measure_table(arm.poses(12, seed=3) + np.radians(SHIFT), seed=3, orientation=True)
+    for joint, column in enumerate(arm.poses(12, seed=3).T, start=1):
+        table[f"q{joint}"] = column
+    found = ta.update(calibration, ta.Measurements.from_dataframe(table))
+    assert found.verdict == "moved"
+    assert found.tools[0].turn_deg is not None
+    assert found.after.orientation.mean < 0.5
+    for offset, shift in zip(found.offsets[1:4], SHIFT[1:4], strict=True):
+        check_offset(offset, shift, errors=5.0)
+
+
+def test_the_world_as_frame_finds_the_base_again():
+    arm = VirtualArm.paper(seed=3, imperfections=Imperfections(share=0.0, noise_mm=0.02))
+    arm.world_from_base = np.eye(4)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), frame="world", model="constant")
+    arm.world_from_base = np.eye(4)
+    arm.world_from_base[:3, 3] = 0.002, 0.001, -0.001
+    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9)
+    found = ta.update(calibration, data)
+    assert found.verdict == "moved"
+    assert found.frames == ()
+    assert error_mm(found.calibration, arm, SHIFT) < 0.1
+    with pytest.raises(ta.UsageError, match="the base is part of the arm"):
+        ta.update(calibration, data, keep_frame=True)
+
+
+def test_an_update_is_saved_with_what_was_before(known, moved, tmp_path):
+    arm, calibration = known
+    calibration.save(tmp_path / "old.calib")
+    old = (tmp_path / "old.calib").read_bytes()
+    data, _ = moved
+    found = ta.update(ta.Calibration.load(tmp_path / "old.calib"), data)
+    found.calibration.save(tmp_path / "new.calib")
+    back = ta.Calibration.load(tmp_path / "new.calib")
+    q = arm.poses(20, seed=4)
+    assert np.array_equal(back.pose(q), found.calibration.pose(q))
+    np.testing.assert_allclose(back.position_std(q), found.calibration.position_std(q), rtol=1e-9)
+    assert back.revision is not None
+    assert back.revision.report["verdict"] == "moved"
+    ta.roll_back(tmp_path / "new.calib", tmp_path / "again.calib")
+    assert (tmp_path / "again.calib").read_bytes() == old
+    ta.roll_back(tmp_path / "new.calib", tmp_path / "again.calib")
+    with pytest.raises(ta.UsageError, match="something else already"):
+        ta.roll_back(tmp_path / "new.calib", tmp_path / "new.calib")
+
+
+def test_an_updated_calibration_is_updated_and_rolled_back_again(known, moved, tmp_path):
+    arm, _ = known
+    data, found = moved
+    found.calibration.save(tmp_path / "one.calib")
+    twice = 2.0 * SHIFT
+    more = remastered(arm, arm.poses(15, seed=19), twice, seed=19, tool_mm=TOOL_MM)
+    second = ta.update(ta.Calibration.load(tmp_path / "one.calib"), more)
+    assert second.verdict == "moved"
+    check_offset(second.offsets[3], SHIFT[3], errors=5.0)
+    second.calibration.save(tmp_path / "two.calib")
+    ta.roll_back(tmp_path / "two.calib", tmp_path / "back.calib")
+    assert (tmp_path / "back.calib").read_bytes() == (tmp_path / "one.calib").read_bytes()
+    assert ta.update(found.calibration, data).verdict == "holds"
+
+
+def test_bounds_of_the_updated_deviation_are_no_smaller(known, moved):
+    arm, _ = known
+    updated = moved[1].calibration
+    q = arm.poses(100, seed=5)
+    assert (1e3 * updated.conservative_std(q)[:, 0] >= std_mm(updated, q) * (1.0 - 1e-9)).all()
+    assert (std_mm(updated, q) > 0.98 * std_mm(known[1], q)).all()
+    assert np.median(std_mm(updated, q)) < 2.0 * np.median(std_mm(known[1], q))
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"offset_deg": 0.0}, ta.UsageError, "positive"),
+        ({"level": 1.0}, ta.UsageError, "Between 0 and 1"),
+        ({"keep_tool": True, "new_tool": True}, ta.UsageError, "Give one of"),
+        ({"use": "pose"}, ta.UsageError, "no orientation was measured"),
+        ({"offset_deg": 0.05}, ta.WorkError, "--offset-deg"),
+    ],
+)
+def test_options_that_cannot_be(known, moved, options, error, words):
+    with pytest.raises(error, match=words):
+        ta.update(known[1], moved[0], **options)
+
+
+def test_data_that_cannot_be(known, tmp_path):
+    arm, calibration = known
+    with pytest.raises(ta.InputError, match=r"12 measured values in 4 poses .* 10 to 20"):
+        ta.update(calibration, arm.measure(arm.poses(4, seed=3)))
+    other = VirtualArm(ta.Robot.load("ur10"), seed=1)
+    with pytest.raises(ta.InputError, match="6 joint columns"):
+        ta.update(calibration, other.measure(other.poses(15)))
+    calibration.save(tmp_path / "small.calib", with_rows=False)
+    with pytest.raises(ta.WorkError, match="left out of this file"):
+        ta.update(ta.Calibration.load(tmp_path / "small.calib"), arm.measure(arm.poses(15, seed=3)))
+
+
+def test_kept_parts_need_a_set_up_that_is_known(known):
+    arm = known[0]
+    parts = [
+        ta.Measurements.from_dataframe(arm.measure_table(arm.poses(30, seed=k), seed=k), name=name)
+        for k, name in enumerate(("one", "two"))
+    ]
+    calibration = ta.calibrate(arm.robot, parts, model="constant")
+    table = arm.measure_table(arm.poses(15, seed=9), seed=9)
+    with pytest.raises(ta.UsageError, match=r'"three" that could be kept.*"one" and "two"'):
+        ta.update(calibration, ta.Measurements.from_dataframe(table, name="three"), keep_frame=True)
+    named = ta.update(calibration, ta.Measurements.from_dataframe(table, name="two"), keep_frame=True)
+    assert named.verdict == "holds"
+    free = ta.update(calibration, ta.Measurements.from_dataframe(table, name="three"))
+    assert free.verdict == "holds"
+    assert free.tools == ()
+
+
+def test_set_up_derivatives_are_those_of_finite_differences(known):
+    from truearm.core_set import core_set, select
+    from truearm.fitting import Task
+    from truearm.updating import UpdateOptions
+    from truearm.updating.scene import Scene
+    from truearm.updating.unknowns import Unknowns
+
+    arm, calibration = known
+    data = arm.measure(arm.poses(6, seed=3))
+    task = Task(calibration.arm, select(data, None), data.groups, calibration.options)
+    unknowns = Unknowns.of(calibration, task, UpdateOptions())
+    scene = Scene(task, data, calibration.model, unknowns)
+    state = scene.start()
+    linear = scene.linear(state)
+    size = 1e-6
+    for k in range(len(unknowns.std)):
+        step = np.zeros(len(unknowns.std))
+        step[k] = size
+        ahead, back = (scene.linear(scene.moved(state, sign * step)).residual for sign in (1.0, -1.0))
+        np.testing.assert_allclose((back - ahead) / (2.0 * size), linear.jacobian[:, k], atol=2e-4)
+    assert setup_jacobian(scene.problem, scene.parameters, state.setup).shape == (6, 3, 9)
+    with pytest.raises(ValueError, match="step has shape"):
+        step_setup(scene.problem, state.setup, np.zeros((1, 4)))
+    assert core_set(arm.robot, data, task.selection, task.groups).rows_per_pose == 3
+
+
+def test_a_chi_square_says_how_rare_it_is():
+    found = ChiSquare.of(np.array([3.0, 4.0]), 2)
+    assert found.squares == 25.0
+    np.testing.assert_allclose(found.p, np.exp(-12.5))
+    assert ChiSquare.of(np.empty(0), 0).p == 1.0
