@@ -1,0 +1,105 @@
+"""The questions of the study: a set, a split, a number of training poses and a seed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from truearm.errors import UsageError
+from truearm.splitting import DEFAULT_SEED
+from truearm.studies.accuracy.sets import DataSet, read_set
+from truearm.studies.accuracy.splits import Cut, Kind, cuts, divide
+
+ALL: Final = "all"
+MOST_TRAINING: Final = 2000
+SIZES: Final = ("25", "50", "100", "200", "400", ALL)
+SOONER: Final = ("400", "100")
+"""Sizes that are looked at first, so that an interrupted study has told most."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One question: how far are methods off that learned from these rows?
+
+    Attributes:
+        data_set: The set.
+        cut: How rows are held out.
+        size: Training poses as it was asked for, "all" for as many as there are, 2000 at the most.
+        poses: Training poses.
+        seed: Of the split.
+    """
+
+    data_set: DataSet
+    cut: Cut
+    size: str
+    poses: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of every set.
+
+    Attributes:
+        kinds: Kinds of splits.
+        split_by: Columns of the split "groups".
+        sizes: Numbers of training poses, and "all".
+        seeds: Seeds.
+    """
+
+    kinds: tuple[Kind, ...]
+    split_by: tuple[str, ...]
+    sizes: tuple[str, ...]
+    seeds: tuple[int, ...]
+
+
+def parse_sizes(text: str) -> tuple[str, ...]:
+    """Sizes from "25,50,all".
+
+    Raises:
+        UsageError: If one is neither a positive number nor "all", or is named twice.
+    """
+    sizes = [part.strip() for part in text.split(",")]
+    for size in sizes:
+        if size != ALL and not (size.isascii() and size.isdigit() and int(size) > 0):
+            raise UsageError(
+                f'"{size}" is no number of poses', where="--sizes", rule="Such as 25,100,400,all"
+            )
+    sizes = [size if size == ALL else str(int(size)) for size in sizes]
+    if len(set(sizes)) < len(sizes):
+        raise UsageError(f'"{text}"', where="--sizes", rule="Each size once")
+    return tuple(sizes)
+
+
+def study_seeds(count: int) -> tuple[int, ...]:
+    """The seed of `truearm calibrate`, then those that follow from 0."""
+    return (DEFAULT_SEED, *(seed for seed in range(count) if seed != DEFAULT_SEED))[:count]
+
+
+def list_cells(sets: Sequence[DataSet], asked: Asked) -> list[Cell]:
+    """All questions, those that tell most first: seed by seed, the middle sizes before the others.
+
+    Sizes beyond what is left to train on are left out.
+    """
+    order = [size for size in SOONER if size in asked.sizes]
+    order += [size for size in asked.sizes if size not in order]
+    return [
+        cell
+        for turn, seed in enumerate(asked.seeds)
+        for size in order
+        for kind in sorted(asked.kinds, key=lambda kind: kind == "tails")
+        for one in sets
+        for cell in _cells_of(one, kind, size, (turn, seed), asked.split_by)
+    ]
+
+
+def _cells_of(
+    data_set: DataSet, kind: Kind, size: str, seed: tuple[int, int], split_by: Sequence[str]
+) -> list[Cell]:
+    data = read_set(data_set).data
+    cells = []
+    for cut in cuts(data, (kind,), split_by, seed[0]):
+        available = min(len(divide(data_set, cut, seed[1]).train), MOST_TRAINING)
+        poses = available if size == ALL else int(size)
+        if poses <= available:
+            cells.append(Cell(data_set, cut, size, poses, seed[1]))
+    return cells

@@ -1,0 +1,79 @@
+"""A fair search of a method's settings: cross-validation over a small grid, on some hundred poses."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.studies.accuracy.fitted import Correction
+from truearm.studies.accuracy.poses import Poses
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Setting = TypeVar("Setting")
+Setting_contra = TypeVar("Setting_contra", contravariant=True)
+
+SEARCH_POSES: Final = 500
+"""Settings are looked for on so many poses at the most; the method is then fitted to all of them."""
+FOLDS: Final = 4
+QUICK_SETTINGS: Final = 2
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard settings are looked for.
+
+    Attributes:
+        seed: Of folds and starts.
+        quick: Whether two settings of each grid are enough.
+    """
+
+    seed: int = 0
+    quick: bool = False
+
+    def some(self, settings: Sequence[Setting]) -> list[Setting]:
+        """The settings to try."""
+        return list(settings[:QUICK_SETTINGS] if self.quick else settings)
+
+
+Learn = Callable[[Poses, Floats, Effort], Correction]
+"""From poses and residuals of the constant model there (n, 3), m: what is to be added to it."""
+
+
+def folds(count: int, seed: int) -> list[tuple[Rows, Rows]]:
+    """Rows to fit to and rows to judge, for each fold."""
+    order = np.random.default_rng([seed, count]).permutation(count)
+    parts = np.array_split(order, min(FOLDS, count))
+    return [(np.setdiff1d(order, part), np.sort(part)) for part in parts]
+
+
+def search_rows(count: int) -> Rows:
+    """The rows that settings are looked for on; rows are in random order."""
+    return np.arange(min(count, SEARCH_POSES))
+
+
+def best_setting(
+    settings: Sequence[Setting],
+    predict: Callable[[Setting, Rows, Rows], Floats],
+    residuals: Floats,
+    seed: int,
+) -> Setting:
+    """The setting with the lowest mean error over the folds.
+
+    Args:
+        settings: What to try.
+        predict: From a setting, rows to fit to and rows to predict (k,): predictions (k, 3).
+        residuals: What is to be predicted (n, 3).
+        seed: Of the folds.
+    """
+    divided = folds(len(search_rows(len(residuals))), seed)
+
+    def score(setting: Setting) -> float:
+        return sum(
+            float(np.linalg.norm(predict(setting, fit, judge) - residuals[judge], axis=1).sum())
+            for fit, judge in divided
+        )
+
+    return min(settings, key=score)

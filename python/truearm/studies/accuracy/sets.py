@@ -1,0 +1,100 @@
+"""Arms and their data, as the study is told them: ROBOT=FILE.csv."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from truearm.errors import InputError, Notice, UsageError
+from truearm.measurements import Measurements
+from truearm.plausibility import check_against
+from truearm.robot import Robot
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """Measurements of one arm.
+
+    Attributes:
+        name: Stem of the file; names the set in results.
+        robot: Library name or file of the arm.
+        file: CSV file.
+        length_unit: Of columns that name none; m without.
+        angle_unit: Of joint columns that name none; rad without.
+    """
+
+    name: str
+    robot: str
+    file: str
+    length_unit: str | None = None
+    angle_unit: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """A set that was read.
+
+    Attributes:
+        robot: The arm.
+        data: What was measured, without repeated rows.
+        print_: Short hash of both, by which results are known again.
+        notices: What the user should know.
+    """
+
+    robot: Robot
+    data: Measurements
+    print_: str
+    notices: tuple[Notice, ...]
+
+
+def parse_sets(
+    given: Sequence[str], robot: str | None, length_unit: str | None = None, angle_unit: str | None = None
+) -> tuple[DataSet, ...]:
+    """Sets from texts "ROBOT=FILE", or "FILE" where `robot` is given.
+
+    Raises:
+        UsageError: If an arm is missing, or two files have the same name.
+    """
+    sets = []
+    for text in given:
+        before, equals, behind = text.partition("=")
+        arm, file = (before, behind) if equals else (robot or "", text)
+        if not arm or not file:
+            raise UsageError(
+                f'"{text}" names no arm',
+                rule="Write ROBOT=FILE.csv, such as ur10=measurements.csv",
+                way_out="Or name the arm of all files with --robot",
+            )
+        sets.append(DataSet(Path(file).stem, arm, file, length_unit, angle_unit))
+    names = [one.name for one in sets]
+    for one in sets:
+        if names.count(one.name) > 1:
+            raise UsageError(
+                f'two files are called "{one.name}"',
+                rule="Results are known by the name of the file",
+                way_out="Rename one of them",
+            )
+    return tuple(sets)
+
+
+@lru_cache(maxsize=8)
+def read_set(data_set: DataSet) -> Read:
+    """Read robot and measurements; what was read last is kept.
+
+    Raises:
+        InputError: If either cannot be read, or the measurements cannot be of the arm.
+    """
+    robot = Robot.load(data_set.robot)
+    units = {"length_unit": data_set.length_unit, "angle_unit": data_set.angle_unit}
+    data = Measurements.read_csv(data_set.file, joints=robot.joints, **units)
+    if data.target_count == 0:
+        raise InputError(
+            "distances were measured, not points", where=data_set.file, rule="Methods are judged at points"
+        )
+    notices = check_against(data, robot)
+    data = data.deduplicated()
+    described = json.dumps(robot.to_dict(), sort_keys=True) + data.hash()
+    short = hashlib.sha256(described.encode()).hexdigest()[:12]
+    return Read(robot, data, short, tuple(notices))
