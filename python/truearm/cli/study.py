@@ -8,7 +8,9 @@ HELP: Final = """Simulations and comparisons that anybody can run again.
 
 Examples:
   truearm study paper -o study --seeds 1 --figure 6
+  truearm study accuracy ur10=measurements.csv -o accuracy
 """
 COMMANDS: Final = (
     Entry("paper", "truearm.cli.study_paper", "The paper's simulations, reproduced and measured."),
+    Entry("accuracy", "truearm.cli.study_accuracy", "Our models and other methods on your measurements."),
 )

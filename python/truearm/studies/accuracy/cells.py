@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.errors import UsageError
-from truearm.splitting import DEFAULT_SEED
+from truearm.defaults import SEED
 from truearm.studies.accuracy.sets import DataSet, read_set
 from truearm.studies.accuracy.splits import Cut, Kind, cuts, divide
 
@@ -72,7 +72,7 @@ def parse_sizes(text: str) -> tuple[str, ...]:
 
 def study_seeds(count: int) -> tuple[int, ...]:
     """The seed of `truearm calibrate`, then those that follow from 0."""
-    return (DEFAULT_SEED, *(seed for seed in range(count) if seed != DEFAULT_SEED))[:count]
+    return (SEED, *(seed for seed in range(count) if seed != SEED))[:count]
 
 
 def list_cells(sets: Sequence[DataSet], asked: Asked) -> list[Cell]:

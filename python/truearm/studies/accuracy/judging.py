@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from truearm.errors import TruearmError
+from truearm.models import CONSTANT
 from truearm.studies.accuracy.cells import Cell
 from truearm.studies.accuracy.fitted import Fitted
 from truearm.studies.accuracy.libraries import one_thread
@@ -68,7 +69,7 @@ def _run(job: Job) -> list[Record]:
     _ = prepared.train_poses
     began = time.process_time()
     fitted = BY_NAME[job.method].fit(prepared, Effort(job.cell.seed, job.quick))
-    seconds = time.process_time() - began
+    seconds = prepared.fits.seconds[CONSTANT] + time.process_time() - began
     return [_record(job, name, prepared, fitted, seconds) for name in job.results]
 
 

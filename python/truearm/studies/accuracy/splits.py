@@ -11,7 +11,8 @@ from scipy.cluster.vq import kmeans2
 
 from truearm.errors import UsageError, did_you_mean, list_names
 from truearm.measurements import Measurements
-from truearm.splitting import DEFAULT_HOLDOUT, HoldoutRange, Split, SplitRule, split_rows
+from truearm.defaults import HOLDOUT
+from truearm.splitting import HoldoutRange, Split, SplitRule, split_rows
 from truearm.studies.accuracy.sets import DataSet, read_set
 
 Kind = Literal["tails", "clusters", "groups", "target", "random"]
@@ -26,6 +27,7 @@ TITLES: Final = {
 }
 CLUSTERS: Final = 10
 CLUSTER_COLUMN: Final = "cluster of the study"
+MOST_SHARED: Final = 0.5
 MOST_JUDGED: Final = 1000
 """Held-out rows at the most; a mean over more of them changes by less than it does with the seed."""
 
@@ -71,7 +73,8 @@ def cuts(data: Measurements, kinds: Sequence[Kind], split_by: Sequence[str], tur
     """The ways to hold out rows that `data` allows.
 
     Of each joint one tail, the lower and the upper ones in turn from joint to joint and from seed to seed;
-    groups where all columns are there; targets where several were measured.
+    groups where the columns are there and most rows share their values with others; targets where several
+    were measured.
 
     Args:
         data: What was measured.
@@ -84,8 +87,7 @@ def cuts(data: Measurements, kinds: Sequence[Kind], split_by: Sequence[str], tur
         if kind == "tails":
             found += [Cut(kind, str(_tail(joint, turn))) for joint in range(1, data.joint_count + 1)]
         elif kind == "groups":
-            there = all(name in data.features.columns for name in split_by)
-            found += [Cut(kind, ",".join(split_by))] if there else []
+            found += [Cut(kind, ",".join(split_by))] if _has_groups(data, split_by) else []
         elif kind == "target":
             found += [Cut(kind, str(number)) for number in range(2, data.target_count + 1)]
         else:
@@ -117,7 +119,15 @@ def divide(data_set: DataSet, cut: Cut, seed: int) -> Split:
 
 
 def _tail(joint: int, turn: int) -> HoldoutRange:
-    return HoldoutRange(joint, high=(joint + turn) % 2 == 0, share=DEFAULT_HOLDOUT)
+    return HoldoutRange(joint, high=(joint + turn) % 2 == 0, share=HOLDOUT)
+
+
+def _has_groups(data: Measurements, split_by: Sequence[str]) -> bool:
+    """Whether the columns are there and most rows are equal in them to others."""
+    if not all(name in data.features.columns for name in split_by):
+        return False
+    shared = data.features.duplicated(list(split_by), keep=False).mean()
+    return bool(shared > MOST_SHARED)
 
 
 def _clusters(data: Measurements, seed: int) -> NDArray[np.float64]:

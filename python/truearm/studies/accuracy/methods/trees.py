@@ -13,8 +13,8 @@ from truearm.studies.accuracy.poses import Poses
 
 Floats = NDArray[np.float64]
 
-LEAVES: Final = (4, 8, 16, 31)
-ROUNDS: Final = (100, 300, 800)
+LEAVES: Final = (4, 8, 16)
+ROUNDS: Final = (100, 400)
 LEAST_ROWS: Final = 5
 
 

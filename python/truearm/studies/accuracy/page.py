@@ -1,0 +1,196 @@
+"""The page of the study: who is first where, all means, what each block adds, and what it costs."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from statistics import median
+from typing import Any, Final
+
+from truearm.studies.accuracy.methods import FAMILIES, OURS, TITLES
+from truearm.studies.accuracy.methods.ours import OWN, OWN_SMOOTH
+from truearm.studies.accuracy.splits import TITLES as SPLITS
+
+Summary = Mapping[str, Any]
+
+DETAILED: Final = ("400", "all", "200", "100", "50", "25")
+"""The first of these sizes that there is, is told in detail."""
+FEWEST_TO_STAND: Final = 100
+BLOCKS: Final = ("constant", OWN, OWN_SMOOTH, OURS)
+ABOUT: Final = """Mean held-out position error in mm, the median over runs: one run is a seed and, for tails, one
+joint's tail. Each table has its number of runs and seeds. In bold the lowest mean and those within 3 % of it."""
+
+
+def page(summary: Summary) -> str:
+    """The text of accuracy.md."""
+    missing = summary["asked"] - summary["there"]
+    parts = [
+        "# Comparison of methods",
+        f"Made by `truearm study accuracy`, version {summary['version']}. {_flat(ABOUT)}",
+        f"{missing} of {summary['asked']} results are not there yet." if missing else "",
+        *sections(summary),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def sections(summary: Summary) -> list[str]:
+    """Everything below the title: standing, means, blocks, cost, failures."""
+    return [
+        "## Where ours stands",
+        _standing(summary),
+        *_means(summary),
+        *_blocks(summary),
+        *_cost(summary),
+        *_failures(summary),
+    ]
+
+
+def _standing(summary: Summary) -> str:
+    rows = []
+    for (name, split), groups in _by_set_and_split(summary).items():
+        cells = []
+        for size in summary["sizes"]:
+            lead = groups[size]["lead"] if size in groups else None
+            cells.append("" if lead is None else _lead_cell(groups[size], lead))
+        rows.append((name, SPLITS[split], *cells))
+    words = (
+        "Ours, and its ratio to the best other method, which is named; below one ours is better, bold is first or "
+        "within 3 %."
+    )
+    return f"{words}\n\n{table(('set', 'split', *map(_size_title, summary['sizes'])), rows)}"
+
+
+def _lead_cell(group: Mapping[str, Any], lead: Mapping[str, Any]) -> str:
+    number = f"{group['methods'][OURS]['mean_mm']:.3f}"
+    ratio = f"{lead['ratio']:.2f} {lead['best']}"
+    return f"**{number}** ({ratio})" if lead["level"] else f"{number} ({ratio})"
+
+
+def _means(summary: Summary) -> Iterable[str]:
+    name_before = ""
+    for (name, split), groups in _by_set_and_split(summary).items():
+        if name != name_before:
+            about = summary["sets"][name]
+            yield f"## {name}"
+            yield f"{about['robot']}, {about['rows']} rows."
+            name_before = name
+        yield f"### {name}: {SPLITS[split]}"
+        yield _means_table(groups, summary["sizes"])
+
+
+def _means_table(groups: Mapping[str, Mapping[str, Any]], sizes: Sequence[str]) -> str:
+    there = [size for size in sizes if size in groups]
+    detailed = next(size for size in DETAILED + tuple(there) if size in groups)
+    lowest = {size: min(_mean(found) for found in groups[size]["methods"].values()) for size in there}
+    rows = []
+    for name in TITLES:
+        if FAMILIES[name] == "block" or not any(name in groups[size]["methods"] for size in there):
+            continue
+        means = [_mean_cell(groups[size]["methods"].get(name, {}), lowest[size]) for size in there]
+        rows.append((TITLES[name], *means, *_details(groups[detailed]["methods"].get(name, {}))))
+    told = [f"{size}: {_count(groups[size])}" for size in there]
+    head = ("method", *map(_size_title, there), "worst", "95 %", "99 %", "max", "covered")
+    words = f"Runs: {'; '.join(told)}. The last five columns are of {_size_title(detailed)} poses."
+    return f"{words}\n\n{table(head, rows)}"
+
+
+def _count(group: Mapping[str, Any]) -> str:
+    seeds = f"{group['seeds']} seed{'s' if group['seeds'] > 1 else ''}"
+    return seeds if group["runs"] == group["seeds"] else f"{group['runs']} of {seeds}"
+
+
+def _mean(found: Mapping[str, Any]) -> float:
+    return float(found.get("mean_mm", float("inf")))
+
+
+def _mean_cell(found: Mapping[str, Any], lowest: float) -> str:
+    if "mean_mm" not in found:
+        return ""
+    number = f"{found['mean_mm']:.3f}"
+    return f"**{number}**" if found["mean_mm"] <= 1.03 * lowest else number
+
+
+def _details(found: Mapping[str, Any]) -> tuple[str, ...]:
+    if "mean_mm" not in found:
+        return ("",) * 5
+    numbers = [f"{found[key]:.3f}" for key in ("worst_mean_mm", "p95_mm", "p99_mm", "max_mm")]
+    covered = found["coverage_95"]
+    return (*numbers, "" if covered is None else f"{100 * covered:.0f} %")
+
+
+def _blocks(summary: Summary) -> Iterable[str]:
+    rows = []
+    for (name, split), groups in _by_set_and_split(summary).items():
+        size = next(size for size in DETAILED + tuple(groups) if size in groups)
+        found = groups[size]["methods"]
+        if OWN in found:
+            means = [f"{found[block]['mean_mm']:.3f}" if "mean_mm" in found.get(block, {}) else "" for block in BLOCKS]
+            rows.append((name, SPLITS[split], _size_title(size), *means))
+    if rows:
+        yield "## What each block adds"
+        yield (
+            "Scales as the whole model found them; the other blocks are switched off, and everything is fitted "
+            "again. Where the larger blocks do most of the work, `own` alone takes over what is not its own."
+        )
+        yield table(("set", "split", "poses", "constant", "and own", "and smooth", "all: ours"), rows)
+
+
+def _cost(summary: Summary) -> Iterable[str]:
+    sizes = [size for size in summary["sizes"] if any(g["size"] == size for g in summary["groups"])]
+    rows = []
+    for name in TITLES:
+        fits = [_over_groups(summary, name, size, "fit_s") for size in sizes]
+        predicts = [_over_groups(summary, name, size, "predict_us") for size in sizes]
+        known = [value for value in predicts if value is not None]
+        if known:
+            times = ["" if value is None else f"{value:.2g}" for value in fits]
+            rows.append((TITLES[name], *times, f"{max(known):.2g}"))
+    if rows:
+        yield "## What it costs"
+        yield (
+            "Seconds of one thread to fit, search of settings included, the median over all sets and splits; and "
+            "microseconds a pose to predict many at once, of the size where it is most."
+        )
+        yield table(("method", *(f"{_size_title(size)}, s" for size in sizes), "predict, us"), rows)
+
+
+def _over_groups(summary: Summary, name: str, size: str, key: str) -> float | None:
+    values = [
+        group["methods"][name][key]
+        for group in summary["groups"]
+        if group["size"] == size and group["methods"].get(name, {}).get(key) is not None
+    ]
+    return median(values) if values else None
+
+
+def _failures(summary: Summary) -> Iterable[str]:
+    failed: dict[tuple[str, str], int] = {}
+    for record in summary["results"]:
+        if "failed" in record:
+            key = (record["method"], record["failed"])
+            failed[key] = failed.get(key, 0) + 1
+    if failed:
+        yield "## Could not be fitted"
+        yield table(
+            ("method", "results", "why"),
+            [(TITLES[name], str(count), why) for (name, why), count in failed.items()],
+        )
+
+
+def _by_set_and_split(summary: Summary) -> dict[tuple[str, str], dict[str, Mapping[str, Any]]]:
+    """Groups by size, of each set and split."""
+    found: dict[tuple[str, str], dict[str, Mapping[str, Any]]] = {}
+    for group in summary["groups"]:
+        found.setdefault((group["set"], group["split"]), {})[group["size"]] = group
+    return found
+
+
+def _size_title(size: str) -> str:
+    return size
+
+
+def _flat(text: str) -> str:
+    return " ".join(text.split())
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])

@@ -1,0 +1,75 @@
+"""Learning curves of the methods, one panel a set and split."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from truearm.studies.accuracy.methods import FAMILIES, OURS, TITLES
+from truearm.studies.accuracy.splits import TITLES as SPLITS
+from truearm.studies.panels import STYLE, save_figure
+
+COLOURS: Final = {
+    OURS: "#0072B2",
+    "constant": "#000000",
+    "curves": "#D55E00",
+    "gravity": "#009E73",
+    "gp-joint": "#CC79A7",
+    "gp-additive": "#E69F00",
+    "trees": "#56B4E9",
+}
+PALE: Final = "#bbbbbb"
+PANEL_IN: Final = (2.6, 2.1)
+STEM: Final = "learning_curves"
+
+
+def save_curves(summary: Mapping[str, Any], directory: Path) -> list[Path]:
+    """Draw median mean errors over training poses into a directory as PNG and SVG; the files."""
+    names = [name for name in summary["sets"] if any(g["set"] == name for g in summary["groups"])]
+    kinds = [kind for kind in summary["splits"] if any(g["split"] == kind for g in summary["groups"])]
+    if not names:
+        return []
+    with mpl.rc_context(STYLE):
+        figure = Figure(
+            figsize=(PANEL_IN[0] * len(kinds), PANEL_IN[1] * len(names) + 0.8), layout="constrained"
+        )
+        panels = figure.subplots(len(names), len(kinds), squeeze=False)
+        lines: dict[str, Any] = {}
+        for row, name in enumerate(names):
+            for column, kind in enumerate(kinds):
+                _draw(panels[row][column], summary, name, kind, lines)
+        figure.legend(
+            [lines[name] for name in lines], list(lines), loc="outside lower center", ncols=4, frameon=False
+        )
+        return save_figure(figure, directory / STEM)
+
+
+def _draw(axes: Axes, summary: Mapping[str, Any], name: str, kind: str, lines: dict[str, Any]) -> None:
+    groups = [g for g in summary["groups"] if (g["set"], g["split"]) == (name, kind)]
+    groups.sort(key=lambda group: group["n_train"])
+    if not groups:
+        axes.set_axis_off()
+        return
+    for method in TITLES:
+        points = [(g["n_train"], g["methods"].get(method, {}).get("mean_mm")) for g in groups]
+        known = [(x, y) for x, y in points if y is not None]
+        if FAMILIES[method] == "block" or not known:
+            continue
+        (line,) = axes.plot(
+            *zip(*known, strict=True),
+            color=COLOURS.get(method, PALE),
+            linewidth=2.0 if method == OURS else 1.0,
+            marker=".",
+            markersize=4,
+            zorder=3 if method in COLOURS else 1,
+        )
+        lines.setdefault(TITLES[method] if method in COLOURS else "other methods", line)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_title(f"{name}, {SPLITS[kind]}", fontsize=6)
+    axes.set_xlabel("training poses")
+    axes.set_ylabel("mean error, mm")
+    axes.grid(visible=True, which="both", linewidth=0.3, alpha=0.6)
