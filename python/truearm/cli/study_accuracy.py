@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from truearm.cli.arguments import AngleUnit, AsJson, LengthUnit, OutputDirectory
+from truearm.cli.arguments import AngleUnit, AsJson, LengthUnit, OutputDirectory, Scheduler, Workers
 from truearm.cli.console import print_json, print_table, say, suggest, tell, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress
@@ -25,7 +25,7 @@ SIZES: Final = "25,50,100,200,400,all"
 def command(
     data: Annotated[
         list[str],
-        typer.Argument(metavar="ROBOT=FILE...", help="An arm and a CSV file of its measurements, for each set."),
+        typer.Argument(metavar="ROBOT=FILE...", help="An arm and a CSV file of its measurements."),
     ],
     output: OutputDirectory,
     robot: Annotated[
@@ -57,13 +57,8 @@ def command(
     again: Annotated[
         str | None, typer.Option(metavar="NAME,NAME", help="Methods whose results are found again.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes at once.  [default: one a processor]")
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers see the same files."),
-    ] = None,
+    scheduler: Scheduler = None,
+    workers: Workers = None,
     length_unit: LengthUnit = None,
     angle_unit: AngleUnit = None,
     as_json: AsJson = False,
@@ -76,7 +71,8 @@ def command(
     rows. Needs scikit-learn and lightgbm: pip install truearm[study].
 
     Writes DIR/accuracy.json, DIR/accuracy.md and learning curves as PNG and SVG. Every result is kept in
-    DIR/results.jsonl as soon as it is there; the same command goes on where it was interrupted.
+    DIR/results.jsonl as soon as it is there; the same command goes on where it was interrupted. The workers
+    of a scheduler read the files themselves, so they must see them under the same names.
 
     Examples:
       truearm study accuracy ur10=measurements.csv -o accuracy
@@ -84,7 +80,8 @@ def command(
       truearm study accuracy ur10=a.csv -o accuracy --methods constant,ours
     """
     from truearm.cli.calibrate import check_directory
-    from truearm.studies.accuracy.running import Where, conduct, so_far as gather
+    from truearm.studies.accuracy.running import Where, conduct
+    from truearm.studies.accuracy.running import so_far as gather
     from truearm.studies.accuracy.summary import summarise
 
     asked = {"methods": methods, "splits": splits, "split_by": split_by, "sizes": sizes, "seeds": seeds}
@@ -171,7 +168,9 @@ def _print(summary: Mapping[str, Any], outcome: "Outcome", files: Sequence[Path]
         if lead is not None:
             ours = f"{group['methods']['ours']['mean_mm']:.3f}"
             best = f"{group['methods'][lead['best']]['mean_mm']:.3f}"
-            rows.append((group["set"], group["split"], group["size"], str(group["runs"]), ours, lead["best"], best))
+            rows.append(
+                (group["set"], group["split"], group["size"], str(group["runs"]), ours, lead["best"], best)
+            )
     if rows:
         head = ("set", "split", "poses", "runs", "ours, mm", "best other", "mm")
         print_table(head, rows, title="Mean held-out error, median over runs", left=(0, 1, 5))
@@ -180,4 +179,4 @@ def _print(summary: Mapping[str, Any], outcome: "Outcome", files: Sequence[Path]
     say(f"{len(outcome.records)} of {outcome.asked} results are there, {outcome.run} of them found now.")
     for path in files:
         say(f"Written: {path}")
-    suggest(f"truearm calibrate ROBOT MEASUREMENTS -o DIR", when="Calibrate an arm with ours:")
+    suggest("truearm calibrate ROBOT MEASUREMENTS -o DIR", when="Calibrate an arm with ours:")

@@ -4,15 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from truearm.errors import UsageError
 from truearm.defaults import SEED
+from truearm.errors import UsageError
 from truearm.studies.accuracy.sets import DataSet, read_set
 from truearm.studies.accuracy.splits import Cut, Kind, cuts, divide
 
 ALL: Final = "all"
 MOST_TRAINING: Final = 2000
 SIZES: Final = ("25", "50", "100", "200", "400", ALL)
-SOONER: Final = ("400", "100")
+SOONER: Final[tuple[str, ...]] = ("400", "100")
 """Sizes that are looked at first, so that an interrupted study has told most."""
 
 

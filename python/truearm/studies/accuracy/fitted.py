@@ -116,7 +116,7 @@ class CorrectedArm:
 def _shifts(
     seen: Poses, known: Floats, seen_group: NDArray[np.str_], poses: Poses, group: NDArray[np.str_]
 ) -> Floats:
-    """What a shift of the target on the tool changes at poses (n, 3): the mean of `known` in the flange frame."""
+    """What a shift of the target on the tool, the mean of `known` in the flange frame, changes (n, 3)."""
     shifts = np.zeros_like(poses.points)
     in_flange = np.einsum("nji,nj->ni", seen.rotations, known)
     for name in set(group.tolist()):

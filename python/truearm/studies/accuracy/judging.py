@@ -79,9 +79,7 @@ def _prepared(cell: Cell) -> Prepared:
     return prepare(cell)
 
 
-def _record(
-    job: Job, name: str, prepared: Prepared, fitted: Mapping[str, Fitted], seconds: float
-) -> Record:
+def _record(job: Job, name: str, prepared: Prepared, fitted: Mapping[str, Fitted], seconds: float) -> Record:
     one, held = fitted[name], prepared.held
     began = time.process_time()
     errors = one.errors(prepared, held)

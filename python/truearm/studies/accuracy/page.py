@@ -7,15 +7,17 @@ from typing import Any, Final
 from truearm.studies.accuracy.methods import FAMILIES, OURS, TITLES
 from truearm.studies.accuracy.methods.ours import OWN, OWN_SMOOTH
 from truearm.studies.accuracy.splits import TITLES as SPLITS
+from truearm.studies.accuracy.summary import LEVEL
 
 Summary = Mapping[str, Any]
 
 DETAILED: Final = ("400", "all", "200", "100", "50", "25")
 """The first of these sizes that there is, is told in detail."""
-FEWEST_TO_STAND: Final = 100
 BLOCKS: Final = ("constant", OWN, OWN_SMOOTH, OURS)
-ABOUT: Final = """Mean held-out position error in mm, the median over runs: one run is a seed and, for tails, one
-joint's tail. Each table has its number of runs and seeds. In bold the lowest mean and those within 3 % of it."""
+ABOUT: Final = (
+    "Mean held-out position error in mm, the median over runs: one run is a seed and, for tails, one joint's "
+    "tail. Each table has its number of runs and seeds. In bold the lowest mean and those within 3 % of it."
+)
 
 
 def page(summary: Summary) -> str:
@@ -23,7 +25,7 @@ def page(summary: Summary) -> str:
     missing = summary["asked"] - summary["there"]
     parts = [
         "# Comparison of methods",
-        f"Made by `truearm study accuracy`, version {summary['version']}. {_flat(ABOUT)}",
+        f"Made by `truearm study accuracy`, version {summary['version']}. {ABOUT}",
         f"{missing} of {summary['asked']} results are not there yet." if missing else "",
         *sections(summary),
     ]
@@ -51,10 +53,10 @@ def _standing(summary: Summary) -> str:
             cells.append("" if lead is None else _lead_cell(groups[size], lead))
         rows.append((name, SPLITS[split], *cells))
     words = (
-        "Ours, and its ratio to the best other method, which is named; below one ours is better, bold is first or "
-        "within 3 %."
+        "Ours, and its ratio to the best other method, which is named: below one ours is better. "
+        "In bold where it is first or within 3 %."
     )
-    return f"{words}\n\n{table(('set', 'split', *map(_size_title, summary['sizes'])), rows)}"
+    return f"{words}\n\n{table(('set', 'split', *summary['sizes']), rows)}"
 
 
 def _lead_cell(group: Mapping[str, Any], lead: Mapping[str, Any]) -> str:
@@ -86,14 +88,18 @@ def _means_table(groups: Mapping[str, Mapping[str, Any]], sizes: Sequence[str]) 
         means = [_mean_cell(groups[size]["methods"].get(name, {}), lowest[size]) for size in there]
         rows.append((TITLES[name], *means, *_details(groups[detailed]["methods"].get(name, {}))))
     told = [f"{size}: {_count(groups[size])}" for size in there]
-    head = ("method", *map(_size_title, there), "worst", "95 %", "99 %", "max", "covered")
-    words = f"Runs: {'; '.join(told)}. The last five columns are of {_size_title(detailed)} poses."
+    head = ("method", *there, "worst", "95 %", "99 %", "max", "covered")
+    words = f"Runs: {'; '.join(told)}. The last five columns are of {detailed} poses."
     return f"{words}\n\n{table(head, rows)}"
 
 
 def _count(group: Mapping[str, Any]) -> str:
     seeds = f"{group['seeds']} seed{'s' if group['seeds'] > 1 else ''}"
     return seeds if group["runs"] == group["seeds"] else f"{group['runs']} of {seeds}"
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
 
 
 def _mean(found: Mapping[str, Any]) -> float:
@@ -104,7 +110,7 @@ def _mean_cell(found: Mapping[str, Any], lowest: float) -> str:
     if "mean_mm" not in found:
         return ""
     number = f"{found['mean_mm']:.3f}"
-    return f"**{number}**" if found["mean_mm"] <= 1.03 * lowest else number
+    return f"**{number}**" if found["mean_mm"] <= LEVEL * lowest else number
 
 
 def _details(found: Mapping[str, Any]) -> tuple[str, ...]:
@@ -121,13 +127,16 @@ def _blocks(summary: Summary) -> Iterable[str]:
         size = next(size for size in DETAILED + tuple(groups) if size in groups)
         found = groups[size]["methods"]
         if OWN in found:
-            means = [f"{found[block]['mean_mm']:.3f}" if "mean_mm" in found.get(block, {}) else "" for block in BLOCKS]
-            rows.append((name, SPLITS[split], _size_title(size), *means))
+            means = [
+                f"{found[block]['mean_mm']:.3f}" if "mean_mm" in found.get(block, {}) else ""
+                for block in BLOCKS
+            ]
+            rows.append((name, SPLITS[split], size, *means))
     if rows:
         yield "## What each block adds"
         yield (
-            "Scales as the whole model found them; the other blocks are switched off, and everything is fitted "
-            "again. Where the larger blocks do most of the work, `own` alone takes over what is not its own."
+            "Scales as the whole model found them; the other blocks are switched off and everything else is "
+            "fitted again. Where larger blocks do most of the work, `own` alone takes over what is theirs."
         )
         yield table(("set", "split", "poses", "constant", "and own", "and smooth", "all: ours"), rows)
 
@@ -140,15 +149,14 @@ def _cost(summary: Summary) -> Iterable[str]:
         predicts = [_over_groups(summary, name, size, "predict_us") for size in sizes]
         known = [value for value in predicts if value is not None]
         if known:
-            times = ["" if value is None else f"{value:.2g}" for value in fits]
-            rows.append((TITLES[name], *times, f"{max(known):.2g}"))
+            rows.append((TITLES[name], *(_number(value, 2) for value in fits), f"{max(known):.1f}"))
     if rows:
         yield "## What it costs"
         yield (
-            "Seconds of one thread to fit, search of settings included, the median over all sets and splits; and "
-            "microseconds a pose to predict many at once, of the size where it is most."
+            "Seconds of one thread to fit, search of settings included, the median over all sets and splits; "
+            "and microseconds a pose to predict many at once, of the size where it is most."
         )
-        yield table(("method", *(f"{_size_title(size)}, s" for size in sizes), "predict, us"), rows)
+        yield table(("method", *(f"{size}, s" for size in sizes), "predict, us"), rows)
 
 
 def _over_groups(summary: Summary, name: str, size: str, key: str) -> float | None:
@@ -180,14 +188,6 @@ def _by_set_and_split(summary: Summary) -> dict[tuple[str, str], dict[str, Mappi
     for group in summary["groups"]:
         found.setdefault((group["set"], group["split"]), {})[group["size"]] = group
     return found
-
-
-def _size_title(size: str) -> str:
-    return size
-
-
-def _flat(text: str) -> str:
-    return " ".join(text.split())
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -11,7 +11,7 @@ from truearm.studies.accuracy.libraries import require
 from truearm.studies.accuracy.methods import BY_NAME
 from truearm.studies.accuracy.results import Kept, Record, key_of
 from truearm.studies.accuracy.sets import DataSet
-from truearm.workers import run_tasks
+from truearm.workers import check_workers, run_tasks
 
 Progress = Callable[[str, int, int], None]
 
@@ -72,9 +72,11 @@ def conduct(study: Study, directory: Path, where: Where, told: Progress) -> Outc
     outcome, and is tried again the next time.
 
     Raises:
-        UsageError: If a library of a method is missing.
-        InputError: If data cannot be read, or the directory holds something else.
+        UsageError: If a library of a method is missing, or workers contradict each other.
+        InputError: If data cannot be read, the scheduler does not answer, or the directory holds
+            something else.
     """
+    check_workers(where.scheduler, where.workers)
     require(BY_NAME[name].needs for name in study.methods)
     jobs, kept = list(_jobs(study)), Kept(directory)
     if where.again:
@@ -119,4 +121,3 @@ def _jobs(study: Study) -> Iterator[Job]:
 
 def _keys(job: Job) -> list[tuple[str, ...]]:
     return [key_of(job.head(name)) for name in job.results]
-

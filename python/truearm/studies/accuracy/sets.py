@@ -87,8 +87,12 @@ def read_set(data_set: DataSet) -> Read:
         InputError: If either cannot be read, or the measurements cannot be of the arm.
     """
     robot = Robot.load(data_set.robot)
-    units = {"length_unit": data_set.length_unit, "angle_unit": data_set.angle_unit}
-    data = Measurements.read_csv(data_set.file, joints=robot.joints, **units)
+    data = Measurements.read_csv(
+        data_set.file,
+        joints=robot.joints,
+        length_unit=data_set.length_unit,
+        angle_unit=data_set.angle_unit,
+    )
     if data.target_count == 0:
         raise InputError(
             "distances were measured, not points", where=data_set.file, rule="Methods are judged at points"

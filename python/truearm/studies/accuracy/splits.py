@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
+from truearm.defaults import HOLDOUT
 from truearm.errors import UsageError, did_you_mean, list_names
 from truearm.measurements import Measurements
-from truearm.defaults import HOLDOUT
 from truearm.splitting import HoldoutRange, Split, SplitRule, split_rows
 from truearm.studies.accuracy.sets import DataSet, read_set
 

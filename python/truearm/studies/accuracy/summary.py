@@ -45,7 +45,7 @@ def summarise(study: Study, outcome: Outcome) -> dict[str, Any]:
 
 
 def _group(study: Study, records: Sequence[Record], where: tuple[str, str, str]) -> Group | None:
-    """Statistics of one set, split and size, over the runs that all methods have; None where there are none."""
+    """Statistics of one set, split and size over the runs that all methods have; None without any."""
     runs: dict[tuple[int, str], dict[str, Record]] = {}
     for record in records:
         if (record["set"], record["split"], record["size"]) == where:

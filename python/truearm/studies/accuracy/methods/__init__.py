@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from truearm.errors import UsageError, did_you_mean, list_names
-from truearm.studies.accuracy.fitted import Correction, CorrectedArm, Fitted
+from truearm.studies.accuracy.fitted import CorrectedArm, Correction, Fitted
 from truearm.studies.accuracy.methods.arms import (
     fit_constant_model,
     fit_fcmac,
@@ -36,8 +36,8 @@ class Method:
     Attributes:
         name: Short name.
         title: Name for people.
-        family: "model" of the arm; "curves" of single joints; "residual" of the constant model learned; "ours";
-            or "block", a part of ours.
+        family: "model" of the arm; "curves" of single joints; "residual" of the constant model, learned;
+            "ours"; or "block", a part of ours.
         fit: Fits it to a cell; may bring parts of itself with it.
         needs: Library that it is fitted by, where that does not come with truearm.
         parts: Names of the parts that it brings.

@@ -35,7 +35,7 @@ class SumOverJoints(StationaryKernelMixin, Kernel):  # type: ignore[misc]
         """Lengths as the library optimises them, rad."""
         return Hyperparameter("lengths", "numeric", (1e-2, 1e2), len(self.lengths))
 
-    def __call__(self, X: Floats, Y: Floats | None = None, eval_gradient: bool = False) -> Any:  # noqa: N803, ANN401, FBT001, FBT002
+    def __call__(self, X: Floats, Y: Floats | None = None, eval_gradient: bool = False) -> Any:  # noqa: N803, ANN401
         """The kernel (n, m), and with `eval_gradient` its derivatives by the logarithms (n, n, 2 N)."""
         other = X if Y is None else Y
         gap = X[:, None, :] - other[None, :, :]

@@ -1,4 +1,4 @@
-"""Constant D-H with a curve of theta for each joint: cubic splines around the turn, as smooth as the data says."""
+"""Constant D-H with a curve of theta for each joint: closed cubic splines, as smooth as the data says."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 
 DEGREE: Final = 3
 CELLS: Final = (24, 48, 96, 144)
-HEIGHTS_RAD: Final = (1e-4, 3e-4, 1e-3)
-BENDS_RAD: Final = (3e-5, 1e-4, 3e-4, 1e-3)
+HEIGHTS_RAD: Final = (1e-3, 3e-4, 1e-4)
+BENDS_RAD: Final = (1e-3, 3e-4, 1e-4, 3e-5)
 FULL_TURN: Final = 2.0 * np.pi
 
 

@@ -122,9 +122,7 @@ def _best(trials: Sequence[Trial], poses: Poses, residuals: Floats, effort: Effo
     return Process(chosen.inputs, found, {**chosen.settings, "kernel_found": str(found.kernel_)})
 
 
-def _process(
-    trial: Trial, poses: Poses, residuals: Floats, effort: Effort, *, optimise: bool = True
-) -> Any:  # noqa: ANN401
+def _process(trial: Trial, poses: Poses, residuals: Floats, effort: Effort, *, optimise: bool = True) -> Any:  # noqa: ANN401
     from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
 
     process = GaussianProcessRegressor(

@@ -1,4 +1,4 @@
-"""Constant D-H with joints that give way to gravity: links weigh at their ends, the base's z axis is upright."""
+"""Constant D-H with joints that give way to gravity; links weigh at their ends, the base is upright."""
 
 from typing import Final
 
@@ -23,8 +23,8 @@ def torque_columns(poses: Poses) -> Floats:
     joint; it turns the joint by its compliance times that.
     """
     moves, levers = poses.joint_columns(), poses.heights  # (n, 3, N), (n, L, N)
-    found = np.einsum("nij,nlj->nijl", moves, levers)
-    return found.reshape(len(poses), 3, -1)
+    found: Floats = np.einsum("nij,nlj->nijl", moves, levers).reshape(len(poses), 3, -1)
+    return found
 
 
 def fit_gravity(poses: Poses, residuals: Floats, effort: Effort) -> Correction:

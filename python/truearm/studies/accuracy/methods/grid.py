@@ -42,7 +42,7 @@ class Nodes:
     count: int
 
     def shares(self, poses: Poses) -> csr_array:
-        """Shares (n, nodes) of each node in the interpolation; outside the grid those of its nearest point."""
+        """Shares (n, nodes) of each node; beyond the grid those of its nearest point."""
         inside = np.clip(self.space.coordinates(poses)[:, :AXES], self.low, self.high)
         knots = []
         for low, high in zip(self.low, self.high, strict=True):

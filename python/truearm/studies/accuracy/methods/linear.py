@@ -1,4 +1,4 @@
-"""Least squares with a ridge: a correction that is linear in its weights, fitted together with the constants."""
+"""Least squares with a ridge: a correction linear in its weights, fitted together with the constants."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -66,7 +66,9 @@ def fit_linear(grid: Sequence[Sequence[Ridge]], poses: Poses, residuals: Floats,
     rows = search_rows(len(poses))
     noise = float(np.square(residuals).mean())
     scored = [
-        pair for family in grid for pair in _scores(family, poses.select(rows), residuals[rows], noise, effort)
+        pair
+        for family in grid
+        for pair in _scores(family, poses.select(rows), residuals[rows], noise, effort)
     ]
     _, best = min(scored, key=lambda pair: pair[0])
     weights = _solve(*_normal(best, poses, residuals), _penalty(best, poses), noise)

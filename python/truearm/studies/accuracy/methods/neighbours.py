@@ -37,6 +37,6 @@ def _make(settings: dict[str, Any], _: int) -> Any:  # noqa: ANN401
     power = settings["power"]
 
     def weights(distance: Floats) -> Floats:
-        return np.maximum(distance, CLOSEST) ** -power
+        return np.asarray(np.maximum(distance, CLOSEST) ** -power)
 
     return KNeighborsRegressor(n_neighbors=settings["neighbours"], weights=weights)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,16 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 SPACES: Final[tuple[Kind, ...]] = ("joints", "circles", "cartesian")
-SHAPES: Final = (("linear", 1.0), ("gaussian", 0.3), ("gaussian", 0.7), ("gaussian", 1.5), ("gaussian", 3.0))
+Shape = Literal["linear", "gaussian"]
+Setting = tuple[Kind, tuple[Shape, float], float]
+
+SHAPES: Final[tuple[tuple[Shape, float], ...]] = (
+    ("linear", 1.0),
+    ("gaussian", 0.3),
+    ("gaussian", 0.7),
+    ("gaussian", 1.5),
+    ("gaussian", 3.0),
+)
 """Kernels and what coordinates are multiplied by. Higher polyharmonic ones need polynomials of more terms
 than there may be poses, and were no better where they could be tried."""
 SMOOTHING: Final = (1e-2, 1e-1, 1.0, 10.0)
@@ -45,13 +54,13 @@ def fit_radial(poses: Poses, residuals: Floats, effort: Effort) -> Correction:
     spaces = {kind: Space.of(kind, poses) for kind in SPACES}
     inputs = {kind: space.coordinates(poses) for kind, space in spaces.items()}
 
-    def functions(setting: tuple[Kind, tuple[str, float], float], rows: Rows) -> RBFInterpolator:
+    def functions(setting: Setting, rows: Rows) -> RBFInterpolator:
         kind, (shape, width), smoothing = setting
         return RBFInterpolator(
             inputs[kind][rows], residuals[rows], kernel=shape, epsilon=width, smoothing=smoothing, degree=0
         )
 
-    def predict(setting: tuple[Kind, tuple[str, float], float], fit: Rows, judge: Rows) -> Floats:
+    def predict(setting: Setting, fit: Rows, judge: Rows) -> Floats:
         return np.asarray(functions(setting, fit)(inputs[setting[0]][judge]))
 
     settings = effort.some(list(product(SPACES, SHAPES, SMOOTHING)))

@@ -17,8 +17,8 @@ class Space:
     """Coordinates of poses.
 
     Attributes:
-        kind: "joints", each in its standard deviations; "circles", cosine and sine of joints that turn, so that
-            a whole turn is none; "cartesian", the target's place in its standard deviation.
+        kind: "joints", each in its standard deviations; "circles", cosine and sine of joints that turn, so
+            that a whole turn is none; "cartesian", the target's place in its standard deviation.
         middle: What is taken off.
         spread: What is divided by.
     """

@@ -55,4 +55,4 @@ class Trees:
 
     def predict(self, inputs: Floats) -> Floats:
         """Outputs (n, 3) of inputs (n, D)."""
-        return np.column_stack([model.predict(inputs) for model in self._models])
+        return np.column_stack([np.asarray(model.predict(inputs)) for model in self._models])

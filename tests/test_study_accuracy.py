@@ -1,0 +1,232 @@
+"""`truearm study accuracy`, as a user runs it: results, going on, splits, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from truearm.cli import main
+from truearm.errors import InputError, UsageError
+from truearm.measurements import Measurements
+from truearm.robot import Robot
+from truearm.simulation import VirtualArm
+from truearm.studies.accuracy import judging, libraries, running
+from truearm.studies.accuracy.cells import Asked, list_cells, parse_sizes, study_seeds
+from truearm.studies.accuracy.page import page
+from truearm.studies.accuracy.results import Kept
+from truearm.studies.accuracy.sets import parse_sets
+from truearm.studies.accuracy.splits import KINDS, Cut, cuts, divide
+from truearm.workers import Done
+
+POSES = 80
+FAST = ["--methods", "nominal,constant,grid", "--sizes", "20,30", "--seeds", "2", "--quick"]
+
+
+@pytest.fixture(scope="module")
+def table():
+    arm = VirtualArm(Robot.load("ur10"), seed=3)
+    table = arm.measure_table(arm.poses(POSES))
+    return table.assign(**{f"{axis}2": table[axis] for axis in "xyz"}, place=np.arange(POSES) // 4)
+
+
+@pytest.fixture
+def file(table, tmp_path):
+    path = tmp_path / "arm.csv"
+    table.to_csv(path, index=False)
+    return path
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Tasks are done in this process, and counted."""
+    ran = []
+
+    def run_tasks(function, items, **_):
+        for index, item in enumerate(items):
+            ran.append(item.method)
+            yield Done(index, value=function(item))
+
+    monkeypatch.setattr(running, "run_tasks", run_tasks)
+    return ran
+
+
+def study(file, out, *more):
+    return main(["study", "accuracy", f"ur10={file}", "-o", str(out), *more])
+
+
+def test_a_user_gets_tables_curves_and_results(file, tmp_path, capsys):
+    out = tmp_path / "out"
+    given = ["--methods", "nominal,constant", "--sizes", "30", "--seeds", "1", "--splits", "random,clusters"]
+    assert study(file, out, *given, "--workers", "1", "--json") == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads((out / "accuracy.json").read_text())
+    names = {path.name for path in out.iterdir()}
+    stems = ("learning_curves.png", "learning_curves.svg")
+    assert names == {"accuracy.json", "accuracy.md", "results.jsonl", *stems}
+    assert printed["asked"] == printed["there"] == 4
+    for group in printed["groups"]:
+        assert group["methods"]["constant"]["mean_mm"] < group["methods"]["nominal"]["mean_mm"]
+    assert "clusters of joint space held out" in (out / "accuracy.md").read_text()
+
+
+def test_an_interrupted_study_goes_on(file, tmp_path, here, capsys):
+    out = tmp_path / "out"
+    assert study(file, out, *FAST, "--splits", "random") == 0
+    done, lines = len(here), (out / "results.jsonl").read_text().splitlines(keepends=True)
+    assert done == len(lines) == 3 * 2 * 2
+    (out / "results.jsonl").write_text("".join(lines[:5]) + lines[5][:40])
+    assert study(file, out, *FAST, "--splits", "random", "--so-far") == 0
+    assert "5 of 12 results are there, 0 of them found now" in capsys.readouterr().out
+    assert study(file, out, *FAST, "--splits", "random") == 0
+    assert len(here) - done == done - 5
+    again = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]
+    assert {_but_times(one) for one in again} == {_but_times(json.loads(line)) for line in lines}
+    assert study(file, out, *FAST, "--splits", "random", "--again", "grid") == 0
+    assert here[-4:] == ["grid"] * 4
+
+
+def _but_times(record):
+    return json.dumps({key: record[key] for key in record if key not in ("fit_s", "predict_us")})
+
+
+def test_a_method_that_cannot_be_fitted_says_why_and_stops_no_other(file, tmp_path, here, capsys):
+    out = tmp_path / "out"
+    given = ["--methods", "nominal,constant", "--sizes", "5,30", "--seeds", "1", "--splits", "random"]
+    assert study(file, out, *given) == 0
+    capsys.readouterr()
+    text = (out / "accuracy.md").read_text()
+    assert "Could not be fitted" in text
+    assert "15 measured values in 5 rows" in text
+
+
+def test_a_method_that_breaks_is_told_and_tried_again(file, tmp_path, monkeypatch, capsys):
+    def breaks(function, items, **_):
+        for index, item in enumerate(items):
+            broken = item.method == "grid"
+            yield Done(index, error=ValueError("no luck")) if broken else Done(index, value=function(item))
+
+    monkeypatch.setattr(running, "run_tasks", breaks)
+    out = tmp_path / "out"
+    assert study(file, out, *FAST, "--splits", "random") == 1
+    assert "4 results are missing, the first of grid: no luck" in capsys.readouterr().err
+    assert len(Kept(out).records) == 8
+    assert (out / "accuracy.md").exists()
+
+
+def test_every_split_leaves_out_what_it_says(file, table):
+    one = parse_sets([f"ur10={file}"], None)[0]
+    found = cuts(Measurements.read_csv(file), KINDS, ("place",), 0)
+    assert [cut.kind for cut in found] == ["tails"] * 6 + ["clusters", "groups", "target", "random"]
+    for cut in found:
+        split = divide(one, cut, 0)
+        assert not set(split.train) & set(split.holdout)
+        assert len(split.train) + len(split.holdout) == POSES
+    low = divide(one, Cut("tails", "q1:low:0.3"), 0)
+    q1 = table["q1"].to_numpy()
+    assert q1[low.holdout].max() < q1[low.train].min()
+    places = divide(one, found[7], 0)
+    assert not set(table["place"][places.train]) & set(table["place"][places.holdout])
+
+
+def test_tails_change_sides_from_seed_to_seed(file):
+    data = Measurements.read_csv(file)
+    sides = [[cut.detail.split(":")[1] for cut in cuts(data, ("tails",), (), turn)] for turn in (0, 1)]
+    assert sides[0] == ["low", "high"] * 3
+    assert sides[1] == ["high", "low"] * 3
+
+
+def test_columns_that_hardly_any_rows_share_make_no_groups(file):
+    assert cuts(Measurements.read_csv(file), ("groups",), ("x2",), 0) == []
+    assert cuts(Measurements.read_csv(file), ("groups",), ("absent",), 0) == []
+
+
+def test_sizes_beyond_the_training_rows_are_left_out_and_the_middle_comes_first(file):
+    sets = parse_sets([f"ur10={file}"], None)
+    cells = list_cells(sets, Asked(("random",), (), ("20", "50", "100", "400", "all"), (7, 0)))
+    assert [(cell.seed, cell.size, cell.poses) for cell in cells[:3]] == [
+        (7, "20", 20),
+        (7, "50", 50),
+        (7, "all", 56),
+    ]
+    assert len(cells) == 6
+    assert study_seeds(3) == (7, 0, 1)
+
+
+def test_the_same_job_gives_the_same_result(file):
+    sets = parse_sets([f"ur10={file}"], None)
+    cell = list_cells(sets, Asked(("random",), (), ("30",), (7,)))[0]
+    first, second = (judging.run_job(judging.Job(cell, "grid", quick=True))[0] for _ in range(2))
+    assert _but_times(first) == _but_times(second)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--methods", "gp-joints"], 'no method "gp-joints"'),
+        (["--splits", "tail"], 'no split "tail"'),
+        (["--splits", "groups"], "needs columns"),
+        (["--split-by", "nowhere"], 'no set has a column "nowhere"'),
+        (["--sizes", "10,many"], '"many" is no number of poses'),
+        (["--sizes", "10,10"], "Each size once"),
+        (["--again", "nothing"], 'no method "nothing"'),
+    ],
+)
+def test_wrong_usage_is_refused_before_any_work(file, tmp_path, given, message, here, capsys):
+    assert study(file, tmp_path / "out", *given) == 2
+    assert message in capsys.readouterr().err
+    assert here == []
+
+
+def test_sets_need_an_arm_and_names_of_their_own(file, tmp_path, capsys):
+    assert main(["study", "accuracy", str(file), "-o", str(tmp_path / "out")]) == 2
+    assert "names no arm" in capsys.readouterr().err
+    with pytest.raises(UsageError, match='two files are called "arm"'):
+        parse_sets(["ur10=a/arm.csv", "ur10=b/arm.csv"], None)
+    assert main(["study", "accuracy", "ur10=absent.csv", "-o", str(tmp_path / "out")]) == 1
+    assert "no such file" in capsys.readouterr().err
+
+
+def test_a_missing_library_is_named_with_what_installs_it(monkeypatch):
+    monkeypatch.setattr(libraries, "find_spec", lambda _: None)
+    with pytest.raises(UsageError, match=r"pip install truearm\[study\]"):
+        libraries.require(["lightgbm", ""])
+    libraries.require([""])
+
+
+def test_a_directory_with_something_else_is_refused(tmp_path):
+    (tmp_path / "results.jsonl").write_text("nothing of ours\n")
+    with pytest.raises(InputError, match=r"results\.jsonl, line 1: this is no result"):
+        Kept(tmp_path)
+
+
+def test_sizes_are_numbers_and_all():
+    assert parse_sizes("25, 100,all") == ("25", "100", "all")
+
+
+def test_the_page_says_who_is_first_and_what_is_missing():
+    methods = {
+        "constant": _found(0.2),
+        "curves": _found(0.1),
+        "ours": _found(0.102),
+    }
+    lead = {"best": "curves", "ratio": 1.02, "level": True}
+    group = {"set": "arm", "split": "random", "size": "100", "runs": 1, "seeds": 1, "n_train": 100}
+    text = page(
+        {
+            "version": "1",
+            "asked": 4,
+            "there": 3,
+            "sizes": ["100"],
+            "sets": {"arm": {"robot": "ur10", "rows": 200}},
+            "groups": [{**group, "methods": methods, "lead": lead}],
+            "results": [],
+        }
+    )
+    assert "1 of 4 results are not there yet" in text
+    assert "| arm | random rows held out | **0.102** (1.02 curves) |" in text
+    assert "| constant D-H, theta curves | **0.100** |" in text
+
+
+def _found(mean):
+    errors = dict.fromkeys(("p95_mm", "p99_mm", "max_mm", "worst_mean_mm"), 2.0 * mean)
+    return {"mean_mm": mean, "failed": 0, "coverage_95": None, "fit_s": 1.0, "predict_us": 2.0, **errors}
