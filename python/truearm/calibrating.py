@@ -22,6 +22,7 @@ from truearm.fitting import (
     no_stages,
     setup_unknowns,
 )
+from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
@@ -68,7 +69,7 @@ def calibrate(
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))
     with stages("judging on held-out rows"):
-        validation = _validate(task, trained, given, split)
+        validation, held = _validate(task, trained, given, split)
     final, order, hyper = trained, split.train, None
     if chosen.refit:
         order = np.random.default_rng(chosen.split.seed).permutation(len(given))
@@ -85,6 +86,7 @@ def calibrate(
         constant=ConstantDetails.of(final.identifiability.determined, final.constant),
         variable=variable,
         validation=validation,
+        held=held,
         rows=FittedRows.of(final, sides(len(given), split)[order], task.selection),
         data_hash=given.hash(),
         version=version("truearm"),
@@ -122,16 +124,19 @@ def _task(robot: Robot, data: Measurements, options: Options, threads: int | Non
     return Task(arm, selection, data.groups, options, threads, stages)
 
 
-def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> Validation:
+def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> tuple[Validation, HeldRows]:
     models = trained.models(task.arm)
     held = data.select(split.holdout)
-    return Validation(
+    errors = judge(task, models, held, trained.data)
+    on_training = judge(task, models, trained.data, trained.data)
+    validation = Validation(
         n_train=len(trained.data),
         n_holdout=len(held),
-        holdout=judge(task, models, held, trained.data),
-        train=judge(task, models, trained.data, trained.data),
+        holdout={name: found.statistics() for name, found in errors.items()},
+        train={name: found.statistics() for name, found in on_training.items()},
         coverage_95=interval_coverage(task, trained, held),
     )
+    return validation, HeldRows.of(held, errors)
 
 
 def _open_setup(task: Task, found: Identifiability) -> list[Notice]:

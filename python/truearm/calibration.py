@@ -1,6 +1,6 @@
 """A calibration: an arm's identified parameters, what they predict, and how good that is."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -20,6 +20,7 @@ from truearm.endpoints import Endpoint, at_target, at_tool
 from truearm.errors import Notice, WorkError
 from truearm.files import read_bytes, write_whole
 from truearm.fitted_rows import FittedRows
+from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.inputs import feature_columns
@@ -59,6 +60,7 @@ class Calibration:
         variable: More about the variable model; None where there is none.
         validation: Errors on rows that took no part in fitting.
         rows: The rows it was fitted to; None where they were left out of the file.
+        held: The held-out rows with their errors; None where they were left out of the file.
         data_hash: SHA-256 of all measurements that were given.
         version: Version of truearm that made it.
         notices: What the user should know.
@@ -86,6 +88,7 @@ class Calibration:
     notices: tuple[Notice, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     scheme: SchemeDetails | None = None
+    held: HeldRows | None = None
     stored_conservative: Conservative | None = None
     fitted_spread: Spread | None = None
     revision: Revision | None = None
@@ -319,6 +322,32 @@ class Calibration:
         )
         covariance = self.spread.covariance(inputs, jacobian)
         return inputs, np.einsum("nii->ni", covariance), self.spread.prior(inputs, jacobian)
+
+    def variation_std(
+        self, q: ArrayLike, reference: ArrayLike, names: Sequence[str], *, features: Features | None = None
+    ) -> Floats:
+        """Standard deviation of how much parameters differ between readings, (n, c), rad and m.
+
+        How parameters vary is known better than their level, which frame and target may take over.
+
+        Args:
+            q: Readings (n, N).
+            reference: Readings (n, N) whose parameters are subtracted.
+            names: Names of the c parameters, such as "theta2".
+            features: Features by name, the same for both.
+
+        Raises:
+            UsageError: If there is no such parameter.
+            WorkError: If the rows were left out of the file, or the model does not tell.
+        """
+        rows, _ = self._readings(q)
+        others, _ = self._readings(reference)
+        picked = np.zeros((len(rows), len(names), self.arm.table.size))
+        for k, name in enumerate(names):
+            picked[:, k, self.arm.candidates.column(name)] = 1.0
+        inputs, from_inputs = self._inputs(rows, features), self._inputs(others, features)
+        variances = np.einsum("nii->ni", self._spread.contrast(inputs, from_inputs, picked))
+        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
 
     def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)

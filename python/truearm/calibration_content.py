@@ -12,6 +12,7 @@ from truearm._core import Field, Setup
 from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.errors import InputError
+from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.models import ArmModel
@@ -48,6 +49,7 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         "validation": calibration.validation.to_dict(),
         "data_sha256": calibration.data_hash,
         "rows": None,
+        "held": None,
         "conservative": None,
         "update": None,
     }
@@ -57,6 +59,8 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         content["rows"] = rows_content.pack(calibration.rows, calibration.options.features, arrays)
     if calibration.revision is not None:
         content["update"] = revision.pack(calibration.revision, arrays, whole=with_rows)
+    if with_rows and calibration.held is not None:
+        content["held"] = calibration.held.pack(arrays)
     return arrays, content
 
 
@@ -77,7 +81,8 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     robot = Robot.from_dict(content["robot"])
     arm = IdentifiedArm(robot, options.frame)
     selection = content["selection"]
-    constant, rows, bounds = content["constant"], content["rows"], content.get("conservative")
+    constant, rows, held = content["constant"], content["rows"], content.get("held")
+    bounds = content.get("conservative")
     inputs = robot.joint_count + len(options.features)
     models = {
         name: _read_model(name, stored, arrays, (inputs, arm.table.size))
@@ -99,6 +104,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "scheme": SchemeDetails(**content["scheme"]) if content.get("scheme") else None,
         "validation": Validation.from_dict(content["validation"]),
         "rows": None if rows is None else rows_content.unpack(rows, arrays),
+        "held": None if held is None else HeldRows.unpack(held, arrays),
         "data_hash": content["data_sha256"],
         "version": content["version"],
         "stored_conservative": None if bounds is None else conservative.unpack(bounds, arrays),

@@ -13,6 +13,7 @@ from truearm.core_set import Use, core_set, rotations, select
 from truearm.defaults import SEED
 from truearm.errors import InputError, Notice, UsageError, list_names
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
+from truearm.held_rows import HeldRows
 from truearm.judging import judge, model_inputs
 from truearm.measurements import Measurements
 from truearm.models import ArmModel
@@ -65,15 +66,17 @@ class Evaluation:
         n_judged: Rows that were judged.
         errors: Errors of "nominal", "constant" and, if there is one, "variable".
         notices: What the user should know.
+        rows: The rows that were judged, each with its errors.
     """
 
     n_frame: int
     n_judged: int
     errors: Mapping[str, Errors]
     notices: tuple[Notice, ...] = ()
+    rows: HeldRows | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON values, without the notices."""
+        """JSON values, without the notices and the rows."""
         errors = {name: found.to_dict() for name, found in self.errors.items()}
         return {"n_frame": self.n_frame, "n_judged": self.n_judged, "errors": errors}
 
@@ -125,8 +128,10 @@ def evaluate(
             for name, model in calibration.models.items()
         }
     with stages("judging"):
-        errors = judge(task, models, data.select(judged), data.select(frame if len(frame) else judged))
-    return Evaluation(len(frame), len(judged), errors, tuple(notices))
+        chosen_rows = data.select(judged)
+        errors = judge(task, models, chosen_rows, data.select(frame if len(frame) else judged))
+    statistics = {name: found.statistics() for name, found in errors.items()}
+    return Evaluation(len(frame), len(judged), statistics, tuple(notices), HeldRows.of(chosen_rows, errors))
 
 
 def _divide(data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]:

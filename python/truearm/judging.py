@@ -11,7 +11,7 @@ from truearm.fitting import Task, feature_values
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
 from truearm.models import ArmModel
-from truearm.validation import Errors, measure_errors
+from truearm.validation import RowErrors, row_errors
 
 Floats = NDArray[np.float64]
 
@@ -24,8 +24,8 @@ def model_inputs(arm: IdentifiedArm, data: Measurements, features: tuple[str, ..
 
 def judge(
     task: Task, models: Mapping[str, ArmModel], data: Measurements, fitted: Measurements
-) -> dict[str, Errors]:
-    """Errors of each model on `data`.
+) -> dict[str, RowErrors]:
+    """Errors of each model at every row of `data`.
 
     Args:
         task: What was fitted.
@@ -42,7 +42,7 @@ def judge(
             setup = setup_of_judged(task, fitted, at, model.setup)
             selection = Selection((selection.judge,), selection.orientation, judge=selection.judge)
         parameters = model.parameters(model_inputs(task.arm, data, features))
-        found[name] = measure_errors(task.arm, data, selection, task.groups, parameters, setup)
+        found[name] = row_errors(task.arm, data, selection, task.groups, parameters, setup)
     return found
 
 

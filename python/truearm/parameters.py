@@ -7,6 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import UsageError, did_you_mean, list_names
+
 Floats = NDArray[np.float64]
 
 KINDS: Final = ("theta", "d", "a", "alpha", "beta")
@@ -30,6 +32,20 @@ class Candidates:
     constant: tuple[int, ...]
     driven: tuple[int, ...]
     names: tuple[str, ...]
+
+    def column(self, name: str) -> int:
+        """Index into the chain's parameters of a name.
+
+        Raises:
+            UsageError: If there is no such candidate.
+        """
+        if name not in self.names:
+            raise UsageError(
+                f'there is no parameter "{name}"',
+                rule=f"There are {list_names(self.names)}",
+                way_out=did_you_mean(name, self.names),
+            )
+        return self.columns[self.names.index(name)]
 
 
 def candidates(

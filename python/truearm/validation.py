@@ -66,6 +66,37 @@ class Errors:
         return cls(unit("mm"), unit("mrad") if "mean_mrad" in content else None)
 
 
+@dataclass(frozen=True, eq=False)
+class RowErrors:
+    """Errors of one model, row by row, measured minus predicted in the base frame; NaN where not measured.
+
+    Attributes:
+        position: At the judged target (n, 3), m; of distances (d, 1).
+        orientation: Rotation vectors (n, 3), rad; None where orientation took no part.
+    """
+
+    position: Floats
+    orientation: Floats | None = None
+
+    @property
+    def distance_m(self) -> Floats:
+        """Lengths of the position errors (n,)."""
+        return np.asarray(np.linalg.norm(self.position, axis=1))
+
+    def statistics(self) -> Errors:
+        """Statistics over the rows that were measured; there must be one."""
+        position = Statistics.of(_measured(self.position))
+        if self.orientation is None:
+            return Errors(position)
+        turned = _measured(self.orientation)
+        return Errors(position, Statistics.of(turned) if len(turned) else None)
+
+
+def _measured(errors: Floats) -> Floats:
+    """Lengths of the errors (n, k) that are known."""
+    return np.asarray(np.linalg.norm(errors[np.isfinite(errors).all(axis=1)], axis=1))
+
+
 @dataclass(frozen=True)
 class Validation:
     """Errors on rows that took no part in any fit, and on those that trained.
@@ -105,14 +136,14 @@ class Validation:
         return cls(content["n_train"], content["n_holdout"], **sides, coverage_95=content["coverage_95"])
 
 
-def measure_errors(
+def row_errors(
     arm: IdentifiedArm,
     data: Measurements,
     selection: Selection,
     groups: Sequence[str],
     parameters: Floats,
     setup: Setup,
-) -> Errors:
+) -> RowErrors:
     """Errors of a model at the first target of the set-up and, if selected, of the orientation.
 
     Args:
@@ -129,7 +160,7 @@ def measure_errors(
     problem = Problem(arm.flange_chain, core_set(arm.robot, data, selection, groups), [], arm.world_is_known)
     left = residuals(problem, np.ascontiguousarray(parameters), setup)
     if selection.distances:
-        return Errors(Statistics.of(np.abs(left[:, 0])))
+        return RowErrors(left[:, :1].copy())
     seen = np.isfinite(data.targets[:, selection.targets[0]]).all(axis=1)
     if not seen.any():
         raise InputError(
@@ -137,10 +168,8 @@ def measure_errors(
             where=", ".join(data.files),
             way_out="Judge at another target, or measure it at more poses",
         )
-    position = Statistics.of(np.linalg.norm(left[seen, :3], axis=1))
+    position = np.where(seen[:, None], left[:, :3], np.nan)
     if not selection.orientation or data.orientations is None:
-        return Errors(position)
+        return RowErrors(position)
     turned = np.isfinite(data.orientations).all(axis=1)
-    if not turned.any():
-        return Errors(position)
-    return Errors(position, Statistics.of(np.linalg.norm(left[turned, -3:], axis=1)))
+    return RowErrors(position, np.where(turned[:, None], left[:, -3:], np.nan))

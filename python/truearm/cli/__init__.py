@@ -24,6 +24,7 @@ COMMANDS: Final = (
     Entry("cell", "truearm.cli.cell", "A virtual cell; check a cell; cell files to begin with."),
     Entry("evaluate", "truearm.cli.evaluate", "Errors of a calibration on other measurements."),
     Entry("update", "truearm.cli.update", "Take a calibration over to an arm that was re-mastered."),
+    Entry("report", "truearm.cli.report", "A calibration's report, as a page or a PDF."),
     Entry("frame", "truearm.cli.frame", "Teach a tool or a work object again."),
     Entry("strip", "truearm.cli.strip", "A calibration without its measurements, for controllers."),
     Entry("serve", "truearm.cli.serve", "Correct set-points that come over TCP."),

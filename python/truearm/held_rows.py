@@ -1,0 +1,64 @@
+"""Rows that a model was judged on and took no part in, each with its errors."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.measurements import Measurements
+from truearm.validation import RowErrors
+
+Floats = NDArray[np.float64]
+Arrays = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldRows:
+    """n rows and what each model missed there. Where distances were judged, errors have rows of their own.
+
+    Attributes:
+        readings: Joint readings (n, N), rad or m.
+        rows: Number of each row in its file (n,), the first data row being 1.
+        sources: File of each row (n,).
+        errors: Errors by name of the model, as it was before it saw these rows.
+    """
+
+    readings: Floats
+    rows: NDArray[np.int64]
+    sources: NDArray[np.str_]
+    errors: Mapping[str, RowErrors]
+
+    def __len__(self) -> int:
+        return len(self.readings)
+
+    @classmethod
+    def of(cls, data: Measurements, errors: Mapping[str, RowErrors]) -> "HeldRows":
+        """Those of judged rows."""
+        return cls(data.readings, data.rows, data.sources, errors)
+
+    def pack(self, arrays: Arrays) -> dict[str, Any]:
+        """JSON values; arrays are added to `arrays`."""
+        known, index = np.unique(self.sources, return_inverse=True)
+        arrays |= {"held.readings": self.readings, "held.rows": self.rows}
+        arrays["held.sources"] = index.astype(np.int64)
+        for name, found in self.errors.items():
+            arrays[f"held.{name}.position"] = found.position
+            if found.orientation is not None:
+                arrays[f"held.{name}.orientation"] = found.orientation
+        return {"sources": known.tolist(), "models": list(self.errors)}
+
+    @classmethod
+    def unpack(cls, content: Mapping[str, Any], arrays: Arrays) -> "HeldRows":
+        """The rows that `pack` described.
+
+        Raises:
+            KeyError: If an array or a key is missing.
+        """
+        sources = np.array(content["sources"], dtype=np.str_)[arrays["held.sources"]]
+        errors = {
+            name: RowErrors(arrays[f"held.{name}.position"], arrays.get(f"held.{name}.orientation"))
+            for name in content["models"]
+        }
+        return cls(arrays["held.readings"], arrays["held.rows"], sources, errors)

@@ -1,0 +1,174 @@
+"""What would help most next, decided by rules from the data."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from truearm.models import CONSTANT, VARIABLE
+from truearm.reporting.facts import Facts
+from truearm.reporting.floor import distance_at_floor_mm
+from truearm.reporting.numbers import count_of, listed, percent, short, shown_readings
+from truearm.reporting.trust import Stretch, weakest
+
+MOST: Final = 4
+AT_THE_FLOOR: Final = 1.25
+"""A mean error within so many times what noise alone leaves has reached it."""
+FEW_HELD: Final = 30
+COVERED: Final = 0.88
+SAME: Final = 0.97
+ROWS_NAMED: Final = 5
+SETUP_WORDS: Final = "the place of device or target"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to do next.
+
+    Attributes:
+        kind: Short name for programs.
+        name: A few words.
+        words: A sentence or two.
+        weight_mm: What it is about, in mm of mean error; the larger comes first.
+    """
+
+    kind: str
+    name: str
+    words: str
+    weight_mm: float
+
+
+def advise(facts: Facts) -> list[Advice]:
+    """What would help most, the most first, four at most."""
+    found = [
+        advice
+        for rule in (_outliers, _noise_or_poses, _where, _unseen, _few_held, _intervals, _what_varies)
+        for advice in rule(facts)
+    ]
+    return sorted(found, key=lambda advice: -advice.weight_mm)[:MOST]
+
+
+def _mean_mm(facts: Facts, model: str | None = None) -> float:
+    return facts.calibration.validation.holdout[model or facts.best].position.mean
+
+
+def _outliers(facts: Facts) -> Iterator[Advice]:
+    outliers = facts.summary["outliers"]
+    if not outliers:
+        return
+    named = listed([f"{entry['row']}" for entry in outliers[:ROWS_NAMED]])
+    rows = "row" if len(outliers) == 1 else "rows"
+    more = f" and {len(outliers) - ROWS_NAMED} more" if len(outliers) > ROWS_NAMED else ""
+    largest = short(outliers[0]["distance_mm"])[0]
+    share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
+    words = (
+        f"{count_of(len(outliers), 'measurement')} cannot be of this arm as the others show it: {rows} "
+        f"{named}{more}, "
+        f"up to {largest} mm off. Measure these poses again; a blocked beam, a loose target or an "
+        "unsettled arm "
+        "shows at once."
+    )
+    yield Advice("outliers", "Look at the outliers.", words, share)
+
+
+def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
+    if facts.best != VARIABLE:
+        return
+    floor, mean = distance_at_floor_mm(facts), _mean_mm(facts)
+    left, noise = short(mean, floor)
+    if mean <= AT_THE_FLOOR * floor:
+        words = (
+            f"{left} mm are left where noise alone leaves {noise} mm. More poses will hardly help: what is "
+            "left is "
+            "the instrument and what the arm does not repeat."
+        )
+        yield Advice("noise_floor", "The noise floor is reached.", words, floor)
+        return
+    trained = facts.calibration.validation.n_train
+    words = (
+        f"{left} mm are left where noise alone leaves {noise} mm: what {trained} training poses do not "
+        "tell is the "
+        "larger part. Poses like those of the work help most."
+    )
+    yield Advice("more_poses", "Measure more poses.", words, mean - floor)
+
+
+def _where(facts: Facts) -> Iterator[Advice]:
+    weak = weakest(facts)
+    if weak is None:
+        return
+    std, median = short(weak.std_mm, weak.median_mm)
+    there = (
+        count_of(weak.rows, "measured pose") if facts.readings is not None else "an unknown number of poses"
+    )
+    words = (
+        f"With {_range(facts, weak)} the standard deviation is {std} mm, against {median} mm in the median; "
+        f"{there} lie there. Measure there, or keep the work away."
+    )
+    yield Advice("more_poses_there", "Fill the gap.", words, 0.5 * (weak.std_mm - weak.median_mm))
+
+
+def _range(facts: Facts, weak: Stretch) -> str:
+    low, high = (
+        shown_readings(facts.typical * 0.0 + end, facts.joints)[weak.joint] for end in (weak.low, weak.high)
+    )
+    return f"joint {weak.joint + 1} between {low:.0f} and {high:.0f} {facts.unit(weak.joint)}"
+
+
+def _unseen(facts: Facts) -> Iterator[Advice]:
+    found, selection = facts.calibration.identifiability, facts.calibration.selection
+    pairs = zip(found.undetermined, found.words, strict=True)
+    hidden = [name for name, words in pairs if SETUP_WORDS not in words]
+    if hidden:
+        words = (
+            f"The poses cannot tell {listed(hidden)} from other parameters, so they stay nominal. Turn the "
+            "joints "
+            "before them further, and mount the target away from the last axis."
+        )
+        yield Advice("unseen_parameters", "Show what cannot be seen.", words, 0.1 * _mean_mm(facts))
+    if selection.distances or selection.orientation or len(selection.targets) > 2:
+        return
+    words = (
+        "How the tool is turned follows from positions alone and is judged by nothing here. If the tool is "
+        "long or "
+        "its direction matters, measure orientation or three targets on it."
+    )
+    yield Advice("no_orientation", "Measure orientation.", words, 0.05 * _mean_mm(facts))
+
+
+def _few_held(facts: Facts) -> Iterator[Advice]:
+    held = facts.calibration.validation.n_holdout
+    if held < FEW_HELD:
+        words = f"The errors above are those of {count_of(held, 'pose')}; another draw would give others."
+        yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * _mean_mm(facts))
+
+
+def _intervals(facts: Facts) -> Iterator[Advice]:
+    covered = facts.calibration.validation.coverage_95
+    if covered is not None and covered < COVERED:
+        words = (
+            f"Only {percent(covered)} of the held-out coordinates lie within their 95 % intervals: the "
+            "held-out "
+            "poses are not like those that trained, or something moved between them."
+        )
+        yield Advice("narrow_intervals", "Do not trust the intervals.", words, _mean_mm(facts))
+
+
+def _what_varies(facts: Facts) -> Iterator[Advice]:
+    mean, constant = _mean_mm(facts), _mean_mm(facts, CONSTANT)
+    if facts.best == CONSTANT and not facts.calibration.selection.distances:
+        words = "Here parameters were held constant; --model variable shows what varies over the workspace."
+        yield Advice("try_variable", "Let the parameters vary.", words, 0.5 * mean)
+    elif facts.best not in (CONSTANT, VARIABLE):
+        words = (
+            "This is a scheme of the paper; --model variable learns from fewer poses and tells its "
+            "uncertainty."
+        )
+        yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
+    elif facts.best == VARIABLE and mean > SAME * constant:
+        left, before = short(mean, constant)
+        words = (
+            f"What varies gains little: {left} mm against {before} mm with constants. The arm has little "
+            "of it, or "
+            "the poses are too few to show it."
+        )
+        yield Advice("constant_suffices", "Constants do as well.", words, 0.2 * mean)

@@ -1,0 +1,124 @@
+"""Traces that several figures use."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.reporting.numbers import lean
+from truearm.reporting.style import SEQUENTIAL, colour_of, dash_of, marker_of
+
+Floats = NDArray[np.float64]
+Trace = dict[str, Any]
+
+
+def axis(title: str, **more: object) -> dict[str, Any]:
+    """An axis with a title, which names the unit."""
+    return {"title": {"text": title}, **more}
+
+
+def log_mm_axis(title: str, low: float, high: float) -> dict[str, Any]:
+    """A logarithmic axis with the round numbers 1, 2, 5 as its ticks."""
+    first, last = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
+    ticks = [round(m * 10.0**e, 9) for e in range(first, last + 1) for m in (1, 2, 5)]
+    text = [f"{tick:g}" for tick in ticks]
+    ends = [float(np.log10(low)), float(np.log10(high))]
+    return axis(title, type="log", tickvals=ticks, ticktext=text, range=lean(ends))
+
+
+def line(x: ArrayLike, y: ArrayLike, model: str, **more: Any) -> Trace:
+    """A line in the manner of a model."""
+    shape = {"color": colour_of(model), "dash": dash_of(model), "width": 2}
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": model,
+        "x": lean(x),
+        "y": lean(y),
+        "line": shape,
+    } | more
+
+
+def points(x: ArrayLike, y: ArrayLike, model: str, **more: Any) -> Trace:
+    """Points in the manner of a model."""
+    marker = {"color": colour_of(model), "symbol": marker_of(model), "size": 4, "opacity": 0.45}
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": model,
+        "x": lean(x),
+        "y": lean(y),
+        "marker": marker,
+    } | more
+
+
+def band(x: ArrayLike, low: ArrayLike, high: ArrayLike, **more: Any) -> Trace:
+    """The area between two curves."""
+    around = [*lean(x), *reversed(lean(x))]
+    values = [*lean(high), *reversed(lean(low))]
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": around,
+        "y": values,
+        "fill": "toself",
+        "fillcolor": "@band",
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "showlegend": False,
+    } | more
+
+
+def heatmap(x: ArrayLike, y: ArrayLike, z: ArrayLike, bar: str, **more: Any) -> Trace:
+    """A map of values (len(y), len(x)); `bar` names them with their unit."""
+    return {
+        "type": "heatmap",
+        "x": lean(x),
+        "y": lean(y),
+        "z": lean(z),
+        "colorscale": SEQUENTIAL,
+        "colorbar": colour_bar(bar),
+        "hoverongaps": False,
+    } | more
+
+
+def colour_bar(title: str) -> dict[str, Any]:
+    """A colour bar with a title beside it."""
+    return {
+        "title": {"text": title, "side": "right", "font": {"color": "@ink", "size": 11}},
+        "thickness": 12,
+        "outlinewidth": 0,
+        "tickfont": {"color": "@muted"},
+    }
+
+
+def running_median(x: Floats, y: Floats, bins: int, fewest: int) -> tuple[Floats, Floats, Floats]:
+    """Edges (b + 1,) of equal shares of x, and medians (b,) of x and y in each; fewer where rows are few."""
+    count = max(1, min(bins, len(x) // fewest))
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, count + 1)))
+    if len(edges) < 2:
+        return edges.repeat(2)[:2], np.array([x.mean()]), np.array([np.median(y)])
+    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
+    filled = [k for k in range(len(edges) - 1) if (place == k).any()]
+    edges = np.append(edges[filled], edges[-1])
+    middles = np.array([np.median(x[place == k]) for k in filled])
+    return edges, middles, np.array([np.median(y[place == k]) for k in filled])
+
+
+def data_points(x: ArrayLike, y: ArrayLike, **more: Any) -> Trace:
+    """Where measurements were taken."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "measured",
+        "x": lean(x),
+        "y": lean(y),
+        "marker": {"color": "@data", "size": 3},
+        "hoverinfo": "skip",
+    } | more
+
+
+def legend(**more: object) -> Mapping[str, Any]:
+    """Layout that shows the legend above the figure."""
+    return {"showlegend": True, "margin": {"t": 34}, **more}

@@ -1,0 +1,150 @@
+"""Chapter: what compensation does: how large its corrections are, and what it refuses."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.compensation import Compensated, Compensator
+from truearm.limits import Limits, Task
+from truearm.measurements import Measurements
+from truearm.reporting.charts import axis
+from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import count_of, fixed, lean, short
+from truearm.reporting.parts import Figure, Part, Section, Table, Text
+
+Floats = NDArray[np.float64]
+
+MOST_POSES: Final = 2000
+LARGEST: Final = 6
+FULL_POSE: Final = 6
+AXIS: Final = 5
+
+
+def compensation(facts: Facts) -> Section:
+    """The poses that were measured, corrected as waypoints of a program."""
+    title = "Compensation"
+    calibration, rows = facts.calibration, facts.calibration.rows
+    if calibration.scheme is not None:
+        words = f"Compensation knows constant and variable models; this one is {facts.best}."
+        return Section(title, [Text(words)])
+    if rows is None:
+        return Section(
+            title, [Text("The measurements were left out of this file: there are no poses to correct.")]
+        )
+    data = rows.data.select(np.arange(min(len(rows.data), MOST_POSES)))
+    task = _task(len(facts.joints))
+    alone = Limits(change_mm_per_mm=None, change_mrad_per_rad=None)
+    found = Compensator(calibration, task=task, limits=alone, features=facts.features or None).joints(
+        data.readings
+    )
+    parts: list[Part] = [Text(_overall(found, task)), *_sizes(facts, found)]
+    return Section(title, [*parts, largest(facts, data, found), *_refusals(data, found)])
+
+
+def _task(joints: int) -> Task:
+    return "pose" if joints >= FULL_POSE else "axis" if joints == AXIS else "position"
+
+
+def _overall(found: Compensated, task: Task) -> str:
+    corrected = int((~found.refused).sum())
+    met = {"pose": "position and orientation", "axis": "position and tool axis", "position": "position"}[task]
+    refused = count_of(len(found.refusals), "refusal") if found.refusals else "none refused"
+    return (
+        f"The {count_of(len(found.q), 'measured pose')}, corrected one by one as a program's waypoints "
+        f"({met}): "
+        f"{corrected} corrected, {refused}."
+    )
+
+
+def _sizes(facts: Facts, found: Compensated) -> list[Figure]:
+    """How far each joint is corrected."""
+    good = ~found.refused
+    if not good.any():
+        return []
+    change = facts.shown(found.q[good] - found.nominal[good])
+    shift = found.correction_mm[good]
+    traces = [
+        {
+            "type": "box",
+            "name": f"{joint + 1}",
+            "y": lean(change[:, joint], 3),
+            "boxpoints": False,
+            "marker": {"color": "@variable"},
+            "line": {"color": "@variable"},
+            "fillcolor": "@band",
+        }
+        for joint in range(change.shape[1])
+    ]
+    widest = int(np.argmax(np.abs(change).max(axis=0)))
+    most, middle = short(float(shift.max()), float(np.median(shift)))
+    units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
+    figure = Figure(
+        "Corrections of the joints",
+        f"Joint {widest + 1} changes most, by up to {np.abs(change[:, widest]).max():.3f} "
+        f"{facts.unit(widest)}. The "
+        f"tool moves by {middle} mm in the median and {most} mm at most.",
+        traces,
+        {"xaxis": axis("joint"), "yaxis": axis(f"correction, {units}")},
+        height=300,
+    )
+    trace = {"type": "histogram", "x": lean(shift), "nbinsx": 40, "marker": {"color": "@variable"}}
+    sizes = Figure(
+        "How far the tool is moved",
+        f"Half of the corrections move the tool by less than {middle} mm; the largest turns it by "
+        f"{short(float(found.correction_mrad[good].max()))[0]} mrad.",
+        [trace],
+        {"xaxis": axis("shift of the tool, mm", rangemode="tozero"), "yaxis": axis("poses"), "bargap": 0.05},
+        height=300,
+    )
+    return [figure, sizes]
+
+
+def largest(facts: Facts, data: Measurements, found: Compensated) -> Table:
+    """The rows with the largest corrections."""
+    shift = np.where(found.refused, -1.0, found.correction_mm)
+    order = [k for k in np.argsort(-shift, kind="stable")[:LARGEST] if shift[k] >= 0.0]
+    change = facts.shown(found.q - found.nominal)
+    rows = [
+        [
+            _row_name(data, k),
+            fixed(found.correction_mm[k]),
+            fixed(found.correction_mrad[k]),
+            fixed(found.std_mm[k]),
+            ", ".join(f"{value:+.3f}" for value in change[k]),
+        ]
+        for k in order
+    ]
+    return Table(
+        "Largest corrections",
+        ["row", "shift, mm", "turn, mrad", "standard deviation, mm", "joints, deg or mm"],
+        rows,
+        left=(0, 4),
+    )
+
+
+def _row_name(data: Measurements, k: int) -> str:
+    place = f" of {Path(str(data.sources[k])).name}" if len(data.files) > 1 else ""
+    return f"{data.rows[k]}{place}"
+
+
+def _refusals(data: Measurements, found: Compensated) -> list[Table]:
+    """How often each reason was given, with the first rows."""
+    if not found.refusals:
+        return []
+    codes = Counter(refusal.code for refusal in found.refusals)
+    rows = []
+    for code, times in codes.most_common():
+        mine = [refusal for refusal in found.refusals if refusal.code == code]
+        named = ", ".join(_row_name(data, refusal.number - 1) for refusal in mine[:5])
+        rows.append([str(times), named + (" ..." if times > 5 else ""), mine[0].reason])
+    table = Table(
+        "Refused",
+        ["poses", "rows", "for the first the reason is"],
+        rows,
+        says="Refused waypoints are left to a person: nothing is clipped.",
+        left=(1, 2),
+    )
+    return [table]

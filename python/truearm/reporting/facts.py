@@ -1,0 +1,139 @@
+"""What a report is made from: the calibration, and what several of its chapters work out of it once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.evaluation import Evaluation
+from truearm.held_rows import HeldRows
+from truearm.reporting.numbers import shown_readings, unit_of
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+OUTER: Final = 0.01
+"""Share of the readings on either side that a joint's usual range leaves out."""
+WIDEST_TURN: Final = np.pi
+DRAWN_FOR_TYPICAL: Final = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """A calibration, and measurements it was judged on besides.
+
+    Attributes:
+        calibration: What is reported.
+        other: Its errors on other measurements; None where there are none.
+        other_names: Files of these.
+    """
+
+    calibration: Calibration
+    other: Evaluation | None = None
+    other_names: tuple[str, ...] = ()
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The content of summary.json: the one source of figures."""
+        return self.calibration.summary
+
+    @property
+    def held(self) -> HeldRows | None:
+        """The held-out rows with their errors, of points; None without, and where distances were measured."""
+        return None if self.calibration.selection.distances else self.calibration.held
+
+    @property
+    def models(self) -> list[str]:
+        """Names of the models, the plainest first."""
+        return list(self.calibration.models)
+
+    @property
+    def best(self) -> str:
+        """Name of the model that predicts."""
+        return self.calibration.model_name
+
+    @cached_property
+    def errors_mm(self) -> Mapping[str, Floats]:
+        """Lengths of the held-out position errors of each model (n,), mm, NaN where not measured."""
+        if self.held is None:
+            return {}
+        return {name: MM_PER_METRE * found.distance_m for name, found in self.held.errors.items()}
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Kind of each joint."""
+        return self.calibration.robot.joints
+
+    def unit(self, joint: int) -> str:
+        """Unit that a joint is shown in; joints count from 0."""
+        return unit_of(self.joints[joint])
+
+    def shown(self, readings: Floats) -> Floats:
+        """Readings (n, N) in deg and mm."""
+        return shown_readings(readings, self.joints)
+
+    @cached_property
+    def readings(self) -> Floats | None:
+        """Readings (n, N) that the calibration was fitted to; None where they were left out of the file."""
+        rows = self.calibration.rows
+        return None if rows is None else rows.data.readings
+
+    @cached_property
+    def features(self) -> dict[str, float]:
+        """A usual value of each feature: the median of the rows, zero where they are not known."""
+        names, rows = self.calibration.options.features, self.calibration.rows
+        if rows is None:
+            return dict.fromkeys(names, 0.0)
+        return {name: float(rows.data.features[name].median()) for name in names}
+
+    @cached_property
+    def point(self) -> Floats:
+        """The measured point that errors are judged at, in the flange frame (3,), m; the tool's otherwise."""
+        targets = self.calibration.model.setup.targets
+        if self.calibration.selection.distances or targets.shape[1] == 0:
+            return self.calibration.robot.tool[:3, 3]
+        return np.asarray(targets[0, 0])
+
+    @cached_property
+    def span(self) -> Floats:
+        """Range of each joint (N, 2): that of the rows but for a percent on either side, else its limits."""
+        if self.readings is not None:
+            return np.quantile(self.readings, [OUTER, 1.0 - OUTER], axis=0).T
+        return self.reachable
+
+    @cached_property
+    def reachable(self) -> Floats:
+        """Range of each joint (N, 2): its limits, at most half a turn to either side or what was measured."""
+        limits = self.calibration.robot.limits
+        most = np.where(np.array(self.joints) == "prismatic", 0.5, WIDEST_TURN)
+        low, high = np.maximum(limits[:, 0], -most), np.minimum(limits[:, 1], most)
+        if self.readings is not None:
+            low = np.minimum(low, self.readings.min(axis=0))
+            high = np.maximum(high, self.readings.max(axis=0))
+        return np.stack([low, high], axis=1)
+
+    @cached_property
+    def typical(self) -> Floats:
+        """A usual pose (N,): the row nearest to the middle of all, or the middle of the joints' ranges."""
+        middle = self.span.mean(axis=1)
+        if self.readings is None:
+            return middle
+        centre = np.median(self.readings, axis=0)
+        width = np.maximum(np.ptp(self.readings, axis=0), 1e-9)
+        return self.readings[np.argmin(np.square((self.readings - centre) / width).sum(axis=1))]
+
+    def drawn(self, count: int) -> Floats:
+        """Some poses (m, N) that stand for all: rows, or drawn within the joints' ranges."""
+        if self.readings is not None:
+            return self.readings[:count]
+        low, high = self.span.T
+        return np.random.default_rng(DRAWN_FOR_TYPICAL).uniform(low, high, (count, len(low)))
+
+    def inputs(self, readings: Floats) -> Floats:
+        """Inputs (n, I) of the field at readings (n, N)."""
+        columns = np.tile(list(self.features.values()), (len(readings), 1))
+        return np.hstack([self.calibration.robot.joints_from_readings(readings), columns])

@@ -1,0 +1,212 @@
+"""Chapter: errors on held-out poses, their distribution, where along the joints, and the worst."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.held_rows import HeldRows
+from truearm.reporting.charts import axis, legend, line, log_mm_axis, points, running_median
+from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import fixed, listed, short
+from truearm.reporting.parts import Figure, Part, Section, Table, Text
+from truearm.reporting.style import colour_of, dash_of
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+BINS: Final = 32
+DRAWN: Final = 1500
+"""More points than these are not told apart."""
+JOINT_BINS: Final = 12
+FEWEST_IN_BIN: Final = 8
+STANDS_OUT: Final = 1.35
+"""A stretch of a joint whose median error is so many times that of all is named."""
+WORST: Final = 12
+SMALLEST_MM: Final = 1e-4
+
+
+def held_errors(facts: Facts) -> Section:
+    """Errors that were made on poses that took no part in fitting."""
+    title = "Errors on unseen poses"
+    if facts.held is None:
+        return Section(title, [Text(_without_rows(facts))])
+    errors = facts.errors_mm
+    parts: list[Part] = [histogram(errors), cumulative(errors)]
+    parts += [along_joint(facts, joint) for joint in range(len(facts.joints))]
+    parts += orientation(facts)
+    return Section(title, [*parts, worst(facts.held, facts)])
+
+
+def _without_rows(facts: Facts) -> str:
+    if facts.calibration.selection.distances:
+        return (
+            "Distances were measured, not points: the table above has their errors, which have no direction."
+        )
+    return (
+        "The measurements were left out of this file, so that errors cannot be shown pose by pose; the table "
+        "above was kept. The calibration as it was written before stripping has them."
+    )
+
+
+def _known(errors: Floats) -> Floats:
+    return np.maximum(errors[np.isfinite(errors)], SMALLEST_MM)
+
+
+def histogram(errors: Mapping[str, Floats]) -> Figure:
+    """Shares of the poses over logarithmic classes of errors (n,) in mm."""
+    known = {name: _known(values) for name, values in errors.items()}
+    low, high = _ends(known)
+    edges = np.geomspace(low, high, BINS + 1)
+    traces = []
+    for name, values in known.items():
+        counts, _ = np.histogram(values, edges)
+        shares = np.append(100.0 * counts / len(values), 0.0)
+        shape = {"color": colour_of(name), "dash": dash_of(name), "width": 2, "shape": "hv"}
+        filled = {"fill": "tozeroy"} if colour_of(name) == "@variable" else {}
+        traces.append(line(edges, shares, name, line=shape, fillcolor="@band", **filled))
+    medians = {name: float(np.median(values)) for name, values in known.items()}
+    texts = short(*medians.values())
+    halves = [f"{text} mm ({name})" for name, text in zip(medians, texts, strict=True)]
+    return Figure(
+        "How large the errors are",
+        f"Half of the poses miss by less than {listed(halves)}.",
+        traces,
+        legend(
+            xaxis=log_mm_axis("position error, mm (logarithmic)", low, high),
+            yaxis=axis("share of the poses, %", rangemode="tozero"),
+        ),
+    )
+
+
+def cumulative(errors: Mapping[str, Floats]) -> Figure:
+    """Share of the poses below each error (n,) in mm."""
+    known = {name: np.sort(_known(values)) for name, values in errors.items()}
+    low, high = _ends(known)
+    traces = []
+    for name, values in known.items():
+        share = 100.0 * np.arange(1, len(values) + 1) / len(values)
+        kept = np.unique(np.linspace(0, len(values) - 1, min(len(values), 300)).astype(int))
+        traces.append(line(values[kept], share[kept], name))
+    bounds = {name: float(np.quantile(values, 0.95)) for name, values in known.items()}
+    within = [f"{text} mm ({name})" for name, text in zip(bounds, short(*bounds.values()), strict=True)]
+    mark = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": 95, "y1": 95}
+    return Figure(
+        "How many poses are within",
+        f"95 of 100 poses are within {listed(within)}.",
+        traces,
+        legend(
+            xaxis=log_mm_axis("position error, mm (logarithmic)", low, high),
+            yaxis=axis("poses with less, %", range=[0, 101]),
+            shapes=[{**mark, "line": {"color": "@muted", "width": 1, "dash": "dot"}}],
+        ),
+    )
+
+
+def _ends(known: Mapping[str, Floats]) -> tuple[float, float]:
+    values = np.concatenate(list(known.values()))
+    return float(np.quantile(values, 0.002)) / 1.1, float(values.max()) * 1.1
+
+
+def along_joint(facts: Facts, joint: int) -> Figure:
+    """Error over the readings of one joint, counted from 0."""
+    held = facts.held
+    if held is None:
+        raise ValueError("there are no held-out rows")
+    q = facts.shown(held.readings)[:, joint]
+    unit, name = facts.unit(joint), facts.best
+    traces = []
+    for model in [model for model in facts.models if model != "nominal"]:
+        errors = facts.errors_mm[model]
+        known = np.isfinite(errors)
+        _, middles, medians = running_median(q[known], errors[known], JOINT_BINS, FEWEST_IN_BIN)
+        if model == name:
+            traces.append(points(q[known][:DRAWN], errors[known][:DRAWN], model, showlegend=False))
+        traces.append(line(middles, medians, model, name=f"{model}, median"))
+    return Figure(
+        f"Error along joint {joint + 1}",
+        _where_along(q, facts.errors_mm[name], unit),
+        traces,
+        legend(
+            xaxis=axis(f"joint {joint + 1}, {unit}"),
+            yaxis=axis("position error, mm", rangemode="tozero"),
+        ),
+        height=270,
+    )
+
+
+def _where_along(q: Floats, errors: Floats, unit: str) -> str:
+    known = np.isfinite(errors)
+    edges, _, medians = running_median(q[known], errors[known], JOINT_BINS, FEWEST_IN_BIN)
+    overall = float(np.median(errors[known]))
+    worst_bin = int(np.argmax(medians))
+    here, everywhere = short(float(medians[worst_bin]), overall)
+    if len(medians) < 3:
+        return f"Too few poses to tell stretches of the joint apart; the median is {everywhere} mm."
+    if medians[worst_bin] < STANDS_OUT * overall:
+        return f"Even along the joint: no stretch's median exceeds {here} mm, that of all is {everywhere} mm."
+    stretch = f"{edges[worst_bin]:.0f} and {edges[worst_bin + 1]:.0f} {unit}"
+    return f"Largest between {stretch}: {here} mm in the median, against {everywhere} mm over all."
+
+
+def orientation(facts: Facts) -> list[Figure]:
+    """Cumulative curves of the orientation's errors, where it was measured."""
+    if facts.held is None:
+        return []
+    turned = {
+        name: np.linalg.norm(found.orientation, axis=1) * 1e3
+        for name, found in facts.held.errors.items()
+        if found.orientation is not None
+    }
+    known = {name: np.sort(values[np.isfinite(values)]) for name, values in turned.items()}
+    if not known or min(map(len, known.values())) == 0:
+        return []
+    traces = [
+        line(values, 100.0 * np.arange(1, len(values) + 1) / len(values), name)
+        for name, values in known.items()
+    ]
+    bounds = {name: float(np.quantile(values, 0.95)) for name, values in known.items()}
+    within = [f"{text} mrad ({name})" for name, text in zip(bounds, short(*bounds.values()), strict=True)]
+    figure = Figure(
+        "Orientation: how many poses are within",
+        f"95 of 100 poses are turned by less than {listed(within)}.",
+        traces,
+        legend(
+            xaxis=axis("orientation error, mrad", rangemode="tozero"),
+            yaxis=axis("poses with less, %", range=[0, 101]),
+        ),
+    )
+    return [figure]
+
+
+def worst(held: HeldRows, facts: Facts) -> Table:
+    """The rows with the largest errors of the model that predicts."""
+    errors = facts.errors_mm
+    mine = np.nan_to_num(errors[facts.best], nan=-1.0)
+    order = np.argsort(-mine, kind="stable")[:WORST]
+    several = len(set(held.sources.tolist())) > 1
+    shown = facts.shown(held.readings)
+    rows = []
+    for k in order:
+        place = [Path(str(held.sources[k])).name] if several else []
+        missed = [fixed(errors[name][k]) for name in facts.models]
+        rows.append([str(held.rows[k]), *place, *missed, ", ".join(f"{value:.1f}" for value in shown[k])])
+    columns = ["row", *(["file"] if several else []), *(f"{name}, mm" for name in facts.models)]
+    units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
+    share = mine[order].sum() / mine[mine >= 0].sum()
+    return Table(
+        "Worst poses",
+        [*columns, f"joints, {units}"],
+        rows,
+        says=f"These {len(rows)} of {len(held)} held-out poses make {100 * share:.0f} % of the sum of all "
+        "errors. "
+        "Rows are counted from 1 below the header of the file.",
+        left=(0, len(columns)) if not several else (0, 1, len(columns)),
+    )
+
+
+def vectors_mm(held: HeldRows, model: str) -> Floats:
+    """Error vectors (n, 3) in the base frame, mm."""
+    return np.asarray(MM_PER_METRE * held.errors[model].position)

@@ -1,0 +1,73 @@
+"""Numbers as pages show and hold them: rounded, with units, and without what JSON has no word for."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+
+DIGITS: Final = 4
+"""Significant digits of what figures are drawn from: finer than a pixel."""
+
+
+def lean(values: ArrayLike, digits: int = DIGITS) -> list[Any]:
+    """Values for JSON, rounded to significant digits; null where they are not finite. Keeps the shape."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim > 1:
+        return [lean(row, digits) for row in array]
+    return [None if not np.isfinite(value) else _rounded(value, digits) for value in array.tolist()]
+
+
+def _rounded(value: float, digits: int) -> float | int:
+    short = float(f"{value:.{digits}g}")
+    return int(short) if short.is_integer() else short
+
+
+def mm(length_m: float) -> str:
+    """A length in mm, as tables show it, without the unit."""
+    return fixed(length_m * MM_PER_METRE)
+
+
+def fixed(value: float) -> str:
+    """A number of tables: three decimals."""
+    return f"{value:.3f}"
+
+
+def short(*values: float) -> list[str]:
+    """Numbers of a sentence, with as many decimals as the smallest needs for two digits, at most four."""
+    sizes = [abs(value) for value in values if value and np.isfinite(value)]
+    decimals = 2 if not sizes else int(np.clip(1 - np.floor(np.log10(min(sizes))), 0, 4))
+    return [f"{value:.{decimals}f}" for value in values]
+
+
+def percent(share: float) -> str:
+    """A share in percent: "64 %"."""
+    return f"{100.0 * share:.0f} %"
+
+
+def count_of(count: int, noun: str) -> str:
+    """A count with its noun: "1 pose", "400 poses"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words with commas and "and"."""
+    return ", ".join(words[:-1]) + (" and " if len(words) > 1 else "") + words[-1]
+
+
+def shown_readings(readings: Floats, joints: Sequence[str]) -> Floats:
+    """Joint readings (n, N) in deg, and mm for prismatic joints."""
+    return readings / np.array([_per_unit(joint) for joint in joints])
+
+
+def unit_of(joint: str) -> str:
+    """Unit that the readings of a joint are shown in."""
+    return "mm" if joint == "prismatic" else "deg"
+
+
+def _per_unit(joint: str) -> float:
+    return 1.0 / MM_PER_METRE if joint == "prismatic" else RADIANS_PER_DEGREE

@@ -1,0 +1,152 @@
+"""Chapter: the constants: nominal, correction, standard error, and what cannot be told from what."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.models import CONSTANT
+from truearm.parameters import KIND_COUNT, KINDS
+from truearm.reporting.charts import colour_bar
+from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import lean
+from truearm.reporting.parts import Cell, Figure, Part, Section, Table, Text
+from truearm.reporting.style import DIVERGING
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+
+LENGTHS: Final = ("d", "a")
+POSES: Final = 300
+CONFOUNDED: Final = 0.9
+NO_WORDS: Final = ""
+
+
+def kind_of(column: int) -> str:
+    """Kind of the parameter in a column of the chain's parameters."""
+    return KINDS[column % KIND_COUNT]
+
+
+def unit_of(column: int) -> str:
+    """Unit it is shown in."""
+    return "mm" if kind_of(column) in LENGTHS else "deg"
+
+
+def per_unit(column: int) -> float:
+    """What its SI value is divided by to be shown."""
+    return 1.0 / MM_PER_METRE if kind_of(column) in LENGTHS else RADIANS_PER_DEGREE
+
+
+def parameters(facts: Facts) -> Section:
+    """The constant model's parameters and what the poses determine."""
+    found = facts.calibration.identifiability
+    words = (
+        f"The poses determine {found.rank} of {found.parameters} parameters of the arm, and with frames "
+        "and targets "
+        f"{found.total_rank} unknowns; condition number {found.condition:.0f}. The others stay nominal."
+    )
+    parts: list[Part] = [Text(words), table(facts)]
+    figure = confounding(facts)
+    return Section("Parameters", [*parts, *([figure] if figure is not None else [])])
+
+
+def table(facts: Facts) -> Table:
+    """A row for each parameter that was asked for."""
+    calibration = facts.calibration
+    candidates, found = calibration.arm.candidates, calibration.identifiability
+    errors = standard_errors(facts)
+    words = dict(zip(found.undetermined, found.words, strict=True))
+    nominal = calibration.arm.table.ravel()
+    corrected = calibration.models[CONSTANT].constants.ravel()
+    effects = effect_mm(facts)
+    rows, largest = [], ("", 0.0)
+    for k in candidates.constant:
+        column, name = candidates.columns[k], candidates.names[k]
+        unit = per_unit(column)
+        change = corrected[column] - nominal[column]
+        effect = float(effects[column] * abs(change))
+        largest = max(largest, (name, effect), key=lambda entry: entry[1])
+        known = name in errors
+        rows.append(
+            [
+                name,
+                unit_of(column),
+                f"{nominal[column] / unit:.3f}",
+                f"{change / unit:+.4f}" if known else NO_WORDS,
+                f"{errors[name] / unit:.4f}" if known else NO_WORDS,
+                f"{effect:.3f}" if known else NO_WORDS,
+                Cell("determined", "good") if known else Cell(_remark(name, words.get(name, "")), "fair"),
+            ]
+        )
+    return Table(
+        "Constant corrections",
+        ["", "unit", "nominal", "correction", "standard error", "at the point, mm", "the data says"],
+        rows,
+        says=f"{largest[0]} matters most: its correction moves the measured point by {largest[1]:.3f} mm "
+        "(root mean "
+        "square over the poses). Standard errors hold for the constant model alone.",
+        left=(0, 1, 6),
+    )
+
+
+def _remark(name: str, words: str) -> str:
+    return words.removeprefix(name).strip().rstrip(".") or "not asked for"
+
+
+def standard_errors(facts: Facts) -> dict[str, float]:
+    """Standard error of each determined constant, SI."""
+    details = facts.calibration.constant
+    variances = np.diagonal(details.covariance)[: len(details.names)]
+    return dict(zip(details.names, np.sqrt(variances).tolist(), strict=True))
+
+
+def effect_mm(facts: Facts) -> Floats:
+    """How far one rad or m of each parameter moves the judged point (5 L,), mm, RMS over poses."""
+    poses = facts.drawn(POSES)
+    chain = facts.calibration.arm.chain(facts.calibration.robot.flange @ _shifted(facts.point))
+    jacobian = chain.parameter_jacobian(facts.calibration.robot.joints_from_readings(poses))
+    return np.asarray(MM_PER_METRE * np.sqrt(np.square(jacobian).sum(axis=1).mean(axis=0)))
+
+
+def _shifted(point: Floats) -> Floats:
+    transform = np.eye(4)
+    transform[:3, 3] = point
+    return transform
+
+
+def confounding(facts: Facts) -> Figure | None:
+    """Correlations between the determined constants; None where there is one alone."""
+    details = facts.calibration.constant
+    names, size = list(details.names), len(details.names)
+    if size < 2:
+        return None
+    covariance = details.covariance[:size, :size]
+    deviation = np.sqrt(np.diagonal(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    off = np.where(np.eye(size, dtype=bool), 0.0, correlation)
+    row, column = np.unravel_index(int(np.argmax(np.abs(off))), off.shape)
+    strong = int((np.abs(np.triu(off)) > CONFOUNDED).sum())
+    pair = f"{names[row]} and {names[column]} go together most: correlation {off[row, column]:+.2f}"
+    pairs = "pair is" if strong == 1 else "pairs are"
+    trace = {
+        "type": "heatmap",
+        "x": names,
+        "y": names,
+        "z": lean(correlation, 2),
+        "colorscale": DIVERGING,
+        "zmin": -1,
+        "zmax": 1,
+        "colorbar": colour_bar("correlation"),
+    }
+    return Figure(
+        "What is confounded with what",
+        f"{pair}. {strong} {pairs} beyond {CONFOUNDED}: of these, sum or difference is known far better than "
+        "each alone.",
+        [trace],
+        {
+            "xaxis": {"title": {"text": "parameter"}, "tickangle": -60},
+            "yaxis": {"title": {"text": "parameter"}, "autorange": "reversed"},
+        },
+        height=max(340, 16 * size + 120),
+        is_wide=True,
+    )

@@ -1,0 +1,87 @@
+"""A page as PDF, printed by Chromium."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from truearm.errors import WorkError
+from truearm.files import write_whole
+
+BROWSERS: Final = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "msedge",
+)
+PATIENCE_S: Final = 180
+DRAWING_MS: Final = 60_000
+"""Time of the page's own clock in which figures are drawn; it runs only while there is nothing to do."""
+
+
+def browser() -> str:
+    """Chromium's program on PATH.
+
+    Raises:
+        WorkError: If there is none; names the package.
+    """
+    found = next((path for path in map(shutil.which, BROWSERS) if path), None)
+    if found is None:
+        raise WorkError(
+            "Chromium was not found on PATH",
+            rule=f"A PDF is printed by one of {', '.join(BROWSERS)}",
+            way_out='Install the package "chromium" (apt install chromium), or write report.html and print '
+            "it from any browser",
+        )
+    return found
+
+
+def write_pdf(html: str, path: Path) -> None:
+    """Print a page to a PDF, completely or not at all.
+
+    Raises:
+        WorkError: If there is no Chromium, or it fails; says what it said.
+    """
+    program = browser()
+    with tempfile.TemporaryDirectory(prefix="truearm-") as folder:
+        source, target = Path(folder) / "page.html", Path(folder) / "page.pdf"
+        source.write_text(html, encoding="utf-8")
+        said = run_browser(
+            program, folder, ["--no-pdf-header-footer", f"--print-to-pdf={target}", source.as_uri()]
+        )
+        if not target.exists():
+            raise WorkError("Chromium printed nothing", where=program, rule=said.strip()[-500:])
+        write_whole(path, target.read_bytes())
+
+
+def run_browser(program: str, folder: str, arguments: list[str]) -> str:
+    """Run Chromium without a window on a page that draws figures; what it said.
+
+    Raises:
+        WorkError: If it takes minutes.
+    """
+    command = [
+        program,
+        "--headless",
+        "--disable-gpu",
+        "--enable-unsafe-swiftshader",
+        "--no-first-run",
+        "--hide-scrollbars",
+        f"--user-data-dir={folder}/profile",
+        f"--virtual-time-budget={DRAWING_MS}",
+        *(["--no-sandbox"] if os.geteuid() == 0 else []),
+        *arguments,
+    ]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)  # noqa: S603
+    except subprocess.TimeoutExpired:
+        raise WorkError(
+            f"Chromium took longer than {PATIENCE_S} s",
+            where=program,
+            way_out="Write report.html and print it from a browser",
+        ) from None
+    return done.stderr

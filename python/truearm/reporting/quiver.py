@@ -1,0 +1,118 @@
+"""Figure: the errors as arrows in space with the arm drawn, before and after."""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.held_rows import HeldRows
+from truearm.models import CONSTANT, NOMINAL
+from truearm.reporting.arm_drawing import arm_traces
+from truearm.reporting.facts import Facts
+from truearm.reporting.held_errors import vectors_mm
+from truearm.reporting.numbers import fixed, lean, short
+from truearm.reporting.parts import Choice, Figure
+from truearm.reporting.style import colour_of
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+MOST_ARROWS: Final = 400
+SHARE_OF_REACH: Final = 0.12
+"""Length of a large nominal error in parts of the workspace."""
+LONGER: Final = 10
+ROUND: Final = (1, 2, 5)
+CAMERA: Final = {"eye": {"x": 1.35, "y": -1.35, "z": 0.75}}
+
+
+def quiver(facts: Facts) -> Figure | None:
+    """Arrows from where the nominal model has the point to where a model misses it, much longer than true."""
+    held = facts.held
+    if held is None:
+        return None
+    robot = facts.calibration.robot
+    flange = robot.flange_chain.pose(robot.joints_from_readings(held.readings))
+    places = MM_PER_METRE * (flange[:, :3, :3] @ facts.point + flange[:, :3, 3])
+    seen = np.flatnonzero(np.isfinite(held.errors[NOMINAL].position).all(axis=1))[:MOST_ARROWS]
+    scale = _scale(places[seen], vectors_mm(held, NOMINAL)[seen])
+    traces = arm_traces(robot, facts.typical, facts.point)
+    labels = []
+    states = _states(facts)
+    for label, model, times in states:
+        traces.append(_arrows(held, model, places, seen, scale * times))
+        labels.append(f"{label}, {scale * times}:1")
+    fixed_traces = len(traces) - len(states)
+    shown = [[True] * fixed_traces + [j == k for j in range(len(states))] for k in range(len(states))]
+    return Figure(
+        f"Errors in space, {scale} times longer than they are",
+        _says(facts, held),
+        traces,
+        {
+            "scene": {
+                **{f"{name}axis": {"title": {"text": f"{name}, mm"}} for name in "xyz"},
+                "camera": CAMERA,
+            },
+            "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        },
+        height=520,
+        is_wide=True,
+        choices=[Choice(label, which) for label, which in zip(labels, shown, strict=True)],
+    )
+
+
+def _states(facts: Facts) -> list[tuple[str, str, int]]:
+    """Label, model and magnification of each state; before and after come first."""
+    best = facts.best
+    states = [("before: nominal", NOMINAL, 1), (f"after: {best}", best, 1)]
+    states += [("constant", CONSTANT, 1)] if best != CONSTANT else []
+    return [*states, (f"after: {best}", best, LONGER)]
+
+
+def _scale(places: Floats, vectors: Floats) -> int:
+    """A round magnification that makes large nominal errors an eighth of the workspace."""
+    reach = float(np.ptp(places, axis=0).max())
+    large = float(np.quantile(np.linalg.norm(vectors, axis=1), 0.9))
+    wanted = SHARE_OF_REACH * reach / max(large, 1e-9)
+    known = [mantissa * 10**power for power in range(7) for mantissa in ROUND]
+    return min(known, key=lambda value: abs(np.log(value / wanted)))
+
+
+def _arrows(
+    held: HeldRows, model: str, places: Floats, seen: NDArray[np.int64], scale: int
+) -> dict[str, Any]:
+    """Line pieces with a dot at their heads."""
+    vectors = vectors_mm(held, model)[seen]
+    tails, heads = places[seen], places[seen] + scale * vectors
+    gaps = np.full_like(tails, np.nan)
+    pieces = np.stack([tails, heads, gaps], axis=1).reshape(-1, 3)
+    lengths = np.linalg.norm(vectors, axis=1)
+    words = [f"row {row}: {fixed(length)} mm" for row, length in zip(held.rows[seen], lengths, strict=True)]
+    return {
+        "type": "scatter3d",
+        "name": model,
+        "mode": "lines+markers",
+        **{name: lean(pieces[:, k]) for k, name in enumerate("xyz")},
+        "text": [text for word in words for text in (word, word, "")],
+        "hoverinfo": "text",
+        "line": {"color": colour_of(model), "width": 3},
+        "marker": {"color": colour_of(model), "size": [0, 3.5, 0] * len(seen), "line": {"width": 0}},
+    }
+
+
+def _says(facts: Facts, held: HeldRows) -> str:
+    """Whether the errors point one way, before and after."""
+    common = []
+    for model in (NOMINAL, facts.best):
+        vectors = vectors_mm(held, model)
+        vectors = vectors[np.isfinite(vectors).all(axis=1)]
+        mean = float(np.linalg.norm(vectors.mean(axis=0)))
+        common.append((mean, float(np.linalg.norm(vectors, axis=1).mean())))
+    (_, before), (mean, after) = common
+    texts = short(before, after, mean)
+    parts = (
+        f"Arrows are {texts[0]} mm long on average before and {texts[1]} mm after; averaged as vectors the "
+        f"latter leave {texts[2]} mm"
+    )
+    if mean < 0.3 * after:
+        return f"{parts}, so they point in all directions. The arm is drawn in a pose near the middle of all."
+    return f"{parts}, so they share a direction. The arm is drawn in a pose near the middle of all."

@@ -1,0 +1,82 @@
+"""Figure: the tree of regions, coloured by what their parameters do."""
+
+from typing import Final
+
+import numpy as np
+
+from truearm.reporting.charts import colour_bar
+from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import count_of, lean, short
+from truearm.reporting.parameters import effect_mm
+from truearm.reporting.parts import Figure
+from truearm.reporting.style import SEQUENTIAL
+from truearm.schemes import RegionalCeps
+
+MOST: Final = 600
+"""Regions that are drawn; deeper ones are left out."""
+
+
+def region_tree(facts: Facts) -> Figure | None:
+    """Which region is half of which, how large and how different it is; None where there is no tree."""
+    scheme = facts.calibration.model.scheme
+    if not isinstance(scheme, RegionalCeps):
+        return None
+    tree = scheme.regions
+    levers = effect_mm(facts)[list(scheme.columns)]
+    moved = np.sqrt(np.square(scheme.ceps * levers).sum(axis=1))
+    volume = np.prod(tree.high - tree.low, axis=1)
+    drawn = [k for k in range(tree.count) if k < MOST]
+    held = _rows_in(facts, scheme)
+    trace = {
+        "type": "icicle",
+        "ids": [str(k) for k in drawn],
+        "parents": ["" if tree.parents[k] < 0 else str(tree.parents[k]) for k in drawn],
+        "labels": ["all" if k == 0 else _label(facts, scheme, k) for k in drawn],
+        "values": lean(volume[drawn] / volume[0], 6),
+        "branchvalues": "total",
+        "text": [f"{short(float(moved[k]))[0]} mm, {count_of(int(held[k]), 'row')}" for k in drawn],
+        "hoverinfo": "label+text",
+        "marker": {"colors": lean(moved[drawn]), "colorscale": SEQUENTIAL, "colorbar": colour_bar("mm")},
+        "tiling": {"orientation": "v"},
+    }
+    leaves = tree.leaves
+    worst = int(leaves[int(np.nanargmax(moved[leaves]))])
+    depth = int(tree.depths[leaves].max())
+    place = _label(facts, scheme, worst)
+    return Figure(
+        "The regions",
+        f"{count_of(len(leaves), 'region')} in up to {count_of(depth, 'halving')}. Their parameters move "
+        "the measured "
+        f"point by {short(float(np.nanmedian(moved[leaves])))[0]} mm in the median and most, "
+        f"{short(float(moved[worst]))[0]} mm, with {place}.",
+        [trace],
+        {"margin": {"l": 4, "r": 4, "t": 4, "b": 4}},
+        height=420,
+        is_wide=True,
+    )
+
+
+def _label(facts: Facts, scheme: RegionalCeps, k: int) -> str:
+    """Ranges of the region in the joints that its whole was halved along."""
+    tree, parts = scheme.regions, []
+    for axis, joint in enumerate(scheme.inputs):
+        if tree.low[k, axis] > tree.low[0, axis] or tree.high[k, axis] < tree.high[0, axis]:
+            ends = np.zeros((2, len(facts.joints)))
+            ends[:, joint] = tree.low[k, axis], tree.high[k, axis]
+            low, high = facts.shown(ends)[:, joint]
+            parts.append(f"joint {joint + 1} {low:.0f} to {high:.0f} {facts.unit(joint)}")
+    return ", ".join(parts) or "all"
+
+
+def _rows_in(facts: Facts, scheme: RegionalCeps) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+    """Measured rows in each region of any size (nodes,)."""
+    tree = scheme.regions
+    counts = np.zeros(tree.count, dtype=np.int64)
+    if facts.readings is None:
+        return counts
+    inputs = facts.inputs(facts.readings)[:, list(scheme.inputs)]
+    leaf = tree.find(np.ascontiguousarray(inputs))
+    np.add.at(counts, leaf, 1)
+    for k in range(tree.count - 1, 0, -1):
+        counts[tree.parents[k]] += counts[k]
+    return counts

@@ -1,0 +1,173 @@
+"""Chapter: repeatability, hysteresis and noise floor, where poses were measured more than once."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.reporting.charts import axis
+from truearm.reporting.facts import Facts
+from truearm.reporting.floor import distance_at_floor_mm
+from truearm.reporting.numbers import count_of, fixed, lean, short
+from truearm.reporting.parts import Figure, Part, Section, Table, Text
+from truearm.simulation import approach_in_sequence
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SAME_READING: Final = 1e-6
+"""Readings that differ by less, rad or m, are one pose: a micrometre at a metre."""
+FEWEST_GROUPS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Repeats:
+    """Rows in their order of measuring, with the pose that each belongs to.
+
+    Attributes:
+        place: Number of the pose (n,); rows of one set-up with equal readings share it.
+        missed: Measured minus predicted (n, 3), m; what is predicted is the same within a pose.
+        approach: Sign of each joint's last movement (n, N).
+    """
+
+    place: Index
+    missed: Floats
+    approach: Floats
+
+    @classmethod
+    def of(cls, facts: Facts) -> "Repeats | None":
+        """Those of the rows that were fitted, judged points that were measured; None where there are none."""
+        rows, selection = facts.calibration.rows, facts.calibration.selection
+        if rows is None or selection.distances:
+            return None
+        data = rows.data
+        seen = np.flatnonzero(np.isfinite(data.targets[:, selection.targets[0]]).all(axis=1))
+        order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
+        approach = np.zeros((len(order), data.joint_count))
+        for source in data.files:
+            mine = data.sources[order] == source
+            approach[mine] = approach_in_sequence(data.readings[order][mine])
+        rounded = np.round(data.readings[order] / SAME_READING)
+        _, group = np.unique(data.group[order], return_inverse=True)
+        _, place = np.unique(np.column_stack([group, rounded]), axis=0, return_inverse=True)
+        again = np.bincount(place)[place] > 1
+        if not again.any():
+            return None
+        return cls(place[again], rows.residual[order][again, :3], approach[again])
+
+    def distances_mm(self) -> Floats:
+        """Distance of each row from the centre of its pose (n,), mm, as unbiased as n rows a pose allow."""
+        found = np.empty(len(self.place))
+        for mine in self.poses():
+            left = self.missed[mine] - self.missed[mine].mean(axis=0)
+            found[mine] = np.linalg.norm(left, axis=1) * np.sqrt(len(mine) / (len(mine) - 1))
+        return MM_PER_METRE * found
+
+    def poses(self) -> Iterator[Index]:
+        """Rows of each pose."""
+        for place in np.unique(self.place):
+            yield np.flatnonzero(self.place == place)
+
+    def both_sides_mm(self, joint: int) -> tuple[Floats, Floats]:
+        """For each pose that a joint reached from both sides: how far the two means lie apart, and what the
+        scatter within the sides would make of it, mm.
+        """
+        apart, scatter = [], []
+        for mine in self.poses():
+            sides = [self.missed[mine[self.approach[mine, joint] == sign]] for sign in (-1.0, 1.0)]
+            if min(map(len, sides)) == 0:
+                continue
+            apart.append(np.linalg.norm(sides[1].mean(axis=0) - sides[0].mean(axis=0)))
+            freedom = sum(len(side) - 1 for side in sides)
+            squares = sum(float(np.square(side - side.mean(axis=0)).sum()) for side in sides)
+            alone = squares / freedom * sum(1.0 / len(side) for side in sides) if freedom else np.nan
+            scatter.append(np.sqrt(alone))
+        return MM_PER_METRE * np.array(apart), MM_PER_METRE * np.array(scatter)
+
+
+def repeats(facts: Facts) -> Section:
+    """What repeated poses say."""
+    title = "Repeatability and noise"
+    floor, noise = short(distance_at_floor_mm(facts), facts.summary["noise_mm"])
+    parts: list[Part] = [
+        Text(
+            f"What no model explains deviates by {noise} mm in each coordinate; alone it would make a mean "
+            "error of "
+            f"{floor} mm. That is the instrument, what the arm does not repeat, and what the model cannot "
+            "follow."
+        )
+    ]
+    found = Repeats.of(facts)
+    if found is None:
+        parts.append(Text(_nothing(facts)))
+    else:
+        parts += [scatter(facts, found), *hysteresis(facts, found)]
+    return Section(title, parts)
+
+
+def _nothing(facts: Facts) -> str:
+    if facts.calibration.rows is None:
+        return "The measurements were left out of this file, so that repeated poses cannot be looked at."
+    return (
+        "No pose was measured twice, so repeatability and hysteresis cannot be told from this data. Some "
+        "poses "
+        "measured several times, and from both sides, would tell them."
+    )
+
+
+def scatter(facts: Facts, found: Repeats) -> Figure:
+    """How far repeated measurements lie from their centres."""
+    distances = found.distances_mm()
+    mean, spread = float(distances.mean()), float(distances.std(ddof=1)) if len(distances) > 1 else 0.0
+    error = facts.calibration.validation.holdout[facts.best].position.mean
+    texts = short(mean, mean + 3.0 * spread)
+    poses = len(np.unique(found.place))
+    trace = {
+        "type": "histogram",
+        "x": lean(distances),
+        "nbinsx": 40,
+        "marker": {"color": "@variable"},
+    }
+    return Figure(
+        "How well poses repeat",
+        f"{len(distances)} measurements of {count_of(poses, 'pose')} lie {texts[0]} mm from their centres "
+        "on average; "
+        f"mean and three standard deviations make {texts[1]} mm. The mean error of unseen poses is "
+        f"{error / mean:.1f} times that scatter.",
+        [trace],
+        {
+            "xaxis": axis("distance from the centre of the pose, mm", rangemode="tozero"),
+            "yaxis": axis("measurements"),
+            "bargap": 0.05,
+        },
+        height=280,
+    )
+
+
+def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
+    """How far poses lie apart that a joint reached from both sides, in the order of the rows."""
+    rows = []
+    for joint in range(len(facts.joints)):
+        apart, scatter_alone = found.both_sides_mm(joint)
+        if len(apart) < FEWEST_GROUPS:
+            continue
+        known = scatter_alone[np.isfinite(scatter_alone)]
+        alone = fixed(float(np.sqrt(np.square(known).mean()))) if len(known) else ""
+        rows.append(
+            [f"joint {joint + 1}", str(len(apart)), fixed(float(np.sqrt(np.square(apart).mean()))), alone]
+        )
+    if not rows:
+        return []
+    largest = max(rows, key=lambda row: float(row[2]))
+    table = Table(
+        "Reached from both sides",
+        ["", "poses", "sides apart, mm", "scatter alone, mm"],
+        rows,
+        says=f"{largest[0].capitalize()} shows most: {largest[2]} mm (root mean square). Rows are taken in "
+        "the order "
+        "of the file as the order of measuring.",
+    )
+    return [table]

@@ -1,0 +1,99 @@
+"""The report of a calibration: what its chapters are, and the page."""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from truearm.calibration import Calibration
+from truearm.evaluation import Evaluation
+from truearm.fitting import Stages, no_stages
+from truearm.reporting.advice import Advice, advise
+from truearm.reporting.corrections import compensation
+from truearm.reporting.facts import Facts
+from truearm.reporting.held_errors import held_errors
+from truearm.reporting.other_data import other_data
+from truearm.reporting.page import page
+from truearm.reporting.parameters import parameters
+from truearm.reporting.parts import Figure, Section
+from truearm.reporting.provenance import provenance
+from truearm.reporting.quiver import quiver
+from truearm.reporting.repeats import repeats
+from truearm.reporting.trust import trust
+from truearm.reporting.varying import varying
+from truearm.reporting.verdict import head, verdict
+
+CHAPTERS: Final = (
+    held_errors,
+    other_data,
+    parameters,
+    varying,
+    trust,
+    repeats,
+    compensation,
+    provenance,
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report.
+
+    Attributes:
+        html: The page.
+        verdict: Its first sentence.
+        advice: What would help most next.
+        figures: Title and sentence of each figure.
+    """
+
+    html: str
+    verdict: str
+    advice: tuple[Advice, ...]
+    figures: tuple[tuple[str, str], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values of all but the page."""
+        return {
+            "verdict": self.verdict,
+            "advice": [
+                {"kind": advice.kind, "words": f"{advice.name} {advice.words}"} for advice in self.advice
+            ],
+            "figures": [{"title": title, "says": says} for title, says in self.figures],
+        }
+
+
+def report(
+    calibration: Calibration,
+    other: Evaluation | None = None,
+    *,
+    other_names: tuple[str, ...] = (),
+    stages: Stages = no_stages,
+) -> Report:
+    """The report of a calibration, one HTML page that needs nothing else.
+
+    Args:
+        calibration: What to report.
+        other: Its errors on other measurements, which get a chapter of their own.
+        other_names: Names of these.
+        stages: Told what is being done.
+    """
+    facts = Facts(calibration, other, other_names)
+    with stages("deciding what would help"):
+        advice = tuple(advise(facts))
+    sections: list[Section] = []
+    for chapter in CHAPTERS:
+        with stages(f"writing the report: {chapter.__name__.replace('_', ' ')}"):
+            sections.append(chapter(facts))
+    sections[0] = _with_quiver(sections[0], facts)
+    with stages("writing the report: page"):
+        first = head(facts, [(entry.name, entry.words) for entry in advice])
+        html = page(first, sections, foot=f"Made by truearm {calibration.version}.")
+    figures = [part for section in sections for part in section.parts if isinstance(part, Figure)]
+    return Report(html, verdict(facts), advice, tuple((figure.title, figure.says) for figure in figures))
+
+
+def _with_quiver(section: Section, facts: Facts) -> Section:
+    """The chapter of errors with arrows in space behind its distributions."""
+    figure = quiver(facts)
+    if figure is None:
+        return section
+    parts = list(section.parts)
+    return Section(section.title, [*parts[:2], figure, *parts[2:]])

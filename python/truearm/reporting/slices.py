@@ -1,0 +1,131 @@
+"""Figures: slices of the `major` block, where parameters vary over several joints together."""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Field
+from truearm.reporting.charts import axis, heatmap
+from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import fixed
+from truearm.reporting.parameters import effect_mm
+from truearm.reporting.parts import Choice, Figure
+from truearm.reporting.style import DIVERGING
+
+Floats = NDArray[np.float64]
+
+BLOCK: Final = "major"
+GRID: Final = 28
+SLICES: Final = 3
+PARAMETERS: Final = 2
+
+
+def slices(facts: Facts) -> list[Figure]:
+    """The block over its first two joints at three places of its third, and its largest parameters."""
+    field = facts.calibration.model.field
+    blocks = [] if field is None else [block for block in field.blocks() if block["name"] == BLOCK]
+    joints = len(facts.joints)
+    if field is None or not blocks or len(blocks[0]["inputs"]) < 2 or max(blocks[0]["inputs"]) >= joints:
+        return []
+    alone = Field(field.input_count, field.parameter_count, blocks)
+    cut = Cut(facts, alone, blocks[0])
+    order = np.argsort(-cut.effects.max(axis=0))[:PARAMETERS]
+    return [cut.moved(), *(cut.parameter(int(column)) for column in order)]
+
+
+class Cut:
+    """A block on a grid over its first two inputs, at three places of its third."""
+
+    def __init__(self, facts: Facts, alone: Field, block: dict[str, Any]) -> None:
+        """Ask the block alone."""
+        self.facts, self.inputs = facts, list(block["inputs"])
+        first, second = self.inputs[:2]
+        self.axes = [np.linspace(*facts.span[joint], GRID) for joint in (first, second)]
+        self.places = self._places()
+        self.values = np.stack([self._ask(alone, place) for place in self.places])
+        self.effects = np.abs(self.values).max(axis=(1, 2)) * effect_mm(facts)
+
+    def _places(self) -> list[float | None]:
+        if len(self.inputs) < SLICES:
+            return [None]
+        low, high = self.facts.span[self.inputs[2]]
+        return [float(low + share * (high - low)) for share in (1 / 6, 1 / 2, 5 / 6)]
+
+    def _ask(self, alone: Field, place: float | None) -> Floats:
+        """Corrections (G, G, 5 L), second input along the first axis."""
+        q = np.repeat(self.facts.typical[None], GRID * GRID, axis=0)
+        first, second = np.meshgrid(*self.axes)
+        q[:, self.inputs[0]], q[:, self.inputs[1]] = first.ravel(), second.ravel()
+        if place is not None:
+            q[:, self.inputs[2]] = place
+        table = np.zeros_like(self.facts.calibration.arm.table)
+        found = alone.parameters(np.ascontiguousarray(self.facts.inputs(q)), table)
+        return np.asarray(found.reshape(GRID, GRID, -1))
+
+    def moved(self) -> Figure:
+        """Root of the sum of squares of what all parameters do to the judged point."""
+        z = np.sqrt(np.square(self.values * effect_mm(self.facts)).sum(axis=-1))
+        names = ", ".join(f"{joint + 1}" for joint in self.inputs)
+        return self._figure(
+            f"What varies with joints {names} together, all parameters",
+            z,
+            "mm",
+            f"It moves the measured point by up to {fixed(float(z.max()))} mm, "
+            f"{fixed(float(np.median(z)))} mm in the "
+            "median of these slices (root of the sum of squares over the parameters).",
+            {"zmin": 0, "zmax": float(f"{z.max():.4g}")},
+        )
+
+    def parameter(self, column: int) -> Figure:
+        """One parameter, as it moves the judged point."""
+        candidates = self.facts.calibration.arm.candidates
+        name = candidates.names[candidates.columns.index(column)]
+        z = self.values[..., column] * effect_mm(self.facts)[column]
+        top = float(f"{np.abs(z).max():.4g}")
+        return self._figure(
+            f"{name} over the same slices",
+            z,
+            "mm",
+            f"As it moves the measured point: between {fixed(float(z.min()))} and {fixed(float(z.max()))} "
+            "mm.",
+            {"zmin": -top, "zmax": top, "colorscale": DIVERGING},
+        )
+
+    def _figure(self, title: str, z: Floats, bar: str, says: str, colours: dict[str, Any]) -> Figure:
+        first, second = self.inputs[:2]
+        shown = [self._shown(joint, ends) for joint, ends in zip((first, second), self.axes, strict=True)]
+        traces = [
+            heatmap(shown[0], shown[1], values, bar, visible=k == len(z) // 2) | colours
+            for k, values in enumerate(z)
+        ]
+        return Figure(
+            title,
+            says,
+            traces,
+            {
+                "xaxis": axis(f"joint {first + 1}, {self.facts.unit(first)}"),
+                "yaxis": axis(f"joint {second + 1}, {self.facts.unit(second)}"),
+            },
+            height=330,
+            choices=self._choices(len(z)),
+        )
+
+    def _choices(self, count: int) -> list[Choice]:
+        if count == 1:
+            return []
+        third = self.inputs[2]
+        labels = self._shown(third, np.array(self.places, dtype=np.float64))
+        order = [1, 0, 2]
+        return [
+            Choice(
+                f"joint {third + 1} at {labels[k]:.0f} {self.facts.unit(third)}",
+                [j == k for j in range(count)],
+            )
+            for k in order
+        ]
+
+    def _shown(self, joint: int, values: Floats) -> Floats:
+        readings = np.zeros((len(values), len(self.facts.joints)))
+        readings[:, joint] = values
+        return self.facts.shown(readings)[:, joint]
