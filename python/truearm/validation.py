@@ -168,8 +168,13 @@ def row_errors(
             where=", ".join(data.files),
             way_out="Judge at another target, or measure it at more poses",
         )
-    position = np.where(seen[:, None], left[:, :3], np.nan)
+    position = _where_seen(np.asarray(seen), left[:, :3])
     if not selection.orientation or data.orientations is None:
         return RowErrors(position)
     turned = np.isfinite(data.orientations).all(axis=1)
-    return RowErrors(position, np.where(turned[:, None], left[:, -3:], np.nan))
+    return RowErrors(position, _where_seen(np.asarray(turned), left[:, -3:]))
+
+
+def _where_seen(seen: NDArray[np.bool_], errors: Floats) -> Floats:
+    """Errors (n, 3), NaN in rows that were not seen."""
+    return np.asarray(np.where(seen[:, None], errors, np.nan))

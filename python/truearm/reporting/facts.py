@@ -119,19 +119,25 @@ class Facts:
     @cached_property
     def typical(self) -> Floats:
         """A usual pose (N,): the row nearest to the middle of all, or the middle of the joints' ranges."""
-        middle = self.span.mean(axis=1)
+        middle = np.asarray(self.span.mean(axis=1))
         if self.readings is None:
             return middle
         centre = np.median(self.readings, axis=0)
         width = np.maximum(np.ptp(self.readings, axis=0), 1e-9)
-        return self.readings[np.argmin(np.square((self.readings - centre) / width).sum(axis=1))]
+        return np.asarray(self.readings[np.argmin(np.square((self.readings - centre) / width).sum(axis=1))])
+
+    def places(self, joint: int, count: int, *, reachable: bool = False) -> Floats:
+        """Readings of one joint (count,) from end to end of its usual range, or of all that it reaches."""
+        low, high = (self.reachable if reachable else self.span)[joint].tolist()
+        return np.linspace(low, high, count)
 
     def drawn(self, count: int) -> Floats:
         """Some poses (m, N) that stand for all: rows, or drawn within the joints' ranges."""
         if self.readings is not None:
-            return self.readings[:count]
+            return np.asarray(self.readings[:count])
         low, high = self.span.T
-        return np.random.default_rng(DRAWN_FOR_TYPICAL).uniform(low, high, (count, len(low)))
+        drawn = np.random.default_rng(DRAWN_FOR_TYPICAL).uniform(low, high, (count, len(low)))
+        return np.asarray(drawn)
 
     def inputs(self, readings: Floats) -> Floats:
         """Inputs (n, I) of the field at readings (n, N)."""

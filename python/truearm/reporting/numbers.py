@@ -38,9 +38,9 @@ def fixed(value: float) -> str:
 
 
 def short(*values: float) -> list[str]:
-    """Numbers of a sentence, with as many decimals as the smallest needs for two digits, at most four."""
+    """Numbers of a sentence, with as many decimals as the smallest needs for two digits, at most three."""
     sizes = [abs(value) for value in values if value and np.isfinite(value)]
-    decimals = 2 if not sizes else int(np.clip(1 - np.floor(np.log10(min(sizes))), 0, 4))
+    decimals = 2 if not sizes else int(np.clip(1 - np.floor(np.log10(min(sizes))), 0, 3))
     return [f"{value:.{decimals}f}" for value in values]
 
 
@@ -61,7 +61,7 @@ def listed(words: Sequence[str]) -> str:
 
 def shown_readings(readings: Floats, joints: Sequence[str]) -> Floats:
     """Joint readings (n, N) in deg, and mm for prismatic joints."""
-    return readings / np.array([_per_unit(joint) for joint in joints])
+    return np.asarray(readings / np.array([_per_unit(joint) for joint in joints]))
 
 
 def unit_of(joint: str) -> str:

@@ -59,7 +59,8 @@ def table(facts: Facts) -> Table:
     nominal = calibration.arm.table.ravel()
     corrected = calibration.models[CONSTANT].constants.ravel()
     effects = effect_mm(facts)
-    rows, largest = [], ("", 0.0)
+    rows: list[list[str | Cell]] = []
+    largest = ("", 0.0)
     for k in candidates.constant:
         column, name = candidates.columns[k], candidates.names[k]
         unit = per_unit(column)

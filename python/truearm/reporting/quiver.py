@@ -73,8 +73,8 @@ def _scale(places: Floats, vectors: Floats) -> int:
     reach = float(np.ptp(places, axis=0).max())
     large = float(np.quantile(np.linalg.norm(vectors, axis=1), 0.9))
     wanted = SHARE_OF_REACH * reach / max(large, 1e-9)
-    known = [mantissa * 10**power for power in range(7) for mantissa in ROUND]
-    return min(known, key=lambda value: abs(np.log(value / wanted)))
+    known: list[int] = [mantissa * pow(10, power) for power in range(7) for mantissa in ROUND]
+    return min(known, key=lambda value: abs(float(np.log(value / wanted))))
 
 
 def _arrows(

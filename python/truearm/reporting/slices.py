@@ -41,7 +41,7 @@ class Cut:
         """Ask the block alone."""
         self.facts, self.inputs = facts, list(block["inputs"])
         first, second = self.inputs[:2]
-        self.axes = [np.linspace(*facts.span[joint], GRID) for joint in (first, second)]
+        self.axes = [facts.places(joint, GRID) for joint in (first, second)]
         self.places = self._places()
         self.values = np.stack([self._ask(alone, place) for place in self.places])
         self.effects = np.abs(self.values).max(axis=(1, 2)) * effect_mm(facts)

@@ -37,7 +37,7 @@ class Sweep:
 def readings_along(facts: Facts, joint: int, steps: int, base: Floats | None = None) -> Floats:
     """Readings (s, N) that differ in one joint alone, from end to end of its usual range."""
     readings = np.repeat((facts.typical if base is None else base)[None], steps, axis=0)
-    readings[:, joint] = np.linspace(*facts.span[joint], steps)
+    readings[:, joint] = facts.places(joint, steps)
     return readings
 
 

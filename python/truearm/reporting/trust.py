@@ -127,7 +127,7 @@ def _most_telling(facts: Facts, values: Floats) -> list[int]:
 
 def pair_map(facts: Facts, pair: tuple[int, int], top: float) -> Figure:
     """The bound over two joints; the others as in some of the poses."""
-    axes = [np.linspace(*facts.reachable[joint], GRID) for joint in pair]
+    axes = [facts.places(joint, GRID, reachable=True) for joint in pair]
     first, second = (grid.ravel() for grid in np.meshgrid(*axes))
     total = np.zeros(len(first))
     others = facts.drawn(OTHERS)
