@@ -34,7 +34,7 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help setup demo test trials check check-capi bench docs site figures rust-test py-test clean
+.PHONY: help setup demo test trials check check-capi check-report bench docs site figures rust-test py-test clean
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
@@ -43,6 +43,7 @@ help:
 	@echo 'make trials the measurement cell killed and with faults, in full (TRIALS="-k kill")'
 	@echo 'make check  formatting, lint, types and layers'
 	@echo 'make check-capi  the C and C++ examples under sanitizers'
+	@echo 'make check-report  the report in headless Chromium and as PDF'
 	@echo 'make bench  speed against peers, with the ratio to reach beside each (BENCH=--write keeps them in docs/)'
 	@echo 'make figures  errors on public measurements, into docs/reference/results.md'
 	@echo 'make docs   write the generated pages of docs/reference again'
@@ -74,6 +75,13 @@ check: $(STAMPS)/built
 # Needs a C and a C++ compiler with address and undefined-behaviour sanitizers.
 check-capi: $(STAMPS)/tools
 	TRUEARM_SANITIZE=1 $(CARGO) test --locked -p truearm-capi --test examples
+
+# Installs Chromium where there is none and apt-get may install packages.
+check-report: $(STAMPS)/built
+	@command -v chromium >/dev/null || command -v google-chrome >/dev/null || { \
+	  command -v apt-get >/dev/null && apt-get install -y -qq chromium; } || { \
+	  echo 'The report is looked at in Chromium; install the package "chromium".' >&2; exit 1; }
+	TRUEARM_BROWSER=1 $(BIN)/python -m pytest tests/test_report_browser.py
 
 bench: $(STAMPS)/built $(STAMPS)/bench
 	$(BIN)/python -m benches $(BENCH)

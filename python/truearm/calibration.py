@@ -1,7 +1,7 @@
 """A calibration: an arm's identified parameters, what they predict, and how good that is."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -109,6 +109,11 @@ class Calibration:
         """The calibration of a file's content; `where` is named in errors, which are those of `load`."""
         arrays, content = parse_calibration(data, where)
         return cls(**calibration_content.unpack(arrays, content, where=where), file=data)
+
+    def without_rows(self) -> "Calibration":
+        """The same as a file without the measurements holds it, with the bounds of the standard deviation."""
+        bounds = self.conservative if self.has_conservative else None
+        return replace(self, rows=None, held=None, fitted_spread=None, stored_conservative=bounds)
 
     def save(self, path: str | Path, *, with_rows: bool = True) -> None:
         """Write a calibration file, completely or not at all.

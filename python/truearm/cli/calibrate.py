@@ -19,6 +19,7 @@ from truearm.cli.arguments import (
 from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import Stages, told_stages
+from truearm.cli.report import REPORT_NAME, make_report
 from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError
 from truearm.files import write_whole
@@ -114,7 +115,8 @@ def command(
 ) -> None:
     """Calibrate an arm and judge the calibration on poses that took no part in it.
 
-    Writes DIR/calibration.calib, fitted to all rows after the errors were judged, and DIR/summary.json.
+    Writes DIR/calibration.calib, fitted to all rows after the errors were judged, DIR/summary.json and
+    DIR/report.html, which opens in any browser.
 
     Examples:
       truearm calibrate ur10 measurements.csv -o result
@@ -159,8 +161,8 @@ def command(
     with ends_promptly():
         calibration = calibrate(arm, data, options, threads=threads, stages=stages)
         bound_std(calibration, stages)
+        summary = write_results(calibration, output, with_rows=not strip)
     warn(calibration.notices)
-    summary = write_results(calibration, output, with_rows=not strip)
     if as_json:
         print_json(summary)
         return
@@ -206,11 +208,12 @@ def bound_std(calibration: "Calibration", stages: Stages) -> None:
 
 
 def write_results(calibration: "Calibration", output: Path, *, with_rows: bool = True) -> dict[str, Any]:
-    """Write both files to a directory, which is made if needed; the content of summary.json."""
+    """Write all three files to a directory, which is made if needed; the content of summary.json."""
     summary = calibration.summary
     output.mkdir(parents=True, exist_ok=True)
     calibration.save(output / CALIBRATION_NAME, with_rows=with_rows)
     write_whole(output / SUMMARY_NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+    make_report(calibration if with_rows else calibration.without_rows(), output / REPORT_NAME)
     return summary
 
 
@@ -218,6 +221,7 @@ def print_places(output: Path) -> None:
     """Say where the files are."""
     say(f"Calibration: {output / CALIBRATION_NAME}")
     say(f"Summary:     {output / SUMMARY_NAME}")
+    say(f"Report:      {output / REPORT_NAME}")
 
 
 def print_results(calibration: "Calibration") -> None:

@@ -7,8 +7,8 @@ from typing import Final
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
+from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.numbers import count_of, listed, percent, short, shown_readings
-from truearm.reporting.trust import Stretch, weakest
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -37,13 +37,12 @@ class Advice:
     weight_mm: float
 
 
-def advise(facts: Facts) -> list[Advice]:
+def advise(facts: Facts, known: Known | None) -> list[Advice]:
     """What would help most, the most first, four at most."""
-    found = [
-        advice
-        for rule in (_outliers, _noise_or_poses, _where, _unseen, _few_held, _intervals, _what_varies)
-        for advice in rule(facts)
-    ]
+    rules = (_outliers, _noise_or_poses, _unseen, _few_held, _intervals, _what_varies)
+    found = [advice for rule in rules for advice in rule(facts)]
+    if known is not None:
+        found += _where(facts, known)
     return sorted(found, key=lambda advice: -advice.weight_mm)[:MOST]
 
 
@@ -67,7 +66,7 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
         "unsettled arm "
         "shows at once."
     )
-    yield Advice("outliers", "Look at the outliers.", words, share)
+    yield Advice("outliers", "Look at the outliers.", words, _mean_mm(facts) + share)
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
@@ -92,8 +91,8 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
 
-def _where(facts: Facts) -> Iterator[Advice]:
-    weak = weakest(facts)
+def _where(facts: Facts, known: Known) -> Iterator[Advice]:
+    weak = weakest(facts, known)
     if weak is None:
         return
     std, median = short(weak.std_mm, weak.median_mm)

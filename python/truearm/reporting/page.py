@@ -2,9 +2,10 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
-from truearm.reporting.parts import Figure, Head, Section
+from truearm.reporting.parts import Figure, Head, Part, Section
 from truearm.reporting.script import licence_notice, plotting_script
 from truearm.reporting.style import DARK, LAYOUT, LIGHT
 
@@ -47,12 +48,28 @@ def _number_figures(sections: Sequence[Section]) -> tuple[list[dict[str, Any]], 
     described = []
     for section in sections:
         parts = []
-        for part in section.parts:
+        for part in _without_gaps(section.parts):
             parts.append({"kind": type(part).__name__.lower(), "part": part, "number": len(figures)})
             if isinstance(part, Figure):
                 figures.append(_content(part))
         described.append({"title": section.title, "parts": parts})
     return described, figures
+
+
+def _without_gaps(parts: Sequence[Part]) -> list[Part]:
+    """The same parts, where a figure that would stand alone in its row takes the row."""
+    filled, in_row = list(parts), 0
+    for k, part in enumerate(parts):
+        is_half = isinstance(part, Figure) and not part.is_wide
+        in_row = (in_row + 1) % 2 if is_half else 0
+        follower = parts[k + 1] if k + 1 < len(parts) else None
+        if (
+            in_row == 1
+            and isinstance(part, Figure)
+            and (not isinstance(follower, Figure) or follower.is_wide)
+        ):
+            filled[k] = replace(part, is_wide=True)
+    return filled
 
 
 def _content(figure: Figure) -> dict[str, Any]:

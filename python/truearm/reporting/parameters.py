@@ -9,7 +9,7 @@ from truearm.models import CONSTANT
 from truearm.parameters import KIND_COUNT, KINDS
 from truearm.reporting.charts import colour_bar
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import lean
+from truearm.reporting.numbers import count_of, lean
 from truearm.reporting.parts import Cell, Figure, Part, Section, Table, Text
 from truearm.reporting.style import DIVERGING
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
@@ -128,7 +128,11 @@ def confounding(facts: Facts) -> Figure | None:
     row, column = np.unravel_index(int(np.argmax(np.abs(off))), off.shape)
     strong = int((np.abs(np.triu(off)) > CONFOUNDED).sum())
     pair = f"{names[row]} and {names[column]} go together most: correlation {off[row, column]:+.2f}"
-    pairs = "pair is" if strong == 1 else "pairs are"
+    others = (
+        f"No pair is beyond {CONFOUNDED}."
+        if strong == 0
+        else f"{count_of(strong, 'pair')} beyond {CONFOUNDED}: their sum or difference is known far better."
+    )
     trace = {
         "type": "heatmap",
         "x": names,
@@ -141,8 +145,7 @@ def confounding(facts: Facts) -> Figure | None:
     }
     return Figure(
         "What is confounded with what",
-        f"{pair}. {strong} {pairs} beyond {CONFOUNDED}: of these, sum or difference is known far better than "
-        "each alone.",
+        f"{pair}. {others}",
         [trace],
         {
             "xaxis": {"title": {"text": "parameter"}, "tickangle": -60},

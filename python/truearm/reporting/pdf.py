@@ -64,7 +64,21 @@ def run_browser(program: str, folder: str, arguments: list[str]) -> str:
     Raises:
         WorkError: If it takes minutes.
     """
-    command = [
+    command = browser_command(program, folder, arguments)
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)  # noqa: S603
+    except subprocess.TimeoutExpired:
+        raise WorkError(
+            f"Chromium took longer than {PATIENCE_S} s",
+            where=program,
+            way_out="Write report.html and print it from a browser",
+        ) from None
+    return done.stderr
+
+
+def browser_command(program: str, folder: str, arguments: list[str]) -> list[str]:
+    """Words that run Chromium without a window, with a profile of its own in a folder."""
+    return [
         program,
         "--headless",
         "--disable-gpu",
@@ -76,12 +90,3 @@ def run_browser(program: str, folder: str, arguments: list[str]) -> str:
         *(["--no-sandbox"] if os.geteuid() == 0 else []),
         *arguments,
     ]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)  # noqa: S603
-    except subprocess.TimeoutExpired:
-        raise WorkError(
-            f"Chromium took longer than {PATIENCE_S} s",
-            where=program,
-            way_out="Write report.html and print it from a browser",
-        ) from None
-    return done.stderr

@@ -22,7 +22,7 @@ SHARE_OF_REACH: Final = 0.12
 """Length of a large nominal error in parts of the workspace."""
 LONGER: Final = 10
 ROUND: Final = (1, 2, 5)
-CAMERA: Final = {"eye": {"x": 1.35, "y": -1.35, "z": 0.75}}
+CAMERA: Final = {"eye": {"x": 1.0, "y": -1.15, "z": 0.55}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
 
 
 def quiver(facts: Facts) -> Figure | None:

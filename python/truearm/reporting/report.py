@@ -1,7 +1,8 @@
 """The report of a calibration: what its chapters are, and the page."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from truearm.calibration import Calibration
 from truearm.evaluation import Evaluation
@@ -10,6 +11,7 @@ from truearm.reporting.advice import Advice, advise
 from truearm.reporting.corrections import compensation
 from truearm.reporting.facts import Facts
 from truearm.reporting.held_errors import held_errors
+from truearm.reporting.known import Known, known
 from truearm.reporting.other_data import other_data
 from truearm.reporting.page import page
 from truearm.reporting.parameters import parameters
@@ -21,16 +23,7 @@ from truearm.reporting.trust import trust
 from truearm.reporting.varying import varying
 from truearm.reporting.verdict import head, verdict
 
-CHAPTERS: Final = (
-    held_errors,
-    other_data,
-    parameters,
-    varying,
-    trust,
-    repeats,
-    compensation,
-    provenance,
-)
+Chapter = tuple[str, Callable[[Facts], Section]]
 
 
 @dataclass(frozen=True)
@@ -76,13 +69,13 @@ def report(
         stages: Told what is being done.
     """
     facts = Facts(calibration, other, other_names)
-    with stages("deciding what would help"):
-        advice = tuple(advise(facts))
+    with stages("working out standard deviations"):
+        certain = known(facts)
+    advice = tuple(advise(facts, certain))
     sections: list[Section] = []
-    for chapter in CHAPTERS:
-        with stages(f"writing the report: {chapter.__name__.replace('_', ' ')}"):
+    for name, chapter in _chapters(certain):
+        with stages(f"writing the report: {name}"):
             sections.append(chapter(facts))
-    sections[0] = _with_quiver(sections[0], facts)
     with stages("writing the report: page"):
         first = head(facts, [(entry.name, entry.words) for entry in advice])
         html = page(first, sections, foot=f"Made by truearm {calibration.version}.")
@@ -90,9 +83,23 @@ def report(
     return Report(html, verdict(facts), advice, tuple((figure.title, figure.says) for figure in figures))
 
 
-def _with_quiver(section: Section, facts: Facts) -> Section:
+def _chapters(certain: Known | None) -> list[Chapter]:
+    """What each chapter is about and what makes it, in their order."""
+    return [
+        ("errors", _errors),
+        ("other measurements", other_data),
+        ("parameters", parameters),
+        ("what varies", varying),
+        ("where to trust it", lambda facts: trust(facts, certain)),
+        ("repeated poses", repeats),
+        ("compensation", compensation),
+        ("provenance", provenance),
+    ]
+
+
+def _errors(facts: Facts) -> Section:
     """The chapter of errors with arrows in space behind its distributions."""
-    figure = quiver(facts)
+    section, figure = held_errors(facts), quiver(facts)
     if figure is None:
         return section
     parts = list(section.parts)

@@ -96,7 +96,7 @@ class Cut:
         first, second = self.inputs[:2]
         shown = [self._shown(joint, ends) for joint, ends in zip((first, second), self.axes, strict=True)]
         traces = [
-            heatmap(shown[0], shown[1], values, bar, visible=k == len(z) // 2) | colours
+            heatmap(shown[0], shown[1], values, bar, visible=k == len(z) // 2, zsmooth="best") | colours
             for k, values in enumerate(z)
         ]
         return Figure(

@@ -58,6 +58,7 @@ _AXIS: Final = {
     "tickfont": {"color": "@muted"},
     "title": {"font": {"color": "@ink", "size": 12}, "standoff": 8},
     "automargin": True,
+    "exponentformat": "none",
     "ticks": "outside",
     "tickcolor": "@grid",
 }
@@ -79,6 +80,7 @@ LAYOUT: Final[Layout] = {
     "scene": {"xaxis": _SCENE_AXIS, "yaxis": _SCENE_AXIS, "zaxis": _SCENE_AXIS, "aspectmode": "data"},
     "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0, "font": {"color": "@ink"}},
     "hoverlabel": {"bgcolor": "@paper", "font": {"color": "@ink"}},
+    "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "@muted", "activecolor": "@ink"},
     "showlegend": False,
 }
 

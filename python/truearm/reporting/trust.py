@@ -1,205 +1,120 @@
-"""Chapter: where to trust it: bounds of the standard deviation and the data, over joints and workspace."""
+"""Chapter: where to trust it: the standard deviation and the data, over joints and workspace."""
 
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.reporting.charts import axis, data_points, heatmap
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, percent, short
-from truearm.reporting.parts import Figure, Section, Text
+from truearm.reporting.known import STRETCHES, Known, means_along
+from truearm.reporting.numbers import percent, short
+from truearm.reporting.parts import Figure, Part, Section, Text
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
-CONFIGURATIONS: Final = 6000
-GRID: Final = 24
-OTHERS: Final = 6
-"""Poses that give the joints which a map does not show; the map is their mean."""
-STRETCHES: Final = 12
+CELLS: Final = 12
 FEWEST_IN_CELL: Final = 2
 DRAWN: Final = 1500
 MAPPED_JOINTS: Final = 3
-STANDS_OUT: Final = 1.5
 
 
-@dataclass(frozen=True)
-class Stretch:
-    """A stretch of a joint where the calibration knows least.
-
-    Attributes:
-        joint: From 0.
-        low: Where it begins, rad or m.
-        high: Where it ends.
-        std_mm: Mean bound of the standard deviation there.
-        median_mm: Median bound of all configurations.
-        rows: Measured poses there.
-    """
-
-    joint: int
-    low: float
-    high: float
-    std_mm: float
-    median_mm: float
-    rows: int
-
-
-def std_mm(facts: Facts, readings: Floats) -> Floats:
-    """Bound of the standard deviation of the judged point (n,), mm."""
-    features = {name: np.full(len(readings), value) for name, value in facts.features.items()}
-    found = facts.calibration.conservative_std(readings, tool=facts.point, features=features or None)
-    return np.asarray(MM_PER_METRE * found[:, 0])
-
-
-def configurations(facts: Facts, count: int = CONFIGURATIONS) -> Floats:
-    """Configurations (n, N) drawn evenly from the joints' ranges; the same every time."""
-    low, high = facts.reachable.T
-    return np.random.default_rng(0).uniform(low, high, (count, len(low)))
-
-
-def weakest(facts: Facts) -> Stretch | None:
-    """The stretch of a joint with the largest bounds, if it stands out; None where bounds are not known."""
-    if not facts.calibration.has_conservative:
-        return None
-    q = configurations(facts)
-    values = std_mm(facts, q)
-    median, found = float(np.median(values)), None
-    for joint, (low, high) in enumerate(facts.reachable):
-        edges = np.linspace(low, high, STRETCHES + 1)
-        means = _means(q[:, joint], values, edges)
-        k = int(np.nanargmax(means))
-        if means[k] > STANDS_OUT * median and (found is None or means[k] > found.std_mm):
-            rows = 0 if facts.readings is None else _between(facts.readings[:, joint], edges[k], edges[k + 1])
-            found = Stretch(joint, edges[k], edges[k + 1], float(means[k]), median, rows)
-    return found
-
-
-def _means(x: Floats, values: Floats, edges: Floats) -> Floats:
-    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    sums = np.bincount(place, values, len(edges) - 1)
-    counts = np.bincount(place, minlength=len(edges) - 1)
-    return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
-
-
-def _between(x: Floats, low: float, high: float) -> int:
-    return int(((x >= low) & (x < high)).sum())
-
-
-def trust(facts: Facts) -> Section:
-    """Maps over pairs of joints and over the workspace."""
+def trust(facts: Facts, found: Known | None) -> Section:
+    """Maps over the workspace and over pairs of joints."""
     title = "Where to trust it"
-    if not facts.calibration.has_conservative:
+    if found is None:
         words = f"The model {facts.best} does not tell how uncertain it is; one with --model variable does."
         return Section(title, [Text(words)])
-    values = std_mm(facts, configurations(facts))
-    joints = _most_telling(facts, values)
+    joints = _most_telling(facts, found)
     pairs = [(joints[i], joints[j]) for i in range(len(joints)) for j in range(i + 1, len(joints))]
-    top = float(np.quantile(values, 0.98))
-    figures = [workspace(facts, top), *(pair_map(facts, pair, top) for pair in pairs)]
-    return Section(title, [Text(_overall(facts, values)), *figures])
+    parts: list[Part] = [Text(_overall(facts, found)), workspace(facts, found)]
+    return Section(title, [*parts, *(pair_map(facts, found, pair) for pair in pairs)])
 
 
-def _overall(facts: Facts, values: Floats) -> str:
-    median, tenth = short(float(np.median(values)), float(np.quantile(values, 0.9)))
-    text = (
-        f"Over the joints' whole ranges the standard deviation of the measured point is at most {median} "
-        "mm in "
-        f"half of all configurations and {tenth} mm in nine of ten: the arm's part, without noise."
+def _overall(facts: Facts, found: Known) -> str:
+    values = [float(np.quantile(found.std_mm, share)) for share in (0.5, 0.9)]
+    median, tenth, near = short(*values, float(np.median(found.at_rows_mm)))
+    kind = "exact" if found.is_exact else "the bounds that compensation judges by, never below the exact ones"
+    where = "the measured poses" if facts.readings is not None else "poses within the joints' limits"
+    return (
+        f"Standard deviation of the measured point, the arm's part without noise: {near} mm in the median of "
+        f"{where}; over all that the joints reach {median} mm in the median, and less than {tenth} mm in "
+        "nine of ten "
+        f"configurations. Values are {kind}, at {len(found.std_mm)} configurations."
     )
-    if facts.readings is not None:
-        here = std_mm(facts, facts.drawn(CONFIGURATIONS))
-        near = short(float(np.median(here)))[0]
-        text += f" At the measured poses it is {near} mm in the median."
-    return f"{text} Values are the bounds that compensation judges by, never below the exact ones."
 
 
-def _most_telling(facts: Facts, values: Floats) -> list[int]:
-    """Joints over which the bound changes most, ascending."""
-    q = configurations(facts)
-    spread = [
-        float(np.nanstd(_means(q[:, joint], values, np.linspace(low, high, STRETCHES + 1))))
-        for joint, (low, high) in enumerate(facts.reachable)
-    ]
+def _most_telling(facts: Facts, found: Known) -> list[int]:
+    """Joints over which the standard deviation changes most, ascending."""
+    spread = []
+    for joint in range(len(facts.joints)):
+        edges = facts.places(joint, STRETCHES + 1, reachable=True)
+        spread.append(float(np.nanstd(means_along(found.readings[:, joint], found.std_mm, edges))))
     return sorted(np.argsort(spread)[::-1][:MAPPED_JOINTS].tolist())
 
 
-def pair_map(facts: Facts, pair: tuple[int, int], top: float) -> Figure:
-    """The bound over two joints; the others as in some of the poses."""
-    axes = [facts.places(joint, GRID, reachable=True) for joint in pair]
-    first, second = (grid.ravel() for grid in np.meshgrid(*axes))
-    total = np.zeros(len(first))
-    others = facts.drawn(OTHERS)
-    for pose in others:
-        q = np.repeat(pose[None], len(first), axis=0)
-        q[:, pair[0]], q[:, pair[1]] = first, second
-        total += std_mm(facts, q)
-    values = total / len(others)
-    shown = [_shown_axis(facts, joint, ends) for joint, ends in zip(pair, axes, strict=True)]
+def pair_map(facts: Facts, found: Known, pair: tuple[int, int]) -> Figure:
+    """Means over two joints, all others anywhere."""
+    places = facts.shown(found.readings)[:, list(pair)]
     names = [f"joint {joint + 1}, {facts.unit(joint)}" for joint in pair]
-    k = int(np.argmax(values))
-    places = [
-        _shown_axis(facts, joint, ends[k : k + 1])[0]
-        for joint, ends in zip(pair, (first, second), strict=True)
-    ]
-    large, small = short(float(values[k]), float(values.min()))
+    means, middles, _ = _means(places, found.std_mm)
+    most, least = np.nanargmax(means), np.nanargmin(means)
+    large, small = short(float(means.flat[most]), float(means.flat[least]))
     where = " and ".join(
-        f"joint {joint + 1} at {place:.0f} {facts.unit(joint)}"
-        for joint, place in zip(pair, places, strict=True)
+        f"joint {joint + 1} near {middles[k][np.unravel_index(most, means.shape)[k]]:.0f} {facts.unit(joint)}"
+        for k, joint in enumerate(pair)
     )
-    traces = [heatmap(shown[0], shown[1], values.reshape(GRID, GRID), "mm", zmin=0, zmax=round(top, 5))]
-    traces += _measured_over(facts, pair)
+    traces = [_map(means, middles, found)]
+    says = f"From {small} mm where it is best known to {large} mm with {where}."
+    if facts.readings is not None:
+        q = facts.shown(facts.readings[:DRAWN])
+        traces.append(data_points(q[:, pair[0]], q[:, pair[1]]))
+        says += " Dots are measured poses."
     return Figure(
         f"Standard deviation over joints {pair[0] + 1} and {pair[1] + 1}",
-        f"From {small} mm where it is best known to {large} mm with {where}. Dots are measured poses.",
+        says,
         traces,
         {"xaxis": axis(names[0]), "yaxis": axis(names[1])},
         height=340,
     )
 
 
-def _shown_axis(facts: Facts, joint: int, values: Floats) -> Floats:
-    readings = np.zeros((len(values), len(facts.joints)))
-    readings[:, joint] = values
-    return facts.shown(readings)[:, joint]
-
-
-def _measured_over(facts: Facts, pair: tuple[int, int]) -> list[dict[str, object]]:
-    if facts.readings is None:
-        return []
-    q = facts.shown(facts.readings[:DRAWN])
-    return [data_points(q[:, pair[0]], q[:, pair[1]])]
-
-
-def workspace(facts: Facts, top: float) -> Figure:
-    """The bound over distance from the base's axis and height, as the mean of configurations there."""
-    q = configurations(facts)
-    places, values = _radius_height(facts, q), std_mm(facts, q)
-    edges = [np.linspace(places[:, k].min(), places[:, k].max(), GRID + 1) for k in range(2)]
+def _means(places: Floats, values: Floats) -> tuple[Floats, list[Floats], list[Floats]]:
+    """Means (c, c) of values in cells of places (n, 2), with the cells' middles and edges."""
+    edges = [np.linspace(float(x.min()), float(x.max()), CELLS + 1) for x in places.T]
     sums, _, _ = np.histogram2d(places[:, 0], places[:, 1], edges, weights=values)
     counts, _, _ = np.histogram2d(places[:, 0], places[:, 1], edges)
     means = np.where(counts >= FEWEST_IN_CELL, sums / np.maximum(counts, 1), np.nan)
-    middles = [0.5 * (ends[1:] + ends[:-1]) for ends in edges]
-    traces = [heatmap(middles[0], middles[1], means.T, "mm", zmin=0, zmax=round(top, 5))]
-    says = "Colours are means over the configurations that reach a place."
+    return np.asarray(means), [0.5 * (ends[1:] + ends[:-1]) for ends in edges], edges
+
+
+def _map(means: Floats, middles: list[Floats], found: Known) -> dict[str, Any]:
+    top = float(f"{np.quantile(found.std_mm, 0.98):.4g}")
+    return heatmap(middles[0], middles[1], means.T, "mm", zmin=0, zmax=top)
+
+
+def workspace(facts: Facts, found: Known) -> Figure:
+    """Means over distance from the base's axis and height."""
+    means, middles, edges = _means(_radius_height(facts, found.readings), found.std_mm)
+    traces = [_map(means, middles, found)]
+    k = np.unravel_index(int(np.nanargmax(means)), means.shape)
+    where = f"{middles[0][k[0]]:.0f} mm from the axis of the base at height {middles[1][k[1]]:.0f} mm"
+    says = f"Largest {where}: {short(float(means[k]))[0]} mm."
     if facts.readings is not None:
         seen = _radius_height(facts, facts.readings)
         traces.append(data_points(seen[:DRAWN, 0], seen[:DRAWN, 1]))
         measured, _, _ = np.histogram2d(seen[:, 0], seen[:, 1], edges)
-        reached = counts >= FEWEST_IN_CELL
-        share = float((measured[reached] > 0).mean())
-        says = (
-            f"{count_of(len(seen), 'measured pose')} lie in {percent(share)} of the cells that the arm "
-            "reaches. " + says
-        )
-    k = np.unravel_index(int(np.nanargmax(means)), means.shape)
-    where = f"{middles[0][k[0]]:.0f} mm from the axis of the base at height {middles[1][k[1]]:.0f} mm"
+        share = float((measured[np.isfinite(means)] > 0).mean())
+        says += f" The measured poses, dots, lie in {percent(share)} of the cells that the arm reaches."
     return Figure(
         "Standard deviation over the workspace",
-        f"Largest {where}: {short(float(means[k]))[0]} mm. {says}",
+        says,
         traces,
-        {"xaxis": axis("distance from the base's z axis, mm"), "yaxis": axis("height in the base frame, mm")},
+        {
+            "xaxis": axis("distance from the base's z axis, mm"),
+            "yaxis": axis("height in the base frame, mm"),
+        },
         height=340,
     )
 

@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-FEWEST_TURNS: Final = 1.5
+FEWEST_TURNS: Final = 2.0
 """Of a wave that the curve must hold to be called one."""
 POINTS_A_TURN: Final = 6
 TRIED: Final = 400
-SHARE: Final = 0.25
+FLAT: Final = 1e-6
+"""A curve that differs from a parabola by so small a part of its reach is one."""
+SHARE: Final = 1.0 / 3.0
 """Of the curve's variance that a wave must make."""
 
 
@@ -32,27 +34,27 @@ class Wave:
 
 
 def strongest_wave(x: Floats, y: Floats) -> Wave | None:
-    """The wave that takes most of the variance of y (n,) over evenly spaced x (n,), beside a straight line.
+    """The wave that takes most of the variance of y (n,) over evenly spaced x (n,), beside a parabola.
 
-    Each period is tried by least squares with sine, cosine and the line together. None where no wave makes a
-    quarter of the variance, or the curve is flat.
+    Each period is tried by least squares with sine, cosine and the parabola together. None where no wave makes
+    a third of the variance, or the curve is none but a parabola.
     """
     span, step = float(x[-1] - x[0]), float(x[1] - x[0])
     longest, shortest = span / FEWEST_TURNS, POINTS_A_TURN * step
-    if longest <= shortest or np.ptp(y) == 0.0:
-        return None
-    trend = np.stack([np.ones_like(x), x - x.mean()], axis=1)
+    trend = np.stack([np.ones_like(x), x - x.mean(), np.square(x - x.mean())], axis=1)
     left = _residual(trend, y)
     total = float(left @ left)
+    if longest <= shortest or np.ptp(left) <= FLAT * np.ptp(y):
+        return None
     best = Wave(0.0, 0.0, 0.0)
     for period in 1.0 / np.linspace(1.0 / longest, 1.0 / shortest, TRIED):
         angle = 2.0 * np.pi * x / period
         basis = np.column_stack([trend, np.cos(angle), np.sin(angle)])
         found = np.linalg.lstsq(basis, y, rcond=None)[0]
         rest = y - basis @ found
-        share = 1.0 - float(rest @ rest) / total if total > 0.0 else 0.0
+        share = 1.0 - float(rest @ rest) / total
         if share > best.share:
-            best = Wave(float(period), float(np.hypot(found[2], found[3])), share)
+            best = Wave(float(period), float(np.hypot(found[-2], found[-1])), share)
     return best if best.share >= SHARE else None
 
 

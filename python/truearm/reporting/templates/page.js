@@ -68,8 +68,10 @@
     const camera = place.layout?.scene?.camera;
     if (camera) layout.scene = { ...layout.scene, camera };
     await Plotly.react(place, data, layout, {
-      responsive: true, displaylogo: false, displayModeBar: touched ? false : "hover",
-      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "hoverClosestCartesian", "hoverCompareCartesian"],
+      responsive: true, displaylogo: false, displayModeBar: touched || place.clientWidth < 480 ? false : "hover",
+      modeBarButtons: figure.spatial
+        ? [["toImage", "orbitRotation", "pan3d", "resetCameraDefault3d"]]
+        : [["toImage", "zoom2d", "pan2d", "resetScale2d"]],
     });
   };
 

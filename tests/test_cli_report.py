@@ -1,0 +1,109 @@
+"""`truearm report` as people run it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.report_support import small_calibration, words_of
+from truearm.cli import main
+from truearm.simulation import VirtualArm
+
+PROGRAM = str(Path(sys.executable).parent / "truearm")
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    small_calibration("constant").save(folder / "arm.calib")
+    arm = VirtualArm.paper(seed=2)
+    arm.measure_table(arm.poses(40, seed=3), seed=3).to_csv(folder / "later.csv", index=False)
+    return folder
+
+
+@pytest.fixture
+def folder(written, monkeypatch):
+    monkeypatch.chdir(written)
+    yield written
+    for page in written.glob("*.html"):
+        page.unlink()
+
+
+def test_a_report_as_people_run_it(folder):
+    done = subprocess.run([PROGRAM, "report", "arm.calib"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("On 28 poses it has never seen, the arm now misses by")
+    assert "What would help most next:" in done.stdout
+    assert done.stdout.endswith("Report: report.html\n")
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert (folder / "report.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_json_alone_on_stdout(folder, capsys):
+    assert main(["report", "arm.calib", "-o", "there.html", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert list(printed) == ["report", "verdict", "advice", "figures"]
+    assert printed["report"] == "there.html"
+    assert {"kind", "words"} == set(printed["advice"][0])
+    page = words_of((folder / "there.html").read_text())
+    assert printed["verdict"] in page
+    for figure in printed["figures"]:
+        assert figure["title"] in page
+        assert figure["says"] in page
+
+
+def test_other_measurements_get_their_chapter(folder, capsys):
+    assert main(["report", "arm.calib", "later.csv"]) == 0
+    capsys.readouterr()
+    assert main(["evaluate", "arm.calib", "later.csv", "--json"]) == 0
+    judged = json.loads(capsys.readouterr().out)
+    page = words_of((folder / "report.html").read_text())
+    assert "On other measurements" in page
+    assert f"later.csv: {judged['n_judged']} rows judged" in page
+    for key in ("mean_mm", "p95_mm", "max_mm"):
+        assert f"{judged['errors']['constant'][key]:.3f}" in page.partition("later.csv: ")[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["report", "none.calib"], 1, "none.calib: there is no such file"),
+        (["report", "later.csv"], 1, "no calibration"),
+        (["report", "arm.calib", "-o", "report.docx"], 2, "A report is a page (.html) or a PDF (.pdf)"),
+        (["report", "arm.calib", "-o", "nowhere/report.html"], 1, "there is no such directory"),
+        (["report", "arm.calib", "missing.csv"], 1, "missing.csv: there is no such file"),
+        (["report"], 2, "Missing argument"),
+    ],
+)
+def test_what_cannot_be_done_is_said(folder, capsys, arguments, status, words):
+    assert main(arguments) == status
+    assert words in " ".join(capsys.readouterr().err.split())
+    assert not list(folder.glob("*.html"))
+
+
+def test_without_chromium_a_pdf_names_the_package(folder, monkeypatch, capsys):
+    monkeypatch.setenv("PATH", str(folder))
+    assert main(["report", "arm.calib", "-o", "report.pdf"]) == 1
+    said = capsys.readouterr().err
+    assert 'Install the package "chromium"' in said
+    assert not (folder / "report.pdf").exists()
+
+
+def test_a_browser_that_prints_nothing_leaves_no_pdf(folder, tmp_path, monkeypatch, capsys):
+    fake = tmp_path / "chromium"
+    fake.write_text("#!/bin/sh\necho something broke >&2\n")
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    assert main(["report", "arm.calib", "-o", "report.pdf"]) == 1
+    assert "something broke" in capsys.readouterr().err
+    assert not (folder / "report.pdf").exists()
+
+
+def test_help_imports_no_numbers(folder):
+    code = "import sys\nfrom truearm.cli import main\nmain(['--help'])\nprint(sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "'numpy'" not in done.stdout
+    assert "'plotly'" not in done.stdout
+    assert "'truearm._core'" not in done.stdout

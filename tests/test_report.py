@@ -1,0 +1,234 @@
+"""The report of a calibration: its numbers are those of summary.json, and it needs nothing but itself."""
+
+import re
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+import truearm as ta
+from tests.report_support import (
+    errors_table,
+    figures_of,
+    repeated_measurements,
+    script_of,
+    small_calibration,
+    words_of,
+)
+from truearm.calibration_file import read_calibration_file, write_calibration_file
+from truearm.reporting.report import report
+from truearm.reporting.script import licence_notice
+from truearm.reporting.waves import strongest_wave
+from truearm.simulation import VirtualArm
+
+STATISTICS = ("mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm")
+MODELS = ("variable", "constant", "regions", "fcmac", "cmac")
+MOST_BYTES = 4_000_000
+FETCHES = re.compile(
+    r"""(?:\b(?:src|href|action|data)\s*=\s*["']?|url\(|@import|fetch\(|import\()\s*(https?:|//)"""
+)
+
+
+@pytest.fixture(scope="module")
+def calibrations():
+    return {model: small_calibration(model, repeatability_mm=0.05) for model in MODELS}
+
+
+@pytest.fixture(scope="module")
+def reports(calibrations):
+    return {model: report(calibration) for model, calibration in calibrations.items()}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_table_is_that_of_the_summary(calibrations, reports, model):
+    summary = calibrations[model].summary
+    shown = errors_table(reports[model].html)
+    for name in ("nominal", "constant"):
+        assert shown[name] == [f"{summary['holdout'][name][key]:.3f}" for key in STATISTICS]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_verdict_is_that_of_the_summary(calibrations, reports, model):
+    summary = calibrations[model].summary
+    numbers = [float(text) for text in re.findall(r"\d+\.\d+", reports[model].verdict)]
+    after, before = summary["holdout"][model], summary["holdout"]["nominal"]
+    wanted = [after["mean_mm"], after["max_mm"], before["mean_mm"], before["max_mm"]]
+    np.testing.assert_allclose(numbers[:4], wanted, atol=0.006)
+    assert f"On {summary['n_holdout']} poses it has never seen" in reports[model].verdict
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_page_asks_for_nothing_from_elsewhere(reports, model):
+    page = reports[model].html
+    assert FETCHES.search(page) is None
+    assert "<link" not in page.replace('<link rel="icon" href="data:,">', "")
+
+
+def test_the_search_for_fetches_finds_them():
+    for text in (
+        '<script src="https://a.b/c.js">',
+        "<img src=//a/b>",
+        "url( http://x )",
+        "@import 'https://",
+    ):
+        assert FETCHES.search(text.replace("'", "")), text
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_figure_is_one_that_plotly_knows_with_units_and_a_sentence(reports, model):
+    content = figures_of(reports[model].html)
+    palette = content["palettes"]["dark"]
+    assert content["palettes"]["light"].keys() == palette.keys()
+    assert len(content["figures"]) == len(reports[model].figures)
+    for figure, (title, says) in zip(content["figures"], reports[model].figures, strict=True):
+        assert says.endswith("."), title
+        assert re.search(r"\d", says), title
+        go.Figure(coloured({"data": figure["traces"], "layout": figure["layout"]}, palette))
+        flat = [trace for trace in figure["traces"] if trace["type"] not in ("scatter3d", "icicle")]
+        if flat:
+            for name in ("xaxis", "yaxis"):
+                assert figure["layout"][name]["title"]["text"], title
+    go.Figure(coloured({"layout": content["layout"]}, palette))
+
+
+def coloured(value, palette):
+    """A figure with the palette's colours for their names."""
+    if isinstance(value, str) and value.startswith("@"):
+        return palette[value[1:]]
+    if isinstance(value, list):
+        return [coloured(entry, palette) for entry in value]
+    if isinstance(value, dict):
+        return {key: coloured(entry, palette) for key, entry in value.items()}
+    return value
+
+
+def test_the_plotting_script_is_whole_and_keeps_its_licence(reports):
+    page = reports["constant"].html
+    assert script_of(page).startswith("/**\n* plotly.js v")
+    assert "Copyright" in licence_notice()
+    assert all(line in words_of(page) for line in licence_notice().splitlines())
+    assert "Permission is hereby granted, free of charge" in page
+
+
+def test_a_thousand_poses_stay_small():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=5)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(1000)), model="constant")
+    page = report(calibration).html
+    assert len(page.encode()) < MOST_BYTES
+    assert "Outliers" not in words_of(page)
+
+
+def test_worst_poses_are_named_by_their_rows(calibrations, reports):
+    held = calibrations["variable"].held
+    worst = int(np.argmax(held.errors["variable"].distance_m))
+    table = reports["variable"].html.partition("Worst poses")[2].partition("</table>")[0]
+    first = re.findall(r"<td[^>]*>(.*?)</td>", table)
+    assert first[0] == str(held.rows[worst])
+    assert first[3] == f"{1e3 * held.errors['variable'].distance_m[worst]:.3f}"
+
+
+def test_errors_row_by_row_are_those_of_the_validation(calibrations):
+    for calibration in calibrations.values():
+        for name, errors in calibration.held.errors.items():
+            assert errors.statistics() == calibration.validation.holdout[name]
+        assert len(calibration.held) == calibration.validation.n_holdout
+
+
+def test_held_rows_come_back_from_the_file(calibrations, tmp_path):
+    held = calibrations["variable"].held
+    calibrations["variable"].save(tmp_path / "arm.calib")
+    again = ta.Calibration.load(tmp_path / "arm.calib").held
+    assert again is not None
+    np.testing.assert_array_equal(again.readings, held.readings)
+    assert (again.rows.tolist(), again.sources.tolist()) == (held.rows.tolist(), held.sources.tolist())
+    for name, errors in held.errors.items():
+        np.testing.assert_array_equal(again.errors[name].position, errors.position)
+
+
+def test_a_file_from_before_held_rows_were_kept_is_reported(calibrations, tmp_path):
+    path = tmp_path / "arm.calib"
+    calibrations["constant"].save(path)
+    arrays, content = read_calibration_file(path)
+    content = {key: value for key, value in content.items() if key not in ("held", "schema", "sha256")}
+    kept = {name: array for name, array in arrays.items() if not name.startswith("held.")}
+    write_calibration_file(path, kept, content)
+    old = ta.Calibration.load(path)
+    assert old.held is None
+    assert "Worst poses" not in report(old).html
+
+
+@pytest.mark.parametrize("model", ["variable", "constant"])
+def test_a_stripped_file_has_no_measurements_and_its_report_says_so(calibrations, tmp_path, model):
+    whole = calibrations[model]
+    whole.save(tmp_path / "arm.calib", with_rows=False)
+    arrays, _ = read_calibration_file(tmp_path / "arm.calib")
+    assert not [name for name in arrays if name.startswith(("held.", "rows.", "outcome."))]
+    page = report(ta.Calibration.load(tmp_path / "arm.calib")).html
+    assert words_of(page).count("The measurements were left out of this file") == 3
+    assert errors_table(page) == errors_table(report(whole).html)
+    assert words_of(report(whole.without_rows()).html).count("left out of this file") == 3
+
+
+def test_the_same_calibration_makes_the_same_page(calibrations, monkeypatch):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    first, second = (report(calibrations["variable"]).html for _ in range(2))
+    assert first == second
+    assert "2023-11-14 22:13 UTC" in first
+
+
+def test_names_are_text_and_nothing_else():
+    arm = VirtualArm.paper(seed=2)
+    table = arm.measure_table(arm.poses(40))
+    table["group"] = "<script>alert(1)</script>"
+    data = ta.Measurements.from_dataframe(table, name="</script><b>")
+    page = report(ta.calibrate(arm.robot, data, model="constant")).html
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert(1)" in page
+    assert "</script><b>" not in page
+
+
+def test_repeated_poses_tell_scatter_and_sides():
+    robot, data = repeated_measurements(sides_apart_mm=0.2, noise_mm=0.01)
+    text = words_of(report(ta.calibrate(robot, data, model="constant")).html)
+    assert "No pose was measured twice" not in text
+    apart, alone = re.findall(r"joint 2 25 (\d\.\d+) (\d\.\d+)", text)[0]
+    assert float(apart) == pytest.approx(0.2, abs=0.01)
+    assert float(alone) == pytest.approx(0.01 * np.sqrt(3 * 2 / 4), rel=0.3)
+    assert "ISO 9283" not in text
+
+
+def test_advice_follows_from_the_data(calibrations, reports):
+    kinds = {model: [advice.kind for advice in reports[model].advice] for model in MODELS}
+    assert "no_orientation" in kinds["variable"]
+    assert "try_variable" in kinds["constant"]
+    assert "few_held_out" in kinds["variable"]
+    robot = VirtualArm.paper(seed=2)
+    data = robot.measure_table(robot.poses(90))
+    data["x"] += np.where(data.index == 4, 0.05, 0.0)
+    found = report(ta.calibrate(robot.robot, ta.Measurements.from_dataframe(data), model="constant"))
+    assert found.advice[0].kind == "outliers"
+    assert "row 5" in found.advice[0].words
+
+
+def test_a_wave_is_found_and_a_line_is_none():
+    x = np.linspace(-150.0, 150.0, 121)
+    wave = strongest_wave(x, 0.01 * x + 2.0 * np.sin(2.0 * np.pi * x / 40.0 + 0.3))
+    assert wave is not None
+    assert wave.period == pytest.approx(40.0, rel=0.02)
+    assert wave.amplitude == pytest.approx(2.0, rel=0.02)
+    assert wave.share > 0.99
+    assert strongest_wave(x, 0.01 * x) is None
+    assert strongest_wave(x, np.exp(-x / 100.0)) is None
+
+
+def test_a_difference_is_known_better_than_its_parts(calibrations):
+    calibration = calibrations["variable"]
+    q = VirtualArm.paper(seed=2).poses(6, seed=8)
+    names = ["theta2", "a3"]
+    none = calibration.variation_std(q, q, names)
+    np.testing.assert_allclose(none, 0.0, atol=1e-9)
+    there = calibration.variation_std(q, q[::-1], names)
+    np.testing.assert_allclose(there, calibration.variation_std(q[::-1], q, names)[:], rtol=1e-6)
+    assert (there[: len(q) // 2] > 0.0).all()
+    with pytest.raises(ta.errors.UsageError, match="theta22.*Did you mean"):
+        calibration.variation_std(q, q, ["theta22"])
