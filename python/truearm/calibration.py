@@ -329,30 +329,31 @@ class Calibration:
         return inputs, np.einsum("nii->ni", covariance), self.spread.prior(inputs, jacobian)
 
     def variation_std(
-        self, q: ArrayLike, reference: ArrayLike, names: Sequence[str], *, features: Features | None = None
+        self, q: ArrayLike, names: Sequence[str], *, features: Features | None = None
     ) -> Floats:
-        """Standard deviation of how much parameters differ between readings, (n, c), rad and m.
+        """Standard deviation of how much parameters differ from their means over the readings, (n, c), SI.
 
         How parameters vary is known better than their level, which frame and target may take over.
 
         Args:
             q: Readings (n, N).
-            reference: Readings (n, N) whose parameters are subtracted.
             names: Names of the c parameters, such as "theta2".
-            features: Features by name, the same for both.
+            features: Features by name.
 
         Raises:
             UsageError: If there is no such parameter.
             WorkError: If the rows were left out of the file, or the model does not tell.
         """
         rows, _ = self._readings(q)
-        others, _ = self._readings(reference)
-        picked = np.zeros((len(rows), len(names), self.arm.table.size))
+        inputs, found = self.field_inputs(rows, features), np.empty((len(rows), len(names)))
         for k, name in enumerate(names):
-            picked[:, k, self.arm.candidates.column(name)] = 1.0
-        inputs, from_inputs = self._inputs(rows, features), self._inputs(others, features)
-        variances = np.einsum("nii->ni", self._spread.contrast(inputs, from_inputs, picked))
-        return np.asarray(np.sqrt(np.maximum(variances, 0.0)))
+            picked = np.zeros((len(rows), 1, self.arm.table.size))
+            picked[:, 0, self.arm.candidates.column(name)] = 1.0
+            covariance = self.spread.joint(inputs, picked)
+            centred = covariance - covariance.mean(axis=0)
+            variances = np.diagonal(centred - centred.mean(axis=1, keepdims=True))
+            found[:, k] = np.sqrt(np.maximum(variances, 0.0))
+        return found
 
     def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)

@@ -30,9 +30,6 @@ class Spread(Protocol):
     def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I)."""
 
-    def contrast(self, inputs: Floats, reference: Floats, jacobian: Floats) -> Floats:
-        """The same of the difference between parameters at inputs and at references (n, I)."""
-
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) of the same before any measurement."""
 
@@ -76,10 +73,6 @@ class ConstantSpread:
         """Covariance (n, m, m), the same rule everywhere."""
         chosen = jacobian[:, :, self.columns]
         return np.asarray(chosen @ self.of_constants @ chosen.transpose(0, 2, 1))
-
-    def contrast(self, inputs: Floats, reference: Floats, jacobian: Floats) -> Floats:
-        """Zero: constants are the same everywhere."""
-        return np.zeros((len(jacobian), jacobian.shape[1], jacobian.shape[1]))
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) that the prior of the constants gives."""
@@ -138,12 +131,6 @@ class VariableSpread:
         """Covariance (n, m, m) at inputs (n, I)."""
         chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
         return self.posterior.covariance(np.ascontiguousarray(inputs), chosen) * self.inflation**2
-
-    def contrast(self, inputs: Floats, reference: Floats, jacobian: Floats) -> Floats:
-        """Covariance (n, m, m) of differences between inputs and references (n, I)."""
-        chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
-        found = self.posterior.contrast(np.ascontiguousarray(inputs), np.ascontiguousarray(reference), chosen)
-        return found * self.inflation**2
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) that constants and field have before any measurement."""

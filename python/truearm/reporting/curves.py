@@ -66,7 +66,7 @@ def along(facts: Facts, joint: int, effects: Floats) -> Figure:
     for k, name in enumerate(names):
         column = candidates.column(name)
         values = found.values[:, column] / per_unit(column)
-        values = values - values[len(values) // 2]
+        values = values - values.mean()
         if spread is not None:
             x = np.linspace(q[0], q[-1], len(spread))
             middle = np.interp(x, q, values)

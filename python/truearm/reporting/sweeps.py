@@ -66,14 +66,13 @@ def influence_mm(facts: Facts) -> Floats:
 
 
 def deviations(facts: Facts, joint: int, names: list[str]) -> Floats | None:
-    """Standard deviations (s, c) of how parameters differ from the middle of a joint, SI.
+    """Standard deviations (s, c) of how parameters differ from their means along a joint, SI.
 
     None where the model does not tell them.
     """
     readings = readings_along(facts, joint, BAND_STEPS)
-    middle = np.repeat(readings[BAND_STEPS // 2][None], BAND_STEPS, axis=0)
     try:
-        return facts.calibration.variation_std(readings, middle, names, features=facts.features or None)
+        return facts.calibration.variation_std(readings, names, features=facts.features or None)
     except WorkError:
         return None
 

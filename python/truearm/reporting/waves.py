@@ -36,7 +36,7 @@ class Wave:
 def strongest_wave(x: Floats, y: Floats) -> Wave | None:
     """The wave that takes most of the variance of y (n,) over evenly spaced x (n,), a parabola aside.
 
-    Each period is tried by least squares with sine, cosine and the parabola together. None where no wave makes
+    Each period is tried by least squares with sine, cosine and parabola together. None where no wave makes
     a third of the variance, or the curve is none but a parabola.
     """
     span, step = float(x[-1] - x[0]), float(x[1] - x[0])
