@@ -32,6 +32,7 @@ from truearm.robot import Robot
 from truearm.scheme_fitting import SchemeDetails
 from truearm.solving import solve
 from truearm.summary import summarise
+from truearm.uncertainty import AXES as ROWS_TOGETHER
 from truearm.uncertainty import ConstantSpread, Spread, UpdatedSpread, VariableSpread
 from truearm.validation import Validation
 
@@ -345,15 +346,15 @@ class Calibration:
             WorkError: If the rows were left out of the file, or the model does not tell.
         """
         rows, _ = self._readings(q)
-        inputs, found = self.field_inputs(rows, features), np.empty((len(rows), len(names)))
+        count = ROWS_TOGETHER * -(-len(names) // ROWS_TOGETHER)
+        picked = np.zeros((len(rows), count, self.arm.table.size))
         for k, name in enumerate(names):
-            picked = np.zeros((len(rows), 1, self.arm.table.size))
-            picked[:, 0, self.arm.candidates.column(name)] = 1.0
-            covariance = self.spread.joint(inputs, picked)
-            centred = covariance - covariance.mean(axis=0)
-            variances = np.diagonal(centred - centred.mean(axis=1, keepdims=True))
-            found[:, k] = np.sqrt(np.maximum(variances, 0.0))
-        return found
+            picked[:, k, self.arm.candidates.column(name)] = 1.0
+        together = self.spread.joint(self.field_inputs(rows, features), picked)
+        covariance = np.einsum("ikjk->kij", together.reshape(len(rows), count, len(rows), count))
+        centred = covariance - covariance.mean(axis=1, keepdims=True)
+        variances = np.einsum("kii->ik", centred - centred.mean(axis=2, keepdims=True))
+        return np.asarray(np.sqrt(np.maximum(variances[:, : len(names)], 0.0)))
 
     def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)
