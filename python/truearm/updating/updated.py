@@ -43,7 +43,8 @@ def updated(
     task, unknowns = scene.task, scene.unknowns
     change = (unknowns.directions @ found.state.arm).reshape(-1, 5)
     models = {name: _model(calibration, scene, found, name, change) for name in calibration.models}
-    trained = judge(task, models, scene.data, scene.data)
+    judged = judge(task, models, scene.data, scene.data)
+    trained = {name: errors.statistics() for name, errors in judged.items()}
     file = calibration.to_bytes() if calibration.file is None else calibration.file
     revision = Revision.of(report, unknowns.directions, found.covariance, file)
     new = replace(
@@ -56,6 +57,7 @@ def updated(
             len(scene.data), len(scene.data), {**trained, calibration.model_name: held_out}, trained
         ),
         rows=_rows(scene, found),
+        held=None,
         data_hash=scene.data.hash(),
         version=version("truearm"),
         notices=(),
