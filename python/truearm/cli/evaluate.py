@@ -65,4 +65,8 @@ def command(
     how = "frame and tool kept" if keep_frames else f"{found.n_frame} rows found the frame"
     say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
     print_errors(found.errors, f"{found.n_judged} rows")
-    suggest(f"truearm compensate {calibration} PROGRAM --dry-run")
+    others = " ".join(map(str, measurements))
+    suggest(
+        f"truearm report {calibration} {others} -o other.html",
+        f"truearm compensate {calibration} PROGRAM --dry-run",
+    )
