@@ -47,8 +47,8 @@ def _without_rows(facts: Facts) -> str:
         )
     if facts.calibration.rows is not None:
         return (
-            "This file does not hold errors pose by pose: it is an update of another calibration, or older than "
-            "the report. The table above has their statistics."
+            "This file does not hold errors pose by pose: it is an update of another calibration, or older "
+            "than the report. The table above has their statistics."
         )
     return (
         "The measurements were left out of this file, so that errors cannot be shown pose by pose; the table "
