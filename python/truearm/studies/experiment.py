@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from truearm.planning.dividing import DivisionOptions, divide_space, named_colum
 from truearm.planning.pool import PoolOptions, needed_pool
 from truearm.planning.spaces import Space
 from truearm.planning.workspace import Workspace, known_setup, measured_points
-from truearm.simulation import PAPER_PARAMETERS, VirtualArm
+from truearm.robot import Robot
+from truearm.simulation import PAPER_PARAMETERS
 from truearm.studies.setting import (
     CANDIDATES,
     CELLS,
@@ -35,6 +36,21 @@ Floats = NDArray[np.float64]
 
 FREE_TO_STOP: Final = 1024
 WORKSPACE_SEED: Final = 7
+
+
+class KnownArm(Protocol):
+    """An arm of which it is known how it really is."""
+
+    @property
+    def robot(self) -> Robot:
+        """The arm as it is meant to be."""
+
+    @property
+    def seed(self) -> int:
+        """What it was drawn from."""
+
+    def true_position(self, q: Floats) -> Floats:
+        """Where the tool really is (n, 3) at readings (n, N), in the frame that measurements are in."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +87,7 @@ class Experiment:
     """
 
     plan: Plan
-    arm: VirtualArm
+    arm: KnownArm
     space: Space
     regions: Regions
     node_error_m: Floats

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm._core import Chain
 from truearm.parameters import KIND_COUNT, A, D
 from truearm.studies.experiment import Experiment
 from truearm.studies.schemes import Scheme
@@ -42,13 +43,18 @@ def trace(made: Experiment, scheme: Scheme, readings: Floats) -> Trace:
     The error of a prediction at q is the error that is left after compensation at the pose whose corrected
     joints are q: the real point there minus the point that was asked for.
     """
-    end = np.eye(4)
-    end[:3, 3] = scheme.point_in_flange
-    chain = made.identified.chain(made.arm.robot.flange @ end)
+    chain = scheme_chain(made, scheme)
     parameters = np.ascontiguousarray(scheme.parameters(readings))
     values = np.ascontiguousarray(made.arm.robot.joints_from_readings(readings))
     missed = made.arm.true_position(readings) - chain.position(values, parameters)
     return Trace(missed * MM_PER_METRE, parameters)
+
+
+def scheme_chain(made: Experiment, scheme: Scheme) -> Chain:
+    """The chain from the base, as a row, to the point that a scheme predicts."""
+    end = np.eye(4)
+    end[:3, 3] = scheme.point_in_flange
+    return made.identified.chain(made.arm.robot.flange @ end)
 
 
 def sizes(errors_mm: Floats) -> dict[str, float]:

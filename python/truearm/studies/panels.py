@@ -30,6 +30,7 @@ ROWS: Final[Mapping[str, Sequence[str]]] = {
     "figure6": ("uncalibrated", "conventional", "regional", "fcmac", "variable"),
     "figure7": ("uncalibrated", "conventional", "regional", "fcmac", "variable"),
     "figure8": ("conventional", "regional", "fcmac", "variable"),
+    "figure10": ("uncalibrated", "conventional", "regional", "fcmac", "variable"),
     "noise": ("conventional", "regional", "fcmac", "fcmac_shrunk", "variable"),
     "cmac": ("cmac", "fcmac"),
 }

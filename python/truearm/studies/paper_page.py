@@ -81,7 +81,7 @@ def page(result: Result) -> str:
         "# The paper's simulations, and ours",
         f"Made by `truearm study paper` over {len(seeds)} seeds; numbers are medians.",
         "## What the paper states, and what comes out",
-        _table(
+        table(
             ("place", "the paper", "here", "agrees"),
             [
                 (s["place"], s["paper"], s["ours"], "yes" if s["agrees"] else "no")
@@ -89,9 +89,9 @@ def page(result: Result) -> str:
             ],
         ),
         "## Readings chosen",
-        _table(("where", "reading"), READINGS),
+        table(("where", "reading"), READINGS),
         "## Figures to reach",
-        _table(
+        table(
             ("claim", "median", "5 %", "95 %", "to reach", "reached"),
             [_claim(entry) for entry in result["claims"]],
         ),
@@ -124,7 +124,7 @@ def _schemes(found: Result) -> str:
         for where, piece in pieces.items():
             rows.append((f"{name}{where}", *_numbers(piece), *_workspace(part)))
     head = ("scheme", "path mean mm", "max mm", "error jump mm", "CEP jump", "workspace mean mm", "max mm")
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _numbers(piece: Result) -> tuple[str, ...]:
@@ -144,9 +144,10 @@ def _readings(found: Result) -> str:
             for scheme, judged in part[noise].items():
                 rows.append((name, noise, scheme, *_numbers(judged["path"])[:2], *_workspace(judged)))
     head = ("reading", "noise", "scheme", "path mean mm", "max mm", "workspace mean mm", "max mm")
-    return _table(head, rows)
+    return table(head, rows)
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
     lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])

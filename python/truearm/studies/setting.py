@@ -31,9 +31,9 @@ DEMANDED_M: Final = 0.1e-3
 NOISE_MM: Final = 0.04
 SHARE: Final = 0.09
 MEMBERSHIPS: Final = 3
-CELLS: Final = {"joint": (17, 11, 11), "sphere": (11, 17, 11)}
+CELLS: Final = {"joint": (17, 11, 11), "sphere": (11, 17, 11), "cartesian": (17, 11, 11)}
 
-Kind = Literal["joint", "sphere"]
+Kind = Literal["joint", "sphere", "cartesian"]
 
 
 @dataclass(frozen=True)

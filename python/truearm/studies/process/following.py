@@ -1,0 +1,39 @@
+"""Paths as the real arm follows them: compensated by a scheme, rounded by the controller."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.planning.spaces import CartesianSpace
+from truearm.studies.experiment import Experiment
+from truearm.studies.metrics import Trace, scheme_chain
+from truearm.studies.process.setting import COMMAND_MM
+from truearm.studies.schemes import Scheme
+from truearm.units import MM_PER_METRE, to_si
+
+Floats = NDArray[np.float64]
+
+STEPS: Final = 12
+
+
+def followed(made: Experiment, space: CartesianSpace, scheme: Scheme, coordinates: Floats) -> Trace:
+    """Errors of the real tool on a path (n, 3) of the space that a scheme has compensated.
+
+    The command of each point is moved against what the scheme says the arm is off there, step by step until
+    that fits, and rounded as the controller rounds it. Points that then are out of reach are NaN.
+    """
+    robot, wanted = made.arm.robot, space.points(coordinates)
+    chain, origin = scheme_chain(made, scheme), np.asarray(space.origin)
+    off = np.zeros_like(wanted)
+    for _ in range(STEPS):
+        readings, reached = space.readings(wanted - off - origin)
+        values = np.ascontiguousarray(robot.joints_from_readings(readings[reached]))
+        parameters = np.ascontiguousarray(scheme.parameters(readings[reached]))
+        off[reached] = chain.position(values, parameters) - robot.position(readings[reached])
+    step = to_si(COMMAND_MM, "mm")
+    readings, reached = space.readings(np.rint((wanted - off) / step) * step - origin)
+    errors, shown = np.full_like(wanted, np.nan), np.full((len(wanted), *made.identified.table.shape), np.nan)
+    errors[reached] = MM_PER_METRE * (made.arm.true_position(readings[reached]) - wanted[reached])
+    shown[reached] = scheme.parameters(readings[reached])
+    return Trace(errors, shown)
