@@ -1,6 +1,8 @@
 """Parts of the cell alone: frames of lines, the panel, patterns, packets, verdicts, clearance."""
 
+import os
 import re
+import tty
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.clearance import Clearance
 from truearm.cell.framing import framed, unframed
 from truearm.cell.judge import Rules, judge
+from truearm.cell.line_port import LinePort
+from truearm.cell.movemaster import parse_numbers
 from truearm.cell.patterns import expression_for, filled, numbers_in
 from truearm.cell.session import Stored
 from truearm.cell.stretches import boundaries
@@ -150,3 +154,30 @@ def test_the_gap_between_link_and_column_is_that_of_the_nearest_points():
     assert gap == pytest.approx(0.2 - 0.02, abs=2e-3)
     through = clearance.gaps(places, (outermost + np.array([0.0, 0.0, 0.1]) - middle)[None])
     assert through[0, 0] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("+1.0,-2.5,300.0,.5,-.1", [10, -25, 3000, 5, -1]),
+        (" 0.0, 0.0, 0.0, 0.0, 0.0 ", [0] * 5),
+        ("1.0,2.0,3.0,4.0", None),
+        ("1.0,2.0,3.0,4.0,5", None),
+        ("1.0,2.0,3.0,4.0,x.0", None),
+    ],
+)
+def test_positions_as_movemaster_controllers_write_them(text, found):
+    numbers = parse_numbers(text)
+    assert numbers is None if found is None else numbers.tolist() == found
+
+
+def test_lines_that_come_may_end_in_any_way():
+    own, other = os.openpty()
+    tty.setraw(other)
+    port = LinePort("device", os.ttyname(other), 1.0, terminator=b"\r")
+    port.open()
+    os.write(own, b"one\r\ntwo\rthree\n\r\nfour\r")
+    assert [port.receive() for _ in range(4)] == ["one", "two", "three", "four"]
+    port.close()
+    os.close(own)
+    os.close(other)

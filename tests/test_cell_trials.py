@@ -12,7 +12,18 @@ import pytest
 import serial
 
 from tests.cell_support import cell_text, measured, poses_of, virtual, write_poses
-from tests.trials import FULL, acknowledged, killed_after, measuring, moments, outcomes, say, simulated, sized
+from tests.trials import (
+    FULL,
+    acknowledged,
+    killed_after,
+    measuring,
+    moments,
+    outcomes,
+    record,
+    say,
+    simulated,
+    sized,
+)
 from truearm.cell import Cell, DeviceError, DeviceSilentError, EmergencyStopError, PortUnavailableError
 from truearm.cell.accepted import accepted_table, measurements_of
 from truearm.cell.measuring import DONE, Process
@@ -46,8 +57,8 @@ def test_killed_at_random_moments_nothing_is_lost_or_doubled(tmp_path):
     said = []
     with simulated(tmp_path, text) as cell:
         done = measuring(cell, tmp_path / "poses.csv", whole)
-        assert done.communicate()[1]
-        assert done.returncode == 0
+        told = done.communicate()[1]
+        assert done.returncode == 0, told[-2000:]
         for number, moment in enumerate(moments(kills, 2.5)):
             process = measuring(cell, tmp_path / "poses.csv", killed)
             said += acknowledged(killed_after(process, moment, once_it_measures=number % 2 == 0))
@@ -56,23 +67,23 @@ def test_killed_at_random_moments_nothing_is_lost_or_doubled(tmp_path):
             assert len(set(poses_stored)) == len(poses_stored)
             assert set(said) <= set(stored)
         last = measuring(cell, tmp_path / "poses.csv", killed)
-        said += acknowledged(last.communicate()[1])
-        assert last.returncode == 0
+        told = last.communicate()[1]
+        said += acknowledged(told)
+        assert last.returncode == 0, told[-2000:]
     assert set(said) <= set(outcomes(killed))
     table, content, summary = finished(killed)
     reference, expected, _ = finished(whole)
     assert summary["measured"] + len(summary["skipped"]) == count
     assert table["pose"].is_unique
     assert content == expected, "the calibration of a session that was killed is another"
-    say(
-        f"{kills} kills, {len(said)} readings acknowledged, {len(table)} of {len(reference)} poses, same data"
-    )
+    record("kill", kills=kills, acknowledged=len(said), poses=len(table), of=len(reference))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [*MESSAGE_FAULTS, *CONTACT_FAULTS])
 def test_with_faults_a_session_completes_with_right_readings(kind, tmp_path):
     sessions, count = sized((1, 6), (20, 20))
+    worst_mm, stopped, events = 0.0, 0, 0
     process = {"check_every": 0, "registration_poses": sized(4, 6)}
     for seed in range(sessions):
         text = cell_text(simulate={"seed": seed, "faults": {kind: SHARE}}, process=process)
@@ -90,6 +101,7 @@ def test_with_faults_a_session_completes_with_right_readings(kind, tmp_path):
                     raise
                 # A damaged Movemaster line may be a valid motion elsewhere: all stops before things meet.
                 say(f"{kind} {SHARE:.0%}, session {seed}: stopped, {error}")
+                stopped += 1
                 continue
         assert end == DONE
         table, _, summary = finished(path)
@@ -102,10 +114,14 @@ def test_with_faults_a_session_completes_with_right_readings(kind, tmp_path):
         assert off_mm.max() < 0.5, "a wrong reading was accepted"
         told = f"{seconds:.0f} s, {summary['readings']} readings, {summary['events']}"
         say(f"{kind} {SHARE:.0%}, session {seed}: {told}, worst {off_mm.max():.2f} mm")
+        worst_mm, events = max(worst_mm, float(off_mm.max())), events + sum(summary["events"].values())
+    figures = {"sessions": sessions, "stopped": stopped, "poses": count, "worst_mm": worst_mm}
+    record(f"fault-{kind}", share=SHARE, remarks=events, **figures)
 
 
 @pytest.mark.slow
 def test_a_device_that_restarts_is_connected_anew(tmp_path):
+    remarks = 0
     for seed in range(sized(1, 20)):
         text = cell_text(simulate={"seed": seed, "faults": {"restart": RESTARTS}}, process={"recoveries": 20})
         poses = poses_of(Cell.from_toml(text), sized(8, 20), seed=seed)
@@ -114,6 +130,8 @@ def test_a_device_that_restarts_is_connected_anew(tmp_path):
         assert end == DONE
         events = finished(tmp_path / f"{seed}.db")[2]["events"]
         say(f"restart {RESTARTS:.0%}, session {seed}: {seconds:.0f} s, {events}")
+        remarks += sum(events.values())
+    record("fault-restart", share=RESTARTS, sessions=sized(1, 20), stopped=0, poses=20, remarks=remarks)
 
 
 @pytest.mark.slow
@@ -130,7 +148,7 @@ def test_what_cannot_go_on_stops_with_the_reason(faults, reason, tmp_path):
         poses = poses_of(Cell.from_toml(text), 12, seed=seed)
         with virtual(text) as (_, cell), pytest.raises(WorkError, match=reason):
             measured(cell, poses, tmp_path / f"{seed}.db")
-        say(f"{next(iter(faults))}, session {seed}: stopped, {reason}")
+    record(f"stop-{next(iter(faults))}", sessions=sized(1, 20), reason=reason)
 
 
 def one_session(text, folder, count=6):
@@ -158,7 +176,9 @@ def test_a_silent_device_is_named_within_its_limit(tmp_path):
     with pytest.raises(DeviceSilentError) as raised:
         one_session(text, tmp_path)
     # Five sendings each time, and as many connections as recoveries allow.
-    assert time.monotonic() - began < 10.0
+    seconds = time.monotonic() - began
+    assert seconds < 10.0
+    record("device-silent", seconds=seconds, said=str(raised.value))
     names_device_port_and_limit(raised.value, "table", port)
     os.close(own)
     os.close(other)
@@ -174,6 +194,7 @@ def test_a_busy_port_is_named(tmp_path):
     ):
         one_session(text, tmp_path)
     names_device_port_and_limit(raised.value, "table", port)
+    record("device-busy", said=str(raised.value))
     os.close(own)
     os.close(other)
 
@@ -182,6 +203,7 @@ def test_a_port_that_is_not_there_is_named(tmp_path):
     with pytest.raises(PortUnavailableError, match="no such port") as raised:
         one_session(cell_text(sensor={"port": "/dev/ttyNOWHERE"}), tmp_path)
     names_device_port_and_limit(raised.value, "table", "/dev/ttyNOWHERE")
+    record("device-absent", said=str(raised.value))
 
 
 def test_a_closed_tcp_port_is_named(tmp_path):
@@ -191,6 +213,7 @@ def test_a_closed_tcp_port_is_named(tmp_path):
     with pytest.raises(PortUnavailableError, match="no connection") as raised:
         one_session(cell_text(sensor={"port": port}), tmp_path)
     names_device_port_and_limit(raised.value, "table", port)
+    record("device-closed", said=str(raised.value))
 
 
 @pytest.mark.slow
@@ -205,6 +228,7 @@ def test_a_device_that_goes_away_stops_the_robot(tmp_path):
         time.sleep(0.2)
         assert not world.arm.speed(world.shared.now()).any()
     assert " at " in str(raised.value)
+    record("device-gone", said=str(raised.value))
 
 
 @pytest.mark.slow
@@ -228,7 +252,7 @@ def test_ctrl_c_in_any_state_ends_within_two_seconds(tmp_path):
             if session.exists():
                 with Session(session, writing=True) as known:
                     assert known.rows("PRAGMA integrity_check") == [("ok",)]
-    say(f"{count} interrupts: the slowest ended after {slowest:.2f} s")
+    record("interrupt", interrupts=count, slowest_s=slowest)
     # Beside the two seconds a loaded machine may be slow; the figure is what `make trials` prints.
     assert slowest < sized(10.0, 2.0)
 
@@ -250,7 +274,7 @@ def test_a_long_session_costs_little_time_and_no_memory(tmp_path):
     quarter = len(used) // 4
     milliseconds = 1e3 * (used[-1][0] - used[quarter][0]) / (len(used) - quarter)
     grown = used[-1][1] - used[quarter][1]
-    say(f"{count} poses: {milliseconds:.2f} ms of process time a pose, memory grew by {grown:.1f} MB")
+    record("long", poses=count, process_ms_a_pose=milliseconds, grown_mb=grown)
     assert len(outcomes(tmp_path / "session.db")) > 0.9 * count
     assert grown < 20.0
     if FULL:

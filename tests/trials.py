@@ -4,6 +4,7 @@ Trials run in small with the tests, and in full with `make trials`, which also p
 """
 
 import contextlib
+import json
 import os
 import random
 import signal
@@ -15,6 +16,7 @@ from pathlib import Path
 from truearm.cell.session import Session
 
 FULL = os.environ.get("TRUEARM_TRIALS") == "full"
+RESULTS = Path(os.environ.get("TRUEARM_TRIALS_RESULTS", "build/trials"))
 PROGRAM = str(Path(sys.executable).parent / "truearm")
 STARTS_WITHIN_S = 60.0
 
@@ -28,6 +30,14 @@ def say(text):
     if FULL:
         sys.stderr.write(f"\n  {text}\n")
         sys.stderr.flush()
+
+
+def record(trial, **figures):
+    """Keep what a trial in full measured, for docs/make_trials.py."""
+    say(f"{trial}: {figures}")
+    if FULL:
+        RESULTS.mkdir(parents=True, exist_ok=True)
+        (RESULTS / f"{trial}.json").write_text(json.dumps(figures, indent=1) + "\n")
 
 
 @contextlib.contextmanager

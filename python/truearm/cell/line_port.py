@@ -1,5 +1,6 @@
 """Lines to and from a device, with time limits, and a way to end a wait from another thread."""
 
+import re
 import threading
 import time
 from collections import deque
@@ -9,10 +10,14 @@ from truearm.cell.channels import Channel, ConnectionEndedError, open_channel
 from truearm.cell.device_errors import DeviceError, gone, silent, stopped
 
 LONGEST_LINE: Final = 65536
+# Devices end lines as they like, and not always as they want them ended: an empty line means nothing.
+END_OF_LINE: Final = re.compile(rb"[\r\n]")
 
 
 class LinePort:
     """A port of a device that speaks in lines of ASCII.
+
+    Lines are sent with the `terminator`; those that come may end with CR, LF or both.
 
     Attributes:
         device: What people call the device.
@@ -147,9 +152,9 @@ class LinePort:
             raise gone(self.device, self.address, str(error)) from None
         if not data:
             return False
-        *lines, self._rest = (self._rest + data).split(self._terminator)
+        *lines, self._rest = END_OF_LINE.split(self._rest + data)
         self._rest = self._rest[-LONGEST_LINE:]
-        self._lines.extend(line.decode("ascii", "replace").strip("\r\n") for line in lines)
+        self._lines.extend(line.decode("ascii", "replace") for line in lines if line)
         return True
 
     def _open_channel(self) -> Channel:

@@ -14,8 +14,8 @@ Commands end with a carriage return and have no answer, but for WH and ER:
 Commands are done one after another, so the answer to WH comes when the arm stands. All numbers have one
 decimal place: 0.1 mm and 0.1 deg is what the controller rounds to. There is no command that ends a motion.
 
-Source: Movemaster EX instruction manuals, chapter on commands. The angles p and r of a position are here the
-sum of the readings of joints 2 to 4 and the reading of joint 5.
+docs/reference/cell-protocols.md tells which of this is confirmed by what. The angles p and r of a position
+are here the sum of the readings of joints 2 to 4 and the reading of joint 5.
 """
 
 import re
@@ -34,7 +34,8 @@ Tenths = NDArray[np.int64]
 
 TERMINATOR: Final = b"\r"
 JOINTS: Final = 5
-NUMBER: Final = r"[+-]?\d{1,4}\.\d"
+# Controllers leave out a zero before the point.
+NUMBER: Final = r"[+-]?\d{0,4}\.\d"
 NUMBERS: Final = re.compile(rf"\s*{NUMBER}(?:\s*,\s*{NUMBER}){{4}}\s*")
 # Joint speeds for SP 0 to 9, deg/s: the manual gives the share of the greatest, which is 140 here.
 SPEEDS_DEG_S: Final = (4.0, 8.0, 14.0, 24.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)

@@ -53,7 +53,7 @@ class RvM2:
         driver: str = "rv-m2"
         port: str
         baud: int = 9600
-        frame: str = Field(default="8E2", pattern="[78][NEO][12]")
+        frame: str = Field(default="7E2", pattern="[78][NEO][12]")
         timeout_s: Positive = 3.0
         speed: int = Field(default=5, ge=0, le=9)
         leg_s: Positive = 0.5
