@@ -1,7 +1,7 @@
 """Robot and sensor as they work together: who moves when, and what is done when one fails."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Final
 
@@ -74,24 +74,30 @@ class Crew:
             raise RefusedError("where arm and table are is not known", where="the cell")
         paths = Paths(self._clearance_of(table), world_from_base, expected.radius_m)
         end, direct = table.carriage_for(expected), paths.along([here, *way])
-        low, under = table.released(carriage), table.released(end)
-        detours = [(way, [table.lowered(carriage, depth)]) for depth in DEPTHS_M]
-        detours += [(way, [low]), (way, [low, under]), ([self._refuge, *way], [low])]
-        for first, over in detours:
+        for first, over in self._detours(table, way, carriage, end):
             arm = direct if first is way else paths.along([here, *first])
-            together, down, meanwhile, up = paths.margins(
-                arm, [[carriage, end], [carriage, *over], [over[-1]], [over[-1], end]]
-            )
+            together, down, up = paths.margins(arm, [[carriage, end], [carriage, *over], [over[-1], end]])
             if self._cell.file.process.together and together.min() > 0.0:
                 self._together(first, expected)
                 return
-            if min(down[0].min(), meanwhile.min(), up[-1].min()) > 0.0:
+            if min(down[0].min(), up[:, 0].min(), up[-1].min()) > 0.0:
                 for place in over:
                     table.go_to(place)
                 self._along(first)
                 table.prepare(expected)
                 return
         raise RefusedError("link or tool would meet the table on every way there", where="the arm")
+
+    def _detours(
+        self, table: TablePanel, way: list[Floats], carriage: Floats, end: Floats
+    ) -> Iterator[tuple[list[Floats], list[Floats]]]:
+        """Ways of the arm, each with places that the carriage goes to before."""
+        for depth in DEPTHS_M:
+            yield way, [table.lowered(carriage, depth)]
+        low = table.released(carriage)
+        yield way, [low]
+        yield way, [low, table.released(end)]
+        yield [self._refuge, *way], [low]
 
     def _clearance_of(self, table: TablePanel) -> Clearance:
         if self._clearance is None:

@@ -33,6 +33,9 @@ class Verdict:
     suspicious: bool = False
 
 
+NOTHING_YET: Final = Verdict("again")
+
+
 @dataclass(frozen=True)
 class Rules:
     """How readings are judged.
@@ -57,6 +60,8 @@ def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict
     all readings that contradict it together. Where it is far from the prediction (3,), it has to have one
     reading more.
     """
+    if not readings:
+        return NOTHING_YET
     valid = [(reading, reading.point) for reading in readings if reading.valid and reading.point is not None]
     points = [tuple(point.tolist()) for _, point in valid]
     agreeing = _largest_cluster(points, rules.agree_m)
@@ -73,8 +78,7 @@ def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict
 
 def mean_point(points: Sequence[Point]) -> Point:
     """The mean of points."""
-    x, y, z = (math.fsum(column) / len(points) for column in zip(*points, strict=True))
-    return (x, y, z)
+    return tuple(math.fsum(column) / len(points) for column in zip(*points, strict=True))
 
 
 def _largest_cluster(points: Sequence[Point], within: float) -> list[int]:
