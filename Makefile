@@ -60,7 +60,8 @@ rust-test: $(STAMPS)/tools
 py-test: $(STAMPS)/built
 	$(BIN)/python -m pytest
 
-# The measurement cell killed, interrupted and with faults, in full; takes half an hour or more.
+# The measurement cell killed, interrupted and with faults, in full; takes half an hour or more. What it finds is
+# kept in build/trials: python docs/make_trials.py build/trials
 trials: $(STAMPS)/built
 	TRUEARM_TRIALS=full $(BIN)/python -m pytest tests/test_cell_trials.py -s $(TRIALS)
 

@@ -168,7 +168,7 @@ def test_the_gap_between_link_and_column_is_that_of_the_nearest_points():
 )
 def test_positions_as_movemaster_controllers_write_them(text, found):
     numbers = parse_numbers(text)
-    assert numbers is None if found is None else numbers.tolist() == found
+    assert (None if numbers is None else numbers.tolist()) == found
 
 
 def test_lines_that_come_may_end_in_any_way():

@@ -9,11 +9,12 @@ import truearm as ta
 from tests.cell_support import cell_text, measured, poses_of, virtual, write_poses
 from tests.trials import measuring, simulated
 from truearm.cell import Cell
-from truearm.cell.accepted import accepted_table, measurements_of
+from truearm.cell.accepted import accepted_table, measurements_of, points_of_last_check
 from truearm.cell.measuring import ACCURATE, DONE, Progress
 from truearm.cell.poses_file import Poses
+from truearm.cell.reading import Reading
 from truearm.cell.registering import register_cell
-from truearm.cell.session import Session
+from truearm.cell.session import Session, Step
 from truearm.cell.summary import summary_of
 from truearm.cli import main
 from truearm.errors import WorkError
@@ -189,3 +190,18 @@ def test_wrong_commands_are_told(words, status, message, tmp_path, monkeypatch, 
         main(["cell", "example", name, "-o", "cell.toml" if name == "rv-m2" else "playback.toml"])
     assert main(words) == status
     assert message in capsys.readouterr().err
+
+
+def test_a_check_is_held_against_the_same_pose_where_the_first_contact_was_given_up(tmp_path):
+    plan = [("registration", 7), ("registration", 9), ("pose", 6), ("pose", 7), ("check", 7)]
+    steps = [Step(k, kind, pose, "", 0, np.zeros(5)) for k, (kind, pose) in enumerate(plan)]
+    with Session.create(tmp_path / "session.db", steps, {}) as known:
+        known.add_outcome(0, "skipped", reason="out of range")
+        for step in steps[1:]:
+            point = np.array([step.pose, step.step, 0.0])
+            known.add_reading(step.step, 1, Reading(point, 1e-4, 0.0, True, ""), np.zeros(5), point)
+            assert points_of_last_check(known) is None
+            known.add_outcome(step.step, "measured", attempts=[1])
+        first, check = points_of_last_check(known)
+    np.testing.assert_array_equal(first, [7.0, 3.0, 0.0])
+    np.testing.assert_array_equal(check, [7.0, 4.0, 0.0])

@@ -22,11 +22,11 @@ JOIN readings r USING (step)
 WHERE r.valid ORDER BY o.step, r.attempt
 """
 LAST_CHECK = """
-SELECT f.step, f.attempts, c.step, c.attempts
-FROM (SELECT * FROM outcomes JOIN steps USING (step)
-      WHERE outcome = 'measured' AND kind = 'check' ORDER BY step DESC LIMIT 1) c
-JOIN (SELECT * FROM outcomes JOIN steps USING (step)
-      WHERE outcome = 'measured' AND kind = 'registration') f USING (pose)
+WITH done AS (SELECT * FROM outcomes JOIN steps USING (step) WHERE outcome = 'measured'),
+     last AS (SELECT * FROM done WHERE kind = 'check' ORDER BY step DESC LIMIT 1)
+SELECT done.step, done.attempts, last.step, last.attempts
+FROM done, last WHERE done.pose = last.pose AND done.step < last.step
+ORDER BY done.step LIMIT 1
 """
 COLUMNS = (
     "step", "pose", "purpose", "approach", "attempts", "time_s", "attempt", "joints", "x", "y", "z",
@@ -61,7 +61,10 @@ def measurements_of(session: Session, *, most: int | None = None, where: str = "
 
 
 def points_of_last_check(session: Session) -> tuple[Floats, Floats] | None:
-    """The point (3,) of the pose checked last, as first measured for the frame, and as checked, m."""
+    """The point (3,) of the pose checked last, as it was first measured, and as checked, m.
+
+    None before there are both: a contact for the frame may have been given up.
+    """
     rows = session.rows(LAST_CHECK)
     if not rows:
         return None
