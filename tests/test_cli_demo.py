@@ -20,7 +20,7 @@ def test_the_demonstration_shows_the_whole_way_and_goes_on_where_it_was(tmp_path
     assert done.returncode == 0, done.stderr
     assert max(map(len, done.stdout.splitlines())) <= 80
     assert "stored, " in done.stderr
-    for name in (*WRITTEN, "summary.json"):
+    for name in (*WRITTEN, "summary.json", "report.html"):
         assert (tmp_path / "demo" / name).exists()
         assert f"demo/{name}" in done.stdout
     errors = json.loads((tmp_path / "demo" / "summary.json").read_text())["holdout"]

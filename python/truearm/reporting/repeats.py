@@ -124,6 +124,7 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     mean, spread = float(distances.mean()), float(distances.std(ddof=1)) if len(distances) > 1 else 0.0
     error = facts.calibration.validation.holdout[facts.best].position.mean
     texts = short(mean, mean + 3.0 * spread)
+    times = f" The mean error of unseen poses is {error / mean:.1f} times that scatter." if mean > 0.0 else ""
     poses = len(np.unique(found.place))
     trace = {
         "type": "histogram",
@@ -135,8 +136,7 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
         "How well poses repeat",
         f"{len(distances)} measurements of {count_of(poses, 'pose')} lie {texts[0]} mm from their centres "
         "on average; "
-        f"mean and three standard deviations make {texts[1]} mm. The mean error of unseen poses is "
-        f"{error / mean:.1f} times that scatter.",
+        f"mean and three standard deviations make {texts[1]} mm.{times}",
         [trace],
         {
             "xaxis": axis("distance from the centre of the pose, mm", rangemode="tozero"),

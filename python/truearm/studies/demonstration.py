@@ -28,7 +28,7 @@ NEARER: Final = 0.9
 def demonstration_cell(speed: float) -> str:
     """The text of the paper's cell file, whose virtual clock runs `speed` times as fast as a real one."""
     content = parsed(example(EXAMPLE), where=EXAMPLE)
-    content["simulate"] = {**content["simulate"], "speed": speed, "repeatable": True}
+    content["simulate"] = {**content["simulate"], "speed": speed}
     return tomli_w.dumps(content)
 
 
