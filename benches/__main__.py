@@ -18,6 +18,7 @@ BENCHMARKS = [
     "networks",
     "planning",
     "latency",
+    "fleet",
 ]
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "performance.md"
 HEAD = """# Performance

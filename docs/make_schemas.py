@@ -10,6 +10,7 @@ from pydantic import BaseModel
 
 from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS
+from truearm.fleet.fleet_file import ArmSection, DefaultsSection, FleetFile
 from truearm.programs.frames import FramesFile
 from truearm.robot_file import RobotFile
 
@@ -23,6 +24,7 @@ def schemas() -> dict[str, dict[str, Any]]:
         "robot.json": _schema(RobotFile, "Robot file of truearm"),
         "frames.json": _schema(FramesFile, "Frames file of truearm"),
         "cell.json": _cell(),
+        "fleet.json": _fleet(),
     }
 
 
@@ -49,6 +51,19 @@ def _cell() -> dict[str, Any]:
             choices.append({**section, "title": name})
         own = {"properties": {"driver": {"type": "string", "pattern": ":"}}, "required": ["driver"]}
         schema["properties"][key] = {"anyOf": [*choices, {**own, "title": "a driver of your own"}]}
+    return schema
+
+
+def _fleet() -> dict[str, Any]:
+    """The fleet file, with the sections that are checked arm by arm."""
+    schema = _schema(FleetFile, "Fleet file of truearm")
+    sections: dict[str, type[BaseModel]] = {"defaults": DefaultsSection, "arm": ArmSection}
+    parts = {key: model.model_json_schema() for key, model in sections.items()}
+    for part in parts.values():
+        files = part["properties"]["measurements"]
+        files["anyOf"] = [{"type": "string", "minLength": 1}, *files["anyOf"]]
+    schema["properties"]["defaults"] = parts["defaults"]
+    schema["properties"]["arm"]["items"] = parts["arm"]
     return schema
 
 

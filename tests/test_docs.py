@@ -23,6 +23,7 @@ from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.schema import checked
 from truearm.cli import COMMANDS
+from truearm.fleet import Fleet
 from truearm.programs.frames import FramesFile
 from truearm.robot import Robot
 from truearm.robot_file import RobotFile
@@ -123,6 +124,8 @@ def check_toml(content, where):
     """What is a whole file of truearm, or a section of a cell file, has to be right."""
     if "convention" in content:
         checked(RobotFile, content, where=where)
+    elif isinstance(content.get("arm"), list):
+        Fleet.from_dict(content, where=where)
     elif "arm" in content:
         checked(CellFile, content, where=where)
     elif "format" in content:

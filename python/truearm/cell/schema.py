@@ -27,6 +27,9 @@ UNIT_RULES: Final = {
     "bool_parsing": "Must be true or false",
     "model_type": "Must be a section of its own",
     "tuple_type": "Must be a list in square brackets",
+    "list_type": "Must be a list in square brackets",
+    "string_too_short": "Must not be empty",
+    "too_short": "Must not be empty",
 }
 M = TypeVar("M", bound=BaseModel)
 

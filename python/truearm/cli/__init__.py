@@ -18,6 +18,7 @@ COMMANDS: Final = (
     Entry("robots", "truearm.cli.robots", "List the library of arms, show and check a robot."),
     Entry("import", "truearm.cli.import_", "Bring in other people's measurement tables."),
     Entry("calibrate", "truearm.cli.calibrate", "Learn an arm's parameters and validate them."),
+    Entry("fleet", "truearm.cli.fleet", "Calibrate many arms and say which need attention."),
     Entry("plan", "truearm.cli.plan", "Choose measurement poses."),
     Entry("measure", "truearm.cli.measure", "Measure poses with the devices of a cell."),
     Entry("session", "truearm.cli.session", "Look into a measurement session, export it."),

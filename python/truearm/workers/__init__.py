@@ -16,10 +16,10 @@ from collections.abc import Callable, Generator, Iterable
 from typing import TypeVar
 
 from truearm.errors import UsageError
-from truearm.workers.done import Done
+from truearm.workers.done import Done, is_expected
 from truearm.workers.local import processors, run_locally
 
-__all__ = ["Done", "check_workers", "processors", "run_tasks"]
+__all__ = ["Done", "check_workers", "is_expected", "processors", "run_tasks"]
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -13,6 +13,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 ATTEMPTS: Final = 3
+CORE: Final = "truearm._core"
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,7 @@ class Done(Generic[R]):
         index: Number of its item, from 0.
         value: What the function returned; None if it failed.
         error: What it raised, or that its workers died; None if it succeeded.
-        trace: Where an error came from that truearm does not raise on purpose; empty otherwise.
+        trace: Where an error came from that is a defect; empty otherwise.
     """
 
     index: int
@@ -59,10 +60,14 @@ def answer(function: Callable[[T], R], item: T, caller: str) -> Done[R]:
         return Done(0, error=_other_version(here, caller))
     try:
         return Done(0, value=function(item))
-    except TruearmError as error:
-        return Done(0, error=_portable(error))
     except Exception as error:  # noqa: BLE001 - the one who asked judges it
-        return Done(0, error=_portable(error), trace=traceback.format_exc())
+        trace = "" if is_expected(error) else traceback.format_exc()
+        return Done(0, error=_portable(error), trace=trace)
+
+
+def is_expected(error: Exception) -> bool:
+    """Whether an error is about the input or the machine, and no defect."""
+    return isinstance(error, TruearmError | OSError | MemoryError) or type(error).__module__ == CORE
 
 
 def died() -> WorkError:

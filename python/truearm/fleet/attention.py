@@ -1,0 +1,130 @@
+"""What of an arm's results needs attention, and the verdict in one sentence."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from truearm.fleet.fleet_file import LimitsSection
+
+Row = Mapping[str, Any]
+
+GOOD: Final = "good"
+ATTENTION: Final = "attention"
+FAILED: Final = "failed"
+MOST_MOVED_NAMED: Final = 3
+PEERS: Final = 4
+"""Arms of one kind that make a median to stand out from."""
+STANDS_OUT: Final = 2.0
+FEWEST_COVERED: Final = 0.85
+MOST_OUTLIERS: Final = 0.02
+HALF: Final = 0.5
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why an arm needs attention.
+
+    Attributes:
+        kind: One word for programs: "failed", "no_gain", "drift", "mean", "max", "stands_out", "outliers" or
+            "intervals".
+        words: The sentence for people.
+        weight: How far beyond its limit; those of one kind are sorted by it.
+    """
+
+    kind: str
+    words: str
+    weight: float = 1.0
+
+
+KINDS: Final = ("failed", "no_gain", "drift", "mean", "max", "stands_out", "outliers", "intervals")
+"""The worst first."""
+
+
+def reasons(arm: Row, fleet: Sequence[Row], limits: LimitsSection) -> list[Reason]:
+    """Why an arm needs attention, the worst first; nothing where it does not.
+
+    Args:
+        arm: Its row.
+        fleet: Rows of all arms.
+        limits: Of the fleet file.
+    """
+    if arm["status"] == FAILED:
+        return [Reason("failed", str(arm["error"]), np.inf)]
+    found = [*_no_gain(arm), *_drifted(arm, limits), *_beyond(arm, limits), *_stands_out(arm, fleet)]
+    found += [*_outliers(arm), *_intervals(arm)]
+    return sorted(found, key=lambda reason: KINDS.index(reason.kind))
+
+
+def order(found: Sequence[Reason]) -> tuple[int, float]:
+    """What arms are sorted by: those that need most attention first."""
+    if not found:
+        return len(KINDS), 0.0
+    return KINDS.index(found[0].kind), -found[0].weight
+
+
+def _no_gain(arm: Row) -> Iterator[Reason]:
+    before, after = arm["nominal_mean_mm"], arm["mean_mm"]
+    if after >= before:
+        words = f"The calibration does not help: {after:.3f} mm on average, {before:.3f} before."
+        yield Reason("no_gain", words, after / before)
+
+
+def _drifted(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
+    drift = arm["drift"]
+    if drift is None:
+        return
+    is_sure = bool(drift["moved"]) or (drift["share_beyond"] or 0.0) > HALF
+    change = f"{drift['mean_mm']:.3f} mm on average, {drift['max_mm']:.3f} mm at most"
+    named = ", ".join(_change(entry) for entry in drift["moved"][:MOST_MOVED_NAMED])
+    rest = len(drift["moved"]) - MOST_MOVED_NAMED
+    moved = f" Moved: {named}{f' and {rest} more' if rest > 0 else ''}." if named else ""
+    if limits.drift_mm is None:
+        if is_sure:
+            yield Reason("drift", f"Drift since the last calibration: {change}.{moved}", drift["mean_mm"])
+    elif drift["mean_mm"] > limits.drift_mm:
+        unsure = "" if is_sure else " That is within what both calibrations leave open: measure more poses."
+        words = f"Drift beyond {limits.drift_mm:g} mm: {change}.{moved}{unsure}"
+        yield Reason("drift", words, drift["mean_mm"])
+
+
+def _change(entry: Row) -> str:
+    return f"{entry['name']} by {entry['change']:+.3f} {entry['unit']}"
+
+
+def _beyond(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
+    for kind, limit, noun in (("mean", limits.mean_mm, "Mean"), ("max", limits.max_mm, "Largest")):
+        value = arm[f"{kind}_mm"]
+        if limit is not None and value > limit:
+            words = f"{noun} error {value:.3f} mm on held-out rows, beyond {limit:g} mm."
+            yield Reason(kind, words, value / limit)
+
+
+def _stands_out(arm: Row, fleet: Sequence[Row]) -> Iterator[Reason]:
+    """Against the arms of its kind that were calibrated in the same way."""
+    alike = [
+        other["mean_mm"]
+        for other in fleet
+        if other["status"] != FAILED and (other["robot"], other["model"]) == (arm["robot"], arm["model"])
+    ]
+    if len(alike) < PEERS:
+        return
+    ratio = arm["mean_mm"] / float(np.median(alike))
+    if ratio > STANDS_OUT:
+        words = f"Mean error {ratio:.1f} times the median of the fleet's {len(alike)} {arm['robot']} arms."
+        yield Reason("stands_out", words, ratio)
+
+
+def _outliers(arm: Row) -> Iterator[Reason]:
+    share = arm["outliers"] / arm["rows"]
+    if share > MOST_OUTLIERS:
+        words = f"{arm['outliers']} of {arm['rows']} rows are outliers: look at them in the report."
+        yield Reason("outliers", words, share)
+
+
+def _intervals(arm: Row) -> Iterator[Reason]:
+    covered = arm["coverage_95"]
+    if covered is not None and covered < FEWEST_COVERED:
+        words = f"The 95 % intervals hold {100 * covered:.0f} % of the held-out coordinates only."
+        yield Reason("intervals", words, 1.0 / max(covered, 1e-3))

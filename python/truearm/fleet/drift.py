@@ -1,0 +1,114 @@
+"""How far an arm has moved away from its last calibration."""
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.errors import InputError
+from truearm.measurements import Measurements
+from truearm.models import CONSTANT
+from truearm.parameters import KIND_COUNT, A, D
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+
+SURE: Final = 2.0
+"""A change of a position beyond so many standard deviations of both calibrations together is seen."""
+MOVED: Final = 4.0
+"""A parameter that changed by more standard errors moved; one unmoved arm in a thousand is suspected."""
+
+
+def check_comparable(previous: Calibration, new_joints: tuple[str, ...], where: str) -> None:
+    """Raise InputError if a calibration is not of an arm with these joints."""
+    if previous.robot.joints != new_joints:
+        raise InputError(
+            f"this is a calibration of {previous.robot.name}, with {len(previous.robot.joints)} joints",
+            where=where,
+            rule=f"The arm has {len(new_joints)}",
+            way_out="Correct previous of this arm",
+        )
+
+
+def drift_of(previous: Calibration, now: Calibration, data: Measurements) -> dict[str, Any]:
+    """What changed from one calibration of an arm to another, over the poses of `data`; JSON values.
+
+    Positions are those of the robot file's tool in its base frame. How uncertain their change is follows
+    from both calibrations' conservative standard deviations, where both know them.
+    """
+    before, after = (_positions(calibration, data) for calibration in (previous, now))
+    change_m = np.linalg.norm(after - before, axis=1)
+    worst = int(np.argmax(change_m))
+    uncertain_m = _uncertain(previous, now, data)
+    return {
+        "since_version": previous.version,
+        "poses": len(data),
+        "mean_mm": float(change_m.mean() * MM_PER_METRE),
+        "max_mm": float(change_m[worst] * MM_PER_METRE),
+        "max_row": int(data.rows[worst]),
+        "max_file": str(data.sources[worst]),
+        "std_mm": None if uncertain_m is None else float(np.median(uncertain_m) * MM_PER_METRE),
+        "share_beyond": None if uncertain_m is None else float(np.mean(change_m > SURE * uncertain_m)),
+        "moved": list(_moved(previous, now)),
+    }
+
+
+def _features(calibration: Calibration, data: Measurements) -> dict[str, Floats] | None:
+    names = calibration.options.features
+    missing = [name for name in names if name not in data.features]
+    if missing:
+        raise InputError(
+            f'the last calibration depends on "{missing[0]}"',
+            where=", ".join(data.files),
+            rule="The measurements have no such column",
+            way_out="Measure it again, or leave previous out",
+        )
+    return {name: data.features[name].to_numpy(dtype=np.float64) for name in names} or None
+
+
+def _positions(calibration: Calibration, data: Measurements) -> Floats:
+    return calibration.position(data.readings, features=_features(calibration, data))
+
+
+def _uncertain(previous: Calibration, now: Calibration, data: Measurements) -> Floats | None:
+    """Standard deviation (n,) of the change, m: that of its length, as if both were independent."""
+    if not (previous.has_conservative and now.has_conservative):
+        return None
+    stds = [
+        calibration.conservative_std(data.readings, features=_features(calibration, data))[:, 0]
+        for calibration in (previous, now)
+    ]
+    return np.asarray(np.hypot(*stds))
+
+
+def _moved(previous: Calibration, now: Calibration) -> Iterator[dict[str, Any]]:
+    """Constants that both determined and that changed beyond their standard errors, the surest first."""
+    if previous.robot.convention != now.robot.convention:
+        return
+    old, new = _constants(previous), _constants(now)
+    errors = {
+        name: abs(new[name][0] - old[name][0]) / math.sqrt(new[name][1] + old[name][1])
+        for name in new
+        if name in old
+    }
+    for name in sorted(errors, key=lambda name: -errors[name]):
+        if errors[name] > MOVED:
+            value, _, is_length = new[name]
+            change = value - old[name][0]
+            unit = "mm" if is_length else "deg"
+            size = change * MM_PER_METRE if is_length else change / RADIANS_PER_DEGREE
+            yield {"name": name, "change": size, "unit": unit, "standard_errors": errors[name]}
+
+
+def _constants(calibration: Calibration) -> dict[str, tuple[float, float, bool]]:
+    """Value, variance and whether it is a length, of the constants that were fitted, by name."""
+    columns = dict(zip(calibration.arm.candidates.names, calibration.arm.candidates.columns, strict=True))
+    values = np.ravel(calibration.models[CONSTANT].constants)
+    variances = np.diag(calibration.constant.covariance)
+    return {
+        name: (float(values[columns[name]]), float(variances[k]), columns[name] % KIND_COUNT in (D, A))
+        for k, name in enumerate(calibration.constant.names)
+    }

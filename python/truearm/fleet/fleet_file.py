@@ -1,0 +1,213 @@
+"""The fleet file: which arms there are, where their data is, how to calibrate them, what needs attention."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import BeforeValidator, Field
+
+from truearm.cell.cell_file import parsed
+from truearm.cell.schema import Positive, Section, checked
+from truearm.errors import InputError, UsageError
+from truearm.files import read_text
+from truearm.options import Options
+
+ARM_NAME: Final = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
+PLACEHOLDER: Final = "{arm}"
+FOR_THE_FLEET: Final = ("fleet.json", "fleet.csv", "fleet.html")
+NOT_OPTIONS: Final = (
+    "name",
+    "robot",
+    "measurements",
+    "previous",
+    "length_unit",
+    "angle_unit",
+    "strip",
+    "report",
+)
+Text = Annotated[str, Field(min_length=1)]
+Files = Annotated[list[Text], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)]
+Number = Annotated[float, Field(strict=True)]
+Whole = Annotated[int, Field(strict=True)]
+
+
+class DefaultsSection(Section):
+    """What holds for all arms that say nothing else; options as of `truearm calibrate`."""
+
+    robot: Text | None = None
+    measurements: Files | None = None
+    previous: Text | None = None
+    length_unit: str | None = None
+    angle_unit: str | None = None
+    strip: bool = False
+    report: bool = True
+    holdout: Number | None = None
+    seed: Whole | None = None
+    train_size: Whole | None = None
+    split_by: list[Text] | None = None
+    holdout_range: str | None = None
+    use: str | None = None
+    judge_target: Whole | None = None
+    model: str | None = None
+    robust: str | None = None
+    features: list[Text] | None = None
+    frame: str | None = None
+    refit: bool | None = None
+    scheme_joints: list[Whole] | None = None
+    demanded_mm: Number | None = None
+    most_regions: Whole | None = None
+    region_rows: Whole | None = None
+    region_ceps: str | None = None
+    train_on: str | None = None
+    membership: str | None = None
+    composition: str | None = None
+    repeatability_mm: Number | None = None
+
+
+class ArmSection(DefaultsSection):
+    """An arm: what it does not say is that of the defaults."""
+
+    name: Text
+
+
+class LimitsSection(Section):
+    """What an arm may show before it needs attention; errors are those on held-out rows."""
+
+    mean_mm: Positive | None = None
+    max_mm: Positive | None = None
+    drift_mm: Positive | None = None
+
+
+class FleetFile(Section):
+    """A fleet file as written."""
+
+    name: Text = "Fleet"
+    defaults: dict[str, Any] = Field(default_factory=dict)
+    limits: LimitsSection = LimitsSection()
+    arm: Annotated[list[dict[str, Any]], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An arm of the fleet, with its files as they are written, and where they are looked for.
+
+    Attributes:
+        name: Name of the arm, and of its directory of results.
+        robot: Library name or file.
+        measurements: Files, or patterns of files such as "r1/*.csv".
+        previous: Its last calibration; None where there is none.
+        options: How to calibrate.
+        section: The rest of what was stated.
+        folder: Where the fleet file is.
+    """
+
+    name: str
+    robot: str
+    measurements: tuple[str, ...]
+    previous: str | None
+    options: Options
+    section: ArmSection
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """A fleet: its arms, in the order of the file."""
+
+    name: str
+    limits: LimitsSection
+    arms: tuple[Entry, ...]
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Fleet":
+        """Read a fleet file. The files that it names are not yet looked at.
+
+        Raises:
+            InputError: If it is no TOML, a key is unknown or missing, or a value breaks its rule.
+        """
+        return cls.from_toml(read_text(Path(path)), where=str(path), folder=Path(path).parent)
+
+    @classmethod
+    def from_toml(cls, text: str, *, where: str = "fleet", folder: Path = Path()) -> "Fleet":
+        """A fleet from the text of its file.
+
+        Raises:
+            InputError: As for load.
+        """
+        return cls.from_dict(parsed(text, where=where), where=where, folder=folder)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any], *, where: str = "fleet", folder: Path = Path()) -> "Fleet":
+        """A fleet from the values of its file.
+
+        Raises:
+            InputError: As for load.
+        """
+        file = checked(FleetFile, content, where=where)
+        checked(DefaultsSection, file.defaults, where=f"{where}, defaults")
+        arms = tuple(
+            _entry(number, given, file.defaults, where=where, folder=folder)
+            for number, given in enumerate(file.arm, start=1)
+        )
+        _check_names([arm.name for arm in arms], where)
+        return cls(file.name, file.limits, arms)
+
+
+def _entry(
+    number: int, given: Mapping[str, Any], defaults: Mapping[str, Any], *, where: str, folder: Path
+) -> Entry:
+    named = given.get("name")
+    place = f'{where}, arm "{named}"' if isinstance(named, str) else f"{where}, arm {number}"
+    section = checked(ArmSection, {**defaults, **given}, where=place)
+    _check_name(section.name, place)
+    if section.robot is None or not section.measurements:
+        missing = "robot" if section.robot is None else "measurements"
+        raise InputError(
+            f'key "{missing}" is missing',
+            where=place,
+            rule="Each arm has a robot and measurements",
+            way_out="Give it there or in [defaults]",
+        )
+    previous = section.previous
+    return Entry(
+        section.name,
+        section.robot.replace(PLACEHOLDER, section.name),
+        tuple(file.replace(PLACEHOLDER, section.name) for file in section.measurements),
+        None if previous is None else previous.replace(PLACEHOLDER, section.name),
+        _options(section, place),
+        section,
+        folder,
+    )
+
+
+def _options(section: ArmSection, place: str) -> Options:
+    given = section.model_dump(exclude_none=True, exclude=set(NOT_OPTIONS))
+    try:
+        return Options.of(**given)
+    except UsageError as error:
+        raise InputError(error.what, where=error.where, rule=error.rule, way_out=error.way_out).at(
+            place
+        ) from None
+
+
+def _check_name(name: str, place: str) -> None:
+    if ARM_NAME.fullmatch(name) is None or name.casefold() in FOR_THE_FLEET:
+        raise InputError(
+            f'"{name}" cannot be the name of an arm',
+            where=f"{place}, name",
+            rule="It names a directory: letters, digits, blanks and . _ + -, a letter or digit first, at "
+            f"most 100, and not {', '.join(FOR_THE_FLEET)}",
+        )
+
+
+def _check_names(names: list[str], where: str) -> None:
+    folded = [name.casefold() for name in names]
+    for name in names:
+        if folded.count(name.casefold()) > 1:
+            raise InputError(
+                f'the name "{name}" is given twice',
+                where=where,
+                rule="Names differ, and not only in capitals: each has a directory",
+            )

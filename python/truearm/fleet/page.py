@@ -1,0 +1,172 @@
+"""The page of a fleet: a verdict an arm, what drifted, and which arms need attention, sorted first."""
+
+from collections.abc import Collection, Sequence
+from importlib.metadata import version
+from typing import Any, Final
+from urllib.parse import quote
+
+from truearm.fleet.attention import ATTENTION, FAILED, GOOD
+from truearm.fleet.drift import SURE
+from truearm.fleet.fleet_file import Fleet
+from truearm.fleet.kept import REPORT_NAME
+from truearm.fleet.rows import Judged, counts
+from truearm.reporting.charts import legend
+from truearm.reporting.page import page
+from truearm.reporting.parts import Card, Cell, Figure, Head, Section, Table, Text, Tone
+from truearm.reporting.style import marker_of
+
+TONES: Final[dict[str, Tone]] = {GOOD: "good", ATTENTION: "fair", FAILED: "bad"}
+COLUMNS: Final = (
+    "arm",
+    "verdict",
+    "robot",
+    "held-out rows",
+    "mean, mm",
+    "max, mm",
+    "mean before, mm",
+    "drift mean, mm",
+    "drift max, mm",
+    "why",
+)
+LEFT: Final = (0, 1, 2, 9)
+
+
+def fleet_page(fleet: Fleet, arms: Sequence[Judged], reports: Collection[str]) -> str:
+    """The HTML of fleet.html.
+
+    Args:
+        fleet: The fleet.
+        arms: Its arms, those that need most attention first.
+        reports: Names of the arms that have a report beside the page.
+    """
+    number = counts(arms)
+    tone: Tone = "bad" if number[FAILED] else "fair" if number[ATTENTION] else "good"
+    head = Head(
+        title=fleet.name,
+        about=f"{len(arms)} arms",
+        verdict=in_words(number),
+        tone=tone,
+        cards=[Card(str(number[word]), "arms", word, TONES[word]) for word in (GOOD, ATTENTION, FAILED)],
+        advice=[(arm.row["arm"], arm.reasons[0].words) for arm in arms if arm.reasons][:5],
+    )
+    done = [arm for arm in arms if arm.verdict != FAILED]
+    sections = [
+        Section("Arms", [_table(arms, reports)]),
+        Section("Errors and drift", [figure for figure in (_errors(done), _drift(done)) if figure]),
+        Section("What the verdicts mean", [Text(words) for words in _meaning(fleet)]),
+    ]
+    return page(head, sections, foot=f"Made by truearm {version('truearm')}.")
+
+
+def in_words(number: dict[str, int]) -> str:
+    """How the fleet is, in one sentence."""
+    total = sum(number.values())
+    if number[GOOD] == total:
+        return f"All {total} arms are good." if total > 1 else "The arm is good."
+    parts = [f"{number[GOOD]} of {total} arms are good"]
+    if number[ATTENTION]:
+        parts.append(f"{number[ATTENTION]} {'needs' if number[ATTENTION] == 1 else 'need'} attention")
+    if number[FAILED]:
+        parts.append(f"{number[FAILED]} could not be calibrated")
+    return ", ".join(parts) + "."
+
+
+def _table(arms: Sequence[Judged], reports: Collection[str]) -> Table:
+    return Table(
+        "Arms, those that need attention first",
+        COLUMNS,
+        [_cells(arm, reports) for arm in arms],
+        says="Errors are those of rows that took no part in the fit. Drift is how far predicted positions "
+        "moved since the last calibration, over the poses of the data.",
+        left=LEFT,
+    )
+
+
+def _cells(arm: Judged, reports: Collection[str]) -> list[str | Cell]:
+    row, name = arm.row, arm.row["arm"]
+    href = f"{quote(name)}/{REPORT_NAME}" if name in reports else ""
+    drift: dict[str, Any] = row.get("drift") or {}
+    numbers = [row.get(key) for key in ("mean_mm", "max_mm", "nominal_mean_mm")]
+    numbers += [drift.get("mean_mm"), drift.get("max_mm")]
+    return [
+        Cell(name, href=href),
+        Cell(arm.verdict, TONES[arm.verdict]),
+        row.get("robot", ""),
+        str(row.get("held_out", "")),
+        *("" if value is None else f"{value:.3f}" for value in numbers),
+        " ".join(reason.words for reason in arm.reasons),
+    ]
+
+
+def _errors(arms: Sequence[Judged]) -> Figure | None:
+    if not arms:
+        return None
+    names = [arm.row["arm"] for arm in arms]
+    marks = [("nominal", "before", "nominal_mean_mm"), ("variable", "after", "mean_mm")]
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": label,
+            "x": names,
+            "y": [arm.row[key] for arm in arms],
+            "marker": {"color": f"@{model}", "symbol": marker_of(model), "size": 10},
+        }
+        for model, label, key in marks
+    ]
+    worst = max(arms, key=lambda arm: float(arm.row["mean_mm"]))
+    layout = {"xaxis": _names(), "yaxis": {"title": {"text": "mean error, mm"}, "type": "log"}}
+    return Figure(
+        "Mean held-out error of each arm",
+        f"The largest is left on {worst.row['arm']}: {worst.row['mean_mm']:.3f} mm.",
+        traces,
+        {**layout, **legend()},
+        is_wide=True,
+    )
+
+
+def _drift(arms: Sequence[Judged]) -> Figure | None:
+    known = [(arm.row["arm"], arm.row["drift"]) for arm in arms if arm.row["drift"] is not None]
+    if not known:
+        return None
+    names = [name for name, _ in known]
+    bars = {
+        "type": "bar",
+        "name": "mean change",
+        "x": names,
+        "y": [drift["mean_mm"] for _, drift in known],
+        "marker": {"color": "@variable"},
+    }
+    unsure = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "what both calibrations leave open",
+        "x": names,
+        "y": [None if drift["std_mm"] is None else SURE * drift["std_mm"] for _, drift in known],
+        "marker": {"color": "@ink", "symbol": "line-ew-open", "size": 24, "line": {"width": 2}},
+    }
+    name, most = max(known, key=lambda entry: float(entry[1]["mean_mm"]))
+    layout = {"xaxis": _names(), "yaxis": {"title": {"text": "change, mm"}, "rangemode": "tozero"}}
+    return Figure(
+        "Change of predicted positions since the last calibration",
+        f"{name} moved most: {most['mean_mm']:.3f} mm on average. What stays below its line, "
+        f"{SURE:g} standard deviations of both calibrations, may be none.",
+        [bars, unsure],
+        {**layout, **legend()},
+        is_wide=True,
+    )
+
+
+def _names() -> dict[str, Any]:
+    return {"title": {"text": "arm"}, "type": "category"}
+
+
+def _meaning(fleet: Fleet) -> list[str]:
+    stated = fleet.limits.model_dump(exclude_none=True)
+    limits = ", ".join(f"{name} = {value:g}" for name, value in stated.items())
+    return [
+        "An arm needs attention if its calibration does not help, if it moved since its last calibration by "
+        "more than both calibrations leave open, if its error is beyond a limit or stands out of its kind, "
+        "if many of its rows are outliers, or if its 95 % intervals hold too little.",
+        f"Limits of the fleet file: {limits or 'none'}.",
+    ]

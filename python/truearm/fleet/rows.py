@@ -1,0 +1,140 @@
+"""One row an arm: what the table, the page and the files of the fleet say of it."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from truearm.fleet.attention import ATTENTION, FAILED, GOOD, Reason, order, reasons
+from truearm.fleet.fleet_file import Fleet
+from truearm.fleet.task import ArmMade
+from truearm.models import NOMINAL
+from truearm.workers import is_expected
+
+DONE: Final = "done"
+CSV_COLUMNS: Final = (
+    "arm",
+    "robot",
+    "model",
+    "rows",
+    "held_out",
+    "mean_mm",
+    "p95_mm",
+    "max_mm",
+    "nominal_mean_mm",
+    "nominal_max_mm",
+    "noise_mm",
+    "coverage_95",
+    "outliers",
+    "determined",
+    "parameters",
+)
+CSV_DRIFT: Final = ("mean_mm", "max_mm", "std_mm", "share_beyond")
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An arm with its verdict.
+
+    Attributes:
+        row: Its results.
+        reasons: Why it needs attention, the worst first.
+    """
+
+    row: Row
+    reasons: tuple[Reason, ...]
+
+    @property
+    def verdict(self) -> str:
+        """In one word: "good", "attention" or "failed"."""
+        if self.row["status"] == FAILED:
+            return FAILED
+        return ATTENTION if self.reasons else GOOD
+
+    @property
+    def words(self) -> str:
+        """In one sentence."""
+        row = self.row
+        if row["status"] == FAILED:
+            return "It could not be calibrated."
+        return (
+            f"On {row['held_out']} held-out rows it misses by {row['mean_mm']:.3f} mm on average and "
+            f"{row['max_mm']:.3f} mm at most; before {row['nominal_mean_mm']:.3f} and "
+            f"{row['nominal_max_mm']:.3f}."
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        attention = [{"kind": reason.kind, "words": reason.words} for reason in self.reasons]
+        return {**self.row, "verdict": self.verdict, "words": self.words, "attention": attention}
+
+
+def row_of_made(arm: str, made: ArmMade) -> Row:
+    """The row of an arm that was calibrated."""
+    summary = made.summary
+    errors, before = summary["holdout"][made.model], summary["holdout"][NOMINAL]
+    return {
+        "arm": arm,
+        "status": DONE,
+        "robot": summary["robot"],
+        "model": made.model,
+        "rows": summary["n_train"] + summary["n_holdout"],
+        "held_out": summary["n_holdout"],
+        **{key: errors[key] for key in ("mean_mm", "p95_mm", "max_mm")},
+        "nominal_mean_mm": before["mean_mm"],
+        "nominal_max_mm": before["max_mm"],
+        "noise_mm": summary["noise_mm"],
+        "coverage_95": summary["coverage_95"],
+        "outliers": len(summary["outliers"]),
+        "determined": summary["identifiability"]["rank"],
+        "parameters": summary["identifiability"]["parameters"],
+        "drift": made.drift,
+        "notices": summary["notices"],
+    }
+
+
+def row_of_failed(arm: str, error: Exception) -> Row:
+    """The row of an arm that could not be calibrated."""
+    kind = type(error).__name__
+    words = str(error) if is_expected(error) else f"{kind}: {error}"
+    return {"arm": arm, "status": FAILED, "error": words, "kind": kind}
+
+
+def judged(fleet: Fleet, rows: Sequence[Row]) -> list[Judged]:
+    """All arms with their verdicts, those that need most attention first, then in the order of the file."""
+    found = [Judged(row, tuple(reasons(row, rows, fleet.limits))) for row in rows]
+    return sorted(found, key=lambda arm: order(arm.reasons))
+
+
+def counts(arms: Sequence[Judged]) -> dict[str, int]:
+    """How many arms there are of each verdict."""
+    return {word: sum(arm.verdict == word for arm in arms) for word in (GOOD, ATTENTION, FAILED)}
+
+
+def content(fleet: Fleet, arms: Sequence[Judged], version: str) -> dict[str, Any]:
+    """The content of fleet.json."""
+    return {
+        "fleet": fleet.name,
+        "version": version,
+        "limits": fleet.limits.model_dump(),
+        "counts": counts(arms),
+        "arms": [arm.to_dict() for arm in arms],
+    }
+
+
+def table_of(arms: Sequence[Judged]) -> str:
+    """The text of fleet.csv: a line an arm; drift and reasons behind the results."""
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    drift = [f"drift_{name}" for name in CSV_DRIFT]
+    writer.writerow([*CSV_COLUMNS, *drift, "moved", "verdict", "attention"])
+    for arm in arms:
+        changed: Mapping[str, Any] = arm.row.get("drift") or {}
+        moved = " ".join(entry["name"] for entry in changed.get("moved", ()))
+        words = " ".join(reason.words for reason in arm.reasons)
+        values = [arm.row.get(name) for name in CSV_COLUMNS] + [changed.get(name) for name in CSV_DRIFT]
+        writer.writerow(["" if value is None else value for value in values] + [moved, arm.verdict, words])
+    return lines.getvalue()

@@ -1,0 +1,76 @@
+"""The work on one arm of the fleet, wherever it is done: calibrate, compare with the last time, report."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from truearm.calibrating import calibrate
+from truearm.calibration import Calibration
+from truearm.fleet.drift import check_comparable, drift_of
+from truearm.measurements import Measurements
+from truearm.options import Options
+from truearm.reporting.report import report
+from truearm.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class ArmTask:
+    """What is to be done; sent by value, so that workers need none of the files.
+
+    Attributes:
+        robot: The nominal arm, as Robot.to_dict gives it.
+        data: What was measured.
+        options: How to calibrate.
+        previous: Bytes of the last calibration; None where there is none.
+        previous_name: What it is called in messages.
+        strip: Whether to leave the measurements out of the calibration.
+        with_report: Whether to write a report.
+    """
+
+    robot: Mapping[str, Any]
+    data: Measurements
+    options: Options
+    previous: bytes | None
+    previous_name: str
+    strip: bool
+    with_report: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ArmMade:
+    """What was made of it.
+
+    Attributes:
+        calibration: Bytes of the calibration file.
+        summary: Content of summary.json.
+        model: Name of the model that predicts.
+        drift: What changed since the last calibration; None where there is none.
+        report: The page; None where it was not asked for.
+    """
+
+    calibration: bytes
+    summary: dict[str, Any]
+    model: str
+    drift: dict[str, Any] | None
+    report: str | None
+
+
+def calibrate_arm(task: ArmTask) -> ArmMade:
+    """Calibrate an arm of the fleet.
+
+    Raises:
+        TruearmError: As calibrate, and if the last calibration is none of this arm.
+    """
+    robot = Robot.from_dict(task.robot)
+    previous = None
+    if task.previous is not None:
+        previous = Calibration.from_bytes(task.previous, where=task.previous_name)
+        check_comparable(previous, robot.joints, task.previous_name)
+    made = calibrate(robot, task.data, task.options)
+    return ArmMade(
+        calibration=made.to_bytes(with_rows=not task.strip),
+        summary=made.summary,
+        model=made.model_name,
+        drift=None if previous is None else drift_of(previous, made, task.data.deduplicated()),
+        report=report(made).html if task.with_report else None,
+    )
