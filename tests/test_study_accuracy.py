@@ -209,7 +209,8 @@ def test_the_page_says_who_is_first_and_what_is_missing():
         "curves": _found(0.1),
         "ours": _found(0.102),
     }
-    lead = {"best": "curves", "ratio": 1.02, "level": True}
+    plain = {"best_without_curves": "constant", "ratio_without_curves": 0.51}
+    lead = {"best": "curves", "ratio": 1.02, "level": True, **plain}
     group = {"set": "arm", "split": "random", "size": "100", "runs": 1, "seeds": 1, "n_train": 100}
     text = page(
         {
@@ -224,6 +225,7 @@ def test_the_page_says_who_is_first_and_what_is_missing():
     )
     assert "1 of 4 results are not there yet" in text
     assert "| arm | random rows held out | **0.102** (1.02 curves) |" in text
+    assert "| arm | random rows held out | 0.51 constant |" in text
     assert "| constant D-H, theta curves | **0.100** |" in text
 
 

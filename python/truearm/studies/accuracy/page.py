@@ -1,6 +1,6 @@
 """The page of the study: who is first where, all means, what each block adds, and what it costs."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from statistics import median
 from typing import Any, Final
 
@@ -13,6 +13,8 @@ Summary = Mapping[str, Any]
 
 DETAILED: Final = ("400", "all", "200", "100", "50", "25")
 """The first of these sizes that there is, is told in detail."""
+HALF: Final = 0.5
+SEVERAL_A_SEED: Final = ("tails", "target")
 BLOCKS: Final = ("constant", OWN, OWN_SMOOTH, OURS)
 ABOUT: Final = (
     "Mean held-out position error in mm, the median over runs: one run is a seed and, for tails, one joint's "
@@ -37,6 +39,7 @@ def sections(summary: Summary) -> list[str]:
     return [
         "## Where ours stands",
         _standing(summary),
+        _standing_without_curves(summary),
         *_means(summary),
         *_blocks(summary),
         *_cost(summary),
@@ -45,24 +48,36 @@ def sections(summary: Summary) -> list[str]:
 
 
 def _standing(summary: Summary) -> str:
-    rows = []
-    for (name, split), groups in _by_set_and_split(summary).items():
-        cells = []
-        for size in summary["sizes"]:
-            lead = groups[size]["lead"] if size in groups else None
-            cells.append("" if lead is None else _lead_cell(groups[size], lead))
-        rows.append((name, SPLITS[split], *cells))
     words = (
         "Ours, and its ratio to the best other method, which is named: below one ours is better. "
         "In bold where it is first or within 3 %."
     )
-    return f"{words}\n\n{table(('set', 'split', *summary['sizes']), rows)}"
+    return f"{words}\n\n{_lead_table(summary, _lead_cell)}"
 
 
-def _lead_cell(group: Mapping[str, Any], lead: Mapping[str, Any]) -> str:
-    number = f"{group['methods'][OURS]['mean_mm']:.3f}"
+def _standing_without_curves(summary: Summary) -> str:
+    words = "Its ratio to the best of those that have no curves of single joints; in bold below a half."
+    return f"{words}\n\n{_lead_table(summary, _plain_cell)}"
+
+
+def _lead_table(summary: Summary, cell: Callable[[Mapping[str, Any]], str]) -> str:
+    """One cell for each set, split and size where ours can be compared."""
+    rows = []
+    for (name, split), groups in _by_set_and_split(summary).items():
+        led = [groups.get(size, {}) for size in summary["sizes"]]
+        rows.append((name, SPLITS[split], *(cell(group) if group.get("lead") else "" for group in led)))
+    return table(("set", "split", *summary["sizes"]), rows)
+
+
+def _lead_cell(group: Mapping[str, Any]) -> str:
+    lead, number = group["lead"], f"{group['methods'][OURS]['mean_mm']:.3f}"
     ratio = f"{lead['ratio']:.2f} {lead['best']}"
     return f"**{number}** ({ratio})" if lead["level"] else f"{number} ({ratio})"
+
+
+def _plain_cell(group: Mapping[str, Any]) -> str:
+    ratio, best = group["lead"]["ratio_without_curves"], group["lead"]["best_without_curves"]
+    return f"**{ratio:.2f}** {best}" if ratio < HALF else f"{ratio:.2f} {best}"
 
 
 def _means(summary: Summary) -> Iterable[str]:
@@ -95,7 +110,7 @@ def _means_table(groups: Mapping[str, Mapping[str, Any]], sizes: Sequence[str]) 
 
 def _count(group: Mapping[str, Any]) -> str:
     seeds = f"{group['seeds']} seed{'s' if group['seeds'] > 1 else ''}"
-    return seeds if group["runs"] == group["seeds"] else f"{group['runs']} of {seeds}"
+    return f"{group['runs']} runs of {seeds}" if group["split"] in SEVERAL_A_SEED else seeds
 
 
 def _number(value: float | None, digits: int = 3) -> str:

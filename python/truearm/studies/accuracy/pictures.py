@@ -23,6 +23,7 @@ COLOURS: Final = {
 }
 PALE: Final = "#bbbbbb"
 PANEL_IN: Final = (2.6, 2.1)
+TICKS_MM: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 STEM: Final = "learning_curves"
 
 
@@ -69,7 +70,13 @@ def _draw(axes: Axes, summary: Mapping[str, Any], name: str, kind: str, lines: d
         lines.setdefault(TITLES[method] if method in COLOURS else "other methods", line)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    sizes = [group["n_train"] for group in groups]
+    axes.set_xticks(sizes, [str(size) for size in sizes])
+    axes.minorticks_off()
+    low, high = axes.get_ylim()
+    ticks = [tick for tick in TICKS_MM if low <= tick <= high]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_title(f"{name}, {SPLITS[kind]}", fontsize=6)
     axes.set_xlabel("training poses")
     axes.set_ylabel("mean error, mm")
-    axes.grid(visible=True, which="both", linewidth=0.3, alpha=0.6)
+    axes.grid(visible=True, linewidth=0.3, alpha=0.6)

@@ -92,8 +92,11 @@ def _lead(methods: Mapping[str, Mapping[str, Any]]) -> dict[str, Any] | None:
         return None
     best = min(others, key=lambda name: others[name])
     plain = {name: mean for name, mean in others.items() if FAMILIES[name] != "curves"}
-    found = {"best": best, "ratio": ours / others[best], "level": ours <= LEVEL * others[best]}
-    if plain:
-        uncurved = min(plain, key=lambda name: plain[name])
-        found |= {"best_without_curves": uncurved, "ratio_without_curves": ours / plain[uncurved]}
-    return found
+    uncurved = min(plain or others, key=lambda name: others[name])
+    return {
+        "best": best,
+        "ratio": ours / others[best],
+        "level": ours <= LEVEL * others[best],
+        "best_without_curves": uncurved,
+        "ratio_without_curves": ours / others[uncurved],
+    }
