@@ -271,6 +271,22 @@ def test_short_work_and_broken_files_of_durations_are_no_matter(tmp_path, monkey
         assert remembered("calibrate ur10", 100) is None
 
 
+def test_without_a_place_for_durations_nothing_is_kept(tmp_path, monkeypatch):
+    took = Took(100, (("frame", 9.0),))
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    remember("calibrate ur10", took)
+    assert remembered("calibrate ur10", 100) is None
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", homeless)
+    remember("calibrate ur10", took)
+    assert remembered("calibrate ur10", 100) is None
+
+
+def homeless():
+    raise RuntimeError("Could not determine home directory.")
+
+
 IMPORT = ["import", "measured.csv", "-o", "again.csv", "--joint-unit", "rad", "--length-unit", "m"]
 WAY = [
     (["robots"], "truearm robots NAME"),

@@ -12,10 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from truearm.errors import InputError
 from truearm.files import write_whole
 
 FILE: Final = "durations.json"
 WORTH_KEEPING_S: Final = 2.0
+NO_PLACE: Final = (OSError, InputError, RuntimeError)
+"""What a cache directory raises that is not there, cannot be written, or has no home directory to be in."""
 
 
 @dataclass(frozen=True)
@@ -47,17 +50,21 @@ def remembered(work: str, size: int) -> Took | None:
 
 
 def remember(work: str, took: Took) -> None:
-    """Keep what `work` took; where that cannot be written nothing is kept, and no time is told."""
+    """Keep what `work` took; where that cannot be written, no time is told the next time."""
     if sum(seconds for _, seconds in took.stages) < WORTH_KEEPING_S:
         return
     everything = {**_all(), work: {"size": took.size, "stages": took.stages}}
-    with suppress(OSError):
+    with suppress(*NO_PLACE):
         place().parent.mkdir(parents=True, exist_ok=True)
         write_whole(place(), json.dumps(everything, indent=1) + "\n")
 
 
 def place() -> Path:
-    """Where durations are kept: below XDG_CACHE_HOME, or ~/.cache."""
+    """Where durations are kept: below XDG_CACHE_HOME, or ~/.cache.
+
+    Raises:
+        RuntimeError: If there is no home directory.
+    """
     cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(cache) / "truearm" / FILE
 
@@ -65,6 +72,6 @@ def place() -> Path:
 def _all() -> Mapping[str, Any]:
     try:
         found = json.loads(place().read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (*NO_PLACE, ValueError):
         return {}
     return found if isinstance(found, dict) else {}
