@@ -61,10 +61,8 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
     words = (
         f"{count_of(len(outliers), 'measurement')} cannot be of this arm as the others show it: {rows} "
-        f"{named}{more}, "
-        f"up to {largest} mm off. Measure these poses again; a blocked beam, a loose target or an "
-        "unsettled arm "
-        "shows at once."
+        f"{named}{more}, up to {largest} mm off. Measure these poses again; a blocked beam, a loose "
+        "target or an unsettled arm shows at once."
     )
     yield Advice("outliers", "Look at the outliers.", words, _mean_mm(facts) + share)
 
@@ -76,17 +74,15 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
         words = (
-            f"{left} mm are left where noise alone leaves {noise} mm. More poses will hardly help: what is "
-            "left is "
-            "the instrument and what the arm does not repeat."
+            f"{left} mm are left where noise alone leaves {noise} mm. More poses will hardly help: what "
+            "is left is the instrument and what the arm does not repeat."
         )
         yield Advice("noise_floor", "The noise floor is reached.", words, floor)
         return
     trained = facts.calibration.validation.n_train
     words = (
         f"{left} mm are left where noise alone leaves {noise} mm: what {trained} training poses do not "
-        "tell is the "
-        "larger part. Poses like those of the work help most."
+        "tell is the larger part. Poses like those of the work help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
@@ -100,8 +96,8 @@ def _where(facts: Facts, known: Known) -> Iterator[Advice]:
         count_of(weak.rows, "measured pose") if facts.readings is not None else "an unknown number of poses"
     )
     words = (
-        f"With {_range(facts, weak)} the standard deviation is {std} mm, against {median} mm in the median; "
-        f"{there} lie there. Measure there, or keep the work away."
+        f"With {_range(facts, weak)} the standard deviation is {std} mm, against {median} mm in the "
+        f"median; {there} lie there. Measure there, or keep the work away."
     )
     yield Advice("more_poses_there", "Fill the gap.", words, 0.5 * (weak.std_mm - weak.median_mm))
 
@@ -119,17 +115,15 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
     hidden = [name for name, words in pairs if SETUP_WORDS not in words]
     if hidden:
         words = (
-            f"The poses cannot tell {listed(hidden)} from other parameters, so they stay nominal. Turn the "
-            "joints "
-            "before them further, and mount the target away from the last axis."
+            f"The poses do not show {listed(hidden)}, which cannot be corrected so. Turn the joints in "
+            "front of them further, and mount the target away from the last axis."
         )
         yield Advice("unseen_parameters", "Show what cannot be seen.", words, 0.1 * _mean_mm(facts))
     if selection.distances or selection.orientation or len(selection.targets) > 2:
         return
     words = (
-        "How the tool is turned follows from positions alone and is judged by nothing here. If the tool is "
-        "long or "
-        "its direction matters, measure orientation or three targets on it."
+        "How the tool is turned follows from positions alone and is judged by nothing here. If the tool "
+        "is long or its direction matters, measure orientation or three targets on it."
     )
     yield Advice("no_orientation", "Measure orientation.", words, 0.05 * _mean_mm(facts))
 
@@ -146,8 +140,7 @@ def _intervals(facts: Facts) -> Iterator[Advice]:
     if covered is not None and covered < COVERED:
         words = (
             f"Only {percent(covered)} of the held-out coordinates lie within their 95 % intervals: the "
-            "held-out "
-            "poses are not like those that trained, or something moved between them."
+            "held-out poses are not like those that trained, or something moved between them."
         )
         yield Advice("narrow_intervals", "Do not trust the intervals.", words, _mean_mm(facts))
 
@@ -167,7 +160,6 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
         left, before = short(mean, constant)
         words = (
             f"What varies gains little: {left} mm against {before} mm with constants. The arm has little "
-            "of it, or "
-            "the poses are too few to show it."
+            "of it, or the poses are too few to show it."
         )
         yield Advice("constant_suffices", "Constants do as well.", words, 0.2 * mean)

@@ -54,8 +54,7 @@ def _overall(found: Compensated, task: Task) -> str:
     refused = count_of(len(found.refusals), "refusal") if found.refusals else "none refused"
     return (
         f"The {count_of(len(found.q), 'measured pose')}, corrected one by one as a program's waypoints "
-        f"({met}): "
-        f"{corrected} corrected, {refused}."
+        f"({met}): {corrected} corrected, {refused}."
     )
 
 
@@ -84,8 +83,7 @@ def _sizes(facts: Facts, found: Compensated) -> list[Figure]:
     figure = Figure(
         "Corrections of the joints",
         f"Joint {widest + 1} changes most, by up to {np.abs(change[:, widest]).max():.3f} "
-        f"{facts.unit(widest)}. The "
-        f"tool moves by {middle} mm in the median and {most} mm at most.",
+        f"{facts.unit(widest)}. The tool moves by {middle} mm in the median and {most} mm at most.",
         traces,
         {"xaxis": axis("joint"), "yaxis": axis(f"correction, {units}")},
         height=300,

@@ -42,8 +42,7 @@ def influence(facts: Facts, effects: Floats) -> Figure:
     return Figure(
         "Which parameter varies along which joint, as it moves the measured point",
         f"Most: {names[k]} along joint {joint + 1}, {fixed(shown[joint, k])} mm peak to peak. Over all "
-        "parameters "
-        f"most varies along joint {int(np.argmax(along)) + 1}.",
+        f"parameters most varies along joint {int(np.argmax(along)) + 1}.",
         [trace],
         {
             "xaxis": axis("parameter", tickangle=-60),
@@ -132,8 +131,7 @@ def _wave(q: Floats, values: Floats, joint_unit: str, unit: str) -> str:
         return ""
     return (
         f" A wave with a period of {short(wave.period)[0]} {joint_unit} and an amplitude of "
-        f"{_four(wave.amplitude)} "
-        f"{unit} makes {100 * wave.share:.0f} % of the curve."
+        f"{_four(wave.amplitude)} {unit} makes {100 * wave.share:.0f} % of the curve."
     )
 
 

@@ -79,7 +79,7 @@ class Facts:
     @cached_property
     def readings(self) -> Floats | None:
         """Readings (n, N) that the calibration was fitted to; None where they were left out of the file."""
-        rows = self.calibration.rows
+        rows = self.calibration.learned_from
         return None if rows is None else rows.data.readings
 
     @cached_property

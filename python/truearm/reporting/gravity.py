@@ -39,10 +39,9 @@ def sag(facts: Facts) -> Figure | None:
     return Figure(
         "Vertical part of what varies",
         f"Far out the point lies {short(abs(drop))[0]} mm {direction} than close by, against the constant "
-        "model "
-        f"({far} and {near} mm in the median). Joints that give way in proportion to the moment of a "
-        "weight at the "
-        f"point would explain {percent(share)} of what varies; other causes may look the same.",
+        f"model ({far} and {near} mm in the median). Joints that give way in proportion to the moment of "
+        f"a weight at the point would explain {percent(share)} of what varies; other causes may look the "
+        "same.",
         [
             points(reach, moved[:, 2], facts.best),
             line(middles, medians, facts.best, line={"color": "@ink", "width": 2}),
@@ -55,15 +54,21 @@ def sag(facts: Facts) -> Figure | None:
 
 
 def _moved_mm(facts: Facts, poses: Floats) -> Floats:
-    """Where the varying model puts the point, less where the constant one does (n, 3), mm, without mean."""
+    """Where the varying model puts the measured point, less where the constant one does (n, 3), mm, centred.
+
+    Both have their own frame and target; the difference is that of the points in the world of the first
+    set-up, along the axes of the constant model's base.
+    """
     calibration = facts.calibration
     chain = calibration.arm.chain(calibration.robot.flange)
     values, inputs = calibration.robot.joints_from_readings(poses), facts.inputs(poses)
     places = []
     for name in (facts.best, CONSTANT):
-        pose = chain.pose(values, calibration.models[name].parameters(inputs))
-        places.append(pose[:, :3, :3] @ facts.point + pose[:, :3, 3])
-    difference = MM_PER_METRE * (places[0] - places[1])
+        model = calibration.models[name]
+        pose = model.setup.frames[0] @ chain.pose(values, model.parameters(inputs))
+        places.append(pose[:, :3, :3] @ model.setup.targets[0, 0] + pose[:, :3, 3])
+    axes = calibration.models[CONSTANT].setup.frames[0][:3, :3]
+    difference = MM_PER_METRE * (places[0] - places[1]) @ axes
     return np.asarray(difference - difference.mean(axis=0))
 
 

@@ -47,12 +47,12 @@ def _without_rows(facts: Facts) -> str:
         )
     if facts.calibration.rows is not None:
         return (
-            "This file does not hold errors pose by pose: it is an update of another calibration, or older "
-            "than the report. The table above has their statistics."
+            "This file does not hold errors pose by pose: it is an update of another calibration, or "
+            "older than the report. The table above has their statistics."
         )
     return (
-        "The measurements were left out of this file, so that errors cannot be shown pose by pose; the table "
-        "above was kept. The calibration as it was written before stripping has them."
+        "The measurements were left out of this file, so that errors cannot be shown pose by pose; the "
+        "table above was kept. The calibration as it was written before stripping has them."
     )
 
 
@@ -206,8 +206,7 @@ def worst(held: HeldRows, facts: Facts) -> Table:
         [*columns, f"joints, {units}"],
         rows,
         says=f"These {len(rows)} of {len(held)} held-out poses make {100 * share:.0f} % of the sum of all "
-        "errors. "
-        "Rows are counted from 1 below the header of the file.",
+        "errors. Rows are counted from 1 below the header of the file.",
         left=(0, len(columns)) if not several else (0, 1, len(columns)),
     )
 

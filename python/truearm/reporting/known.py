@@ -12,9 +12,11 @@ from truearm.units import MM_PER_METRE
 Floats = NDArray[np.float64]
 
 MOST: Final = 1500
-FEWEST: Final = 400
-WORK: Final = 2e10
-"""Multiplications that exact standard deviations may cost: a second or two."""
+FEWEST: Final = 300
+WORK: Final = 1e10
+"""Measured values squared, times configurations, that exact standard deviations may cost: a few seconds."""
+LARGEST: Final = 6000
+"""More values than these are summed up in fewer weights, and cost no more."""
 STRETCHES: Final = 12
 STANDS_OUT: Final = 1.5
 
@@ -58,7 +60,7 @@ class Stretch:
 
 
 def known(facts: Facts) -> Known | None:
-    """Exact values where the rows are there and few enough, else their bounds; None where neither is told."""
+    """Exact values where the rows are there, else their bounds; None where neither is told."""
     if not facts.calibration.has_conservative:
         return None
     count, is_exact = _affordable(facts)
@@ -75,14 +77,11 @@ def configurations(facts: Facts, count: int) -> Floats:
 
 def _affordable(facts: Facts) -> tuple[int, bool]:
     """How many configurations, and whether exact values of them can be had."""
-    calibration = facts.calibration
-    if calibration.variable is None:
-        return MOST, True
-    if calibration.rows is None:
-        return MOST, False
-    values = calibration.rows.residual.size
-    count = int(WORK / (4.0 * values**2))
-    return min(MOST, count) if count >= FEWEST else MOST, count >= FEWEST
+    calibration, rows = facts.calibration, facts.calibration.learned_from
+    if calibration.variable is None or rows is None:
+        return MOST, calibration.variable is None
+    count = WORK / min(rows.residual.size, LARGEST) ** 2
+    return int(np.clip(count, FEWEST, MOST)), True
 
 
 def _std_mm(facts: Facts, readings: Floats, is_exact: bool) -> Floats:

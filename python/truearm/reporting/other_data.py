@@ -29,8 +29,7 @@ def other_data(facts: Facts) -> Section:
         ["model", *HEADINGS],
         rows,
         says=f"{how}. The {facts.best} model misses by {here} mm on average, {there} mm on the poses held "
-        "out of its "
-        "own data.",
+        "out of its own data.",
         strong=[list(errors).index(facts.best)],
     )
     parts: list[Part] = [table]

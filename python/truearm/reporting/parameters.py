@@ -42,8 +42,8 @@ def parameters(facts: Facts) -> Section:
     found = facts.calibration.identifiability
     words = (
         f"The poses determine {found.rank} of {found.parameters} parameters of the arm, and with frames "
-        "and targets "
-        f"{found.total_rank} unknowns; condition number {found.condition:.0f}. The others stay nominal."
+        f"and targets {found.total_rank} unknowns; condition number {found.condition:.0f}. The others "
+        "stay nominal."
     )
     parts: list[Part] = [Text(words), table(facts)]
     figure = confounding(facts)
@@ -84,8 +84,7 @@ def table(facts: Facts) -> Table:
         ["", "unit", "nominal", "correction", "standard error", "at the point, mm", "the data says"],
         rows,
         says=f"{largest[0]} matters most: its correction moves the measured point by {largest[1]:.3f} mm "
-        "(root mean "
-        "square over the poses). Standard errors hold for the constant model alone.",
+        "(root mean square over the poses). Standard errors hold for the constant model alone.",
         left=(0, 1, 6),
     )
 

@@ -22,7 +22,7 @@ SHARE_OF_REACH: Final = 0.12
 """Length of a large nominal error in parts of the workspace."""
 LONGER: Final = 10
 ROUND: Final = (1, 2, 5)
-CAMERA: Final = {"eye": {"x": 1.0, "y": -1.15, "z": 0.55}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
+CAMERA: Final = {"eye": {"x": 1.2, "y": -1.4, "z": 0.6}, "center": {"x": 0.0, "y": 0.0, "z": -0.06}}
 
 
 def quiver(facts: Facts) -> Figure | None:
@@ -110,8 +110,8 @@ def _says(facts: Facts, held: HeldRows) -> str:
     (_, before), (mean, after) = common
     texts = short(before, after, mean)
     parts = (
-        f"Arrows are {texts[0]} mm long on average before and {texts[1]} mm after; averaged as vectors the "
-        f"latter leave {texts[2]} mm"
+        f"Arrows are {texts[0]} mm long on average before and {texts[1]} mm after; averaged as vectors "
+        f"the latter leave {texts[2]} mm"
     )
     if mean < 0.3 * after:
         return f"{parts}, so they point in all directions. The arm is drawn in a pose near the middle of all."

@@ -46,8 +46,7 @@ def region_tree(facts: Facts) -> Figure | None:
     return Figure(
         "The regions",
         f"{count_of(len(leaves), 'region')} in up to {count_of(depth, 'halving')}. Their parameters move "
-        "the measured "
-        f"point by {short(float(np.nanmedian(moved[leaves])))[0]} mm in the median and most, "
+        f"the measured point by {short(float(np.nanmedian(moved[leaves])))[0]} mm in the median and most, "
         f"{short(float(moved[worst]))[0]} mm, with {place}.",
         [trace],
         {"margin": {"l": 4, "r": 4, "t": 4, "b": 4}},

@@ -94,10 +94,9 @@ def repeats(facts: Facts) -> Section:
     floor, noise = short(distance_at_floor_mm(facts), facts.summary["noise_mm"])
     parts: list[Part] = [
         Text(
-            f"What no model explains deviates by {noise} mm in each coordinate; alone it would make a mean "
-            "error of "
-            f"{floor} mm. That is the instrument, what the arm does not repeat, and what the model cannot "
-            "follow."
+            f"What no model explains deviates by {noise} mm in each coordinate; alone it would make a "
+            f"mean error of {floor} mm. That is the instrument, what the arm does not repeat, and what "
+            "the model cannot follow."
         )
     ]
     found = Repeats.of(facts)
@@ -111,10 +110,11 @@ def repeats(facts: Facts) -> Section:
 def _nothing(facts: Facts) -> str:
     if facts.calibration.rows is None:
         return "The measurements were left out of this file, so that repeated poses cannot be looked at."
+    if facts.calibration.selection.distances:
+        return "Distances were measured, not points: how poses repeat cannot be told from them."
     return (
         "No pose was measured twice, so repeatability and hysteresis cannot be told from this data. Some "
-        "poses "
-        "measured several times, and from both sides, would tell them."
+        "poses measured several times, and from both sides, would tell them."
     )
 
 
@@ -135,8 +135,7 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     return Figure(
         "How well poses repeat",
         f"{len(distances)} measurements of {count_of(poses, 'pose')} lie {texts[0]} mm from their centres "
-        "on average; "
-        f"mean and three standard deviations make {texts[1]} mm.{times}",
+        f"on average; mean and three standard deviations make {texts[1]} mm.{times}",
         [trace],
         {
             "xaxis": axis("distance from the centre of the pose, mm", rangemode="tozero"),
@@ -167,7 +166,6 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
         ["", "poses", "sides apart, mm", "scatter alone, mm"],
         rows,
         says=f"{largest[0].capitalize()} shows most: {largest[2]} mm (root mean square). Rows are taken in "
-        "the order "
-        "of the file as the order of measuring.",
+        "the order of the file as the order of measuring.",
     )
     return [table]

@@ -72,8 +72,8 @@ class Cut:
             z,
             "mm",
             f"It moves the measured point by up to {fixed(float(z.max()))} mm, "
-            f"{fixed(float(np.median(z)))} mm in the "
-            "median of these slices (root of the sum of squares over the parameters).",
+            f"{fixed(float(np.median(z)))} mm in the median of these slices (root of the sum of squares "
+            "over the parameters).",
             {"zmin": 0, "zmax": float(f"{z.max():.4g}")},
         )
 

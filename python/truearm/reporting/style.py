@@ -74,7 +74,7 @@ LAYOUT: Final[Layout] = {
     "font": {"family": "system-ui, -apple-system, Segoe UI, Roboto, sans-serif", "size": 12, "color": "@ink"},
     "paper_bgcolor": "rgba(0,0,0,0)",
     "plot_bgcolor": "rgba(0,0,0,0)",
-    "margin": {"l": 52, "r": 14, "t": 10, "b": 44},
+    "margin": {"l": 52, "r": 14, "t": 30, "b": 44},
     "xaxis": _AXIS,
     "yaxis": _AXIS,
     "scene": {"xaxis": _SCENE_AXIS, "yaxis": _SCENE_AXIS, "zaxis": _SCENE_AXIS, "aspectmode": "data"},

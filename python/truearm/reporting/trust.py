@@ -38,10 +38,9 @@ def _overall(facts: Facts, found: Known) -> str:
     kind = "exact" if found.is_exact else "the bounds that compensation judges by, never below the exact ones"
     where = "the measured poses" if facts.readings is not None else "poses within the joints' limits"
     return (
-        f"Standard deviation of the measured point, the arm's part without noise: {near} mm in the median of "
-        f"{where}; over all that the joints reach {median} mm in the median, and less than {tenth} mm in "
-        "nine of ten "
-        f"configurations. Values are {kind}, at {len(found.std_mm)} configurations."
+        f"Standard deviation of the measured point, the arm's part without noise: {near} mm in the median "
+        f"of {where}; over all that the joints reach {median} mm in the median, and less than {tenth} mm "
+        f"in nine of ten configurations. Values are {kind}, at {len(found.std_mm)} configurations."
     )
 
 

@@ -18,8 +18,8 @@ def varying(facts: Facts) -> Section:
         return Section(title, [Text("This calibration holds all parameters constant.")])
     effects = influence_mm(facts)
     words = (
-        "Curves show how a parameter differs from its mean along the joint, with all other joints as in a "
-        "usual pose; bands are two standard deviations of that difference on either side."
+        "Curves show how a parameter differs from its mean along the joint, with all other joints as in "
+        "a usual pose; bands are two standard deviations of that difference on either side."
     )
     parts: list[Part] = [Text(words, is_note=True), influence(facts, effects)]
     tree = region_tree(facts)

@@ -107,6 +107,12 @@
     place.parentElement.classList.add("ready");
   };
 
+  const follow = new ResizeObserver((entries) => {
+    for (const { target } of entries) {
+      if (target.data && target.clientWidth && target.clientWidth !== target._fullLayout.width) Plotly.Plots.resize(target);
+    }
+  });
+
   const each = async (work) => {
     for (let number = 0; number < page.figures.length; number += 1) {
       await work(number);
@@ -138,6 +144,7 @@
     }
     await load();
     await each(draw);
+    document.querySelectorAll(".plot").forEach((place) => follow.observe(place));
     document.documentElement.dataset.figures = "drawn";
     dark.addEventListener("change", () => each(draw));
     await each(printable);
