@@ -137,6 +137,14 @@ def test_files_that_are_no_text(tmp_path: Path, content: bytes, message: str) ->
     assert str(caught.value).startswith(str(path))
 
 
+def test_a_folder_of_the_same_name_hides_no_robot_of_the_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "ur10").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert Robot.load("ur10").name == "UR10"
+
+
 def test_missing_file_and_directory(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no such file"):
         Robot.load(tmp_path / "none.toml")

@@ -50,7 +50,7 @@ class Robot(RobotData):
                 where=given,
                 way_out=f"Expand it first: xacro {path.name} > {path.stem}.urdf",
             )
-        if path.suffix.lower() == ".toml" or path.exists() or "/" in given or "\\" in given:
+        if path.suffix.lower() == ".toml" or path.is_file() or "/" in given or "\\" in given:
             return cls.from_toml(read_text(path), where=given)
         name, text = library_text(given)
         return cls.from_toml(text, where=f"{name}.toml")
