@@ -6,12 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import truearm as ta
 from tests.cell_support import cell_text
 from truearm.cell import Cell
 from truearm.cell.ordering import motion_seconds, paper_order, short_order
 from truearm.cell.poses_file import Poses
 from truearm.cell.rehearsal import rehearse
 from truearm.cli import main
+from truearm.simulation import VirtualArm
 
 
 @pytest.mark.slow
@@ -68,4 +70,72 @@ def test_both_orders_go_from_low_to_high_once_through_all():
 )
 def test_wrong_options_are_told(words, message, capsys):
     assert main(["plan", "rv-m2", *words]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def calib(tmp_path_factory):
+    path = tmp_path_factory.mktemp("plan") / "arm.calib"
+    arm = VirtualArm.paper(seed=2)
+    ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant").save(path)
+    return str(path)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("asked", "purpose", "said"),
+    [
+        ("--next", "train", "Expected standard deviation"),
+        ("--acceptance", "acceptance", "noticed in 95 of 100 cases"),
+    ],
+)
+def test_poses_are_proposed_from_a_calibration(asked, purpose, said, calib, here, capsys):
+    count = 6
+    assert main(["plan", asked, str(count), "--from", calib, "-o", "a.csv", "--picture", "a.png"]) == 0
+    told = capsys.readouterr().out
+    assert said in told
+    assert max(map(len, told.splitlines())) <= 80
+    poses = Poses.read_csv("a.csv", ta.Robot.load("rv-m2"))
+    assert poses.purpose == (purpose,) * count
+    assert set(poses.approach) == {1, -1}
+    assert (here / "a.png").stat().st_size > 1000
+    assert main(["plan", "rv-m2", asked, str(count), "--from", calib, "-o", "b.csv", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["count"] == count
+    assert (here / "a.csv").read_bytes() == (here / "b.csv").read_bytes()
+    if asked == "--next":
+        expected = [found["expected_before_mm"], *found["expected_after_mm"]]
+        assert expected == sorted(expected, reverse=True)
+    else:
+        assert set(found["noticed"]) >= {"joint2", "joint3"}
+
+
+def test_poses_of_a_cell_are_proposed_that_it_can_measure(calib, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cell.toml").write_text(cell_text())
+    assert main(["plan", "--acceptance", "8", "--from", calib, "--cell", "cell.toml", "-o", "a.csv"]) == 0
+    assert "8 poses" in capsys.readouterr().out
+    cell = Cell.load("cell.toml")
+    assert rehearse(cell, Poses.read_csv("a.csv", cell.arm)).refused == []
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["rv-m2", "--next", "5"], "--from CALIB"),
+        (["--from", "CALIB"], "--next N --from CALIB"),
+        (["--next", "5", "--acceptance", "5", "--from", "CALIB"], "--next N --from CALIB"),
+        (["--next", "0", "--from", "CALIB"], "0 poses"),
+        (["ur10", "--next", "5", "--from", "CALIB"], "the calibration is of RV-M2"),
+        (["--next", "5", "--from", "CALIB", "--group", "x"], 'no set-up "x"'),
+        ([], "no robot is named"),
+    ],
+)
+def test_wrong_proposals_are_told(words, message, calib, capsys):
+    assert main(["plan", *[calib if word == "CALIB" else word for word in words]]) == 2
     assert message in capsys.readouterr().err

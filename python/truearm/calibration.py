@@ -363,10 +363,6 @@ class Calibration:
         found: Floats = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
         return found[0] if single else found
 
-    def chain_jacobian(self, q: ArrayLike, features: Features | None = None) -> Floats:
-        """Derivatives (n, 3, 5 L) of the tool's point by all parameters of the chain, a base row included."""
-        return self._jacobian(self._readings(q)[0], features, None, pose=False)
-
     def _jacobian(
         self, rows: Floats, features: Features | None, tool: ArrayLike | None, *, pose: bool
     ) -> Floats:

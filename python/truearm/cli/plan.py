@@ -172,7 +172,7 @@ def _print_proposed(proposed: "Proposed", output: Path) -> None:
     if "noticed" not in told:
         before, after = told["expected_before_mm"], told["expected_after_mm"][-1]
         say_wrapped(
-            f"Expected standard deviation of the tool's position over the workspace: {before:.3f} mm now, "
+            f"Expected standard deviation of the target's position over the workspace: {before:.3f} mm now, "
             f"{after:.3f} mm when these are measured too."
         )
         return

@@ -78,22 +78,24 @@ class Candidates:
         turns = AXES if selection.orientation else 0
         return np.array([False] * (AXES * len(selection.targets)) + [True] * turns)
 
-    def covariance(self, others: Floats | None = None) -> Floats:
-        """Covariance of what candidates would show, without noise, and of the tool's points at others (t, N).
+    def covariance(self, others: "Candidates | None" = None) -> Floats:
+        """Covariance of what candidates would show, without noise, and of the first target at `others`.
 
         Returns:
-            (c m + 3 t, c m + 3 t), the arm's and, of the candidates, the set-up's part.
+            (c m + 3 t, c m + 3 t): the arm's and the set-up's part.
         """
-        width = self.jacobian.shape[2]
-        rows = self.jacobian.reshape(-1, AXES, width)
-        own = self._setup_in_all().reshape(len(rows), AXES, -1)
-        inputs = np.repeat(self.values(self.readings), self.jacobian.shape[1] // AXES, axis=0)
+        rows, own, inputs = self.parts(self.jacobian.shape[1])
         if others is not None:
-            tool = self.calibration.chain_jacobian(others, self._feature_values)
-            rows = np.concatenate([rows, tool])
-            own = np.concatenate([own, np.zeros((len(tool), *own.shape[1:]))])
-            inputs = np.vstack([inputs, self.values(others)])
+            more = others.parts(AXES)
+            pairs = zip((rows, own, inputs), more, strict=True)
+            rows, own, inputs = (np.concatenate(pair) for pair in pairs)
         return np.ascontiguousarray(self.calibration.spread.joint(inputs, rows, own))
+
+    def parts(self, values: int) -> tuple[Floats, Floats, Floats]:
+        """Derivatives (k, 3, 5 L) and (k, 3, S) of so many values of each, the first ones; inputs (k, I)."""
+        rows, own = self.jacobian[:, :values], self._setup_in_all()[:, :values]
+        inputs = np.repeat(self.values(self.readings), values // AXES, axis=0)
+        return rows.reshape(len(inputs), AXES, -1), own.reshape(len(inputs), AXES, -1), inputs
 
     @property
     def _number(self) -> int:

@@ -1,6 +1,6 @@
 """The poses that reduce the expected error over the workspace most, given what is known already."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,9 @@ class NextPoses:
 
     Attributes:
         rows: Of the candidates (count,), the one that teaches most first.
-        expected_mm: Expected standard deviation of the tool's position over the workspace, root of the mean
-            of the sum over x, y and z, before the first and after each (count + 1,).
+        expected_mm: Expected standard deviation of the first target's position over the workspace, in the
+            set-up's world and without noise: root of the mean of the sum over x, y and z, before the first
+            and after each (count + 1,).
     """
 
     rows: NDArray[np.int64]
@@ -45,7 +46,8 @@ def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPos
     """
     check_count(candidates, count)
     core = {"noise": candidates.noise, "points": np.ascontiguousarray(candidates.points), "apart": 0.0}
-    rows, variance = choose_informative(candidates.covariance(workspace), core, count)
+    where = replace(candidates, readings=workspace)
+    rows, variance = choose_informative(candidates.covariance(where), core, count)
     expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(workspace))
     return NextPoses(np.array(rows, dtype=np.int64), expected)
 
