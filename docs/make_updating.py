@@ -16,36 +16,39 @@ PAGE = ROOT / "docs" / "reference" / "updating.md"
 ARMS = {"rv-m2": "RV-M2", "ur10": "UR10"}
 HEAD = """# Updates and proposed poses, measured
 
-`python -m benches.updating OUT` measures this, and `python docs/make_updating.py OUT` writes this page. Virtual arms are the
-paper's: geometric errors of 0.4 mm and 0.05 deg, a field of a tenth of their effect, and 0.04 mm of noise in each measured
-coordinate. Errors are mean position errors at fresh poses, without noise, in the calibration's own set-up; a row of a table is over several
-arms, drawn from different seeds. See [check and update](../how-to/check-and-update-a-calibration.md) and
-[choose poses](../how-to/choose-poses.md).
+`python -m benches.updating OUT` measures this, and `python docs/make_updating.py OUT` writes this page.
+Virtual arms are the paper's: geometric errors of 0.4 mm and 0.05 deg, a field of a tenth of their
+effect, and 0.04 mm of noise in each measured coordinate. Errors are mean position errors at fresh poses,
+without noise, in the calibration's own set-up; a row of a table is over several arms, drawn from
+different seeds. See [check and update](../how-to/check-and-update-a-calibration.md) and [choose
+poses](../how-to/choose-poses.md).
 """
 UPDATE = """## After re-mastering
 
-Two to four joints move by 0.1 to 1 deg and the tool by 1 mm; 15 random poses are measured, with the device's frame found anew. "Told"
-offsets are those of all joints but the first and the last, which a free frame and a free tool hide.
+Two to four joints move by 0.1 to 1 deg and the tool by 1 mm; 15 random poses are measured, with the
+device's frame found anew. "Told" offsets are those of all joints but the first and the last, which a
+free frame and a free tool hide.
 """
 UNCHANGED = """## An arm that did not change
 
-15 random poses of an unchanged arm. `truearm update` should say that the calibration holds in all but the stated share.
+15 random poses of an unchanged arm. `truearm update` should say that the calibration holds in all but
+the stated share.
 """
 ACCEPTANCE = """## Acceptance poses
 
-One joint of those that can be told moves by 0.03 deg. Ten poses of `plan --acceptance` and ten random ones of the same candidates; "noticed" is
-every verdict but "holds", at the level of 1 %.
+One joint of those that can be told moves by 0.03 deg. Ten poses of `plan --acceptance` and ten random
+ones of the same candidates; "noticed" is every verdict but "holds", at the level of 1 %.
 """
 NEXT = """## The next twenty poses
 
-A calibration from 40 (RV-M2) or 60 (UR10) random poses, and 20 more: those of `plan --next`, or random ones of the same 300 candidates
-(three draws an arm). All rows are fitted anew, hyper-parameters and all.
+A calibration from 40 (RV-M2) or 60 (UR10) random poses, and 20 more: those of `plan --next`, or random
+ones of the same 300 candidates (three draws an arm). All rows are fitted anew, hyper-parameters and all.
 """
 REAL = """## A real arm in another set-up
 
-A UR10's calibration from 400 poses of one set-up and 15 poses of another one, hours or days later, positions only
-(christianlandgraf/ipa-robot-accuracy). The target is another one (`--new-tool`). Errors, with noise, at the other poses, frame and target
-found from 200 of them.
+A UR10's calibration from 400 poses of one set-up and 15 poses of another one, hours or days later,
+positions only (christianlandgraf/ipa-robot-accuracy). The target is another one (`--new-tool`). Errors,
+with noise, at the other poses, frame and target found from 200 of them.
 """
 
 
