@@ -11,6 +11,7 @@ import json
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -142,11 +143,11 @@ def real(data: Path, one: str, other: str) -> dict[str, Any]:
     order = rng.permutation(len(read[other]))
     few, rest = read[other].select(order[:UPDATED_WITH]), read[other].select(order[UPDATED_WITH:1500])
     told = ta.update(calibration, few, use="position", new_tool=True)
-    judge = {"use": "position", "frame_rows": 200}
+    judge = ta.EvaluationOptions(use="position", frame_rows=200)
     return {
         "told": told.to_dict(),
-        "old_mm": ta.evaluate(calibration, rest, **judge).errors["variable"].position.mean,
-        "updated_mm": ta.evaluate(told.calibration, rest, **judge).errors["variable"].position.mean,
+        "old_mm": ta.evaluate(calibration, rest, judge).errors["variable"].position.mean,
+        "updated_mm": ta.evaluate(told.calibration, rest, judge).errors["variable"].position.mean,
     }
 
 
@@ -162,12 +163,10 @@ def main() -> int:
     cases: list[tuple[str, Callable[[], dict[str, Any]]]] = []
     for seed in range(given.seeds):
         for arm in ARMS:
-            cases += [
-                (f"{case.__name__}-{arm}-{seed}", lambda c=case, a=arm, s=seed: c(a, s))
-                for case in (updates, acceptance, added)
-            ]
+            for case in (updates, acceptance, added):
+                cases += [(f"{case.__name__}-{arm}-{seed}", partial(case, arm, seed))]
     for one, other in REAL if given.data.is_dir() else ():
-        cases.append((f"real-{one}-{other}", lambda a=one, b=other: real(given.data, a, b)))
+        cases += [(f"real-{one}-{other}", partial(real, given.data, one, other))]
     for name, work in cases:
         target = given.out / f"{name}.json"
         if target.exists() or not name.startswith(given.only):

@@ -7,7 +7,7 @@ import truearm as ta
 from tests.remastered import remastered, remastered_table
 from truearm._core import setup_jacobian, step_setup
 from truearm.simulation import Imperfections, VirtualArm
-from truearm.updating.chi_square import ChiSquare
+from truearm.updating.squares import SquaresTest
 
 SHIFT = np.array([0.0, 0.6, -0.2, 0.9, 0.0])
 TOOL_MM = (0.6, -0.5, 0.6)
@@ -131,6 +131,7 @@ def test_orientation_and_its_target_are_updated():
     found = ta.update(calibration, ta.Measurements.from_dataframe(table))
     assert found.verdict == "moved"
     assert found.tools[0].turn_deg is not None
+    assert found.after.orientation is not None
     assert found.after.orientation.mean < 0.5
     for offset, shift in zip(found.offsets[1:4], SHIFT[1:4], strict=True):
         check_offset(offset, shift, errors=5.0)
@@ -265,8 +266,9 @@ def test_set_up_derivatives_are_those_of_finite_differences(known):
     assert core_set(arm.robot, data, task.selection, task.groups).rows_per_pose == 3
 
 
-def test_a_chi_square_says_how_rare_it_is():
-    found = ChiSquare.of(np.array([3.0, 4.0]), 2)
+def test_a_sum_of_squares_says_how_rare_it_is():
+    found = SquaresTest.of(np.array([3.0, 4.0]), 2, 10**9)
     assert found.squares == 25.0
-    np.testing.assert_allclose(found.p, np.exp(-12.5))
-    assert ChiSquare.of(np.empty(0), 0).p == 1.0
+    np.testing.assert_allclose(found.p, np.exp(-12.5), rtol=1e-5)
+    assert SquaresTest.of(np.array([3.0, 4.0]), 2, 20).p > 10.0 * found.p
+    assert SquaresTest.of(np.empty(0), 0, 20).p == 1.0

@@ -14,11 +14,11 @@ from truearm.fitted_rows import OVERWHELMING
 from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
-from truearm.updating.chi_square import ChiSquare, change_test, rest_test
 from truearm.updating.estimating import Estimate, estimate, left_out, surprise
-from truearm.updating.moved import Motion, Offset, motions, offsets, untold
+from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
 from truearm.updating.scene import Scene
+from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
 from truearm.updating.unknowns import Unknowns
 from truearm.updating.updated import updated
 from truearm.validation import Errors, Statistics
@@ -58,8 +58,8 @@ class Update:
     offsets: tuple[Offset, ...]
     frames: tuple[Motion, ...]
     tools: tuple[Motion, ...]
-    changed: ChiSquare
-    rest: ChiSquare
+    changed: SquaresTest
+    rest: SquaresTest
     before: Errors
     after: Errors
     n_poses: int
@@ -144,13 +144,14 @@ class _Found:
         _check_plausible(scene, found)
         anew = unknowns.free & unknowns.nuisance
         still = estimate(scene, spread, scene.unchanged(start), anew)
-        changed, rest = change_test(still, unknowns), rest_test(found, unknowns)
-        frames, tools = motions(scene, found, level)
+        judge = Judge(level, scale_freedom(self.calibration))
+        changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
+        frames, tools = motions(scene, found, judge)
         told = Update(
             calibration=self.calibration,
             verdict=_verdict(changed, rest, level),
             level=level,
-            offsets=offsets(scene, found, self.held, level),
+            offsets=offsets(scene, found, self.held, judge),
             frames=frames,
             tools=tools,
             changed=changed,
@@ -164,7 +165,7 @@ class _Found:
         return replace(told, calibration=updated(self.calibration, scene, found, told.after, told.to_dict()))
 
 
-def _verdict(changed: ChiSquare, rest: ChiSquare, level: float) -> Verdict:
+def _verdict(changed: SquaresTest, rest: SquaresTest, level: float) -> Verdict:
     """What two tests, which share the level, say together."""
     if rest.p < level / 2.0:
         return "field"

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-from truearm.updating.chi_square import normal_p, wald
 from truearm.updating.estimating import Estimate, factored, posterior
 from truearm.updating.scene import Scene, State
+from truearm.updating.squares import student_p, wald
 from truearm.updating.unknowns import Unknowns
 
 Floats = NDArray[np.float64]
@@ -18,6 +18,19 @@ Mask = NDArray[np.bool_]
 
 TOLD: Final = 0.5
 """An offset is told when its standard error is below this share of the prior's deviation."""
+
+
+@dataclass(frozen=True)
+class Judge:
+    """What is too large to be chance.
+
+    Attributes:
+        level: Share of unmoved ones that are said to have moved.
+        known: Degrees of freedom that the scale of standard errors is known from.
+    """
+
+    level: float
+    known: int
 
 
 @dataclass(frozen=True)
@@ -112,7 +125,7 @@ def untold(scene: Scene, spread: Floats, state: State) -> dict[int, str]:
     }
 
 
-def offsets(scene: Scene, found: Estimate, held: dict[int, str], level: float) -> tuple[Offset, ...]:
+def offsets(scene: Scene, found: Estimate, held: dict[int, str], judge: Judge) -> tuple[Offset, ...]:
     """Changes of all joints' offsets, those that are `held` for not being told among them.
 
     The level is shared among the joints.
@@ -126,17 +139,17 @@ def offsets(scene: Scene, found: Estimate, held: dict[int, str], level: float) -
             result.append(Offset(joint + 1, unit, 0.0, None, None, False, False, held[joint]))
             continue
         change, error = float(found.state.arm[joint]), float(std[joint])
-        p = normal_p(change / error)
+        p = student_p(change / error, judge.known)
         result.append(
-            Offset(joint + 1, unit, scale * change, scale * error, p, p < level / len(kinds), told=True)
+            Offset(joint + 1, unit, scale * change, scale * error, p, p < judge.level / len(kinds), told=True)
         )
     return tuple(result)
 
 
-def motions(scene: Scene, found: Estimate, level: float) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
+def motions(scene: Scene, found: Estimate, judge: Judge) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
     """Motions of the frames, and of the tools, of the set-ups that the calibration knows."""
     frames, tools = [], []
-    judged = _Judged(scene, found, level)
+    judged = _Judged(scene, found, judge)
     for number, group in enumerate(scene.task.groups):
         place = scene.unknowns.group(number)
         frame, tool = scene.motion(found.state, number)
@@ -154,14 +167,14 @@ class _Judged:
 
     scene: Scene
     found: Estimate
-    level: float
+    judge: Judge
 
     def motion(self, group: str, change: Floats, place: slice, points: int) -> Motion:
         """That of a frame or a tool: `points` shifts, then a turn if there is one."""
         covariance = self.found.covariance[place, place]
         std = np.sqrt(np.diag(covariance))
         tested = bool((std > 0.0).all()) and not self.scene.unknowns.nuisance[place].any()
-        p = wald(change, covariance).p if tested else None
+        p = wald(change, covariance, self.judge.known).p if tested else None
         has_turn = len(change) > 3 * points
         return Motion(
             group,
@@ -170,7 +183,7 @@ class _Judged:
             _degrees(change[3 * points :]) if has_turn else None,
             _degrees(std[3 * points :]) if has_turn else None,
             p,
-            p is not None and p < self.level,
+            p is not None and p < self.judge.level,
         )
 
 

@@ -1,4 +1,4 @@
-"""Whether the old calibration still holds, and whether its field does: chi-square tests."""
+"""Whether the old calibration still holds, and whether its field does: tests of sums of squares."""
 
 from dataclasses import asdict, dataclass
 from typing import Any, Final
@@ -6,8 +6,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import erfc, gammaincc
+from scipy.special import fdtrc, stdtr
 
+from truearm.calibration import Calibration
 from truearm.updating.estimating import Estimate
 from truearm.updating.unknowns import Unknowns
 
@@ -21,8 +22,8 @@ NEGLIGIBLE: Final = 1e-2
 
 
 @dataclass(frozen=True)
-class ChiSquare:
-    """A sum of squares that is chi-square distributed if nothing happened.
+class SquaresTest:
+    """A sum of squares in units of a scale that the calibration's own rows told, hence F distributed.
 
     Attributes:
         squares: The sum.
@@ -35,17 +36,24 @@ class ChiSquare:
     p: float
 
     @classmethod
-    def of(cls, values: Floats, freedom: int) -> "ChiSquare":
-        """That of standardised values (k,)."""
+    def of(cls, values: Floats, freedom: int, known: int) -> "SquaresTest":
+        """That of standardised values (k,), whose scale is known from `known` degrees of freedom."""
         squares = float(np.square(values).sum())
-        return cls(squares, freedom, float(gammaincc(freedom / 2.0, squares / 2.0)) if freedom else 1.0)
+        return cls(squares, freedom, float(fdtrc(freedom, known, squares / freedom)) if freedom else 1.0)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
         return asdict(self)
 
 
-def change_test(unchanged: Estimate, unknowns: Unknowns) -> ChiSquare:
+def scale_freedom(calibration: Calibration) -> int:
+    """Degrees of freedom that the scale of a calibration's standard deviations is known from."""
+    learned = calibration.learned_from
+    values = 0 if learned is None else int(np.count_nonzero(learned.residual))
+    return max(values - calibration.identifiability.total_rank, 1)
+
+
+def change_test(unchanged: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:
     """Whether offsets and tool are as they were; `unchanged` holds them there.
 
     What says nothing about a change, such as a frame that is found anew, is projected out.
@@ -55,24 +63,24 @@ def change_test(unchanged: Estimate, unknowns: Unknowns) -> ChiSquare:
     out = _basis(nuisance, NEGLIGIBLE)
     left = residual - out @ (out.T @ residual)
     told = _basis(change - out @ (out.T @ change), TOLD)
-    return ChiSquare.of(told.T @ left, told.shape[1])
+    return SquaresTest.of(told.T @ left, told.shape[1], known)
 
 
-def rest_test(estimated: Estimate, unknowns: Unknowns) -> ChiSquare:
+def rest_test(estimated: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:
     """Whether what is left after offsets, frame and tool were estimated is what field and noise may leave."""
     residual, free = _whitened(estimated, unknowns, unknowns.free)
     out = _basis(free, NEGLIGIBLE)
-    return ChiSquare.of(residual - out @ (out.T @ residual), len(residual) - out.shape[1])
+    return SquaresTest.of(residual - out @ (out.T @ residual), len(residual) - out.shape[1], known)
 
 
-def normal_p(ratio: float) -> float:
-    """How often a standard normal value is farther from zero."""
-    return float(erfc(abs(ratio) / np.sqrt(2.0)))
+def student_p(ratio: float, known: int) -> float:
+    """How often a value that is that many standard errors off or more is chance."""
+    return float(2.0 * stdtr(known, -abs(ratio)))
 
 
-def wald(change: Floats, covariance: Floats) -> ChiSquare:
+def wald(change: Floats, covariance: Floats, known: int) -> SquaresTest:
     """Whether changes (k,) of a covariance (k, k) are zero."""
-    return ChiSquare.of(np.linalg.solve(np.linalg.cholesky(covariance), change), len(change))
+    return SquaresTest.of(np.linalg.solve(np.linalg.cholesky(covariance), change), len(change), known)
 
 
 def _whitened(estimate: Estimate, unknowns: Unknowns, chosen: Mask) -> tuple[Floats, Floats]:
