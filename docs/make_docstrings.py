@@ -20,6 +20,7 @@ MODULES = {
     "truearm.simulation": ("VirtualArm", "Imperfections"),
     "truearm.inverse": ("Inverse",),
     "truearm.planning": (),
+    "truearm.proposing": (),
     "truearm.exporting": (),
     "truearm.framing": (),
     "truearm.streaming": ("CorrectionStream", "StreamOptions"),

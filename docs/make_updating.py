@@ -110,12 +110,13 @@ def unchanged_table(out: Path) -> str:
     """Share of verdicts other than "holds" at two levels."""
     rows = []
     for arm, title in ARMS.items():
-        pairs = [pair for each in read(out, "updates", arm) for pair in each["unchanged"]]
+        found = read(out, "unchanged", arm)
+        pairs = [pair for each in found for pair in each["p"]]
         if not pairs:
             continue
         wrong = [sum(min(pair) < level / 2.0 for pair in pairs) for level in (0.01, 0.05, 0.2)]
-        rows.append([title, str(len(pairs)), *(f"{share / len(pairs):.1%}" for share in wrong)])
-    return table(("arm", "updates", "not held at 1 %", "at 5 %", "at 20 %"), rows)
+        rows.append([title, f"{len(found)}, {len(pairs)}", *(f"{share / len(pairs):.1%}" for share in wrong)])
+    return table(("arm", "arms, updates", "not held at 1 %", "at 5 %", "at 20 %"), rows)
 
 
 def acceptance_table(out: Path) -> str:

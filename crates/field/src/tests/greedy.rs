@@ -9,6 +9,7 @@ use crate::posterior::Posterior;
 use crate::training::Training;
 
 /// Covariance, noise and points of some candidates of m rows, and of t targets behind them.
+#[derive(Debug, Clone)]
 struct Case {
     covariance: Vec<f64>,
     noise: Vec<f64>,
