@@ -183,8 +183,8 @@ def remarks():
         f"with other parameters has the pose that the nominal arm has, to {SAME_M:g} m; loops were timed on "
         f"{LOOP_WAYPOINTS} waypoints and counted for all. The field was fitted to {measurements()[1]}; its "
         f"waypoints, and those of the constant CEPs beside it, lie within {AROUND_RAD:g} rad of measured "
-        f"readings. With the field all bounds are on, as by default but for {LARGEST_STD_MM:g} mm of standard "
-        "deviation; with constant CEPs none is, for the peers have none."
+        f"readings. With the field all bounds are on, as by default but for {LARGEST_STD_MM:g} mm of "
+        "standard deviation; with constant CEPs none is, for the peers have none."
     ]
     if find_spec("roboticstoolbox") is None:
         told.append("roboticstoolbox is left out, as it is not installed: pip install --group bench-toolbox.")

@@ -39,7 +39,7 @@ class Shift:
 
 def read(language, text, robot, frames=""):
     content = text if isinstance(text, str) else text.decode("latin-1")
-    source = Source(Path(f"test{language.endings[0]}"), content)
+    source = Source.of(Path(f"test{language.endings[0]}"), content)
     return language.read([source], robot, Frames.parse(frames))
 
 

@@ -47,8 +47,8 @@ def read(name, text, robot, frames="", **others):
     from pathlib import Path
 
     path = Path(name)
-    sources = [Source(path, text)]
-    sources += [Source(path.with_suffix(f".{ending}"), more) for ending, more in others.items()]
+    sources = [Source.of(path, text)]
+    sources += [Source.of(path.with_suffix(f".{ending}"), more) for ending, more in others.items()]
     return language_of(path).read(sources, robot, Frames.parse(frames))
 
 
@@ -60,7 +60,7 @@ def rewritten(program, given=None, **choices):
 def again(done, robot, frames=""):
     """The program that was written, read again."""
     texts = [content.decode("latin-1") for content in done.contents]
-    sources = [Source(source.path, text) for source, text in zip(done.program.sources, texts, strict=True)]
+    sources = [Source.of(source.path, text) for source, text in zip(done.program.sources, texts, strict=True)]
     return done.program.language.read(sources, robot, Frames.parse(frames))
 
 

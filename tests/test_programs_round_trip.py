@@ -271,7 +271,7 @@ def language_named(name):
 
 
 def read(language, text, robot, frames):
-    source = Source(Path(f"weld{language.endings[0]}"), text)
+    source = Source.of(Path(f"weld{language.endings[0]}"), text)
     return language.read([source], robot, Frames.parse(frames))
 
 

@@ -598,14 +598,14 @@ def residuals(problem: Problem, parameters: NDArray[np.float64], setup: Setup) -
 def scan_lines(
     text: bytes,
 ) -> tuple[
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
-    NDArray[np.int64],
+    NDArray[np.int32],
+    NDArray[np.int32],
+    NDArray[np.int32],
+    NDArray[np.int32],
+    NDArray[np.int32],
+    NDArray[np.int32],
     NDArray[np.float64],
-    NDArray[np.int64],
+    NDArray[np.int16],
 ]:
     """Lines of a program's text and all their numbers.
 
@@ -616,14 +616,17 @@ def scan_lines(
         First byte of each line and the length of the text (l + 1,); for each line which of the different
         lines it is, numbers apart (l,); for each different line the first that is so (k,); for each line its
         first number, and how many there are (l + 1,); and of the numbers (m,) the first byte, the byte behind
-        the last, the value, and the digits behind the point.
+        the last, the value, and the digits behind the point, at most 400.
+
+    Raises:
+        CoreError: The text has 2 GiB or more.
     """
 
 def splice_numbers(
     text: bytes,
-    spans: tuple[NDArray[np.int64], NDArray[np.int64]],
+    spans: tuple[NDArray[np.int32], NDArray[np.int32]],
     values: NDArray[np.float64],
-    decimals: NDArray[np.int64],
+    decimals: NDArray[np.int16],
     words: list[tuple[int, int, bytes]],
 ) -> bytes:
     """`text` with other numbers and words in it; every other byte stays.

@@ -7,7 +7,7 @@ use truearm_text::{Numbers, TextError, Words, scan_lines as scan, splice_in_piec
 
 use crate::door::{CoreError, Failure, quick};
 
-type Integers<'py> = Bound<'py, PyArray1<i64>>;
+type Integers<'py> = Bound<'py, PyArray1<i32>>;
 type Scanned<'py> = (
     Integers<'py>,
     Integers<'py>,
@@ -16,7 +16,7 @@ type Scanned<'py> = (
     Integers<'py>,
     Integers<'py>,
     Bound<'py, PyArray1<f64>>,
-    Integers<'py>,
+    Bound<'py, PyArray1<i16>>,
 );
 
 impl Failure for TextError {
@@ -27,11 +27,11 @@ impl Failure for TextError {
 
 /// Lines and numbers of a text, see the stub.
 #[pyfunction]
-pub fn scan_lines<'py>(py: Python<'py>, text: &[u8]) -> Scanned<'py> {
-    let lines = py.detach(|| scan(text));
-    let integers = |values: Vec<i64>| values.into_pyarray(py);
+pub fn scan_lines<'py>(py: Python<'py>, text: &[u8]) -> PyResult<Scanned<'py>> {
+    let lines = quick(py, || scan(text))?;
+    let integers = |values: Vec<i32>| values.into_pyarray(py);
     let numbers = lines.numbers;
-    (
+    Ok((
         integers(lines.starts),
         integers(lines.skeleton),
         integers(lines.representative),
@@ -39,8 +39,8 @@ pub fn scan_lines<'py>(py: Python<'py>, text: &[u8]) -> Scanned<'py> {
         integers(numbers.starts),
         integers(numbers.ends),
         numbers.values.into_pyarray(py),
-        integers(numbers.decimals),
-    )
+        numbers.decimals.into_pyarray(py),
+    ))
 }
 
 /// A text with other numbers and words, see the stub.
@@ -48,9 +48,9 @@ pub fn scan_lines<'py>(py: Python<'py>, text: &[u8]) -> Scanned<'py> {
 pub fn splice_numbers<'py>(
     py: Python<'py>,
     text: &[u8],
-    spans: (PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, i64>),
+    spans: (PyReadonlyArray1<'py, i32>, PyReadonlyArray1<'py, i32>),
     values: PyReadonlyArray1<'py, f64>,
-    decimals: PyReadonlyArray1<'py, i64>,
+    decimals: PyReadonlyArray1<'py, i16>,
     words: Vec<(usize, usize, Vec<u8>)>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let numbers = Numbers {

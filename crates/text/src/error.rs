@@ -33,4 +33,12 @@ pub enum TextError {
         /// Rows of another one.
         other: usize,
     },
+    /// More bytes than offsets can count.
+    #[error("the text has {length} bytes, it may have {most}")]
+    TooLong {
+        /// Bytes of the text.
+        length: usize,
+        /// Bytes that it may have.
+        most: usize,
+    },
 }

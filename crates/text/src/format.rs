@@ -18,19 +18,71 @@ const PAIRS: [u8; 200] = {
     pairs
 };
 /// Digits of the largest integer that is written here.
-const ROOM: usize = 24;
+pub(crate) const ROOM: usize = 24;
+/// Integers below are of eight digits, which are found together in one machine word.
+const SHORT: f64 = 1e8;
+const SHORT_DIGITS: u32 = 8;
+
+/// Write a number of at most eight digits as [`write_fixed`] does to the beginning of `out`, whose rest may be
+/// written over as well; its length, None for a longer number.
+#[inline]
+pub(crate) fn write_short(out: &mut [u8; ROOM], value: f64, decimals: u32, plus: bool) -> Option<usize> {
+    let magnitude = value.abs();
+    let scaled = magnitude * POWERS.get(decimals as usize).filter(|_| decimals < SHORT_DIGITS)?;
+    if scaled >= SHORT - 1.0 || scaled.is_nan() {
+        return None;
+    }
+    let rest = nearest(scaled);
+    let digits = eight_digits(rest as u32);
+    let written = (SHORT_DIGITS - digits.trailing_zeros() / 8).max(decimals + 1);
+    let text = digits + u64::from_ne_bytes([b'0'; 8]);
+    let negative = value < 0.0 && rest > 0;
+    out[0] = if negative { b'-' } else { b'+' };
+    let first = usize::from(negative || plus);
+    let point = first + (written - decimals) as usize;
+    out[first..first + 8].copy_from_slice(&(text >> (8 * (SHORT_DIGITS - written))).to_le_bytes());
+    if decimals == 0 {
+        return Some(point);
+    }
+    out[point] = b'.';
+    out[point + 1..point + 9].copy_from_slice(&(text >> (8 * (SHORT_DIGITS - decimals))).to_le_bytes());
+    Some(point + 1 + decimals as usize)
+}
+
+/// The nearest integer, away from zero between two, of a number from 0 to `EXACT`.
+#[inline]
+fn nearest(scaled: f64) -> u64 {
+    let whole = scaled as i64;
+    (whole + i64::from(scaled - whole as f64 >= 0.5)) as u64
+}
+
+/// The decimal digits of a number below 10^8, the first one in the lowest byte.
+///
+/// Halves, pairs and digits are parted by products with reciprocals, all parts of the word at once.
+#[inline]
+fn eight_digits(number: u32) -> u64 {
+    let halves = u64::from(number / 10_000) | (u64::from(number % 10_000) << 32);
+    let hundreds = ((halves * 10_486) >> 20) & 0x0000_007f_0000_007f;
+    let pairs = hundreds | ((halves - 100 * hundreds) << 16);
+    let tens = ((pairs * 103) >> 10) & 0x000f_000f_000f_000f;
+    tens | ((pairs - 10 * tens) << 8)
+}
 
 /// Write `value` with `decimals` digits behind the point; no sign at a zero.
 ///
 /// `plus` asks for a sign before positive numbers. The text is the nearest one within a hundredth of its last
 /// digit.
 pub fn write_fixed(out: &mut Vec<u8>, value: f64, decimals: u32, plus: bool) {
+    let mut text = [0; ROOM];
+    if let Some(length) = write_short(&mut text, value, decimals, plus) {
+        return out.extend_from_slice(&text[..length]);
+    }
     let magnitude = value.abs();
     let scaled = POWERS.get(decimals as usize).map(|power| magnitude * power);
     let Some(scaled) = scaled.filter(|scaled| *scaled < EXACT) else {
         return write_slowly(out, value, decimals, plus);
     };
-    let rest = scaled.round() as u64;
+    let rest = nearest(scaled);
     if value < 0.0 && rest > 0 {
         out.push(b'-');
     } else if plus {

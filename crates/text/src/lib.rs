@@ -3,6 +3,7 @@
 mod error;
 mod format;
 mod number;
+mod room;
 mod scan;
 mod splice;
 

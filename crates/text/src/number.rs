@@ -9,6 +9,8 @@ const POWERS: [f64; 23] = [
 ];
 /// Up to here integers are exact machine numbers.
 const EXACT: u64 = 1 << 53;
+/// More digits behind the point than any machine number needs; those of longer ones are counted as so many.
+const MOST_DECIMALS: i32 = 400;
 /// So many digits fit an integer, whatever they are.
 const MOST_DIGITS: usize = 18;
 
@@ -21,8 +23,8 @@ pub struct Number {
     pub end: usize,
     /// What it says.
     pub value: f64,
-    /// Digits behind the point, a negative exponent counted.
-    pub decimals: i32,
+    /// Digits behind the point, a negative exponent counted; at most 400.
+    pub decimals: i16,
 }
 
 /// What a byte can be part of.
@@ -57,11 +59,13 @@ const CLASSES: [Class; 256] = {
 };
 
 /// What a byte can be part of.
+#[inline]
 pub(crate) fn class(byte: u8) -> Class {
     CLASSES[usize::from(byte)]
 }
 
 /// Whether a byte can be in a name.
+#[inline]
 fn in_name(byte: u8) -> bool {
     matches!(class(byte), Class::Name | Class::Digit)
 }
@@ -75,6 +79,7 @@ struct Digits {
 
 impl Digits {
     /// Take the digits at `at`; where they end.
+    #[inline]
     fn take(&mut self, line: &[u8], mut at: usize) -> usize {
         while let Some(digit) = line.get(at).filter(|byte| byte.is_ascii_digit()) {
             self.whole = self.whole.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
@@ -86,6 +91,7 @@ impl Digits {
 }
 
 /// The number whose first digit or point is at `at`; None where digits are part of something else.
+#[inline]
 pub(crate) fn number_at(line: &[u8], at: usize) -> Option<Number> {
     let mut digits = Digits::default();
     let mut decimals = 0;
@@ -106,10 +112,29 @@ pub(crate) fn number_at(line: &[u8], at: usize) -> Option<Number> {
     let shift = exponent.saturating_sub(decimals);
     let magnitude = exact(&digits, shift).or_else(|| parsed(&line[at..end]))?;
     let value = if line[start] == b'-' { -magnitude } else { magnitude };
-    Some(Number { start, end, value, decimals: shift.saturating_neg().max(0) })
+    let decimals = shift.saturating_neg().clamp(0, MOST_DECIMALS) as i16;
+    Some(Number { start, end, value, decimals })
+}
+
+/// The number at `at`, sign included, where all before it is known to be read as in another line.
+///
+/// None where it is not certain that reading from the line's start would find the same: behind what could be
+/// part of a name, of a number or of an exponent.
+#[inline]
+pub(crate) fn expected_number(line: &[u8], at: usize) -> Option<Number> {
+    let before = at.checked_sub(1).map(|place| line[place]);
+    if before.is_some_and(|byte| class(byte) != Class::Other || matches!(byte, b'+' | b'-')) {
+        return None;
+    }
+    let digits = if matches!(line.get(at), Some(b'+' | b'-')) { at + 1 } else { at };
+    if !matches!(class(*line.get(digits)?), Class::Digit | Class::Point) {
+        return None;
+    }
+    number_at(line, digits).filter(|number| number.start == at)
 }
 
 /// The value of digits times a power of ten where both are exact, so that their quotient is the nearest number.
+#[inline]
 fn exact(digits: &Digits, shift: i32) -> Option<f64> {
     if digits.count > MOST_DIGITS || digits.whole > EXACT {
         return None;
@@ -120,6 +145,7 @@ fn exact(digits: &Digits, shift: i32) -> Option<f64> {
 }
 
 /// End and value of the exponent that may begin at `at`.
+#[inline]
 fn exponent_at(line: &[u8], at: usize) -> (usize, i32) {
     if !matches!(line.get(at), Some(b'e' | b'E')) {
         return (at, 0);

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::error::TextError;
-use crate::format::write_fixed;
+use crate::room::Room;
 
 /// Bytes that a number grows by, usually less.
 const GROWTH: usize = 4;
@@ -14,13 +14,13 @@ const PIECE: usize = 1 << 15;
 #[derive(Clone, Copy, Debug)]
 pub struct Numbers<'a> {
     /// First byte of each.
-    pub starts: &'a [i64],
+    pub starts: &'a [i32],
     /// Behind the last byte of each.
-    pub ends: &'a [i64],
+    pub ends: &'a [i32],
     /// What to write.
     pub values: &'a [f64],
     /// With how many digits behind the point.
-    pub decimals: &'a [i64],
+    pub decimals: &'a [i16],
 }
 
 /// Bytes to put over a span of a text; over an empty one they are inserted.
@@ -77,7 +77,7 @@ fn spliced(
     let to = if is_last { text.len() } else { behind(numbers.ends[last - 1], text) };
     let skipped = words.iter().take_while(|word| first > 0 && word.start < from).count();
     let mut waiting = words[skipped..].iter().take_while(|word| is_last || word.start < to).peekable();
-    let mut out = Vec::with_capacity(to.saturating_sub(from) + (last - first) * GROWTH);
+    let mut out = Room::with_capacity(to.saturating_sub(from) + (last - first) * GROWTH);
     let mut copied = from;
     for row in first..last {
         let span = span(numbers.starts[row], numbers.ends[row], copied, text.len())?;
@@ -87,13 +87,13 @@ fn spliced(
         if span.0 < copied {
             return Err(TextError::Span { start: span.0, end: span.1, after: copied, length: text.len() });
         }
-        out.extend_from_slice(&text[copied..span.0]);
+        out.copy(text, copied, span.0);
         let value = numbers.values[row];
         if !value.is_finite() {
             return Err(TextError::NotFinite { start: span.0, value });
         }
         let decimals = u32::try_from(numbers.decimals[row]).unwrap_or(0);
-        write_fixed(&mut out, value, decimals, text[span.0] == b'+');
+        out.number(value, decimals, text[span.0] == b'+');
         copied = span.1;
     }
     for word in waiting {
@@ -102,26 +102,26 @@ fn spliced(
     if copied > to {
         return Err(TextError::Span { start: to, end: to, after: copied, length: text.len() });
     }
-    out.extend_from_slice(&text[copied..to]);
-    Ok(out)
+    out.copy(text, copied, to);
+    Ok(out.into_bytes())
 }
 
 /// An offset within the text; one that is not is an error where its number is written.
-fn behind(end: i64, text: &[u8]) -> usize {
+fn behind(end: i32, text: &[u8]) -> usize {
     usize::try_from(end).unwrap_or(0).min(text.len())
 }
 
 /// The text from `copied` to a word and the word; where copying goes on.
-fn put(out: &mut Vec<u8>, text: &[u8], copied: usize, word: &Words<'_>) -> Result<usize, TextError> {
+fn put(out: &mut Room, text: &[u8], copied: usize, word: &Words<'_>) -> Result<usize, TextError> {
     if word.start < copied || word.end < word.start || word.end > text.len() {
         return Err(TextError::Span { start: word.start, end: word.end, after: copied, length: text.len() });
     }
-    out.extend_from_slice(&text[copied..word.start]);
-    out.extend_from_slice(word.bytes);
+    out.copy(text, copied, word.start);
+    out.copy(word.bytes, 0, word.bytes.len());
     Ok(word.end)
 }
 
-fn span(start: i64, end: i64, after: usize, length: usize) -> Result<(usize, usize), TextError> {
+fn span(start: i32, end: i32, after: usize, length: usize) -> Result<(usize, usize), TextError> {
     let both = usize::try_from(start).ok().zip(usize::try_from(end).ok());
     both.filter(|&(start, end)| after <= start && start < end && end <= length).ok_or(TextError::Span {
         start: usize::try_from(start).unwrap_or(0),

@@ -96,7 +96,7 @@ class _Reader:
 
     def __init__(self, source: Source, robot: Robot) -> None:
         self._source = source
-        found = scan_lines(source.text.encode("latin-1"))
+        found = scan_lines(source.content)
         self._starts, self._skeleton, self._examples, self._first_number = found[:4]
         self._numbers = found[4:]
         self._header = self._find_header()
@@ -170,7 +170,7 @@ class _Reader:
         return not text or text.startswith("#")
 
     def _line(self, line: int) -> str:
-        return self._source.text[int(self._starts[line]) : int(self._starts[line + 1])]
+        return self._source.part(int(self._starts[line]), int(self._starts[line + 1]))
 
     def _fields(self, line: int) -> list[str]:
         """The fields of a line."""

@@ -1,7 +1,7 @@
 """A program's texts with other numbers in them and nothing else changed."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from truearm._core import splice_numbers
 from truearm.programs.encoding import Written
 from truearm.programs.program import Program
+from truearm.programs.tables import run_of
 
+MOST_DECIMALS: Final = 400
 Words = tuple[int, int, bytes]
 Columns = list[NDArray[Any]]
 
@@ -30,25 +32,24 @@ def edited(program: Program, written: Written, inserted: Mapping[int, Sequence[W
             numbers, spelled = _spelled(numbers, lettered)
             words += spelled
         _, starts, ends, values, decimals = numbers
-        content = source.text.encode("latin-1")
-        out.append(splice_numbers(content, (starts, ends), values, decimals, sorted(words)))
+        out.append(splice_numbers(source.content, (starts, ends), values, decimals, sorted(words)))
     return out
 
 
 def _in_file(program: Program, written: Written, number: int) -> Columns:
     """Places, starts, ends, values and decimals of the numbers of one file, in the order of its text."""
-    targets = program.targets
+    targets, places = program.targets, run_of(written.places)
     columns: Columns = [
         written.places,
-        targets.starts[written.places],
-        targets.ends[written.places],
+        targets.starts[places].astype(np.int32, copy=False),
+        targets.ends[places].astype(np.int32, copy=False),
         np.ascontiguousarray(written.values),
-        np.ascontiguousarray(written.decimals),
+        np.minimum(written.decimals, MOST_DECIMALS).astype(np.int16, copy=False),
     ]
     if len(program.sources) > 1:
         here = np.repeat(targets.source, np.diff(targets.first))[written.places] == number
         columns = [column[here] for column in columns]
-    if (np.diff(columns[1]) < 0).any():
+    if (columns[1][1:] < columns[1][:-1]).any():
         order = np.argsort(columns[1], kind="stable")
         columns = [column[order] for column in columns]
     return columns

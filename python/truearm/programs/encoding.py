@@ -13,6 +13,7 @@ from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program
 from truearm.programs.solving import AT_ONCE, are_singular, numbers_of
+from truearm.programs.tables import run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -64,9 +65,9 @@ def encode_targets(
         if of_pose(layout):
             for environment in np.unique(uses.environment[chosen]):
                 here = chosen[uses.environment[chosen] == environment]
-                encoder.poses(here, layout, program.environments[int(environment)], q[here])
+                encoder.poses(here, layout, program.environments[int(environment)], q[run_of(here)])
         if of_joints(layout):
-            encoder.joints(chosen, layout, q[chosen])
+            encoder.joints(chosen, layout, q[run_of(chosen)])
     return encoder.written()
 
 
@@ -163,10 +164,10 @@ class Encoder:
     ) -> tuple[Floats, Integers]:
         """Numbers in the text's units, and the decimals to write them with."""
         targets, factors = self.program.targets, self._factors(which, layout)
-        least = np.array(layout.least_decimals, dtype=np.int64)
+        least = np.array(layout.least_decimals, dtype=np.int16)
         if (factors != 1.0).any():
             lost = np.ceil(np.log10(np.abs(factors)) - ALMOST).astype(np.int64)
-            values, least = values / factors, np.maximum(least + lost, 0)
+            values, least = values / factors, np.maximum(least + lost, 0).astype(np.int16)
         return values, np.maximum(targets.of(targets.decimals, which, layout.width), least)
 
     def _factors(self, which: Integers, layout: JointLayout | PoseLayout) -> Floats:

@@ -20,7 +20,7 @@ def refuse_marked(program: Program) -> None:
         WorkError: If it does; names file and line.
     """
     for source in program.sources:
-        at = source.text.find(MARK)
+        at = source.content.find(MARK.encode())
         if at >= 0:
             line, _ = source.place(at)
             raise WorkError(

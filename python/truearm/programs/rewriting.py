@@ -20,7 +20,7 @@ from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.program import Language, Listed, Program
 from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion
+from truearm.programs.tables import Motion, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 
@@ -187,7 +187,7 @@ def rewrite(
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
     )
-    known: Bools = np.asarray(np.isfinite(solved.q.sum(axis=1)))
+    known: Bools = np.asarray(np.isfinite(solved.q @ np.ones(solved.q.shape[1])))
     known[list(solved.reasons)] = False
     known &= uses.moved
     state = _State(program, uses, models, solved.q, known)
@@ -227,19 +227,21 @@ class _State:
                 self.reasons.update(dict.fromkeys(which.tolist(), tool.unknown))
                 self.known[which] = False
                 continue
+            rows = run_of(which)
             found = self.models.compensator.joints(
-                np.ascontiguousarray(self.nominal[which]), tool=None if tool.unknown else tool.true
+                np.ascontiguousarray(self.nominal[rows]), tool=None if tool.unknown else tool.true
             )
-            refused = np.asarray(found.refused, dtype=bool)
-            self.corrected[which] = np.where(refused[:, None], self.nominal[which], found.q)
-            self.correction_mm[which], self.correction_mrad[which] = (
+            self.corrected[rows] = found.q
+            self.correction_mm[rows], self.correction_mrad[rows] = (
                 found.correction_mm,
                 found.correction_mrad,
             )
             if found.std_mm is not None:
-                self.std_mm[which] = found.std_mm
+                self.std_mm[rows] = found.std_mm
             for refusal in found.refusals:
                 self.refused[int(which[refusal.number - 1])] = refusal.reason
+            refused = which[np.asarray(found.refused, dtype=bool)]
+            self.corrected[refused] = self.nominal[refused]
 
     def settle(self, choices: Choices) -> tuple[Listed, ...]:
         """Refused targets that are kept as they are, or an error."""

@@ -68,8 +68,9 @@ def solve_targets(
 def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
     """Numbers (n, width) of targets of one layout, in the layout's units."""
     targets, width = program.targets, layout.width
-    numbers: Floats = targets.of(targets.values, which, width) * targets.of(targets.factors, which, width)
-    return numbers
+    numbers: Floats = targets.of(targets.values, which, width)
+    factors = targets.of(targets.factors, which, width)
+    return numbers if (factors == 1.0).all() else numbers * factors
 
 
 def flange_poses(stored: Floats, environment: Environment) -> Floats:

@@ -5,10 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NoReturn
+from typing import Final, NoReturn
+
+import numpy as np
 
 from truearm.errors import InputError
 from truearm.files import read_bytes
+
+LONGEST: Final = 2**31 - 1
+GIBIBYTE: Final = 2**30
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,18 +22,23 @@ class Source:
 
     Attributes:
         path: Where it was read.
-        text: Its bytes decoded as Latin-1, whatever their encoding: encoding them again gives the same bytes.
+        content: Its bytes.
     """
 
     path: Path
-    text: str
+    content: bytes
+
+    @classmethod
+    def of(cls, path: Path, text: str) -> "Source":
+        """A file that holds `text`, of Latin-1 characters."""
+        return cls(path, text.encode("latin-1"))
 
     @classmethod
     def load(cls, path: Path) -> "Source":
         """The file at `path`.
 
         Raises:
-            InputError: If it cannot be read, or is no program but binary data or text in UTF-16.
+            InputError: If it cannot be read, is too long, or is no program but binary data or text in UTF-16.
         """
         content = read_bytes(path)
         if content.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -39,24 +49,39 @@ class Source:
                 where=str(path),
                 way_out="Export the program as text",
             )
-        return cls(path, content.decode("latin-1"))
+        if len(content) > LONGEST:
+            raise InputError(
+                f"this is a file of {len(content) / GIBIBYTE:.1f} GiB",
+                where=str(path),
+                rule="A program has less than 2 GiB",
+                way_out="Split it",
+            )
+        return cls(path, content)
+
+    @cached_property
+    def text(self) -> str:
+        """The bytes decoded as Latin-1, whatever their encoding: encoding them again gives the same bytes."""
+        return self.content.decode("latin-1")
+
+    def part(self, start: int, end: int) -> str:
+        """The text from one offset to another, without decoding all of it."""
+        return self.content[start:end].decode("latin-1")
 
     @cached_property
     def line_starts(self) -> Sequence[int]:
         """Offset of the first character of every line; lines end with LF, CR LF or CR."""
-        starts, text, at = [0], self.text, 0
-        mark = "\r" if "\n" not in text and "\r" in text else "\n"
-        while (at := text.find(mark, at) + 1) > 0:
-            starts.append(at)
-        return starts
+        content = self.content
+        mark = b"\r" if b"\n" not in content and b"\r" in content else b"\n"
+        ends = np.flatnonzero(np.frombuffer(content, dtype=np.uint8) == mark[0])
+        return [0, *(ends + 1).tolist()]
 
     @property
     def newline(self) -> str:
         """How the first line ends."""
-        at = self.text.find("\n")
+        at = self.content.find(b"\n")
         if at < 0:
-            return "\r" if "\r" in self.text else "\n"
-        return "\r\n" if self.text[:at].endswith("\r") else "\n"
+            return "\r" if b"\r" in self.content else "\n"
+        return "\r\n" if self.content[:at].endswith(b"\r") else "\n"
 
     def place(self, offset: int) -> tuple[int, int]:
         """Line and column of an offset, both from 1."""
@@ -66,8 +91,8 @@ class Source:
     def line_text(self, line: int) -> str:
         """Line `line`, from 1, without its end."""
         starts = self.line_starts
-        end = starts[line] if line < len(starts) else len(self.text)
-        return self.text[starts[line - 1] : end].rstrip("\r\n")
+        end = starts[line] if line < len(starts) else len(self.content)
+        return self.part(starts[line - 1], end).rstrip("\r\n")
 
     def fail(self, offset: int, what: str, *, rule: str = "", way_out: str = "") -> NoReturn:
         """Raise InputError that names file, line and column of `offset`."""

@@ -13,9 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 Integers = NDArray[np.int64]
+Whole = NDArray[np.integer[Any]]
 Floats = NDArray[np.float64]
 
 ABSENT_AT: Final = -1
+
+
+def run_of(rows: Integers) -> slice | Integers:
+    """Rows that follow one another as a slice, which copies nothing; others as they are."""
+    count = len(rows)
+    if count > 0 and rows[-1] - rows[0] == count - 1 and bool((rows[1:] > rows[:-1]).all()):
+        return slice(int(rows[0]), int(rows[0]) + count)
+    return rows
 
 
 class Motion(IntEnum):
@@ -70,10 +79,10 @@ class Targets:
     at: Integers
     layout: Integers
     first: Integers
-    starts: Integers
-    ends: Integers
+    starts: Whole
+    ends: Whole
     values: Floats
-    decimals: Integers
+    decimals: Whole
     factors: Floats
     names: dict[int, str]
 
@@ -86,9 +95,9 @@ class Targets:
 
     def of(self, column: NDArray[Any], which: Integers, width: int) -> NDArray[Any]:
         """A column of the numbers of targets `which` (n,) of one layout, (n, width); a view if it can be."""
-        count = len(which)
-        if count > 0 and np.array_equal(which, np.arange(which[0], which[0] + count)):
-            start, stop = int(self.first[which[0]]), int(self.first[which[-1] + 1])
+        count, run = len(which), run_of(which)
+        if isinstance(run, slice):
+            start, stop = int(self.first[run.start]), int(self.first[run.stop])
             if stop - start == count * width:
                 return column[start:stop].reshape(count, width)
         found: NDArray[Any] = column[self.numbers(which, width)]
@@ -178,10 +187,10 @@ class TargetTable:
             at,
             layout,
             first.astype(np.int64),
-            starts.astype(np.int64, copy=False),
-            ends.astype(np.int64, copy=False),
+            starts,
+            ends,
             values.astype(np.float64, copy=False),
-            decimals.astype(np.int64, copy=False),
+            decimals,
             factors.astype(np.float64, copy=False),
             self._names,
         )

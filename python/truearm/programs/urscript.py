@@ -22,7 +22,7 @@ from truearm.programs.urscript_reader import Reader
 from truearm.programs.urscript_syntax import NotReadable, expression, statements
 from truearm.robot import Robot
 
-BYTE_ORDER_MARK: Final = "\u00ef\u00bb\u00bf"
+BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
 
 class UrScript:
@@ -61,14 +61,14 @@ class UrScript:
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """A comment before the first line."""
-        start = len(BYTE_ORDER_MARK) if source.text.startswith(BYTE_ORDER_MARK) else 0
+        start = len(BYTE_ORDER_MARK) if source.content.startswith(BYTE_ORDER_MARK) else 0
         return start, f"# {text}{source.newline}"
 
     def linear_step(self, program: Program, step: LinearStep) -> str | None:
         """The motion's own line with the step in place of its target; None if it states a time."""
         source = program.sources[step.file]
         start, end = source.line_starts[step.line - 1 : step.line + 1] or (0, 0)
-        found = list(statements(source.text, start, end))
+        found = list(statements(source, start, end))
         try:
             call = expression(found[0].tokens) if len(found) == 1 else None
         except NotReadable:

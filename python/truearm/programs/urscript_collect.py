@@ -62,7 +62,7 @@ class Collected:
     """
 
     def __init__(self, source: Source) -> None:
-        self.lines = Lines(source.text)
+        self.lines = Lines(source)
         self.motions: list[MotionCall] = []
         self.constants = Constants()
         self.elsewhere: dict[str, int] = {}
@@ -75,7 +75,7 @@ class Collected:
         self._masses: dict[int, Node | None] = {}
         self._made_of: dict[str, tuple[int, list[str]]] = {}
         for start, end in self.lines.rest():
-            for statement in statements(source.text, start, end):
+            for statement in statements(source, start, end):
                 self._statement(statement)
         self._resolve()
 
@@ -110,7 +110,7 @@ class Collected:
     def _tcp_names(self) -> dict[int, str]:
         """Name of each TCP that is set: its variable, or tcp, or tcp 1, tcp 2 and so on where they differ."""
         written = {at: node for at, node in self._tcps.items() if node is not None and node.kind != "name"}
-        texts = {at: self._source.text[node.start : node.end] for at, node in written.items()}
+        texts = {at: self._source.part(node.start, node.end) for at, node in written.items()}
         different = list(dict.fromkeys(texts.values()))
         several = len(different) > 1
         found = {at: f"tcp {different.index(text) + 1}" if several else "tcp" for at, text in texts.items()}

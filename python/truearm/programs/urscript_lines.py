@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import scan_lines
+from truearm.programs.source import Source
 from truearm.programs.tables import Motion
 from truearm.programs.urscript_constants import AXES, RunTime
 from truearm.programs.urscript_places import argument, numbers_of
 from truearm.programs.urscript_syntax import Node, NotReadable, expression, statements
 
-Integers = NDArray[np.int64]
+Integers = NDArray[np.integer[Any]]
 
 JOINTS, POSE = 0, 1
 FEW: Final = 4
@@ -78,9 +79,9 @@ class _Template:
 class Lines:
     """The lines of a text, those that are motions apart from the others."""
 
-    def __init__(self, text: str) -> None:
-        self._text = text
-        found = scan_lines(text.encode("latin-1"))
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        found = scan_lines(source.content)
         self._starts, self._skeleton, self._first_of, self._first_number = found[:4]
         self._numbers = found[4:]
         counts = np.bincount(self._skeleton, minlength=len(self._first_of))
@@ -89,7 +90,9 @@ class Lines:
             for number in np.flatnonzero(counts >= FEW)
             if (template := self._template(int(self._first_of[number]))) is not None
         }
-        self._taken = np.isin(self._skeleton, list(self._templates))
+        taken = np.zeros(len(self._first_of), dtype=bool)
+        taken[list(self._templates)] = True
+        self._taken = taken[self._skeleton]
 
     def rest(self) -> Iterator[tuple[int, int]]:
         """Where text begins and ends that is to be read statement by statement."""
@@ -137,7 +140,7 @@ class Lines:
         """What line number `line` is; None if it is not one whole motion with its numbers in it."""
         start, end = int(self._starts[line]), int(self._starts[line + 1])
         numbers = slice(int(self._first_number[line]), int(self._first_number[line + 1]))
-        found = list(statements(self._text, start, end))
+        found = list(statements(self._source, start, end))
         if len(found) != 1 or found[0].word not in MOTIONS:
             return None
         try:

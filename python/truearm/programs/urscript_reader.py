@@ -97,23 +97,23 @@ class Reader:
         count = sum(len(columns.at) for columns in lines)
         leaves, rows = self._leaves, self._rows.columns
         leaf = _joined([c.leaf for c in lines], leaves.at)
-        order = np.argsort(leaf, kind="stable")
-        rank = np.empty(len(order), dtype=np.int64)
-        rank[order] = np.arange(len(order))
-        starts, ends, values, decimals, factors = (
-            _in_order(_joined([column[place] for column in lines], own).reshape(-1, AXES), order).reshape(-1)
-            for place, own in enumerate(leaves.numbers, start=Columns._fields.index("starts"))
+        order = _order(leaf)
+        rank = np.empty(len(leaf), dtype=np.int64)
+        rank[order] = np.arange(len(leaf))
+        starts, ends, values, decimals = (
+            _rows_joined([column[place] for column in lines], own)[order].reshape(-1)
+            for place, own in enumerate(leaves.numbers[:-1], start=Columns._fields.index("starts"))
         )
         targets = Targets(
-            source=np.zeros(len(order), dtype=np.int64),
+            source=np.zeros(len(leaf), dtype=np.int64),
             at=leaf[order],
             layout=_joined([c.layout for c in lines], leaves.layout)[order].astype(np.int64),
-            first=AXES * np.arange(len(order) + 1),
+            first=AXES * np.arange(len(leaf) + 1),
             starts=starts,
             ends=ends,
             values=values,
             decimals=decimals,
-            factors=factors,
+            factors=_factors([c.factors for c in lines], leaves.numbers[-1], order),
             names={int(rank[count + number]): name for number, name in leaves.names.items()},
         )
         target = rank[np.concatenate([np.arange(count), count + np.array(rows[0], dtype=np.int64)])]
@@ -129,8 +129,8 @@ class Reader:
         own = np.array(rows[4], dtype=np.int64)
         environment = np.concatenate([self._plain_environments(at[: len(at) - len(own)]), own])
         alone = _joined([np.zeros(len(c.at), dtype=np.int64) for c in lines], rows[5]).astype(bool)
-        order = np.argsort(at, kind="stable")
-        region = np.searchsorted(np.sort(np.array(self._found.breaks, dtype=np.int64)), at[order], "right")
+        order = _order(at)
+        region = _counted(at[order], np.sort(np.array(self._found.breaks, dtype=np.int64)))
         follows = np.diff(region, prepend=-1) == 0
         follows &= ~alone[order]
         follows[1:] &= ~alone[order][:-1]
@@ -150,9 +150,11 @@ class Reader:
 
     def _plain_environments(self, at: Integers) -> Integers:
         """Environments of lines that are motions."""
-        which, inverse = np.unique(self._state(at), return_inverse=True)
-        numbers = [self.environments.number(self._environment(self._states[one])) for one in which]
-        found: Integers = np.array(numbers, dtype=np.int64)[inverse]
+        state = self._state(at)
+        numbers = np.zeros(len(self._states), dtype=np.int64)
+        for one in np.flatnonzero(np.bincount(state, minlength=len(numbers))):
+            numbers[one] = self.environments.number(self._environment(self._states[one]))
+        found: Integers = numbers[state]
         return found
 
     def _environment(self, state: State, place: Place | None = None, problem: str = "") -> Environment:
@@ -220,6 +222,30 @@ def _joined(columns: list[NDArray[Any]], own: "array[int] | array[float]") -> ND
     return flat[0] if len(flat) == 1 and not own else np.concatenate([*flat, np.array(own)])
 
 
-def _in_order(rows: NDArray[Any], order: Integers) -> NDArray[Any]:
-    """Rows in an order; they themselves where they are in it already."""
-    return rows if (order[1:] > order[:-1]).all() else rows[order]
+def _rows_joined(columns: list[NDArray[Any]], own: "array[int] | array[float]") -> NDArray[Any]:
+    """The same for columns of rows, (n, 6), which single ones are as they are."""
+    if len(columns) == 1 and not own:
+        return columns[0]
+    return _joined(columns, own).reshape(-1, AXES)
+
+
+def _factors(
+    columns: list[NDArray[Any]], own: "array[float]", order: slice | Integers
+) -> NDArray[np.float64]:
+    """Factors of all numbers; where all have the same, as lines of one kind do, one stands for them all."""
+    known = {float(factor) for column in columns for factor in column[0]} | set(own)
+    if len(known) == 1:
+        return np.broadcast_to(known.pop(), sum(column.size for column in columns) + len(own))
+    found: NDArray[np.float64] = _rows_joined(columns, own)[order].reshape(-1)
+    return found
+
+
+def _order(at: Integers) -> slice | Integers:
+    """What sorts offsets: all of them as a slice where they are sorted."""
+    return slice(None) if (at[1:] > at[:-1]).all() else np.argsort(at, kind="stable")
+
+
+def _counted(at: Integers, edges: Integers) -> Integers:
+    """How many of the sorted `edges` are not behind each of the sorted offsets."""
+    counts = np.bincount(np.searchsorted(at, edges), minlength=len(at) + 1)
+    return np.cumsum(counts)[: len(at)]

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from truearm.programs.source import Source
+
 # fmt: off
 _TOKEN: Final = re.compile(
     r"(?P<space>[ \t\r\f\v]+)|(?P<comment>\#[^\n]*)|(?P<string>\"[^\"\n]*\"?)|(?P<newline>\n)"
@@ -99,15 +101,15 @@ class NotReadable(Exception):  # noqa: N818 - not an error of the program: what 
         self.at = at
 
 
-def statements(text: str, start: int, end: int) -> Iterator[Statement]:
-    """The statements of `text` from `start` to `end`, which are ends of lines."""
+def statements(source: Source, start: int, end: int) -> Iterator[Statement]:
+    """The statements of a text from `start` to `end`, which are ends of lines."""
     tokens: list[Token] = []
     depth = 0
-    for match in _TOKEN.finditer(text, start, end):
+    for match in _TOKEN.finditer(source.part(start, end)):
         kind = match.lastgroup or ""
         if kind in _SKIPPED or (kind == "newline" and depth > 0):
             continue
-        token = Token(kind, match.start(), match.end(), match.group())
+        token = Token(kind, start + match.start(), start + match.end(), match.group())
         if kind == "newline":
             if tokens:
                 yield Statement(tuple(tokens))

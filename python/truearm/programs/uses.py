@@ -49,7 +49,7 @@ class Uses:
         targets, moves = program.targets, program.moves
         joints = np.array([of_joints(layout) for layout in program.layouts], dtype=bool)
         joint_targets = joints[targets.layout] if len(targets) else np.zeros(0, dtype=bool)
-        real = moves.motion != Motion.NONE
+        real = _all_or(moves.motion != Motion.NONE)
         moved = np.zeros(len(targets), dtype=bool)
         moved[moves.target[real]] = True
         mentioned = np.zeros(len(targets), dtype=bool)
@@ -69,6 +69,11 @@ class Uses:
             straight,
             blended,
         )
+
+
+def _all_or(chosen: Bools) -> slice | Bools:
+    """Chosen rows; all of them as a slice, which copies nothing."""
+    return slice(None) if chosen.all() else chosen
 
 
 def _tools(program: Program) -> tuple[Integers, tuple[int, ...]]:
@@ -94,7 +99,7 @@ def _single(values: Integers, targets: Integers, count: int) -> tuple[Integers, 
     return last, several
 
 
-def _along(program: Program, real: Bools) -> tuple[Bools, Bools]:
+def _along(program: Program, real: slice | Bools) -> tuple[Bools, Bools]:
     """Targets at either end of a straight move, and targets at or next to one that is passed."""
     moves, count = program.moves, len(program.targets)
     target = moves.target[real]
