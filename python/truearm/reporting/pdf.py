@@ -19,7 +19,7 @@ BROWSERS: Final = (
     "msedge",
 )
 PATIENCE_S: Final = 180
-DRAWING_MS: Final = 60_000
+DRAWING_MS: Final = 900_000
 """Time of the page's own clock in which figures are drawn; it runs only while there is nothing to do."""
 
 

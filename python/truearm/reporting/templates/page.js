@@ -80,11 +80,12 @@
     const place = placeOf(number);
     if (figure.spatial && !draws) return;
     const printed = place.parentElement.querySelector(".printed");
-    const wide = figure.wide && figure.choices.length < 2;
-    const size = { width: wide ? 760 : 460, height: Math.min(figure.height, wide ? 520 : 400) };
+    const shown = figure.wide ? Math.max(1, Math.min(2, figure.choices.length)) : 1;
+    const alone = figure.wide && shown === 1;
+    const size = { width: alone ? 760 : 400, height: Math.min(figure.height, alone ? 460 : 330) };
     const format = figure.spatial ? "png" : "svg";
     const images = [];
-    for (let choice = 0; choice < Math.max(1, Math.min(2, figure.choices.length)); choice += 1) {
+    for (let choice = 0; choice < shown; choice += 1) {
       const { data, layout } = drawn(figure, choice, page.palettes.light);
       const source = await Plotly.toImage(
         { data, layout: { ...layout, ...size, autosize: false, paper_bgcolor: "#ffffff" } },
@@ -101,7 +102,6 @@
         block.prepend(label);
       }
       images.push(block);
-      await image.decode();
     }
     printed.replaceChildren(...images);
     place.parentElement.classList.add("ready");
