@@ -104,7 +104,8 @@ def test_with_faults_a_session_completes_with_right_readings(kind, tmp_path):
                 stopped += 1
                 continue
         off_mm = apart_mm(path, clean_path)
-        assert len(off_mm) == count
+        # What the table cannot reach is skipped with faults and without.
+        assert len(off_mm) == len(finished(clean_path)[0]) == len(finished(path)[0]) > 0.8 * count
         assert off_mm.max() < 0.5, "a wrong reading was accepted"
         worst_mm, remarks = max(worst_mm, float(off_mm.max())), remarks + remarks_of(path)
         say(f"{kind} {SHARE:.0%}, session {seed}: worst {off_mm.max():.2f} mm")
