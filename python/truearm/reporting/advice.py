@@ -115,8 +115,8 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
     hidden = [name for name, words in pairs if SETUP_WORDS not in words]
     if hidden:
         words = (
-            f"The poses do not show {listed(hidden)}, which cannot be corrected so. Turn the joints in "
-            "front of them further, and mount the target away from the last axis."
+            f"What the poses do not show stays nominal: {listed(hidden)}. Larger turns of the joints, and "
+            "a target mounted away from the last axis, would show it."
         )
         yield Advice("unseen_parameters", "Show what cannot be seen.", words, 0.1 * _mean_mm(facts))
     if selection.distances or selection.orientation or len(selection.targets) > 2:

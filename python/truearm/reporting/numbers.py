@@ -45,8 +45,8 @@ def short(*values: float) -> list[str]:
 
 
 def percent(share: float) -> str:
-    """A share in percent: "64 %"."""
-    return f"{100.0 * share:.0f} %"
+    """A share in percent: "64 %"; of one that is hardly any, "less than 1 %"."""
+    return "less than 1 %" if share < 0.005 else f"{100.0 * share:.0f} %"
 
 
 def count_of(count: int, noun: str) -> str:
