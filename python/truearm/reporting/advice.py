@@ -13,6 +13,8 @@ from truearm.reporting.numbers import count_of, listed, percent, short, shown_re
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
 """A mean error within so many times what noise alone leaves has reached it."""
+LONG_TAIL: Final = 5.0
+"""The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 FEW_HELD: Final = 30
 COVERED: Final = 0.88
 SAME: Final = 0.97
@@ -39,7 +41,7 @@ class Advice:
 
 def advise(facts: Facts, known: Known | None) -> list[Advice]:
     """What would help most, the most first, four at most."""
-    rules = (_outliers, _noise_or_poses, _unseen, _few_held, _intervals, _what_varies)
+    rules = (_outliers, _noise_or_poses, _tail, _unseen, _few_held, _intervals, _what_varies)
     found = [advice for rule in rules for advice in rule(facts)]
     if known is not None:
         found += _where(facts, known)
@@ -81,10 +83,22 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         return
     trained = facts.calibration.validation.n_train
     words = (
-        f"{left} mm are left where noise alone leaves {noise} mm: what {trained} training poses do not "
-        "tell is the larger part. Poses like those of the work help most."
+        f"{left} mm are left where noise alone leaves {noise} mm; the rest is what {trained} training "
+        "poses do not tell. Poses like those of the work help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
+
+
+def _tail(facts: Facts) -> Iterator[Advice]:
+    found = facts.calibration.validation.holdout[facts.best].position
+    if found.p99 > LONG_TAIL * found.mean and facts.held is not None:
+        far, mean = short(found.p99, found.mean)
+        words = (
+            f"One pose in a hundred misses by more than {far} mm, the mean is {mean} mm. Look where the "
+            "worst poses lie, in their table and along the joints: more poses there, or a second look at "
+            "them."
+        )
+        yield Advice("long_tail", "Look at the worst poses.", words, 0.5 * found.p99)
 
 
 def _where(facts: Facts, known: Known) -> Iterator[Advice]:

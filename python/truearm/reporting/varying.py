@@ -1,6 +1,6 @@
 """Chapter: how the parameters vary."""
 
-from truearm.models import CONSTANT
+from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.curves import along, influence
 from truearm.reporting.facts import Facts
 from truearm.reporting.gravity import sag
@@ -17,10 +17,9 @@ def varying(facts: Facts) -> Section:
     if facts.best == CONSTANT:
         return Section(title, [Text("This calibration holds all parameters constant.")])
     effects = influence_mm(facts)
-    words = (
-        "Curves show how a parameter differs from its mean along the joint, with all other joints as in "
-        "a usual pose; bands are two standard deviations of that difference on either side."
-    )
+    words = "Curves show how a parameter differs from its mean along the joint, other joints in a usual pose."
+    if facts.best == VARIABLE and facts.readings is not None:
+        words += " Bands are two standard deviations of that difference on either side."
     parts: list[Part] = [Text(words, is_note=True), influence(facts, effects)]
     tree = region_tree(facts)
     parts += [tree] if tree is not None else []
