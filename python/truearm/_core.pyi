@@ -304,8 +304,10 @@ class FieldFit:
 class Field:
     """A bank of blocks: inputs in, corrections of the parameters out."""
 
-    def __init__(self, input_count: int, parameter_count: int, blocks: Sequence[dict[str, Any]]) -> None:
-        """A bank from blocks as `blocks` gives them."""
+    def __init__(
+        self, input_count: int, parameter_count: int, blocks: Sequence[dict[str, Any]], nominal: Chain
+    ) -> None:
+        """A bank from blocks as `blocks` gives them, of the arm whose nominal chain is given."""
 
     @property
     def input_count(self) -> int:

@@ -85,8 +85,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     bounds = content.get("conservative")
     inputs = robot.joint_count + len(options.features)
     models = {
-        name: _read_model(name, stored, arrays, (inputs, arm.table.size))
-        for name, stored in content["models"].items()
+        name: _read_model(name, stored, arrays, (inputs, arm)) for name, stored in content["models"].items()
     }
     return {
         "robot": robot,
@@ -152,8 +151,11 @@ def _model(name: str, model: ArmModel, arrays: Arrays) -> dict[str, Any]:
     return {"blocks": blocks}
 
 
-def _read_model(name: str, content: Mapping[str, Any], arrays: Arrays, sizes: tuple[int, int]) -> ArmModel:
-    """A model; `sizes` are the numbers of inputs and of parameters."""
+def _read_model(
+    name: str, content: Mapping[str, Any], arrays: Arrays, of: tuple[int, IdentifiedArm]
+) -> ArmModel:
+    """A model; `of` are the number of inputs and the arm."""
+    inputs, arm = of
     setup = Setup(*(arrays[f"{name}.{part}"] for part in SETUP_PARTS))
     field = None
     if content["blocks"] is not None:
@@ -165,7 +167,7 @@ def _read_model(name: str, content: Mapping[str, Any], arrays: Arrays, sizes: tu
             }
             for number, block in enumerate(content["blocks"])
         ]
-        field = Field(*sizes, blocks)
+        field = Field(inputs, arm.table.size, blocks, arm.flange_chain)
     kept = content.get("scheme")
     scheme = schemes.unpack(kept, name, arrays) if kept else None
     return ArmModel(np.ascontiguousarray(arrays[f"{name}.constants"]), setup, field, scheme)

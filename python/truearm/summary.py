@@ -65,7 +65,7 @@ def _describe(
     block: dict[str, Any], calibration: "Calibration", hyper: dict[str, list[float]]
 ) -> dict[str, Any]:
     joints, name = calibration.robot.joint_count, block["name"]
-    lengths = hyper.get(f"{name}_lengths") or hyper[f"{name}_length"] * len(block["inputs"])
+    lengths = _lengths(block, hyper)
     scales = [axis[1] for axis in block["axes"]]
     cells = 1
     for axis in block["axes"]:
@@ -81,6 +81,16 @@ def _describe(
     }
 
 
+def _lengths(block: dict[str, Any], hyper: dict[str, list[float]]) -> list[float]:
+    """Length scales of a block's axes; none where it has no cells."""
+    name, axes = block["name"], len(block["axes"])
+    if not axes:
+        return []
+    return hyper.get(f"{name}_lengths") or hyper[f"{name}_length"] * axes
+
+
 def _amplitudes(name: str, hyper: dict[str, list[float]]) -> dict[str, float]:
+    if name == "sag":
+        return {"theta_mrad_per_m": hyper["sag"][0] * MRAD_PER_RAD}
     values = hyper.get(f"{name}_amplitudes") or hyper[name]
     return {key: value * unit for (key, unit), value in zip(AMPLITUDES, values, strict=False)}

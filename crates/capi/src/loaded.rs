@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use truearm_compensate::{Limits, Model, Spread};
-use truearm_field::{Axis, Bank, Block, Conservative, ConservativeParts, Grid, Input, InputKind};
+use truearm_field::{
+    Axis, Bank, Block, Conservative, ConservativeParts, Grid, Input, InputKind, Levers, SAG_NAME, Sag,
+};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
 
 use crate::container::Container;
@@ -81,8 +83,11 @@ fn calibrated(container: &Container, content: &Content, coupling: &[f64]) -> Res
     let constants = container.numbers(&format!("{name}.constants"))?;
     let mut model = Model::new(chain, &constants, coupling)?;
     if let Some(stored) = &content.models[name].blocks {
-        let blocks = blocks(container, stored, name)?;
-        let bank = Bank { input_count: inputs, parameter_count: width, blocks };
+        let mut blocks = blocks(container, stored, name)?;
+        let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
+        let levers = Levers::new(model.chain());
+        let sag = sag.map(|block| Sag { levers, outputs: block.outputs, weights: block.weights });
+        let bank = Bank { input_count: inputs, parameter_count: width, blocks, sag };
         bank.check()?;
         model = model.with_field(bank.compiled(), content.options.features.len())?;
     }
@@ -101,7 +106,7 @@ fn conservative(
     let any = [f64::NEG_INFINITY, f64::INFINITY];
     let blocks = blocks(container, &stored.blocks, "conservative")?;
     Ok(Conservative::new(ConservativeParts {
-        tables: Bank { input_count: inputs, parameter_count: truearm_field::BOUNDED, blocks },
+        tables: Bank { input_count: inputs, parameter_count: truearm_field::BOUNDED, blocks, sag: None },
         level: stored.level,
         largest: stored.largest,
         ranges: stored.ranges.iter().map(|range| range.unwrap_or(any)).collect(),

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use truearm_field::FieldScratch;
 use truearm_kinematics::{
-    Chain, Isa, Kernel, LANES, Lane, LaneFrame, LaneParameters, Screw, Transform, dispatch_on, lane_room,
-    load_lanes,
+    Chain, Isa, Kernel, LANES, Lane, LaneFrame, LaneParameters, OnePose, Screw, Transform, dispatch_on,
+    lane_room, load_lanes,
 };
 
 use crate::error::CompensateError;
@@ -37,6 +37,7 @@ impl Aimed {
             // One group of lanes more, so that whole blocks can be read.
             rows: vec![0.0; LANES * (width + LANES)],
             parameters: vec![Lane::ZERO; lane_room(width)],
+            one: OnePose::new(&self.chain),
             screws: vec![Screw::ZERO; joints.max(spread)],
             field: self.model.field.as_ref().map(|field| field.scratch()),
             bounds: self.model.spread.as_ref().and_then(Spread::scratch),
@@ -51,6 +52,7 @@ pub(crate) struct AimedScratch {
     pub inputs: Vec<Lane>,
     rows: Vec<f64>,
     parameters: Vec<Lane>,
+    one: OnePose,
     pub screws: Vec<Screw>,
     field: Option<FieldScratch>,
     pub bounds: Option<FieldScratch>,
@@ -115,35 +117,34 @@ impl Kernel for Sweep<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) -> LaneFrame {
         let Self { aimed: Aimed { model, chain, .. }, alone, columns, scratch } = self;
-        let AimedScratch { inputs, rows, parameters, screws, field, .. } = scratch;
+        let AimedScratch { inputs, rows, parameters, one, screws, field, .. } = scratch;
+        let (count, width) = (if alone { 1 } else { LANES }, chain.parameter_count());
+        let rows = &mut rows[..];
         if let (Some(bank), Some(room)) = (&model.field, field) {
-            let count = if alone { 1 } else { LANES };
-            let width = chain.parameter_count();
             for row in rows.chunks_exact_mut(width).take(count) {
                 row.copy_from_slice(&model.constants);
             }
             bank.excite_and_add::<I>(inputs, room, &mut rows[..count * width]);
-            spread_rows::<I>(rows, width, alone, parameters);
         }
-        let parameters = match model.field {
-            None => LaneParameters::Shared(&model.shared),
-            Some(_) => LaneParameters::Each(&parameters[..chain.parameter_count()]),
-        };
         let joints = &inputs[..chain.joint_count()];
+        let parameters = match (&model.field, alone) {
+            (None, false) => LaneParameters::Shared(&model.shared),
+            (Some(_), false) => {
+                load_lanes::<I>(rows, width, 0, parameters);
+                LaneParameters::Each(&parameters[..width])
+            }
+            (None, true) => {
+                one.set_shared::<I>(chain, joints, &model.shared);
+                LaneParameters::One(one)
+            }
+            (Some(_), true) => {
+                one.set::<I>(chain, joints, &rows[..width]);
+                LaneParameters::One(one)
+            }
+        };
         let Some(columns) = columns else { return chain.end_frame::<I>(joints, parameters) };
         let mut frame = LaneFrame::splat(&Transform::IDENTITY);
         chain.sweep::<I>(joints, parameters, columns, &mut frame, screws);
         frame
-    }
-}
-
-/// Lanes of eight rows of numbers, or of one for all poses.
-#[inline(always)]
-fn spread_rows<I: Isa>(rows: &[f64], width: usize, alone: bool, lanes: &mut [Lane]) {
-    if !alone {
-        return load_lanes::<I>(rows, width, 0, lanes);
-    }
-    for (lane, value) in lanes.iter_mut().zip(&rows[..width]) {
-        *lane = Lane::splat(*value);
     }
 }

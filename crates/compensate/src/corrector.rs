@@ -193,10 +193,11 @@ impl Corrector {
         search.best.copy_from_slice(nominal);
         let residual = toward::<I>(&self.calibrated, &self.plan, &target, alone, search);
         let reached = self.programming.end::<I>(&search.best, alone, programming);
-        let spread = self.calibrated.model.spread.as_ref();
-        let std = spread.map_or(Lane::splat(f64::NAN), |spread| {
-            spread.at::<I>(&self.calibrated, &search.best, alone, &mut search.model)
-        });
+        // A closure would be compiled without the instruction set of this function.
+        let std = match &self.calibrated.model.spread {
+            Some(spread) => spread.at::<I>(&self.calibrated, &search.best, alone, &mut search.model),
+            None => Lane::splat(f64::NAN),
+        };
         Group { residual, shift: shift(&target, &reached), turn: turn::<I>(&target, &reached), std, target }
     }
 
@@ -285,7 +286,9 @@ impl Plan {
         let unit = |k: &usize| if slides(&model.chain, *k) { LEVER } else { 1.0 };
         let position_first = task != Task::Position && moving.len() < Task::Pose.rows();
         let turn_weight = if position_first { LEVER * POSITION_FIRST } else { LEVER };
-        Ok(Plan { task, unit: moving.iter().map(unit).collect(), moving, turn_weight, steps, longest })
+        let unit = moving.iter().map(unit).collect();
+        let enough = Plan::enough(model.field.is_some());
+        Ok(Plan { task, unit, moving, turn_weight, enough, steps, longest })
     }
 }
 

@@ -4,7 +4,9 @@
 //! step may be, the error is far smaller than what the joints would have to turn for it: the step is then damped,
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
 //! which the arm moves well nearly undamped. A step that makes the error larger is halved. Once the error is small its
-//! Jacobian is kept. What a pose gets does not depend on the poses beside it.
+//! Jacobian is kept, and corrected by what the last step brought: Broyden's method with a memory of one step (Kelley,
+//! Iterative Methods for Linear and Nonlinear Equations, 1995, section 7.3). What a pose gets does not depend on the
+//! poses beside it.
 
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
 
@@ -16,10 +18,14 @@ use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task};
 pub(crate) const LEVER: f64 = 0.3;
 /// Error at which the search ends, m: a few roundings of a pose.
 const ENOUGH: f64 = 1e-13;
+/// The same where the parameters vary, which each step leaves a hundredth to a thousandth of the error for.
+const ENOUGH_VARIED: f64 = 1e-10;
 /// Error from which on a Jacobian is good enough for the steps to come, m.
 const CALM: f64 = 1e-4;
 /// Step at which it ends where an error is left that the joints cannot remove, rad.
 const STANDSTILL: f64 = 1e-11;
+/// Share of a step along the one before from which on it says nothing.
+const UNSURE: f64 = 0.3;
 /// Added to J J^T so that it can be inverted everywhere, m^2.
 const FLOOR: f64 = 1e-12;
 
@@ -33,6 +39,8 @@ pub(crate) struct Plan {
     pub unit: Vec<f64>,
     /// Metres that one radian of the task counts.
     pub turn_weight: f64,
+    /// Error at which the search ends, m.
+    pub enough: f64,
     /// Steps at most.
     pub steps: usize,
     /// Longest step, rad.
@@ -40,6 +48,11 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
+    /// Error at which a search with a model ends, m.
+    pub fn enough(varied: bool) -> f64 {
+        if varied { ENOUGH_VARIED } else { ENOUGH }
+    }
+
     /// Whether there are too few joints to meet all of the task.
     pub fn position_first(&self) -> bool {
         self.turn_weight < LEVER
@@ -162,7 +175,7 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
             aimed.end::<I>(&search.trial, alone, &mut search.model)
         };
         let error = weighted::<I, G, M>(&frame, target, plan.turn_weight);
-        let norm = progress.take::<I, M>(&error, search);
+        let norm = progress.take::<I, M>(&error, plan.enough, search);
         if step == plan.steps || !NO.any_below(progress.open) {
             break;
         }
@@ -199,7 +212,7 @@ impl Progress {
 
     /// Takes over the trials that are better than what was found before; gives the squared errors.
     #[inline(always)]
-    fn take<I: Isa, const M: usize>(&mut self, error: &[Lane; M], search: &mut Search) -> Lane {
+    fn take<I: Isa, const M: usize>(&mut self, error: &[Lane; M], enough: f64, search: &mut Search) -> Lane {
         let (norm, before) = (squared::<I>(error), self.least);
         let left = [squared::<I>(&error[..3]), squared::<I>(&error[3..])];
         for (kept, found) in self.left.iter_mut().zip(left) {
@@ -210,7 +223,7 @@ impl Progress {
         }
         self.least = norm.where_below(before, norm, before);
         self.better = norm.where_below(before, YES, NO);
-        let far = Lane::splat(ENOUGH * ENOUGH).where_below(self.least, YES, NO);
+        let far = Lane::splat(enough * enough).where_below(self.least, YES, NO);
         self.open = Lane::splat(STANDSTILL * STANDSTILL).where_below(self.length, far, NO);
         norm
     }
@@ -232,14 +245,31 @@ impl Progress {
         search: &mut Search,
     ) {
         let longest = Lane::splat(plan.longest * plan.longest);
-        self.length = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
+        let before = self.length;
+        let (length, along) = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
+        self.length = length;
         if longest.any_below(self.length) {
             let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
             self.damping = longest.where_below(self.length, damping, self.damping);
             let columns = &search.columns[..plan.moving.len()];
             dispatch_on(I::LEVEL, Damp { columns, damping: self.damping, factor });
-            self.length = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
+            (self.length, _) = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
+        } else {
+            self.lengthen(plan, along / before, search);
         }
+    }
+
+    /// Broyden's update for the last step, where the Jacobian is kept: `share` of that step points along the one before.
+    #[inline(always)]
+    fn lengthen(&mut self, plan: &Plan, share: Lane, search: &mut Search) {
+        let (low, high) = (Lane::splat(-UNSURE), Lane::splat(UNSURE));
+        let share = low.where_below(share, share, low);
+        let share = share.where_below(high, share, high);
+        let factor = NO.where_below(self.stale, YES, YES / (YES - share));
+        for step in search.step.iter_mut().take(plan.moving.len()) {
+            *step = *step * factor;
+        }
+        self.length = self.length * factor * factor;
     }
 
     /// Which poses need a Jacobian at their next trial: those with a large error, and those that did not improve.
@@ -301,19 +331,20 @@ pub(crate) fn fill_pose_columns<I: Isa>(aimed: &Aimed, plan: &Plan, alone: bool,
     fill_columns::<I, PoseGoal, 6>(aimed, plan, &frame, YES, search);
 }
 
-/// J^T y, the step; gives its squared length.
+/// J^T y, the step; gives its squared length, and its product with the step before.
 #[inline(always)]
-fn step_for<I: Isa, const M: usize>(plan: &Plan, y: &[Lane; M], search: &mut Search) -> Lane {
-    let mut length = NO;
+fn step_for<I: Isa, const M: usize>(plan: &Plan, y: &[Lane; M], search: &mut Search) -> (Lane, Lane) {
+    let (mut length, mut along) = (NO, NO);
     for (step, column) in search.step.iter_mut().zip(&search.columns).take(plan.moving.len()) {
         let mut sum = NO;
         for (value, row) in column.iter().zip(y) {
             sum = I::mul_add(*value, *row, sum);
         }
+        along = I::mul_add(sum, *step, along);
         *step = sum;
         length = I::mul_add(sum, sum, length);
     }
-    length
+    (length, along)
 }
 
 /// Factors anew with other damping: rare, and so kept out of the way of what is not.

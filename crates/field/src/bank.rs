@@ -3,6 +3,7 @@
 use crate::FieldError;
 use crate::cells::{Axis, Grid, MOST_AXES};
 use crate::compiled::Compiled;
+use crate::sag::Sag;
 
 /// One FCMAC: a grid of cells, each with a weight for every parameter that the block drives.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,14 +25,16 @@ pub struct Bank {
     pub input_count: usize,
     /// Parameters of the chain, 5 L.
     pub parameter_count: usize,
-    /// The blocks.
+    /// The blocks over cells.
     pub blocks: Vec<Block>,
+    /// What gives way under the arm's own weight.
+    pub sag: Option<Sag>,
 }
 
 impl Bank {
     /// A field that is zero everywhere.
     pub fn empty(input_count: usize, parameter_count: usize) -> Self {
-        Self { input_count, parameter_count, blocks: Vec::new() }
+        Self { input_count, parameter_count, blocks: Vec::new(), sag: None }
     }
 
     /// Checks that weights, grids and indices fit together, once, where a bank comes from outside.
@@ -39,6 +42,7 @@ impl Bank {
     /// # Errors
     /// [`FieldError::Length`], [`FieldError::NotFinite`].
     pub fn check(&self) -> Result<(), FieldError> {
+        self.check_sag()?;
         for block in &self.blocks {
             let (axes, inputs) = (&block.grid.axes, &block.grid.inputs);
             if !(1..=MOST_AXES).contains(&axes.len()) || !axes.iter().all(Axis::is_sound) {
@@ -65,6 +69,23 @@ impl Bank {
             if output >= self.parameter_count {
                 let expected = self.parameter_count;
                 return Err(FieldError::Length { what: "outputs of a block", found: output + 1, expected });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_sag(&self) -> Result<(), FieldError> {
+        let Some(sag) = &self.sag else { return Ok(()) };
+        let output = sag.outputs.iter().copied().max().unwrap_or(0);
+        let lengths = [
+            ("weights of the sag", sag.weights.len(), sag.levers.len()),
+            ("outputs of the sag", sag.outputs.len(), sag.levers.len()),
+            ("joints of the sag", self.input_count.min(sag.levers.joint_count()), sag.levers.joint_count()),
+            ("outputs of the sag", (output + 1).max(self.parameter_count), self.parameter_count),
+        ];
+        for (what, found, expected) in lengths {
+            if found != expected {
+                return Err(FieldError::Length { what, found, expected });
             }
         }
         Ok(())

@@ -13,6 +13,7 @@ use crate::bank::{Bank, Block};
 use crate::cells::MOST_ACTIVE;
 use crate::compiled_axis::{CompiledAxis, Excited};
 use crate::compiled_table::{Line, MOST_LANES, Numbered, Sheet};
+use crate::sag::{Sag, SagScratch};
 
 /// Below this many poses threads cost more than they bring.
 const THREADED_POSES: usize = 4096;
@@ -29,6 +30,7 @@ pub struct Compiled {
     axes: Vec<CompiledAxis>,
     lines: Vec<Line>,
     sheets: Vec<Sheet>,
+    sag: Option<Sag>,
 }
 
 impl Compiled {
@@ -41,6 +43,7 @@ impl Compiled {
             axes: Vec::new(),
             lines: Vec::new(),
             sheets: Vec::new(),
+            sag: bank.sag.clone(),
         };
         let mut blocks: Vec<&Block> = bank.blocks.iter().collect();
         blocks.sort_by_key(|block| Reverse(block.grid.axes.len()));
@@ -133,6 +136,7 @@ impl Compiled {
 pub struct FieldScratch {
     three: Vec<Excited<3>>,
     four: Vec<Excited<MOST_ACTIVE>>,
+    sag: Option<SagScratch>,
 }
 
 impl Compiled {
@@ -152,6 +156,7 @@ impl Compiled {
         FieldScratch {
             three: vec![Excited::NONE; self.axes.len() - count(MOST_ACTIVE)],
             four: vec![Excited::NONE; count(MOST_ACTIVE)],
+            sag: self.sag.as_ref().map(|sag| sag.levers.scratch()),
         }
     }
 
@@ -161,9 +166,9 @@ impl Compiled {
     #[inline(always)]
     pub fn excite_and_add<I: Isa>(&self, inputs: &[Lane], scratch: &mut FieldScratch, rows: &mut [f64]) {
         if self.active == MOST_ACTIVE {
-            self.group::<I, MOST_ACTIVE>(|input| inputs[input], &mut scratch.four, rows);
+            self.group::<I, MOST_ACTIVE>(|input| inputs[input], &mut scratch.four, &mut scratch.sag, rows);
         } else {
-            self.group::<I, 3>(|input| inputs[input], &mut scratch.three, rows);
+            self.group::<I, 3>(|input| inputs[input], &mut scratch.three, &mut scratch.sag, rows);
         }
     }
 
@@ -172,6 +177,7 @@ impl Compiled {
         &self,
         input: impl Fn(usize) -> Lane,
         excited: &mut [Excited<K>],
+        room: &mut Option<SagScratch>,
         rows: &mut [f64],
     ) {
         for (axis, excited) in self.axes.iter().zip(excited.iter_mut()) {
@@ -182,6 +188,9 @@ impl Compiled {
         }
         for sheet in &self.sheets {
             sheet.add::<I, K>(excited, rows, self.parameter_count);
+        }
+        if let (Some(sag), Some(room)) = (&self.sag, room) {
+            sag.add::<I>(input, room, rows, self.parameter_count);
         }
     }
 }
@@ -205,9 +214,10 @@ impl Evaluate<'_> {
     #[inline(always)]
     fn all<I: Isa, const K: usize>(self) {
         let Self { bank, values, out } = self;
-        if bank.axes.is_empty() {
+        if bank.axes.is_empty() && bank.sag.is_none() {
             return;
         }
+        let mut room = bank.sag.as_ref().map(|sag| sag.levers.scratch());
         let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
         let (wide, width) = (bank.input_count * LANES, bank.parameter_count);
         for (values, out) in values.chunks(wide).zip(out.chunks_mut(width * LANES)) {
@@ -218,7 +228,7 @@ impl Evaluate<'_> {
                 }
                 lane
             };
-            bank.group::<I, K>(input, &mut excited, out);
+            bank.group::<I, K>(input, &mut excited, &mut room, out);
         }
     }
 }

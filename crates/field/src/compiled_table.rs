@@ -22,12 +22,18 @@ impl Line {
     /// Adds to the outputs (up to 8, `width`) of the poses.
     #[inline(always)]
     pub fn add<I: Isa, const K: usize>(&self, excited: &[Excited<K>], out: &mut [f64], width: usize) {
-        let excited = &excited[self.axis];
+        let (excited, poses) = (&excited[self.axis], LANES.min(out.len() / width));
         let mut sum = Lane::ZERO;
         for k in 0..K {
             let mut weight = Lane::ZERO;
-            for p in 0..LANES {
-                weight.0[p] = self.weights[excited.cell[k][p] as usize];
+            if poses == LANES {
+                for p in 0..LANES {
+                    weight.0[p] = self.weights[excited.cell[k][p] as usize];
+                }
+            } else {
+                for p in 0..poses {
+                    weight.0[p] = self.weights[excited.cell[k][p] as usize];
+                }
             }
             sum = I::mul_add(excited.grade[k], weight, sum);
         }

@@ -64,7 +64,20 @@ impl DataSpace {
         };
         let mut bank = Bank::empty(training.inputs.len(), training.parameter_count);
         bank.blocks = self.model.plans().iter().map(|plan| self.block(plan, &pull)).collect();
+        bank.sag = self.model.sag(self.sag_weights(&pull));
         Solution { constant: (0..columns).map(constant).collect(), bank, setup: step }
+    }
+
+    /// Weight of every lever, (L,).
+    fn sag_weights(&self, pull: &[f64]) -> Vec<f64> {
+        let training = &self.model.training;
+        let columns = training.columns.len();
+        let weight = |(lever, term): (usize, &Option<(usize, f64)>)| {
+            let Some((p, deviation)) = *term else { return 0.0 };
+            let of = |pose: usize| pull[pose * columns + p] * training.levers_of(pose)[lever];
+            deviation.powi(2) * (0..training.pose_count()).map(of).sum::<f64>()
+        };
+        self.model.sag_terms().iter().enumerate().map(weight).collect()
     }
 
     fn setup_step(&self, residual: &[f64]) -> Vec<f64> {

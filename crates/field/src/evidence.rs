@@ -15,11 +15,12 @@ use truearm_kinematics::{Isa, Kernel, dispatch};
 use crate::FieldError;
 use crate::data_space::setup_precision;
 use crate::hyper::{
-    AT_CONSTANT, AT_OWN, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SMOOTH, AT_SMOOTH_LENGTH, Hyper,
-    Product,
+    AT_CONSTANT, AT_OWN, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH, AT_SMOOTH_LENGTH,
+    Hyper, Product,
 };
 use crate::kernel::{Value, matern, squared_exponential};
 use crate::pairs::{ByColumn, ClassSums, PairKernels, PairTable, add_products, covariance};
+use crate::sag::alike;
 use crate::training::Training;
 
 /// The evidence of one training set under any hyper-parameters.
@@ -27,6 +28,7 @@ pub struct Evidence<'a> {
     training: &'a Training,
     by_column: ByColumn,
     distances: Distances,
+    loads: Loads,
     cancel: &'a Cancel,
 }
 
@@ -51,6 +53,23 @@ impl Distances {
                     inputs.iter().enumerate().map(|(k, input)| input.distance(there[k], here[k]))
                 })
                 .collect()
+        };
+        Self((0..training.pose_count()).into_par_iter().map(of_pose).collect())
+    }
+}
+
+/// How alike the loads of the joints are, computed once: pose j with poses j.., (count, I) each, zero for what is no joint.
+struct Loads(Vec<Vec<f64>>);
+
+impl Loads {
+    fn new(training: &Training) -> Self {
+        let (inputs, joints) = (training.inputs.len(), training.geometry.joint_count());
+        let of_pose = |j: usize| {
+            let mut loads = vec![0.0; (training.pose_count() - j) * inputs];
+            for (i, out) in loads.chunks_exact_mut(inputs).enumerate() {
+                alike(joints, training.levers_of(j), training.levers_of(j + i), out);
+            }
+            loads
         };
         Self((0..training.pose_count()).into_par_iter().map(of_pose).collect())
     }
@@ -86,18 +105,22 @@ fn exponents<'a>(product: &'a Product, distances: &'a [f64]) -> impl Iterator<It
 }
 
 /// The continuous kernels of all poses.
-struct Continuous {
+struct Continuous<'a> {
     inputs: usize,
     poses: Vec<PoseKernels>,
+    loads: &'a Loads,
 }
 
-impl PairKernels for Continuous {
+impl PairKernels for Continuous<'_> {
     fn fill(&self, j: usize, table: &mut PairTable) {
         let kernels = &self.poses[j];
         let count = kernels.own.len() / self.inputs;
         table.clear(self.inputs, kernels.products.len(), count);
         for (i, own) in kernels.own.chunks_exact(self.inputs).enumerate() {
             table.own.iter_mut().zip(own).for_each(|(column, value)| column[i] = value.kernel);
+        }
+        for (i, loads) in self.loads.0[j].chunks_exact(self.inputs).enumerate() {
+            table.sag.iter_mut().zip(loads).for_each(|(column, value)| column[i] = *value);
         }
         let smooth = kernels.smooth.chunks_exact(self.inputs);
         for (sum, values) in table.smooth.iter_mut().zip(smooth) {
@@ -118,7 +141,8 @@ struct Restricted {
 
 impl<'a> Evidence<'a> {
     pub fn new(training: &'a Training, cancel: &'a Cancel) -> Self {
-        Self { training, by_column: ByColumn::new(training), distances: Distances::new(training), cancel }
+        let (distances, loads) = (Distances::new(training), Loads::new(training));
+        Self { training, by_column: ByColumn::new(training), distances, loads, cancel }
     }
 
     /// Evidence and prior with their gradient at a point.
@@ -139,11 +163,11 @@ impl<'a> Evidence<'a> {
         Ok(Score { value, gradient })
     }
 
-    fn kernels(&self, hyper: &Hyper) -> Continuous {
+    fn kernels(&self, hyper: &Hyper) -> Continuous<'_> {
         let inputs = self.training.inputs.len();
         let poses =
             self.distances.0.par_iter().map(|distances| PoseKernels::new(distances, inputs, hyper)).collect();
-        Continuous { inputs, poses }
+        Continuous { inputs, poses, loads: &self.loads }
     }
 
     fn restricted(&self, matrix: &[f64]) -> Result<Restricted, FieldError> {
@@ -309,16 +333,20 @@ impl PoseGradient<'_> {
         gradient
     }
 
-    /// `own` and `smooth`.
+    /// `own`, `sag` and `smooth`.
     fn contract_single(&self, shares: &Shares, gradient: &mut [f64]) {
         let hyper = self.hyper;
         let inputs = self.evidence.training.inputs.len();
+        let loads = &self.evidence.loads.0[self.pose];
         for i in 0..shares.constant.len() {
             let range = i * inputs..(i + 1) * inputs;
             for (own, share) in self.kernels.own[range.clone()].iter().zip(&shares.own) {
                 let share = hyper.own.powi(2) * share[i];
                 gradient[AT_OWN] += share * own.kernel;
                 gradient[AT_OWN_LENGTH] += 0.5 * share * own.by_log_length;
+            }
+            for (load, share) in loads[range.clone()].iter().zip(&shares.own) {
+                gradient[AT_SAG] += hyper.sag.powi(2) * share[i] * load;
             }
             let smooth = &self.kernels.smooth[range];
             let kernel: f64 = smooth.iter().map(|value| value.kernel).sum();

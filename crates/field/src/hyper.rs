@@ -33,6 +33,8 @@ pub struct Hyper {
     pub smooth_length: f64,
     /// What every joint misses anew at every pose, rad (prismatic: times [`OWN_LEVER`] m).
     pub repeatability: f64,
+    /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`OWN_LEVER`] m).
+    pub sag: f64,
     /// Blocks over several joints together.
     pub products: Vec<Product>,
     /// Noise of positions (m) and of orientations (rad).
@@ -41,6 +43,8 @@ pub struct Hyper {
     pub own_widening: f64,
     /// The same of the `smooth` amplitudes.
     pub smooth_widening: [f64; 3],
+    /// The same of the `sag` amplitude.
+    pub sag_widening: f64,
     /// Factor on the standard deviation of the arm's part, at least one; found by leaving out whole parts of the space, not
     /// by the evidence.
     pub extrapolation: f64,
@@ -75,6 +79,7 @@ const OWN_LENGTH: Range = range(0.1, 0.02, 3.0, 0.7);
 const SMOOTH: [Range; 3] = [amplitude(0.05), amplitude(0.05), amplitude(0.025)];
 const SMOOTH_LENGTH: Range = range(1.5, 0.5, 10.0, 0.7);
 const REPEATABILITY: Range = range(0.03 * MILLI, 0.002 * MILLI, MILLI, 1.0);
+const SAG: Range = range(MILLI, 0.003 * MILLI, 100.0 * MILLI, 2.0);
 const MAJOR: [Range; 3] = [amplitude(0.1), amplitude(0.1), amplitude(0.05)];
 const WRIST: [Range; 3] = [amplitude(0.05), amplitude(0.05), amplitude(0.025)];
 const PRODUCT_LENGTH: Range = range(2.0, 0.6, 20.0, 0.7);
@@ -88,7 +93,8 @@ pub const AT_OWN_LENGTH: usize = 2;
 pub const AT_SMOOTH: usize = 3;
 pub const AT_SMOOTH_LENGTH: usize = 6;
 pub const AT_REPEATABILITY: usize = 7;
-pub const AT_PRODUCTS: usize = 8;
+pub const AT_SAG: usize = 8;
+pub const AT_PRODUCTS: usize = 9;
 
 /// Name of the block whose joints the evidence chooses.
 pub const MAJOR_NAME: &str = "major";
@@ -134,10 +140,12 @@ impl Hyper {
             smooth: SMOOTH.map(|r| r.start),
             smooth_length: SMOOTH_LENGTH.start,
             repeatability: REPEATABILITY.start,
+            sag: SAG.start,
             products,
             noise,
             own_widening: 1.0,
             smooth_widening: [1.0; 3],
+            sag_widening: 1.0,
             extrapolation: 1.0,
         }
     }
@@ -170,7 +178,7 @@ impl Hyper {
     pub fn to_logs(&self) -> Vec<f64> {
         let mut values = vec![self.constant, self.own, self.own_length];
         values.extend(self.smooth);
-        values.extend([self.smooth_length, self.repeatability]);
+        values.extend([self.smooth_length, self.repeatability, self.sag]);
         for product in &self.products {
             values.extend(product.amplitudes);
             values.extend(&product.lengths);
@@ -198,15 +206,16 @@ impl Hyper {
             smooth: three(AT_SMOOTH),
             smooth_length: at(AT_SMOOTH_LENGTH),
             repeatability: at(AT_REPEATABILITY),
+            sag: at(AT_SAG),
             products,
             noise: [at(first), at(first + 1)],
             ..self.clone()
         }
     }
 
-    /// Positions of the amplitudes among the logarithms: `own`, `smooth`, then each product's.
+    /// Positions of the amplitudes among the logarithms: `own`, `smooth`, `sag`, then each product's.
     pub fn amplitude_positions(&self) -> Vec<usize> {
-        let mut positions = vec![AT_OWN, AT_SMOOTH, AT_SMOOTH + 1, AT_SMOOTH + 2];
+        let mut positions = vec![AT_OWN, AT_SMOOTH, AT_SMOOTH + 1, AT_SMOOTH + 2, AT_SAG];
         let mut first = AT_PRODUCTS;
         for product in &self.products {
             positions.extend(first..first + 3);
@@ -218,9 +227,14 @@ impl Hyper {
     /// The same hyper-parameters with other widenings, in the order of [`Hyper::amplitude_positions`].
     pub fn with_widenings(&self, widenings: &[f64]) -> Self {
         let three = |first: usize| std::array::from_fn(|k| widenings[first + k]);
-        let mut other = Self { own_widening: widenings[0], smooth_widening: three(1), ..self.clone() };
+        let mut other = Self {
+            own_widening: widenings[0],
+            smooth_widening: three(1),
+            sag_widening: widenings[4],
+            ..self.clone()
+        };
         for (k, product) in other.products.iter_mut().enumerate() {
-            product.widening = three(4 + 3 * k);
+            product.widening = three(5 + 3 * k);
         }
         other
     }
@@ -230,6 +244,7 @@ impl Hyper {
         let times = |a: &[f64; 3], b: &[f64; 3]| std::array::from_fn(|k| a[k] * b[k]);
         let mut wide = self.clone();
         wide.own *= self.own_widening;
+        wide.sag *= self.sag_widening;
         wide.smooth = times(&self.smooth, &self.smooth_widening);
         for product in &mut wide.products {
             product.amplitudes = times(&product.amplitudes, &product.widening);
@@ -241,7 +256,7 @@ impl Hyper {
     pub fn ranges(&self) -> Vec<Range> {
         let mut ranges = vec![CONSTANT, OWN, OWN_LENGTH];
         ranges.extend(SMOOTH);
-        ranges.extend([SMOOTH_LENGTH, REPEATABILITY]);
+        ranges.extend([SMOOTH_LENGTH, REPEATABILITY, SAG]);
         for product in &self.products {
             ranges.extend(Product::amplitude_ranges(&product.name));
             ranges.extend(vec![PRODUCT_LENGTH; product.lengths.len()]);

@@ -6,7 +6,8 @@
 //! (a kernel on its cells), so that fit, evidence and standard deviation are those of exact Gaussian inference.
 //!
 //! Blocks: `constant` (the constants, kernel one), `own` (theta of a revolute joint, d of a prismatic one, over that
-//! joint), `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
+//! joint), `sag` (the same parameter in proportion to the levers of the links behind the joint),
+//! `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
 //! together: those that the evidence chooses, and the last three).
 
 #[cfg(test)]
@@ -39,6 +40,7 @@ mod predict;
 mod product;
 mod refine;
 pub mod regions;
+mod sag;
 mod select;
 #[cfg(test)]
 mod tests;
@@ -60,4 +62,5 @@ pub use kernel::{Input, InputKind};
 pub use outliers::Judgement;
 pub use posterior::Posterior;
 pub use predict::measurement_covariance;
+pub use sag::{Levers, SAG_NAME, Sag, SagScratch};
 pub use training::{Class, Column, Training};

@@ -6,6 +6,7 @@ use truearm_kinematics::Joint;
 use crate::FieldError;
 use crate::fit::FieldOptions;
 use crate::kernel::Input;
+use crate::sag::Levers;
 use crate::training::{Column, Training};
 
 /// Rows of a problem linearised at a point, the constants' prior centred on the nominal arm.
@@ -18,11 +19,15 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
     let inputs: Vec<Input> =
         joint_inputs(problem).into_iter().chain(options.features.iter().copied()).collect();
     let own = layout.len() - layout.arm;
+    let geometry = Levers::new(problem.chain);
+    let joints = set.joints.chunks_exact(set.joint_count);
     let mut training = Training {
         columns,
         parameter_count: problem.chain.parameter_count(),
         inputs,
         values: input_values(problem, options),
+        levers: joints.flat_map(|joints| geometry.at(joints)).collect(),
+        geometry,
         offsets: vec![0],
         jacobian: Vec::new(),
         setup: Vec::new(),

@@ -4,6 +4,7 @@ use crate::cells::{Active, Axis, CellKernel, Grid};
 use crate::hyper::{Hyper, Product};
 use crate::kernel::{matern, squared_exponential};
 use crate::pairs::{ByColumn, PairKernels, PairTable};
+use crate::sag::{Levers, Sag, alike};
 use crate::training::Training;
 
 /// Cells per length scale: `own` curves have a rougher kernel and cost little.
@@ -19,6 +20,8 @@ pub struct Cells {
     pub smooth: Vec<CellKernel>,
     /// Inputs and cells of each product.
     pub products: Vec<Vec<(usize, CellKernel)>>,
+    /// What the joints carry.
+    pub geometry: Levers,
 }
 
 impl Cells {
@@ -43,6 +46,7 @@ impl Cells {
             own: (0..training.inputs.len()).map(own).collect(),
             smooth: (0..training.inputs.len()).map(|k| smooth(k, hyper.smooth_length)).collect(),
             products: hyper.products.iter().map(product).collect(),
+            geometry: training.geometry.clone(),
         }
     }
 
@@ -61,6 +65,7 @@ impl Cells {
                 .iter()
                 .map(|axes| axes.iter().map(|(k, cells)| cells.axis.active(values[*k])).collect())
                 .collect(),
+            levers: self.geometry.at(values),
         }
     }
 
@@ -77,6 +82,7 @@ impl Cells {
         };
         Correlations {
             own: own.collect(),
+            sag: self.loads(&a.levers, &b.levers),
             smooth: smooth.map(|(cells, (a, b))| cells.implied(a, b)).sum(),
             products: self.products.iter().enumerate().map(product).collect(),
         }
@@ -84,13 +90,22 @@ impl Cells {
 }
 
 impl Cells {
+    /// How alike the loads of the joints are under two sets of levers, (I,).
+    fn loads(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
+        let mut loads = vec![0.0; self.own.len()];
+        alike(self.geometry.joint_count(), a, b, &mut loads);
+        loads
+    }
+
     /// Prior variances of the blocks at one configuration, cells beyond the axes included.
     fn unbounded(&self, values: &[f64]) -> Correlations {
         let of = |k: usize, cells: &CellKernel| cells.variance(values[k]);
         let own = |(k, cells): (usize, &Option<CellKernel>)| cells.as_ref().map_or(0.0, |cells| of(k, cells));
         let product = |axes: &Vec<(usize, CellKernel)>| axes.iter().map(|(k, cells)| of(*k, cells)).product();
+        let levers = self.geometry.at(values);
         Correlations {
             own: self.own.iter().enumerate().map(own).collect(),
+            sag: self.loads(&levers, &levers),
             smooth: self.smooth.iter().enumerate().map(|(k, cells)| of(k, cells)).sum(),
             products: self.products.iter().map(product).collect(),
         }
@@ -100,6 +115,7 @@ impl Cells {
 /// Prior correlations of two configurations, by block.
 struct Correlations {
     own: Vec<f64>,
+    sag: Vec<f64>,
     smooth: f64,
     products: Vec<f64>,
 }
@@ -110,6 +126,7 @@ pub struct Excited {
     own: Vec<Option<Active>>,
     smooth: Vec<Active>,
     products: Vec<Vec<Active>>,
+    levers: Vec<f64>,
 }
 
 /// Kernels between the training poses that the cells imply.
@@ -124,6 +141,7 @@ impl PairKernels for Implied<'_> {
         for (i, other) in self.excited[j..].iter().enumerate() {
             let kernels = self.cells.kernels(&self.excited[j], other);
             table.own.iter_mut().zip(kernels.own).for_each(|(column, value)| column[i] = value);
+            table.sag.iter_mut().zip(kernels.sag).for_each(|(column, value)| column[i] = value);
             table.smooth[i] = kernels.smooth;
             table.products.iter_mut().zip(kernels.products).for_each(|(column, value)| column[i] = value);
         }
@@ -200,6 +218,21 @@ impl Model {
         driven
     }
 
+    /// Column and prior standard deviation of every lever's weight, (L,); `None` where nothing is driven.
+    pub fn sag_terms(&self) -> Vec<Option<(usize, f64)>> {
+        let of = |joint: usize| self.by_column.own[joint].map(|(p, lever)| (p, self.hyper.sag * lever));
+        self.training.geometry.joints().map(of).collect()
+    }
+
+    /// The `sag` block with given weights, zero where nothing is driven.
+    pub fn sag(&self, weights: Vec<f64>) -> Option<Sag> {
+        let parameter = |term: &Option<(usize, f64)>| term.map(|(p, _)| self.training.columns[p].parameter);
+        let terms = self.sag_terms();
+        let any = terms.iter().find_map(parameter)?;
+        let outputs = terms.iter().map(|term| parameter(term).unwrap_or(any)).collect();
+        Some(Sag { levers: self.training.geometry.clone(), outputs, weights })
+    }
+
     /// Prior covariance of each column's CEP at two configurations, (P,).
     pub fn variances(&self, a: &Excited, b: &Excited) -> Vec<f64> {
         self.combined(&self.cells.kernels(a, b))
@@ -234,6 +267,7 @@ impl Model {
         for (k, entry) in self.by_column.own.iter().enumerate() {
             if let Some((p, lever)) = entry {
                 variances[*p] += (self.hyper.own * lever).powi(2) * kernels.own[k];
+                variances[*p] += (self.hyper.sag * lever).powi(2) * kernels.sag[k];
             }
         }
         variances

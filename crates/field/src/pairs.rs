@@ -1,7 +1,7 @@
 //! Covariance of measured rows, column by column, from kernels between poses.
 //!
 //! For rows r of pose i and c of pose j,
-//! `K[r, c] = sum_p J[r, p] J[c, p] (constant_p^2 + own^2 k_own + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
+//! `K[r, c] = sum_p J[r, p] J[c, p] (constant_p^2 + own^2 k_own + sag^2 k_sag + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
 //! and within one pose what its joints do not repeat.
 //! The sums over the parameters of a class are formed first, for all rows at once, so that the inner loops run over
 //! contiguous rows; nothing of the size of the matrix is kept but the matrix.
@@ -18,6 +18,8 @@ use crate::training::{Class, Training};
 pub struct PairTable {
     pub own: Vec<Vec<f64>>,
     pub smooth: Vec<f64>,
+    /// Of each input that is a joint, how alike its loads are.
+    pub sag: Vec<Vec<f64>>,
     /// One for each product.
     pub products: Vec<Vec<f64>>,
 }
@@ -25,8 +27,9 @@ pub struct PairTable {
 impl PairTable {
     pub fn clear(&mut self, joints: usize, products: usize, count: usize) {
         self.own.resize(joints, Vec::new());
+        self.sag.resize(joints, Vec::new());
         self.products.resize(products, Vec::new());
-        let columns = self.own.iter_mut().chain(&mut self.products);
+        let columns = self.own.iter_mut().chain(&mut self.sag).chain(&mut self.products);
         for column in columns.chain([&mut self.smooth]) {
             column.clear();
             column.resize(count, 0.0);
@@ -162,13 +165,16 @@ impl RowFactors {
             }
         }
         self.own.resize(by_column.own.len(), Vec::new());
-        for ((factors, kernels), own) in self.own.iter_mut().zip(&table.own).zip(&by_column.own) {
+        let tables = table.own.iter().zip(&table.sag);
+        for ((factors, (kernels, loads)), own) in self.own.iter_mut().zip(tables).zip(&by_column.own) {
             let lever = own.map_or(0.0, |(_, lever)| lever);
+            let sag = (hyper.sag * lever).powi(2);
             let (variance, anew) = ((hyper.own * lever).powi(2), (hyper.repeatability * lever).powi(2));
             factors.clear();
-            factors.extend(
-                poses.iter().map(|i| variance * kernels[i - pose] + if *i == pose { anew } else { 0.0 }),
-            );
+            factors.extend(poses.iter().map(|i| {
+                let varying = variance * kernels[i - pose] + sag * loads[i - pose];
+                varying + if *i == pose { anew } else { 0.0 }
+            }));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::FieldError;
 use crate::kernel::Input;
+use crate::sag::Levers;
 
 /// What a driven parameter is; each class has amplitudes of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,6 +59,10 @@ pub struct Training {
     pub inputs: Vec<Input>,
     /// Values of the inputs, (n, I).
     pub values: Vec<f64>,
+    /// The arm's levers, L.
+    pub geometry: Levers,
+    /// The levers of each pose, (n, L).
+    pub levers: Vec<f64>,
     /// First row of each pose, (n + 1,).
     pub offsets: Vec<usize>,
     /// (R, P).
@@ -99,6 +104,11 @@ impl Training {
         &self.values[pose * self.inputs.len()..(pose + 1) * self.inputs.len()]
     }
 
+    /// Levers of a pose, (L,).
+    pub fn levers_of(&self, pose: usize) -> &[f64] {
+        &self.levers[pose * self.geometry.len()..(pose + 1) * self.geometry.len()]
+    }
+
     /// Row of the Jacobian, (P,).
     pub fn jacobian_row(&self, row: usize) -> &[f64] {
         &self.jacobian[row * self.columns.len()..(row + 1) * self.columns.len()]
@@ -121,6 +131,7 @@ impl Training {
         }
         thinned.offsets = offsets;
         thinned.values.clone_from(&self.values);
+        thinned.levers.clone_from(&self.levers);
         thinned
     }
 
@@ -139,6 +150,8 @@ impl Training {
             parameter_count: self.parameter_count,
             inputs: self.inputs.clone(),
             values: poses.iter().flat_map(|&pose| self.values_of(pose)).copied().collect(),
+            geometry: self.geometry.clone(),
+            levers: poses.iter().flat_map(|&pose| self.levers_of(pose)).copied().collect(),
             offsets,
             jacobian: take(&self.jacobian, self.columns.len()),
             setup: take(&self.setup, self.setup_width),

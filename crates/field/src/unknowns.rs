@@ -1,4 +1,4 @@
-//! The unknowns of weight space: constants, set-up, then block by block the eigenvectors of the cells' priors that matter.
+//! The unknowns of weight space: constants, set-up, `sag`, then block by block the eigenvectors of the cells' priors that matter.
 
 use faer::{Mat, Side};
 
@@ -49,7 +49,7 @@ pub struct Unknowns {
 
 /// Unknowns that a model has in weight space, constants and set-up included; `None` where the cells' priors fail.
 pub fn unknowns(model: &Model) -> Option<(Vec<Unknowns>, usize)> {
-    let mut start = model.by_column.constant.len() + model.training.setup_width;
+    let mut start = sag_start(model) + model.training.geometry.len();
     let mut all = Vec::new();
     for plan in model.plans() {
         let roots: Vec<Root> = plan.axes.iter().map(|(_, cells)| Root::new(cells)).collect::<Option<_>>()?;
@@ -59,6 +59,11 @@ pub fn unknowns(model: &Model) -> Option<(Vec<Unknowns>, usize)> {
         start += count;
     }
     Some((all, start))
+}
+
+/// Where the weights of the `sag` block stand, one a lever.
+pub fn sag_start(model: &Model) -> usize {
+    model.by_column.constant.len() + model.training.setup_width
 }
 
 fn combinations(roots: &[Root]) -> Vec<[usize; 3]> {

@@ -16,7 +16,7 @@ use crate::bank::{Bank, Block};
 use crate::model::{BlockPlan, Model};
 use crate::posterior::{LeaveOneOut, Query, Solution};
 use crate::product::{product, times};
-use crate::unknowns::{Unknowns, unknowns};
+use crate::unknowns::{Unknowns, sag_start, unknowns};
 
 /// Poses whose rows are formed together.
 const BATCH: usize = 512;
@@ -39,6 +39,7 @@ pub struct WeightSpace {
 struct Rows<'a> {
     space: &'a WeightSpaceParts<'a>,
     plans: &'a [BlockPlan<'a>],
+    sag: &'a [Option<(usize, f64)>],
 }
 
 /// What rows are formed from.
@@ -59,6 +60,14 @@ impl Rows<'_> {
             if let Some(setup) = setup {
                 let width = model.training.setup_width;
                 (0..width).for_each(|k| out[(row, constants + k)] = setup[row * width + k]);
+            }
+        }
+        let levers = model.training.geometry.at(values);
+        let start = sag_start(model);
+        for (k, (term, lever)) in self.sag.iter().zip(&levers).enumerate() {
+            let Some((p, deviation)) = term else { continue };
+            for (row, entries) in jacobian.chunks_exact(columns).enumerate() {
+                out[(row, start + k)] = entries[*p] * deviation * lever;
             }
         }
         for (plan, unknowns) in self.plans.iter().zip(self.space.unknowns) {
@@ -152,6 +161,9 @@ impl WeightSpace {
         let plans = self.model.plans();
         bank.blocks =
             plans.iter().zip(&self.unknowns).map(|(plan, u)| self.block(plan, u, &solution)).collect();
+        let sag = &solution[sag_start(&self.model)..];
+        let weight = |(term, value): (Option<(usize, f64)>, &f64)| term.map_or(0.0, |(_, d)| d * value);
+        bank.sag = self.model.sag(self.model.sag_terms().into_iter().zip(sag).map(weight).collect());
         Ok(Solution { constant, bank, setup })
     }
 
@@ -284,7 +296,8 @@ impl WeightSpace {
     fn reduced(&self, query: &Query, poses: std::ops::Range<usize>) -> Mat<f64> {
         let plans = self.model.plans();
         let parts = self.parts();
-        let rows = Rows { space: &parts, plans: &plans };
+        let sag = self.model.sag_terms();
+        let rows = Rows { space: &parts, plans: &plans, sag: &sag };
         let width = self.model.training.setup_width;
         let mut filled = Mat::zeros(poses.len() * query.rows, self.width);
         for (index, pose) in poses.enumerate() {
@@ -308,7 +321,8 @@ impl WeightSpaceParts<'_> {
     fn whitened(&self, poses: &[usize], width: usize) -> Result<Mat<f64>, FieldError> {
         let training = &self.model.training;
         let plans = self.model.plans();
-        let rows = Rows { space: self, plans: &plans };
+        let sag = self.model.sag_terms();
+        let rows = Rows { space: self, plans: &plans, sag: &sag };
         let count = poses.iter().map(|&pose| training.rows(pose).len()).sum();
         let mut out = Mat::zeros(count, width);
         let mut at = 0;

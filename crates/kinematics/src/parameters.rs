@@ -1,7 +1,9 @@
 //! Where the parameters of a batch come from.
 
+use crate::chain::Joint;
 use crate::isa::Isa;
 use crate::lane::Lane;
+use crate::one_pose::OnePose;
 use crate::trig::sin_cos;
 
 /// Absolute parameters of a batch, by link theta, d, a, alpha, beta.
@@ -22,18 +24,31 @@ pub enum LaneParameters<'a> {
     Shared(&'a SharedParameters),
     /// A set for each pose of the group, 5 L lanes.
     Each(&'a [Lane]),
+    /// One pose in all lanes, its joint values included.
+    One(&'a OnePose),
 }
 
 /// One set of parameters with the sines and cosines that all poses share.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SharedParameters {
-    links: Vec<LinkValues<f64>>,
+    pub(crate) links: Vec<SharedLink>,
+}
+
+/// Numbers of one link; alpha and beta as sine and cosine, `bent` unless beta is zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SharedLink {
+    pub theta: f64,
+    pub d: f64,
+    pub a: f64,
+    pub alpha: (f64, f64),
+    pub beta: (f64, f64),
+    pub bent: bool,
 }
 
 impl SharedParameters {
     /// Prepare 5 L absolute parameters.
     pub fn new(parameters: &[f64]) -> SharedParameters {
-        let links = parameters.chunks_exact(5).map(|p| LinkValues {
+        let links = parameters.chunks_exact(5).map(|p| SharedLink {
             theta: p[0],
             d: p[1],
             a: p[2],
@@ -50,10 +65,10 @@ impl SharedParameters {
     }
 }
 
-/// Numbers of one link; alpha and beta as sine and cosine, `bent` unless beta is zero.
+/// Numbers of one link with its joint where it is; angles as sine and cosine, `bent` unless beta is zero.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LinkValues<T> {
-    pub theta: T,
+    pub theta: (T, T),
     pub d: T,
     pub a: T,
     pub alpha: (T, T),
@@ -61,21 +76,43 @@ pub(crate) struct LinkValues<T> {
     pub bent: bool,
 }
 
+impl LinkValues<f64> {
+    /// The same for all poses.
+    #[inline(always)]
+    pub fn splat(&self) -> LinkValues<Lane> {
+        LinkValues {
+            theta: splat(self.theta),
+            d: Lane::splat(self.d),
+            a: Lane::splat(self.a),
+            alpha: splat(self.alpha),
+            beta: splat(self.beta),
+            bent: self.bent,
+        }
+    }
+}
+
+#[inline(always)]
+fn splat((sine, cosine): (f64, f64)) -> (Lane, Lane) {
+    (Lane::splat(sine), Lane::splat(cosine))
+}
+
 /// The values of a link for a group of poses.
 pub(crate) trait LinkSource {
-    fn link<I: Isa>(&self, index: usize) -> LinkValues<Lane>;
+    /// Of the link's joint, `value` is where it is; of no meaning where it is fixed.
+    fn link<I: Isa>(&self, index: usize, joint: Joint, value: Lane) -> LinkValues<Lane>;
 }
 
 impl LinkSource for &SharedParameters {
     #[inline(always)]
-    fn link<I: Isa>(&self, index: usize) -> LinkValues<Lane> {
+    fn link<I: Isa>(&self, index: usize, joint: Joint, value: Lane) -> LinkValues<Lane> {
         let link = &self.links[index];
+        let (theta, d) = moved(joint, Lane::splat(link.theta), Lane::splat(link.d), value);
         LinkValues {
-            theta: Lane::splat(link.theta),
-            d: Lane::splat(link.d),
+            theta: sin_cos::<I>(theta),
+            d,
             a: Lane::splat(link.a),
-            alpha: (Lane::splat(link.alpha.0), Lane::splat(link.alpha.1)),
-            beta: (Lane::splat(link.beta.0), Lane::splat(link.beta.1)),
+            alpha: splat(link.alpha),
+            beta: splat(link.beta),
             bent: link.bent,
         }
     }
@@ -83,15 +120,26 @@ impl LinkSource for &SharedParameters {
 
 impl LinkSource for &[Lane] {
     #[inline(always)]
-    fn link<I: Isa>(&self, index: usize) -> LinkValues<Lane> {
+    fn link<I: Isa>(&self, index: usize, joint: Joint, value: Lane) -> LinkValues<Lane> {
         let p = &self[5 * index..5 * index + 5];
+        let (theta, d) = moved(joint, p[0], p[1], value);
         LinkValues {
-            theta: p[0],
-            d: p[1],
+            theta: sin_cos::<I>(theta),
+            d,
             a: p[2],
             alpha: sin_cos::<I>(p[3]),
             beta: sin_cos::<I>(p[4]),
             bent: true,
         }
+    }
+}
+
+/// theta and d with a joint's value added to the one that moves.
+#[inline(always)]
+fn moved(joint: Joint, theta: Lane, d: Lane, value: Lane) -> (Lane, Lane) {
+    match joint {
+        Joint::Revolute => (theta + value, d),
+        Joint::Prismatic => (theta, d + value),
+        Joint::Fixed => (theta, d),
     }
 }

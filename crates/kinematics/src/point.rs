@@ -4,7 +4,6 @@ use crate::chain::{Chain, Convention, Joint};
 use crate::isa::Isa;
 use crate::lane::Lane;
 use crate::parameters::{LaneParameters, LinkSource, LinkValues};
-use crate::trig::sin_cos;
 
 impl Chain {
     /// Origin of the end in the base frame, for a group of eight poses; arguments as for [`Chain::sweep`].
@@ -13,6 +12,7 @@ impl Chain {
         match parameters {
             LaneParameters::Shared(shared) => self.carry::<I, _>(joints, shared),
             LaneParameters::Each(lanes) => self.carry::<I, _>(joints, lanes),
+            LaneParameters::One(pose) => self.carry::<I, _>(joints, pose),
         }
     }
 
@@ -22,15 +22,8 @@ impl Chain {
         let mut point = [Lane::splat(x), Lane::splat(y), Lane::splat(z)];
         let mut values = joints.iter().rev();
         for (index, link) in self.links().iter().enumerate().rev() {
-            let mut numbers = source.link::<I>(index);
-            if link.joint != Joint::Fixed
-                && let Some(value) = values.next()
-            {
-                match link.joint {
-                    Joint::Prismatic => numbers.d += *value,
-                    _ => numbers.theta += *value,
-                }
-            }
+            let value = if link.joint == Joint::Fixed { None } else { values.next() };
+            let numbers = source.link::<I>(index, link.joint, value.copied().unwrap_or(Lane::ZERO));
             match self.convention() {
                 Convention::Standard => standard::<I>(&mut point, &numbers),
                 Convention::Modified => modified::<I>(&mut point, &numbers),
@@ -55,13 +48,13 @@ fn standard<I: Isa>(point: &mut [Lane; 3], link: &LinkValues<Lane>) {
     turn::<I>(point, 1, 2, link.alpha);
     point[0] += link.a;
     point[2] += link.d;
-    turn::<I>(point, 0, 1, sin_cos::<I>(link.theta));
+    turn::<I>(point, 0, 1, link.theta);
 }
 
 #[inline(always)]
 fn modified<I: Isa>(point: &mut [Lane; 3], link: &LinkValues<Lane>) {
     point[2] += link.d;
-    turn::<I>(point, 0, 1, sin_cos::<I>(link.theta));
+    turn::<I>(point, 0, 1, link.theta);
     if link.bent {
         turn::<I>(point, 2, 0, link.beta);
     }

@@ -5,7 +5,6 @@ use crate::frame::LaneFrame;
 use crate::isa::Isa;
 use crate::lane::Lane;
 use crate::parameters::{LaneParameters, LinkSource, LinkValues};
-use crate::trig::sin_cos;
 
 /// Motion of the end for a unit change of one parameter, in the base frame.
 ///
@@ -64,7 +63,7 @@ impl Chain {
 
     /// The end's frame; shows `axes` every frame on the way.
     #[inline(always)]
-    fn walk<I: Isa, A: Axes>(
+    pub(crate) fn walk<I: Isa, A: Axes>(
         &self,
         joints: &[Lane],
         parameters: LaneParameters<'_>,
@@ -74,6 +73,7 @@ impl Chain {
         match parameters {
             LaneParameters::Shared(shared) => self.walk_links::<I, _, _>(joints, shared, &mut frame, axes),
             LaneParameters::Each(lanes) => self.walk_links::<I, _, _>(joints, lanes, &mut frame, axes),
+            LaneParameters::One(pose) => self.walk_links::<I, _, _>(joints, pose, &mut frame, axes),
         }
         let [x, y, z] = self.end().translation;
         frame.shift::<I>(0, Lane::splat(x));
@@ -95,13 +95,9 @@ impl Chain {
     ) {
         let mut joint = 0;
         for (index, link) in self.links().iter().enumerate() {
-            let mut values = source.link::<I>(index);
-            match link.joint {
-                Joint::Revolute => values.theta += joints[joint],
-                Joint::Prismatic => values.d += joints[joint],
-                Joint::Fixed => {}
-            }
+            let value = if link.joint == Joint::Fixed { Lane::ZERO } else { joints[joint] };
             joint += usize::from(link.joint != Joint::Fixed);
+            let values = source.link::<I>(index, link.joint, value);
             axes.enter(index);
             match self.convention() {
                 Convention::Standard => standard::<I, A>(frame, &values, axes),
@@ -112,7 +108,7 @@ impl Chain {
 }
 
 /// Sees the frames on the way along the chain in which the parameters of the links move what comes after.
-trait Axes {
+pub(crate) trait Axes {
     /// Here begins a link.
     fn enter(&mut self, link: usize);
 
@@ -182,7 +178,7 @@ impl Axes for Wanted<'_> {
 fn standard<I: Isa, A: Axes>(frame: &mut LaneFrame, link: &LinkValues<Lane>, axes: &mut A) {
     axes.turns(0, frame, 2);
     axes.shifts(1, frame, 2);
-    frame.turn::<I>(0, 1, sin_cos::<I>(link.theta));
+    frame.turn::<I>(0, 1, link.theta);
     frame.shift::<I>(2, link.d);
     axes.shifts(2, frame, 0);
     frame.shift::<I>(0, link.a);
@@ -207,7 +203,7 @@ fn modified<I: Isa, A: Axes>(frame: &mut LaneFrame, link: &LinkValues<Lane>, axe
     }
     axes.turns(0, frame, 2);
     axes.shifts(1, frame, 2);
-    frame.turn::<I>(0, 1, sin_cos::<I>(link.theta));
+    frame.turn::<I>(0, 1, link.theta);
     frame.shift::<I>(2, link.d);
 }
 

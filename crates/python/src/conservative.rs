@@ -58,7 +58,7 @@ impl Conservative {
         let any = [f64::NEG_INFINITY, f64::INFINITY];
         let ranges: Vec<[f64; 2]> = stored.ranges.into_iter().map(|range| range.unwrap_or(any)).collect();
         let parts = ConservativeParts {
-            tables: Bank { input_count: ranges.len(), parameter_count: BOUNDED, blocks },
+            tables: Bank { input_count: ranges.len(), parameter_count: BOUNDED, blocks, sag: None },
             level: stored.level,
             largest: stored.largest,
             ranges,

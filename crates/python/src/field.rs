@@ -14,11 +14,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
-    Axis, Bank, Block, Compiled, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind,
-    MAJOR_NAME, Posterior as CorePosterior, Product, WRIST_NAME, fit_field as fit, measurement_covariance,
-    restore,
+    Axis, Bank, Block, Compiled, FieldFit as CoreFit, FieldOptions, Grid, Hyper, Input, InputKind, Levers,
+    MAJOR_NAME, Posterior as CorePosterior, Product, SAG_NAME, Sag, WRIST_NAME, fit_field as fit,
+    measurement_covariance, restore,
 };
 
+use crate::chain::Chain;
 use crate::door::{CoreError, Failure, long, quick, with_threads};
 use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
 use crate::measured::{Setup, matrix, vector};
@@ -95,6 +96,8 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         noise: [one("noise_position")?, one("noise_orientation")?],
         own_widening: one("own_widening")?,
         smooth_widening: three("smooth_widening")?,
+        sag: values.get("sag").map_or(Ok(0.0), |_| one("sag"))?,
+        sag_widening: values.get("sag_widening").map_or(Ok(1.0), |_| one("sag_widening"))?,
         extrapolation: one("extrapolation")?,
     })
 }
@@ -111,6 +114,8 @@ fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         ("noise_orientation".to_owned(), vec![hyper.noise[1]]),
         ("own_widening".to_owned(), vec![hyper.own_widening]),
         ("smooth_widening".to_owned(), hyper.smooth_widening.to_vec()),
+        ("sag".to_owned(), vec![hyper.sag]),
+        ("sag_widening".to_owned(), vec![hyper.sag_widening]),
         ("extrapolation".to_owned(), vec![hyper.extrapolation]),
     ]);
     for product in &hyper.products {
@@ -248,9 +253,17 @@ impl Field {
 #[pymethods]
 impl Field {
     #[new]
-    fn new(input_count: usize, parameter_count: usize, blocks: Vec<Bound<'_, PyDict>>) -> PyResult<Self> {
-        let blocks = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
-        let core = Bank { input_count, parameter_count, blocks };
+    fn new(
+        input_count: usize,
+        parameter_count: usize,
+        blocks: Vec<Bound<'_, PyDict>>,
+        nominal: &Chain,
+    ) -> PyResult<Self> {
+        let mut blocks: Vec<Block> = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
+        let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
+        let levers = || Levers::new(nominal.core());
+        let sag = sag.map(|block| Sag { levers: levers(), outputs: block.outputs, weights: block.weights });
+        let core = Bank { input_count, parameter_count, blocks, sag };
         core.check().map_err(|error| CoreError::new_err(error.to_string()))?;
         Ok(Self::wrap(core))
     }
@@ -272,7 +285,8 @@ impl Field {
 
     /// The blocks as dictionaries.
     fn blocks<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        self.core.blocks.iter().map(|block| block_into(py, block)).collect()
+        let sag = self.core.sag.as_ref().map(sag_block);
+        self.core.blocks.iter().chain(&sag).map(|block| block_into(py, block)).collect()
     }
 
     /// Absolute parameters (n, L, 5): `constants` (L, 5) plus the CEPs of the inputs (n, I).
@@ -343,6 +357,16 @@ pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<
     stored.set_item("outputs", &block.outputs)?;
     stored.set_item("weights", matrix(py, &block.weights, block.outputs.len()))?;
     Ok(stored)
+}
+
+/// The sag as a block over all joints without cells.
+fn sag_block(sag: &Sag) -> Block {
+    Block {
+        name: SAG_NAME.to_owned(),
+        grid: Grid { inputs: (0..sag.levers.joint_count()).collect(), axes: Vec::new() },
+        outputs: sag.outputs.clone(),
+        weights: sag.weights.clone(),
+    }
 }
 
 pub(crate) fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {

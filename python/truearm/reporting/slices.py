@@ -28,7 +28,7 @@ def slices(facts: Facts) -> list[Figure]:
     joints = len(facts.joints)
     if field is None or not blocks or len(blocks[0]["inputs"]) < 2 or max(blocks[0]["inputs"]) >= joints:
         return []
-    alone = Field(field.input_count, field.parameter_count, blocks)
+    alone = Field(field.input_count, field.parameter_count, blocks, facts.calibration.arm.flange_chain)
     cut = Cut(facts, alone, blocks[0])
     order = np.argsort(-cut.effects.max(axis=0))[:PARAMETERS]
     return [cut.moved(), *(cut.parameter(int(column)) for column in order)]

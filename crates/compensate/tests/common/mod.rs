@@ -118,7 +118,7 @@ pub fn field(chain: &Chain, size: f64) -> Bank {
     let grid = Grid { inputs: vec![1], axes: vec![axis(1.0, -1.0, 1.0)] };
     let weights = stream(grid.cell_count() * width, 3).iter().map(|x| size * x).collect();
     blocks.push(Block { name: "smooth".to_owned(), grid, outputs: (0..width).collect(), weights });
-    Bank { input_count: joints, parameter_count: width, blocks }
+    Bank { blocks, ..Bank::empty(joints, width) }
 }
 
 /// Bounds that refuse nothing but what is not reached.

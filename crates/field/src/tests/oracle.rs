@@ -133,6 +133,7 @@ impl<'a, K: Kernels> Oracle<'a, K> {
             }
             if let Some(k) = column.own {
                 sum += (hyper.own * self.lever(k)).powi(2) * self.kernels.own(k, a[k], b[k]);
+                sum += (hyper.sag * self.lever(k)).powi(2) * self.loads(k, a, b);
             }
             sum
         };
@@ -141,6 +142,13 @@ impl<'a, K: Kernels> Oracle<'a, K> {
             constant: columns.iter().map(|column| (hyper.constant * column.constant).powi(2)).collect(),
             varying: columns.iter().map(of).collect(),
         }
+    }
+
+    /// Sum of the products of a joint's levers.
+    fn loads(&self, joint: usize, a: &[f64], b: &[f64]) -> f64 {
+        let geometry = &self.training.geometry;
+        let pairs = geometry.joints().zip(geometry.at(a).into_iter().zip(geometry.at(b)));
+        pairs.filter(|(owner, _)| *owner == joint).map(|(_, (x, y))| x * y).sum()
     }
 
     fn lever(&self, input: usize) -> f64 {

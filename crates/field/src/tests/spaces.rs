@@ -69,12 +69,13 @@ fn covariance_grows_away_from_the_data_up_to_the_prior() {
 }
 
 #[test]
-fn beyond_the_cells_nothing_is_left_but_the_constants() {
+fn beyond_the_cells_nothing_is_left_but_constants_and_sag() {
     let mut training = few_driven(40);
     training.values.iter_mut().for_each(|value| *value *= 0.2);
     let hyper = short(&training);
     for posterior in both(&training, &hyper) {
-        let solution = posterior.solve(&training.residual).unwrap();
+        let mut solution = posterior.solve(&training.residual).unwrap();
+        assert!(solution.bank.sag.take().is_some());
         let far: Vec<f64> = (0..6).map(|k| training.values[k] + std::f64::consts::PI).collect();
         let mut ceps = vec![0.0; training.parameter_count];
         solution.bank.add(&far, &mut ceps).unwrap();

@@ -36,7 +36,7 @@ fn an_amplitude_that_much_data_tells_is_not_widened() {
 fn wider_amplitudes_make_nothing_surer() {
     let training = positions(20);
     let narrow = hyper(&training, 6);
-    let wide = narrow.with_widenings(&[1.1, 1.5, 2.0, 1.0, 1.2, 1.3, 1.4, 2.0, 2.1, 2.2]);
+    let wide = narrow.with_widenings(&[1.1, 1.5, 2.0, 1.0, 1.6, 1.2, 1.3, 1.4, 2.0, 2.1, 2.2]);
     let posterior = |hyper| {
         let model = Model::new(training.clone(), hyper, 2);
         Posterior::Data(Box::new(DataSpace::new(model, &Cancel::default()).unwrap()))

@@ -1,0 +1,153 @@
+//! The `sag` block: each joint gives way in proportion to what it carries.
+//!
+//! A joint with stiffness s under the weights w_k of the links behind it turns by `sum_k w_k g_jk / s`, where g_jk is the
+//! derivative by joint j of the height at which link k ends: the lever of that weight (Siciliano et al. 2009, eq. 7.41,
+//! gives the torque). Weights and stiffness are not known apart: the block has one number for each pair of joints, rad
+//! for each metre of lever. Levers are those of the nominal arm, and up is the z axis of the base.
+
+use truearm_kinematics::{
+    Chain, Isa, Kernel, LANES, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters, dispatch,
+    lever_count,
+};
+
+/// Name of the block.
+pub const SAG_NAME: &str = "sag";
+
+/// The levers of an arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Levers {
+    chain: Chain,
+    nominal: SharedParameters,
+}
+
+/// Weights of the block.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sag {
+    /// The arm's levers, L.
+    pub levers: Levers,
+    /// Parameter that each lever drives, (L,): 5 * link + (theta, d).
+    pub outputs: Vec<usize>,
+    /// Its weight, (L,): rad/m, m/m where the joint slides.
+    pub weights: Vec<f64>,
+}
+
+/// What levers are worked out in.
+#[derive(Debug, Clone)]
+pub struct SagScratch {
+    joints: Vec<Lane>,
+    levers: Vec<Lane>,
+    frames: LeverScratch,
+    one: OnePose,
+}
+
+impl Levers {
+    /// Of an arm as it was meant to be.
+    pub fn new(chain: &Chain) -> Self {
+        Self { nominal: SharedParameters::new(&chain.nominal()), chain: chain.clone() }
+    }
+
+    /// Number of joints, N.
+    pub fn joint_count(&self) -> usize {
+        self.chain.joint_count()
+    }
+
+    /// Number of levers, L: for each joint those of all links from its own on.
+    pub fn len(&self) -> usize {
+        lever_count(self.joint_count())
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Joint of each lever, (L,).
+    pub fn joints(&self) -> impl Iterator<Item = usize> {
+        let count = self.joint_count();
+        (0..count).flat_map(move |j| std::iter::repeat_n(j, count - j))
+    }
+
+    /// Levers of one configuration, given its N joint values; what follows them is not looked at.
+    pub fn at(&self, values: &[f64]) -> Vec<f64> {
+        let mut scratch = self.scratch();
+        for (lane, value) in scratch.joints.iter_mut().zip(values) {
+            *lane = Lane::splat(*value);
+        }
+        dispatch(At { levers: self, scratch: &mut scratch });
+        scratch.levers.iter().map(|lane| lane.0[0]).collect()
+    }
+
+    /// Room for a group of configurations.
+    pub fn scratch(&self) -> SagScratch {
+        SagScratch {
+            joints: vec![Lane::ZERO; self.joint_count()],
+            levers: vec![Lane::ZERO; self.len()],
+            frames: LeverScratch::new(&self.chain),
+            one: OnePose::new(&self.chain),
+        }
+    }
+
+    /// Levers of the joint values in the scratch.
+    #[inline(always)]
+    fn group<I: Isa>(&self, alone: bool, scratch: &mut SagScratch) {
+        let SagScratch { joints, levers, frames, one } = scratch;
+        let parameters = if alone {
+            one.set_shared::<I>(&self.chain, joints, &self.nominal);
+            LaneParameters::One(one)
+        } else {
+            LaneParameters::Shared(&self.nominal)
+        };
+        self.chain.levers::<I>(joints, parameters, frames, levers);
+    }
+}
+
+struct At<'a> {
+    levers: &'a Levers,
+    scratch: &'a mut SagScratch,
+}
+
+impl Kernel for At<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        self.levers.group::<I>(true, self.scratch);
+    }
+}
+
+/// For each of `joints` the sum of the products of its levers in two configurations: how alike its loads are.
+pub fn alike(joints: usize, a: &[f64], b: &[f64], out: &mut [f64]) {
+    let mut pairs = a.iter().zip(b);
+    for (j, sum) in out.iter_mut().enumerate().take(joints) {
+        *sum = pairs.by_ref().take(joints - j).map(|(x, y)| x * y).sum();
+    }
+}
+
+impl Sag {
+    /// Adds to the parameters (up to 8, `width`) of the poses whose inputs `input` gives.
+    #[inline(always)]
+    pub fn add<I: Isa>(
+        &self,
+        input: impl Fn(usize) -> Lane,
+        scratch: &mut SagScratch,
+        rows: &mut [f64],
+        width: usize,
+    ) {
+        let poses = LANES.min(rows.len() / width);
+        for (k, lane) in scratch.joints.iter_mut().enumerate() {
+            *lane = input(k);
+        }
+        self.levers.group::<I>(poses == 1, scratch);
+        let (count, mut at) = (self.levers.joint_count(), 0);
+        for j in 0..count {
+            let mut sum = Lane::ZERO;
+            for k in at..at + count - j {
+                sum = I::mul_add(scratch.levers[k], Lane::splat(self.weights[k]), sum);
+            }
+            for (row, value) in rows.chunks_exact_mut(width).zip(&sum.0) {
+                row[self.outputs[at]] += value;
+            }
+            at += count - j;
+        }
+    }
+}

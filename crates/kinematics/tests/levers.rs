@@ -1,0 +1,113 @@
+//! Levers against differences of heights, and one pose alone against the same pose among others.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+mod common;
+
+use common::{mixed, reference, six_axis, spread};
+use truearm_kinematics::{
+    Chain, Convention, InstructionSet, Isa, Joint, Kernel, Lane, LaneFrame, LaneParameters, LeverScratch,
+    Link, OnePose, Screw, SharedParameters, Transform, dispatch_on, lever_count,
+};
+
+const STEP: f64 = 1e-5;
+
+/// Height at which the link that joint `k` moves ends: the origin of the next joint's frame, or the end.
+fn height(chain: &Chain, k: usize, joints: &[f64]) -> f64 {
+    let next = chain.joint_columns().get(k + 1).map(|column| column / 5);
+    let Some(next) = next else { return reference(chain, joints, &chain.nominal()).translation[2] };
+    let mut links: Vec<Link> = chain.links()[..next].to_vec();
+    if chain.convention() == Convention::Modified {
+        links.push(Link { joint: Joint::Fixed, theta: 0.0, d: 0.0, ..chain.links()[next] });
+    }
+    let part = Chain::new(chain.convention(), links, *chain.base(), Transform::IDENTITY).unwrap();
+    reference(&part, &joints[..=k], &part.nominal()).translation[2]
+}
+
+struct Levers<'a>(&'a Chain, &'a [Lane]);
+
+impl Kernel for Levers<'_> {
+    type Output = Vec<Lane>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Vec<Lane> {
+        let mut out = vec![Lane::ZERO; lever_count(self.0.joint_count())];
+        let shared = SharedParameters::new(&self.0.nominal());
+        let parameters = LaneParameters::Shared(&shared);
+        self.0.levers::<I>(self.1, parameters, &mut LeverScratch::new(self.0), &mut out);
+        out
+    }
+}
+
+#[test]
+fn levers_are_derivatives_of_heights() {
+    for chain in [six_axis(), mixed(Convention::Standard), mixed(Convention::Modified)] {
+        let count = chain.joint_count();
+        let q = spread(count, 7);
+        let lanes: Vec<Lane> = q.iter().map(|x| Lane::splat(*x)).collect();
+        let found = dispatch_on(InstructionSet::detected(), Levers(&chain, &lanes));
+        let mut at = 0;
+        for j in 0..count {
+            for k in j..count {
+                let moved = |by: f64| {
+                    let mut q = q.clone();
+                    q[j] += by;
+                    height(&chain, k, &q)
+                };
+                let wanted = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
+                assert!((found[at].0[3] - wanted).abs() < 1e-9, "joint {j}, link {k}");
+                at += 1;
+            }
+        }
+    }
+}
+
+/// Everything of a sweep of one pose, by `OnePose` where it is alone.
+struct Alone<'a> {
+    chain: &'a Chain,
+    joints: &'a [Lane],
+    each: Option<&'a [Lane]>,
+    alone: bool,
+}
+
+impl Kernel for Alone<'_> {
+    type Output = (LaneFrame, Vec<Screw>, [Lane; 3]);
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Self::Output {
+        let Self { chain, joints, each, alone } = self;
+        let shared = SharedParameters::new(&chain.nominal());
+        let mut one = OnePose::new(chain);
+        let parameters = match (each, alone) {
+            (None, false) => LaneParameters::Shared(&shared),
+            (Some(lanes), false) => LaneParameters::Each(lanes),
+            (None, true) => {
+                one.set_shared::<I>(chain, joints, &shared);
+                LaneParameters::One(&one)
+            }
+            (Some(lanes), true) => {
+                let row: Vec<f64> = lanes.iter().map(|lane| lane.0[0]).collect();
+                one.set::<I>(chain, joints, &row);
+                LaneParameters::One(&one)
+            }
+        };
+        let mut frame = LaneFrame::splat(&Transform::IDENTITY);
+        let mut screws = vec![Screw::ZERO; chain.joint_count()];
+        chain.sweep::<I>(joints, parameters, chain.joint_columns(), &mut frame, &mut screws);
+        (frame, screws, chain.end_point::<I>(joints, parameters))
+    }
+}
+
+#[test]
+fn a_pose_alone_is_to_the_bit_what_it_is_among_others() {
+    for chain in [six_axis(), mixed(Convention::Standard), mixed(Convention::Modified)] {
+        let joints: Vec<Lane> = spread(chain.joint_count(), 4).iter().map(|x| Lane::splat(3.0 * x)).collect();
+        let own = spread(chain.parameter_count(), 9);
+        let each: Vec<Lane> = own.iter().map(|x| Lane::splat(*x)).collect();
+        for each in [None, Some(&each[..])] {
+            for set in InstructionSet::ALL {
+                let run = |alone| dispatch_on(set, Alone { chain: &chain, joints: &joints, each, alone });
+                assert_eq!(run(true), run(false));
+            }
+        }
+    }
+}
