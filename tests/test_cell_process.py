@@ -202,6 +202,8 @@ def test_a_check_is_held_against_the_same_pose_where_the_first_contact_was_given
             known.add_reading(step.step, 1, Reading(point, 1e-4, 0.0, True, ""), np.zeros(5), point)
             assert points_of_last_check(known) is None
             known.add_outcome(step.step, "measured", attempts=[1])
-        first, check = points_of_last_check(known)
+        pair = points_of_last_check(known)
+    assert pair is not None
+    first, check = pair
     np.testing.assert_array_equal(first, [7.0, 3.0, 0.0])
     np.testing.assert_array_equal(check, [7.0, 4.0, 0.0])
