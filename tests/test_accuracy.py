@@ -68,7 +68,7 @@ def test_held_out_errors(case, read):
     assert variable.mean <= case.variable
     assert variable.rms <= case.rms
     assert variable.max <= case.largest
-    assert validation.coverage_95 == pytest.approx(0.95, abs=case.coverage_within)
+    assert round(abs(validation.coverage_95 - 0.95), 6) <= case.coverage_within
 
 
 @pytest.mark.parametrize(("robot", "file"), [(UR10, "ur10_ipa_C.csv"), (IRB120, "irb120_faro.csv")])

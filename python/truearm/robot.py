@@ -50,7 +50,8 @@ class Robot(RobotData):
                 where=given,
                 way_out=f"Expand it first: xacro {path.name} > {path.stem}.urdf",
             )
-        if path.suffix.lower() == ".toml" or path.is_file() or "/" in given or "\\" in given:
+        is_path = "/" in given or "\\" in given or given in {".", ".."}
+        if path.suffix.lower() == ".toml" or path.is_file() or is_path:
             return cls.from_toml(read_text(path), where=given)
         name, text = library_text(given)
         return cls.from_toml(text, where=f"{name}.toml")
