@@ -7,8 +7,9 @@ use truearm_field::{
     BOUNDED, Bank, Conservative as Core, ConservativeParts, ConservativePlan, InputKind, Samples,
 };
 
+use crate::blocks::{block_from, block_into};
 use crate::door::{CoreError, Failure, quick};
-use crate::field::{block_from, block_into, numbers};
+use crate::field::numbers;
 use crate::measured::matrix;
 
 /// Bounds of the standard deviation, see the stub.

@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 
+mod blocks;
 mod chain;
 mod choice;
 mod cmac;

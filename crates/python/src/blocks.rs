@@ -1,0 +1,60 @@
+//! Blocks of a field as dictionaries, and back.
+
+use numpy::PyReadonlyArrayDyn;
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use truearm_field::{Axis, Block, Grid, Input, InputKind, SAG_NAME, Sag};
+
+use crate::measured::matrix;
+
+/// One axis as stored: is an angle, scale, origin, spacing, count, closed, degree.
+type StoredAxis = (bool, f64, f64, f64, usize, bool, usize);
+
+pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<'py, PyDict>> {
+    let axes: Vec<StoredAxis> = block
+        .grid
+        .axes
+        .iter()
+        .map(|axis| {
+            let angle = axis.input.kind == InputKind::Angle;
+            (angle, axis.input.scale, axis.origin, axis.spacing, axis.count, axis.closed, axis.degree)
+        })
+        .collect();
+    let stored = PyDict::new(py);
+    stored.set_item("name", &block.name)?;
+    stored.set_item("inputs", &block.grid.inputs)?;
+    stored.set_item("axes", axes)?;
+    stored.set_item("outputs", &block.outputs)?;
+    stored.set_item("weights", matrix(py, &block.weights, block.outputs.len()))?;
+    Ok(stored)
+}
+
+/// The sag as a block over all joints without cells.
+pub(crate) fn sag_block(sag: &Sag) -> Block {
+    Block {
+        name: SAG_NAME.to_owned(),
+        grid: Grid { inputs: (0..sag.levers.joint_count()).collect(), axes: Vec::new() },
+        outputs: sag.outputs.clone(),
+        weights: sag.weights.clone(),
+    }
+}
+
+pub(crate) fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {
+    let item = |name: &str| {
+        let message = || PyKeyError::new_err(format!("a block of the field has no '{name}'"));
+        stored.get_item(name)?.ok_or_else(message)
+    };
+    let axes: Vec<StoredAxis> = item("axes")?.extract()?;
+    let axis = |(angle, scale, origin, spacing, count, closed, degree): StoredAxis| {
+        let kind = if angle { InputKind::Angle } else { InputKind::Line };
+        Axis { input: Input { kind, scale }, origin, spacing, count, closed, degree }
+    };
+    let weights: PyReadonlyArrayDyn<'_, f64> = item("weights")?.extract()?;
+    Ok(Block {
+        name: item("name")?.extract()?,
+        grid: Grid { inputs: item("inputs")?.extract()?, axes: axes.into_iter().map(axis).collect() },
+        outputs: item("outputs")?.extract()?,
+        weights: weights.as_array().iter().copied().collect(),
+    })
+}
