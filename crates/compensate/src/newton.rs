@@ -248,24 +248,26 @@ impl Progress {
         let before = self.length;
         let (length, along) = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
         self.length = length;
-        if longest.any_below(self.length) {
+        let mut fresh = self.stale;
+        if longest.any_below(length) {
             let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
-            self.damping = longest.where_below(self.length, damping, self.damping);
+            self.damping = longest.where_below(length, damping, self.damping);
+            fresh = longest.where_below(length, YES, fresh);
             let columns = &search.columns[..plan.moving.len()];
             dispatch_on(I::LEVEL, Damp { columns, damping: self.damping, factor });
             (self.length, _) = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
-        } else {
-            self.lengthen(plan, along / before, search);
         }
+        self.lengthen(plan, fresh, along / before, search);
     }
 
-    /// Broyden's update for the last step, where the Jacobian is kept: `share` of that step points along the one before.
+    /// Broyden's update for the last step: `share` of this step points along that one. Flag `fresh`: the Jacobian is new, or
+    /// the step damped, and stays as it is.
     #[inline(always)]
-    fn lengthen(&mut self, plan: &Plan, share: Lane, search: &mut Search) {
+    fn lengthen(&mut self, plan: &Plan, fresh: Lane, share: Lane, search: &mut Search) {
         let (low, high) = (Lane::splat(-UNSURE), Lane::splat(UNSURE));
         let share = low.where_below(share, share, low);
         let share = share.where_below(high, share, high);
-        let factor = NO.where_below(self.stale, YES, YES / (YES - share));
+        let factor = NO.where_below(fresh, YES, YES / (YES - share));
         for step in search.step.iter_mut().take(plan.moving.len()) {
             *step = *step * factor;
         }

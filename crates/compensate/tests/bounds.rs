@@ -158,7 +158,9 @@ fn neighbours_get_neighbouring_corrections() {
 fn threads_batches_and_single_waypoints_agree_bit_for_bit() {
     for scene in [scene(), Scene::varying(six_axis(), 1e-3)] {
         let corrector = scene.corrector(limits(unbounded()));
-        let q = readings(&scene.chain, 1003, 4);
+        let mut q = readings(&scene.chain, 1003, 4);
+        // Some near the wrist's singular configuration, whose steps are damped, among others.
+        q.chunks_exact_mut(6).step_by(5).for_each(|row| row[4] = 1e-4);
         let found = correct(&corrector, &q, 1);
         let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         for threads in [2, 4] {
