@@ -295,7 +295,7 @@ def test_a_worker_of_the_cluster_is_killed_in_the_middle(plant, runs, tmp_path):
     fleet = Fleet.from_toml(HEAD + arms(*names, **stated), folder=plant)
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "1s"}),
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs=50) as cluster,
     ):
         first = cluster.workers[0].pid
 

@@ -24,7 +24,7 @@ ENDS_WITHIN_S = 1.5
 @pytest.fixture(scope="module")
 def cluster():
     made = LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     )
     yield made
     made.close()
