@@ -5,7 +5,7 @@
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
 //! which the arm moves well nearly undamped. A step that makes the error larger is halved. Once the error is small its
 //! Jacobian is kept, and corrected by what the last step brought: Broyden's method with a memory of one step (Kelley,
-//! Iterative Methods for Linear and Nonlinear Equations, 1995, section 7.3). What a pose gets does not depend on the
+//! Iterative Methods for Linear and Nonlinear Equations, 1995). What a pose gets does not depend on the
 //! poses beside it.
 
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
