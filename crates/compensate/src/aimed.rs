@@ -37,7 +37,7 @@ impl Aimed {
             // One group of lanes more, so that whole blocks can be read.
             rows: vec![0.0; LANES * (width + LANES)],
             parameters: vec![Lane::ZERO; lane_room(width)],
-            one: OnePose::new(&self.chain),
+            one: OnePose::new(&self.model.shared),
             screws: vec![Screw::ZERO; joints.max(spread)],
             field: self.model.field.as_ref().map(|field| field.scratch()),
             bounds: self.model.spread.as_ref().and_then(Spread::scratch),
@@ -134,7 +134,7 @@ impl Kernel for Sweep<'_> {
                 LaneParameters::Each(&parameters[..width])
             }
             (None, true) => {
-                one.set_shared::<I>(chain, joints, &model.shared);
+                one.move_to::<I>(chain, joints);
                 LaneParameters::One(one)
             }
             (Some(_), true) => {

@@ -18,6 +18,8 @@ const STEPS: usize = 10;
 const LONGEST_STEP: f64 = 0.5;
 /// Longest step where they have a tight one: enough to find out what they would have to be.
 const SHORT_STEP: f64 = 0.05;
+/// Errors that fall by less than a thousandth with each step are all but the same after the last one.
+const HOPELESS: f64 = 0.999;
 /// With fewer joints than the task has numbers, turns weigh so much less that the position is met first.
 const POSITION_FIRST: f64 = 1e-4;
 
@@ -266,7 +268,10 @@ pub(crate) fn length(vector: &[f64; 3]) -> f64 {
 fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let limits = &options.limits;
     let longest = limits.largest_angle.clamp(SHORT_STEP, LONGEST_STEP);
-    Plan::new(model, options.task, options.moving.as_deref(), STEPS, longest)
+    let plan = Plan::new(model, options.task, options.moving.as_deref(), STEPS, longest)?;
+    // The turn that five axes leave is no failure: its least value is searched for to the end.
+    let hopeless = if plan.position_first() { plan.hopeless } else { HOPELESS };
+    Ok(Plan { hopeless, ..plan })
 }
 
 impl Plan {
@@ -287,8 +292,8 @@ impl Plan {
         let position_first = task != Task::Position && moving.len() < Task::Pose.rows();
         let turn_weight = if position_first { LEVER * POSITION_FIRST } else { LEVER };
         let unit = moving.iter().map(unit).collect();
-        let enough = Plan::enough(model.field.is_some());
-        Ok(Plan { task, unit, moving, turn_weight, enough, steps, longest })
+        let (varied, hopeless) = (model.field.is_some(), f64::INFINITY);
+        Ok(Plan { task, moving, unit, turn_weight, varied, steps, longest, hopeless })
     }
 }
 

@@ -5,8 +5,9 @@
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
 //! which the arm moves well nearly undamped. A step that makes the error larger is halved. Once the error is small its
 //! Jacobian is kept, and corrected by what the last step brought: Broyden's method with a memory of one step (Kelley,
-//! Iterative Methods for Linear and Nonlinear Equations, 1995). What a pose gets does not depend on the
-//! poses beside it.
+//! Iterative Methods for Linear and Nonlinear Equations, 1995). A search ends with a step whose error is not looked at
+//! where the rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential
+//! Equations II, section IV.8). What a pose gets does not depend on the poses beside it.
 
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
 
@@ -19,11 +20,13 @@ pub(crate) const LEVER: f64 = 0.3;
 /// Error at which the search ends, m: a few roundings of a pose.
 const ENOUGH: f64 = 1e-13;
 /// The same where the parameters vary, which each step leaves a hundredth to a thousandth of the error for.
-const ENOUGH_VARIED: f64 = 1e-10;
+const ENOUGH_VARIED: f64 = 3e-10;
 /// Error from which on a Jacobian is good enough for the steps to come, m.
 const CALM: f64 = 1e-4;
 /// Step at which it ends where an error is left that the joints cannot remove, rad.
 const STANDSTILL: f64 = 1e-11;
+/// Largest rate at which errors fall that is trusted to hold for one more step.
+const STEADY: f64 = 0.1;
 /// Share of a step along the one before from which on it says nothing.
 const UNSURE: f64 = 0.3;
 /// Added to J J^T so that it can be inverted everywhere, m^2.
@@ -39,18 +42,20 @@ pub(crate) struct Plan {
     pub unit: Vec<f64>,
     /// Metres that one radian of the task counts.
     pub turn_weight: f64,
-    /// Error at which the search ends, m.
-    pub enough: f64,
+    /// Whether the model's parameters vary with the joints.
+    pub varied: bool,
     /// Steps at most.
     pub steps: usize,
     /// Longest step, rad.
     pub longest: f64,
+    /// Rate from which on errors fall too slowly to go on.
+    pub hopeless: f64,
 }
 
 impl Plan {
-    /// Error at which a search with a model ends, m.
-    pub fn enough(varied: bool) -> f64 {
-        if varied { ENOUGH_VARIED } else { ENOUGH }
+    /// Error at which the search ends, m.
+    fn enough(&self) -> f64 {
+        if self.varied { ENOUGH_VARIED } else { ENOUGH }
     }
 
     /// Whether there are too few joints to meet all of the task.
@@ -92,6 +97,8 @@ struct Progress {
     length: Lane,
     /// What the smallest error leaves of position and orientation, squared.
     left: [Lane; 2],
+    /// Squared ratio of the last error to the smallest before it; zero where there was none.
+    rate: Lane,
     /// Flag: the search goes on.
     open: Lane,
     /// Flag: the last trial was better than those before.
@@ -175,7 +182,7 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
             aimed.end::<I>(&search.trial, alone, &mut search.model)
         };
         let error = weighted::<I, G, M>(&frame, target, plan.turn_weight);
-        let norm = progress.take::<I, M>(&error, plan.enough, search);
+        let norm = progress.take::<I, M>(&error, plan, search);
         if step == plan.steps || !NO.any_below(progress.open) {
             break;
         }
@@ -185,7 +192,8 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
         }
         progress.find_step::<I, M>(plan, &mut factor, (&error, norm), search);
         search.advance(plan, &progress);
-        progress.settle(norm);
+        progress.foresee(norm, plan.enough(), search);
+        progress.settle(norm, plan.varied);
     }
     [progress.left[0].sqrt(), progress.left[1].sqrt() * (1.0 / plan.turn_weight)]
 }
@@ -198,6 +206,7 @@ impl Progress {
             least: infinite,
             length: infinite,
             left: [infinite; 2],
+            rate: NO,
             open: YES,
             better: NO,
             stale: YES,
@@ -212,8 +221,11 @@ impl Progress {
 
     /// Takes over the trials that are better than what was found before; gives the squared errors.
     #[inline(always)]
-    fn take<I: Isa, const M: usize>(&mut self, error: &[Lane; M], enough: f64, search: &mut Search) -> Lane {
-        let (norm, before) = (squared::<I>(error), self.least);
+    fn take<I: Isa, const M: usize>(&mut self, error: &[Lane; M], plan: &Plan, search: &mut Search) -> Lane {
+        let before = self.least;
+        let infinite = Lane::splat(f64::INFINITY);
+        let norm = NO.where_below(self.open, squared::<I>(error), infinite);
+        self.rate = before.where_below(infinite, norm / before, NO);
         let left = [squared::<I>(&error[..3]), squared::<I>(&error[3..])];
         for (kept, found) in self.left.iter_mut().zip(left) {
             *kept = norm.where_below(before, found, *kept);
@@ -223,8 +235,10 @@ impl Progress {
         }
         self.least = norm.where_below(before, norm, before);
         self.better = norm.where_below(before, YES, NO);
-        let far = Lane::splat(enough * enough).where_below(self.least, YES, NO);
-        self.open = Lane::splat(STANDSTILL * STANDSTILL).where_below(self.length, far, NO);
+        let far = Lane::splat(plan.enough() * plan.enough()).where_below(self.least, self.open, NO);
+        let far = Lane::splat(STANDSTILL * STANDSTILL).where_below(self.length, far, NO);
+        let slow = Lane::splat(plan.hopeless * plan.hopeless).where_below(self.rate, self.better, NO);
+        self.open = NO.where_below(slow, NO, far);
         norm
     }
 
@@ -274,10 +288,31 @@ impl Progress {
         self.length = self.length * factor * factor;
     }
 
-    /// Which poses need a Jacobian at their next trial: those with a large error, and those that did not improve.
+    /// Takes over the next trials where they will be near enough, and ends their searches.
     #[inline(always)]
-    fn settle(&mut self, norm: Lane) {
-        let far = Lane::splat(CALM * CALM).where_below(norm, YES, NO);
+    fn foresee(&mut self, norm: Lane, enough: f64, search: &mut Search) {
+        let near = (norm * self.rate).where_below(Lane::splat(enough * enough), self.open, NO);
+        let near = self.rate.where_below(Lane::splat(STEADY * STEADY), near, NO);
+        let near = NO.where_below(self.rate, near, NO);
+        for (best, trial) in search.best.iter_mut().zip(&search.trial) {
+            *best = NO.where_below(near, *trial, *best);
+        }
+        for left in &mut self.left {
+            *left = NO.where_below(near, *left * self.rate, *left);
+        }
+        self.open = NO.where_below(near, NO, self.open);
+    }
+
+    /// Which poses need a Jacobian at their next trial: those with a large error, and those that did not improve.
+    ///
+    /// Where the parameters vary no Jacobian of the chain is better than that of the start, once corrected, as long as errors
+    /// fall with it.
+    #[inline(always)]
+    fn settle(&mut self, norm: Lane, varied: bool) {
+        let mut far = Lane::splat(CALM * CALM).where_below(norm, YES, NO);
+        if varied {
+            far = Lane::splat(STEADY * STEADY).where_below(self.rate, far, NO);
+        }
         self.stale = NO.where_below(self.better, far, YES);
     }
 }

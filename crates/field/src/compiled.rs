@@ -13,7 +13,7 @@ use crate::bank::{Bank, Block};
 use crate::cells::MOST_ACTIVE;
 use crate::compiled_axis::{CompiledAxis, Excited};
 use crate::compiled_table::{Line, MOST_LANES, Numbered, Sheet};
-use crate::sag::{Sag, SagScratch};
+use crate::sag::{Loads, SagScratch};
 
 /// Below this many poses threads cost more than they bring.
 const THREADED_POSES: usize = 4096;
@@ -30,7 +30,7 @@ pub struct Compiled {
     axes: Vec<CompiledAxis>,
     lines: Vec<Line>,
     sheets: Vec<Sheet>,
-    sag: Option<Sag>,
+    sag: Option<Loads>,
 }
 
 impl Compiled {
@@ -43,7 +43,7 @@ impl Compiled {
             axes: Vec::new(),
             lines: Vec::new(),
             sheets: Vec::new(),
-            sag: bank.sag.clone(),
+            sag: bank.sag.as_ref().map(Loads::new),
         };
         let mut blocks: Vec<&Block> = bank.blocks.iter().collect();
         blocks.sort_by_key(|block| Reverse(block.grid.axes.len()));
@@ -156,7 +156,7 @@ impl Compiled {
         FieldScratch {
             three: vec![Excited::NONE; self.axes.len() - count(MOST_ACTIVE)],
             four: vec![Excited::NONE; count(MOST_ACTIVE)],
-            sag: self.sag.as_ref().map(|sag| sag.levers.scratch()),
+            sag: self.sag.as_ref().map(Loads::scratch),
         }
     }
 
@@ -217,7 +217,7 @@ impl Evaluate<'_> {
         if bank.axes.is_empty() && bank.sag.is_none() {
             return;
         }
-        let mut room = bank.sag.as_ref().map(|sag| sag.levers.scratch());
+        let mut room = bank.sag.as_ref().map(Loads::scratch);
         let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
         let (wide, width) = (bank.input_count * LANES, bank.parameter_count);
         for (values, out) in values.chunks(wide).zip(out.chunks_mut(width * LANES)) {

@@ -14,14 +14,14 @@ const WHOLE: f64 = (1_u64 << 52) as f64;
 
 /// Cells without weights beyond each end of an open axis: what lies outside excites them alone.
 const EMPTY: usize = MOST_ACTIVE;
-/// More than any index: taken away it leaves a larger number.
-const NEVER: u32 = 1 << 31;
+/// More than any index.
+const NEVER: i64 = 1 << 31;
 
 /// Cells that eight values excite, and how much.
 #[derive(Debug, Clone, Copy)]
 pub struct Excited<const K: usize> {
     /// Cell of each grade, always one that tables have.
-    pub cell: [[u32; LANES]; K],
+    pub cell: [[u64; LANES]; K],
     /// Membership grades.
     pub grade: [Lane; K],
 }
@@ -56,7 +56,7 @@ pub struct CompiledAxis {
     /// Added to the centre it leaves the first excited cell's index in the lowest bits, a turn more on a closed axis.
     whole: f64,
     /// Cells of a turn; more than there are on an open axis.
-    wrap: u32,
+    wrap: i64,
     count: usize,
     closed: bool,
     cubic: bool,
@@ -83,7 +83,7 @@ impl CompiledAxis {
             lowest: if axis.closed { -1.0 } else { -beyond },
             highest: if axis.closed { count } else { count + 1.0 },
             whole: WHOLE + if axis.closed { count - 1.0 } else { beyond },
-            wrap: if axis.closed { axis.count as u32 } else { NEVER },
+            wrap: if axis.closed { axis.count as i64 } else { NEVER },
             count: axis.count,
             closed: axis.closed,
             cubic: axis.degree == 3,
@@ -135,21 +135,27 @@ impl CompiledAxis {
 
     /// Indices of the cells around a centre, in the tables.
     #[inline(always)]
-    fn cells<const K: usize>(&self, centre: Lane, cell: &mut [[u32; LANES]; K]) {
-        let mut first = [0_u32; LANES];
+    fn cells<const K: usize>(&self, centre: Lane, cell: &mut [[u64; LANES]; K]) {
+        let mut first = [0_i64; LANES];
         for (first, &centre) in first.iter_mut().zip(&centre.0) {
             let high = if centre > self.lowest { centre } else { self.lowest };
             let inside = if high < self.highest { high } else { self.highest };
-            *first = (inside + self.whole).to_bits() as u32;
+            let index = (inside + self.whole).to_bits() as i64 - WHOLE.to_bits() as i64;
+            *first = once_around(index, self.wrap);
         }
         for (k, cell) in cell.iter_mut().enumerate() {
             for (cell, first) in cell.iter_mut().zip(&first) {
-                let index = first + k as u32;
-                let once = index.min(index.wrapping_sub(self.wrap));
-                *cell = once.min(once.wrapping_sub(self.wrap));
+                *cell = once_around(first + k as i64, self.wrap) as u64;
             }
         }
     }
+}
+
+/// A turn less, where that leaves an index.
+#[inline(always)]
+fn once_around(index: i64, wrap: i64) -> i64 {
+    let less = index - wrap;
+    if less < 0 { index } else { less }
 }
 
 #[inline(always)]

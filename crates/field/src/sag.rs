@@ -5,8 +5,7 @@
 //! for each metre of lever. Levers are those of the nominal arm, and up is the z axis of the base.
 
 use truearm_kinematics::{
-    Chain, Isa, Kernel, LANES, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters, dispatch,
-    lever_count,
+    Chain, Isa, Kernel, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters, dispatch, lever_count,
 };
 
 /// Name of the block.
@@ -34,9 +33,19 @@ pub struct Sag {
 #[derive(Debug, Clone)]
 pub struct SagScratch {
     joints: Vec<Lane>,
-    levers: Vec<Lane>,
+    loads: Vec<Lane>,
     frames: LeverScratch,
     one: OnePose,
+}
+
+/// A sag prepared for evaluation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loads {
+    levers: Levers,
+    /// Parameter that each joint's loads drive, (J,).
+    outputs: Vec<usize>,
+    /// Of each lever its weight and those of the same joint behind it, (L,).
+    heights: Vec<f64>,
 }
 
 impl Levers {
@@ -72,37 +81,27 @@ impl Levers {
         for (lane, value) in scratch.joints.iter_mut().zip(values) {
             *lane = Lane::splat(*value);
         }
-        dispatch(At { levers: self, scratch: &mut scratch });
-        scratch.levers.iter().map(|lane| lane.0[0]).collect()
+        let mut out = vec![Lane::ZERO; self.len()];
+        dispatch(At { levers: self, scratch: &mut scratch, out: &mut out });
+        out.iter().map(|lane| lane.0[0]).collect()
     }
 
     /// Room for a group of configurations.
     pub fn scratch(&self) -> SagScratch {
+        let lanes = vec![Lane::ZERO; self.joint_count()];
         SagScratch {
-            joints: vec![Lane::ZERO; self.joint_count()],
-            levers: vec![Lane::ZERO; self.len()],
+            joints: lanes.clone(),
+            loads: lanes,
             frames: LeverScratch::new(&self.chain),
-            one: OnePose::new(&self.chain),
+            one: OnePose::new(&self.nominal),
         }
-    }
-
-    /// Levers of the joint values in the scratch.
-    #[inline(always)]
-    fn group<I: Isa>(&self, alone: bool, scratch: &mut SagScratch) {
-        let SagScratch { joints, levers, frames, one } = scratch;
-        let parameters = if alone {
-            one.set_shared::<I>(&self.chain, joints, &self.nominal);
-            LaneParameters::One(one)
-        } else {
-            LaneParameters::Shared(&self.nominal)
-        };
-        self.chain.levers::<I>(joints, parameters, frames, levers);
     }
 }
 
 struct At<'a> {
     levers: &'a Levers,
     scratch: &'a mut SagScratch,
+    out: &'a mut [Lane],
 }
 
 impl Kernel for At<'_> {
@@ -110,7 +109,9 @@ impl Kernel for At<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        self.levers.group::<I>(true, self.scratch);
+        let Levers { chain, nominal } = self.levers;
+        let SagScratch { joints, frames, .. } = self.scratch;
+        chain.levers::<I>(joints, LaneParameters::Shared(nominal), frames, self.out);
     }
 }
 
@@ -122,7 +123,26 @@ pub fn alike(joints: usize, a: &[f64], b: &[f64], out: &mut [f64]) {
     }
 }
 
-impl Sag {
+impl Loads {
+    /// Of a sag.
+    pub fn new(sag: &Sag) -> Self {
+        let joints = sag.levers.joint_count();
+        let (mut heights, mut outputs, mut at) = (sag.weights.clone(), Vec::new(), 0);
+        for own in (1..=joints).rev() {
+            for k in (at..at + own - 1).rev() {
+                heights[k] += heights[k + 1];
+            }
+            outputs.push(sag.outputs[at]);
+            at += own;
+        }
+        Self { levers: sag.levers.clone(), outputs, heights }
+    }
+
+    /// Room for a group of configurations.
+    pub fn scratch(&self) -> SagScratch {
+        self.levers.scratch()
+    }
+
     /// Adds to the parameters (up to 8, `width`) of the poses whose inputs `input` gives.
     #[inline(always)]
     pub fn add<I: Isa>(
@@ -132,21 +152,22 @@ impl Sag {
         rows: &mut [f64],
         width: usize,
     ) {
-        let poses = LANES.min(rows.len() / width);
-        for (k, lane) in scratch.joints.iter_mut().enumerate() {
+        let SagScratch { joints, loads, frames, one } = scratch;
+        for (k, lane) in joints.iter_mut().enumerate() {
             *lane = input(k);
         }
-        self.levers.group::<I>(poses == 1, scratch);
-        let (count, mut at) = (self.levers.joint_count(), 0);
-        for j in 0..count {
-            let mut sum = Lane::ZERO;
-            for k in at..at + count - j {
-                sum = I::mul_add(scratch.levers[k], Lane::splat(self.weights[k]), sum);
+        let Levers { chain, nominal } = &self.levers;
+        let parameters = if rows.len() == width {
+            one.move_to::<I>(chain, joints);
+            LaneParameters::One(one)
+        } else {
+            LaneParameters::Shared(nominal)
+        };
+        chain.loads::<I>(joints, parameters, &self.heights, frames, loads);
+        for (load, &output) in loads.iter().zip(&self.outputs) {
+            for (row, value) in rows.chunks_exact_mut(width).zip(&load.0) {
+                row[output] += value;
             }
-            for (row, value) in rows.chunks_exact_mut(width).zip(&sum.0) {
-                row[self.outputs[at]] += value;
-            }
-            at += count - j;
         }
     }
 }

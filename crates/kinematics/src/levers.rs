@@ -1,7 +1,7 @@
 //! By how much the joints lift the links: what a joint's drive carries of the links' weights.
 
 use crate::chain::{Chain, Joint};
-use crate::frame::LaneFrame;
+use crate::frame::Carried;
 use crate::isa::Isa;
 use crate::lane::Lane;
 use crate::parameters::LaneParameters;
@@ -17,12 +17,15 @@ pub const fn lever_count(joints: usize) -> usize {
 pub struct LeverScratch {
     /// Axis and origin of each joint's frame.
     frames: Vec<[[Lane; 3]; 2]>,
+    /// Way from each joint's origin to the next one's or to the end, along x and y.
+    ways: Vec<[Lane; 2]>,
 }
 
 impl LeverScratch {
     /// Room for a chain.
     pub fn new(chain: &Chain) -> Self {
-        Self { frames: vec![[[Lane::ZERO; 3]; 2]; chain.joint_count()] }
+        let joints = chain.joint_count();
+        Self { frames: vec![[[Lane::ZERO; 3]; 2]; joints], ways: vec![[Lane::ZERO; 2]; joints] }
     }
 }
 
@@ -41,56 +44,128 @@ impl Chain {
         scratch: &mut LeverScratch,
         out: &mut [Lane],
     ) {
-        let mut seen =
-            Frames { columns: self.joint_columns(), link: 0, next: 0, frames: &mut scratch.frames };
-        let end = self.walk::<I, _>(joints, parameters, &mut seen);
-        let kinds = self.links().iter().map(|link| link.joint).filter(|joint| *joint != Joint::Fixed);
-        let (frames, mut at) = (&scratch.frames, 0);
-        for (j, kind) in kinds.enumerate() {
-            let [axis, point] = &frames[j];
-            for k in j..frames.len() {
-                let tip = frames.get(k + 1).map_or(&end.position, |frame| &frame[1]);
-                out[at] = match kind {
-                    Joint::Prismatic => axis[2],
-                    _ => I::mul_add(axis[0], tip[1] - point[1], -(axis[1] * (tip[0] - point[0]))),
-                };
+        self.find_ways::<I, true>(joints, parameters, scratch);
+        let mut at = 0;
+        for (j, slides) in self.slides().enumerate() {
+            let mut arm = [Lane::ZERO; 2];
+            for way in &scratch.ways[j..] {
+                arm = [arm[0] + way[0], arm[1] + way[1]];
+                out[at] = lift::<I>(slides, &scratch.frames[j][0], &arm, 1.0);
                 at += 1;
             }
         }
     }
+
+    /// Sums of the levers of each joint, each times its weight, into `out`, J lanes; else as for [`Chain::levers`].
+    ///
+    /// `heights` are sums of weights, in the order of levers: for each joint j and each k from j on the weights of joint
+    /// j's levers from k on.
+    #[inline(always)]
+    pub fn loads<I: Isa>(
+        &self,
+        joints: &[Lane],
+        parameters: LaneParameters<'_>,
+        heights: &[f64],
+        scratch: &mut LeverScratch,
+        out: &mut [Lane],
+    ) {
+        if self.slides().any(|slides| slides) {
+            self.find_loads::<I, true>(joints, parameters, heights, scratch, out);
+        } else {
+            self.find_loads::<I, false>(joints, parameters, heights, scratch, out);
+        }
+    }
+
+    #[inline(always)]
+    fn find_loads<I: Isa, const SLIDES: bool>(
+        &self,
+        joints: &[Lane],
+        parameters: LaneParameters<'_>,
+        heights: &[f64],
+        scratch: &mut LeverScratch,
+        out: &mut [Lane],
+    ) {
+        self.find_ways::<I, SLIDES>(joints, parameters, scratch);
+        let mut heights = heights;
+        for ((j, slides), out) in self.slides().enumerate().zip(out) {
+            let (own, rest) = heights.split_at(scratch.ways.len() - j);
+            let mut arm = [Lane::ZERO; 2];
+            for (way, weight) in scratch.ways[j..].iter().zip(own) {
+                arm[0] = I::mul_add(way[0], Lane::splat(*weight), arm[0]);
+                arm[1] = I::mul_add(way[1], Lane::splat(*weight), arm[1]);
+            }
+            *out = lift::<I>(SLIDES && slides, &scratch.frames[j][0], &arm, own[0]);
+            heights = rest;
+        }
+    }
+
+    /// Whether each joint slides.
+    #[inline(always)]
+    fn slides(&self) -> impl Iterator<Item = bool> {
+        let kinds = self.links().iter().map(|link| link.joint).filter(|joint| *joint != Joint::Fixed);
+        kinds.map(|kind| kind == Joint::Prismatic)
+    }
+
+    /// Frames and ways into the scratch, without the heights unless `SLIDES`.
+    #[inline(always)]
+    fn find_ways<I: Isa, const SLIDES: bool>(
+        &self,
+        joints: &[Lane],
+        parameters: LaneParameters<'_>,
+        scratch: &mut LeverScratch,
+    ) {
+        let LeverScratch { frames, ways } = scratch;
+        let mut seen = Frames::<SLIDES> { columns: self.joint_columns(), link: 0, next: 0, frames };
+        let end = self.walk::<I, _>(joints, parameters, &mut seen);
+        for (j, way) in ways.iter_mut().enumerate() {
+            let (tip, point) = (frames.get(j + 1).map_or(&end.position, |frame| &frame[1]), &frames[j][1]);
+            *way = [tip[0] - point[0], tip[1] - point[1]];
+        }
+    }
 }
 
-/// Gathers the frame of each joint.
-struct Frames<'a> {
+/// How fast a joint lifts what is at the end of an arm, `weight` times where it slides and all else is lifted with it.
+#[inline(always)]
+fn lift<I: Isa>(slides: bool, axis: &[Lane; 3], arm: &[Lane; 2], weight: f64) -> Lane {
+    if slides { axis[2] * weight } else { I::mul_add(axis[0], arm[1], -(axis[1] * arm[0])) }
+}
+
+/// Gathers the frame of each joint, without the heights unless `SLIDES`.
+struct Frames<'a, const SLIDES: bool> {
     columns: &'a [usize],
     link: usize,
     next: usize,
     frames: &'a mut [[[Lane; 3]; 2]],
 }
 
-impl Frames<'_> {
+impl<const SLIDES: bool> Frames<'_, SLIDES> {
     #[inline(always)]
-    fn take(&mut self, k: usize, frame: &LaneFrame) {
+    fn take(&mut self, k: usize, frame: &impl Carried) {
         if self.columns.get(self.next) == Some(&(5 * self.link + k)) {
-            self.frames[self.next] = [frame.axis(2), frame.position];
+            let frame = frame.here();
+            let (axis, point) = (frame.axis(2), frame.position);
+            let [to_axis, to_point] = &mut self.frames[self.next];
+            for i in 0..if SLIDES { 3 } else { 2 } {
+                (to_axis[i], to_point[i]) = (axis[i], point[i]);
+            }
             self.next += 1;
         }
     }
 }
 
-impl Axes for Frames<'_> {
+impl<const SLIDES: bool> Axes for Frames<'_, SLIDES> {
     #[inline(always)]
     fn enter(&mut self, link: usize) {
         self.link = link;
     }
 
     #[inline(always)]
-    fn turns(&mut self, k: usize, frame: &LaneFrame, _axis: usize) {
+    fn turns<F: Carried>(&mut self, k: usize, frame: &F, _axis: usize) {
         self.take(k, frame);
     }
 
     #[inline(always)]
-    fn shifts(&mut self, k: usize, frame: &LaneFrame, _axis: usize) {
+    fn shifts<F: Carried>(&mut self, k: usize, frame: &F, _axis: usize) {
         self.take(k, frame);
     }
 }

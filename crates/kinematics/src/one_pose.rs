@@ -3,7 +3,7 @@
 use crate::chain::{Chain, Joint};
 use crate::isa::Isa;
 use crate::lane::{LANES, Lane};
-use crate::parameters::{LinkSource, LinkValues, SharedParameters};
+use crate::parameters::{LinkSource, LinkValues, SharedLink, SharedParameters};
 use crate::trig::sin_cos;
 
 /// The links of a pose that stands in all lanes: each lane gets to the bit what that pose gets among others.
@@ -14,15 +14,29 @@ pub struct OnePose {
     sines: Vec<Lane>,
     cosines: Vec<Lane>,
     links: Vec<LinkValues<f64>>,
+    /// theta and d of the links that it was made with.
+    still: Vec<[f64; 2]>,
 }
 
 impl OnePose {
-    /// Room for the poses of a chain.
-    pub fn new(chain: &Chain) -> OnePose {
-        let links = chain.links().len();
-        let straight = LinkValues { theta: ZERO, d: 0.0, a: 0.0, alpha: ZERO, beta: ZERO, bent: true };
-        let lanes = vec![Lane::ZERO; (3 * links).div_ceil(LANES)];
-        OnePose { sines: lanes.clone(), cosines: lanes.clone(), angles: lanes, links: vec![straight; links] }
+    /// For the poses of a chain with parameters that are prepared, or that come with each pose.
+    pub fn new(shared: &SharedParameters) -> OnePose {
+        let link = |given: &SharedLink| LinkValues {
+            theta: given.theta.sin_cos(),
+            d: given.d,
+            a: given.a,
+            alpha: given.alpha,
+            beta: given.beta,
+            bent: given.bent,
+        };
+        let lanes = vec![Lane::ZERO; (3 * shared.links.len()).div_ceil(LANES)];
+        OnePose {
+            sines: lanes.clone(),
+            cosines: lanes.clone(),
+            angles: lanes,
+            links: shared.links.iter().map(link).collect(),
+            still: shared.links.iter().map(|link| [link.theta, link.d]).collect(),
+        }
     }
 
     /// Takes 5 L absolute parameters, and of `joints`, J lanes, the first pose.
@@ -32,7 +46,7 @@ impl OnePose {
         let angles = Lane::numbers(&mut self.angles);
         for (index, (link, p)) in self.links.iter_mut().zip(parameters.chunks_exact(5)).enumerate() {
             (angles[index], angles[count + index], angles[2 * count + index]) = (p[0], p[3], p[4]);
-            (link.d, link.a, link.bent) = (p[1], p[2], true);
+            (link.d, link.a, link.bent) = (p[1], p[2], p[4] != 0.0);
         }
         self.move_joints(chain, joints);
         self.turn::<I>(3 * count);
@@ -43,14 +57,12 @@ impl OnePose {
         }
     }
 
-    /// The same with parameters that are prepared.
+    /// The same with the parameters that it was made with, where no others were ever taken.
     #[inline(always)]
-    pub fn set_shared<I: Isa>(&mut self, chain: &Chain, joints: &[Lane], shared: &SharedParameters) {
+    pub fn move_to<I: Isa>(&mut self, chain: &Chain, joints: &[Lane]) {
         let angles = Lane::numbers(&mut self.angles);
-        for (index, (link, given)) in self.links.iter_mut().zip(&shared.links).enumerate() {
-            angles[index] = given.theta;
-            (link.d, link.a, link.alpha) = (given.d, given.a, given.alpha);
-            (link.beta, link.bent) = (given.beta, given.bent);
+        for (index, (link, [theta, d])) in self.links.iter_mut().zip(&self.still).enumerate() {
+            (angles[index], link.d) = (*theta, *d);
         }
         self.move_joints(chain, joints);
         self.turn::<I>(self.links.len());
@@ -86,8 +98,6 @@ impl OnePose {
         }
     }
 }
-
-const ZERO: (f64, f64) = (0.0, 1.0);
 
 impl LinkSource for &OnePose {
     #[inline(always)]

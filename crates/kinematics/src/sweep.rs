@@ -1,7 +1,7 @@
 //! One pass along the chain: the end's frame and its motion by any of the parameters.
 
 use crate::chain::{Chain, Convention, Joint};
-use crate::frame::LaneFrame;
+use crate::frame::{Carried, LaneFrame, OneFrame};
 use crate::isa::Isa;
 use crate::lane::Lane;
 use crate::parameters::{LaneParameters, LinkSource, LinkValues};
@@ -69,11 +69,37 @@ impl Chain {
         parameters: LaneParameters<'_>,
         axes: &mut A,
     ) -> LaneFrame {
-        let mut frame = LaneFrame::splat(self.base());
         match parameters {
-            LaneParameters::Shared(shared) => self.walk_links::<I, _, _>(joints, shared, &mut frame, axes),
-            LaneParameters::Each(lanes) => self.walk_links::<I, _, _>(joints, lanes, &mut frame, axes),
-            LaneParameters::One(pose) => self.walk_links::<I, _, _>(joints, pose, &mut frame, axes),
+            LaneParameters::Shared(shared) => {
+                self.walk_links::<I, _, _, _>(joints, shared, LaneFrame::splat(self.base()), axes)
+            }
+            LaneParameters::Each(lanes) => {
+                self.walk_links::<I, _, _, _>(joints, lanes, LaneFrame::splat(self.base()), axes)
+            }
+            LaneParameters::One(pose) => {
+                self.walk_links::<I, _, _, _>(joints, pose, OneFrame::new(self.base()), axes)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn walk_links<I: Isa, S: LinkSource, F: Carried, A: Axes>(
+        &self,
+        joints: &[Lane],
+        source: S,
+        mut frame: F,
+        axes: &mut A,
+    ) -> LaneFrame {
+        let mut joint = 0;
+        for (index, link) in self.links().iter().enumerate() {
+            let value = if link.joint == Joint::Fixed { Lane::ZERO } else { joints[joint] };
+            joint += usize::from(link.joint != Joint::Fixed);
+            let values = source.link::<I>(index, link.joint, value);
+            axes.enter(index);
+            match self.convention() {
+                Convention::Standard => standard::<I, F, A>(&mut frame, &values, axes),
+                Convention::Modified => modified::<I, F, A>(&mut frame, &values, axes),
+            }
         }
         let [x, y, z] = self.end().translation;
         frame.shift::<I>(0, Lane::splat(x));
@@ -82,28 +108,7 @@ impl Chain {
         if self.end_turns() {
             frame.rotate::<I>(&self.end().rotation);
         }
-        frame
-    }
-
-    #[inline(always)]
-    fn walk_links<I: Isa, S: LinkSource, A: Axes>(
-        &self,
-        joints: &[Lane],
-        source: S,
-        frame: &mut LaneFrame,
-        axes: &mut A,
-    ) {
-        let mut joint = 0;
-        for (index, link) in self.links().iter().enumerate() {
-            let value = if link.joint == Joint::Fixed { Lane::ZERO } else { joints[joint] };
-            joint += usize::from(link.joint != Joint::Fixed);
-            let values = source.link::<I>(index, link.joint, value);
-            axes.enter(index);
-            match self.convention() {
-                Convention::Standard => standard::<I, A>(frame, &values, axes),
-                Convention::Modified => modified::<I, A>(frame, &values, axes),
-            }
-        }
+        frame.here()
     }
 }
 
@@ -113,10 +118,10 @@ pub(crate) trait Axes {
     fn enter(&mut self, link: usize);
 
     /// Parameter k of the link turns about an axis of the frame through its origin.
-    fn turns(&mut self, k: usize, frame: &LaneFrame, axis: usize);
+    fn turns<F: Carried>(&mut self, k: usize, frame: &F, axis: usize);
 
     /// Parameter k of the link shifts along an axis of the frame.
-    fn shifts(&mut self, k: usize, frame: &LaneFrame, axis: usize);
+    fn shifts<F: Carried>(&mut self, k: usize, frame: &F, axis: usize);
 }
 
 /// Only the end is wanted.
@@ -127,10 +132,10 @@ impl Axes for NoAxes {
     fn enter(&mut self, _link: usize) {}
 
     #[inline(always)]
-    fn turns(&mut self, _k: usize, _frame: &LaneFrame, _axis: usize) {}
+    fn turns<F: Carried>(&mut self, _k: usize, _frame: &F, _axis: usize) {}
 
     #[inline(always)]
-    fn shifts(&mut self, _k: usize, _frame: &LaneFrame, _axis: usize) {}
+    fn shifts<F: Carried>(&mut self, _k: usize, _frame: &F, _axis: usize) {}
 }
 
 /// Slot of a parameter that is not wanted: beyond all screws.
@@ -157,25 +162,26 @@ impl Axes for Wanted<'_> {
     }
 
     #[inline(always)]
-    fn turns(&mut self, k: usize, frame: &LaneFrame, axis: usize) {
+    fn turns<F: Carried>(&mut self, k: usize, frame: &F, axis: usize) {
         if let Some(screw) = self.screws.get_mut(self.slots[k]) {
+            let frame = frame.here();
             screw.angular = frame.axis(axis);
             screw.linear = frame.position;
         }
     }
 
     #[inline(always)]
-    fn shifts(&mut self, k: usize, frame: &LaneFrame, axis: usize) {
+    fn shifts<F: Carried>(&mut self, k: usize, frame: &F, axis: usize) {
         if let Some(screw) = self.screws.get_mut(self.slots[k]) {
             screw.angular = [Lane::ZERO; 3];
-            screw.linear = frame.axis(axis);
+            screw.linear = frame.here().axis(axis);
         }
     }
 }
 
 /// Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta).
 #[inline(always)]
-fn standard<I: Isa, A: Axes>(frame: &mut LaneFrame, link: &LinkValues<Lane>, axes: &mut A) {
+fn standard<I: Isa, F: Carried, A: Axes>(frame: &mut F, link: &LinkValues<Lane>, axes: &mut A) {
     axes.turns(0, frame, 2);
     axes.shifts(1, frame, 2);
     frame.turn::<I>(0, 1, link.theta);
@@ -192,7 +198,7 @@ fn standard<I: Isa, A: Axes>(frame: &mut LaneFrame, link: &LinkValues<Lane>, axe
 
 /// Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d).
 #[inline(always)]
-fn modified<I: Isa, A: Axes>(frame: &mut LaneFrame, link: &LinkValues<Lane>, axes: &mut A) {
+fn modified<I: Isa, F: Carried, A: Axes>(frame: &mut F, link: &LinkValues<Lane>, axes: &mut A) {
     axes.turns(3, frame, 0);
     frame.turn::<I>(1, 2, link.alpha);
     axes.shifts(2, frame, 0);

@@ -39,7 +39,9 @@ const COSINE: [f64; 7] = [
 pub fn sin_cos<I: Isa>(angle: Lane) -> (Lane, Lane) {
     let (mut sine, mut cosine) = reduced::<I>(angle);
     if angle.0.iter().fold(false, |beyond, x| beyond | !(x.abs() <= LIMIT)) {
-        by_library(&angle, &mut sine, &mut cosine);
+        for i in 0..LANES {
+            (sine.0[i], cosine.0[i]) = by_library(angle.0[i]);
+        }
     }
     (sine, cosine)
 }
@@ -82,8 +84,6 @@ fn quadrant(shifted: Lane, even: Lane, odd: Lane, shift: u64) -> Lane {
 
 #[cold]
 #[inline(never)]
-fn by_library(angle: &Lane, sine: &mut Lane, cosine: &mut Lane) {
-    for i in 0..LANES {
-        (sine.0[i], cosine.0[i]) = angle.0[i].sin_cos();
-    }
+fn by_library(angle: f64) -> (f64, f64) {
+    angle.sin_cos()
 }

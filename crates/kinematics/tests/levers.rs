@@ -61,6 +61,44 @@ fn levers_are_derivatives_of_heights() {
     }
 }
 
+struct Loads<'a>(&'a Chain, &'a [Lane], &'a [f64]);
+
+impl Kernel for Loads<'_> {
+    type Output = Vec<Lane>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Vec<Lane> {
+        let Self(chain, joints, heights) = self;
+        let mut out = vec![Lane::ZERO; chain.joint_count()];
+        let shared = SharedParameters::new(&chain.nominal());
+        let parameters = LaneParameters::Shared(&shared);
+        chain.loads::<I>(joints, parameters, heights, &mut LeverScratch::new(chain), &mut out);
+        out
+    }
+}
+
+#[test]
+fn loads_are_weighted_sums_of_levers() {
+    for chain in [six_axis(), mixed(Convention::Standard), mixed(Convention::Modified)] {
+        let count = chain.joint_count();
+        let lanes: Vec<Lane> = spread(count, 5).iter().map(|x| Lane::splat(*x)).collect();
+        let weights = spread(lever_count(count), 6);
+        for set in InstructionSet::ALL {
+            let levers = dispatch_on(set, Levers(&chain, &lanes));
+            let (mut heights, mut wanted, mut at) = (Vec::new(), Vec::new(), 0);
+            for own in (1..=count).rev() {
+                let weights = &weights[at..at + own];
+                heights.extend((0..own).map(|k| weights[k..].iter().sum::<f64>()));
+                wanted.push(weights.iter().zip(&levers[at..]).map(|(w, g)| w * g.0[2]).sum::<f64>());
+                at += own;
+            }
+            for (found, wanted) in dispatch_on(set, Loads(&chain, &lanes, &heights)).iter().zip(wanted) {
+                assert!((found.0[2] - wanted).abs() < 1e-12, "{} is not {wanted}", found.0[2]);
+            }
+        }
+    }
+}
+
 /// Everything of a sweep of one pose, by `OnePose` where it is alone.
 struct Alone<'a> {
     chain: &'a Chain,
@@ -76,12 +114,12 @@ impl Kernel for Alone<'_> {
     fn run<I: Isa>(self) -> Self::Output {
         let Self { chain, joints, each, alone } = self;
         let shared = SharedParameters::new(&chain.nominal());
-        let mut one = OnePose::new(chain);
+        let mut one = OnePose::new(&shared);
         let parameters = match (each, alone) {
             (None, false) => LaneParameters::Shared(&shared),
             (Some(lanes), false) => LaneParameters::Each(lanes),
             (None, true) => {
-                one.set_shared::<I>(chain, joints, &shared);
+                one.move_to::<I>(chain, joints);
                 LaneParameters::One(&one)
             }
             (Some(lanes), true) => {
