@@ -271,7 +271,9 @@ fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let plan = Plan::new(model, options.task, options.moving.as_deref(), STEPS, longest)?;
     // The turn that five axes leave is no failure: its least value is searched for to the end.
     let hopeless = if plan.position_first() { plan.hopeless } else { HOPELESS };
-    Ok(Plan { hopeless, ..plan })
+    // Where parameters vary errors do not fall steadily enough to foresee them.
+    let foreseen = if plan.varied { 0.0 } else { plan.enough() };
+    Ok(Plan { hopeless, foreseen, ..plan })
 }
 
 impl Plan {
@@ -292,8 +294,8 @@ impl Plan {
         let position_first = task != Task::Position && moving.len() < Task::Pose.rows();
         let turn_weight = if position_first { LEVER * POSITION_FIRST } else { LEVER };
         let unit = moving.iter().map(unit).collect();
-        let (varied, hopeless) = (model.field.is_some(), f64::INFINITY);
-        Ok(Plan { task, moving, unit, turn_weight, varied, steps, longest, hopeless })
+        let (varied, hopeless, foreseen) = (model.field.is_some(), f64::INFINITY, 0.0);
+        Ok(Plan { task, moving, unit, turn_weight, varied, steps, longest, hopeless, foreseen })
     }
 }
 

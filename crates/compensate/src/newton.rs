@@ -4,7 +4,7 @@
 //! step may be, the error is far smaller than what the joints would have to turn for it: the step is then damped,
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
 //! which the arm moves well nearly undamped. A step that makes the error larger is halved. Once the error is small its
-//! Jacobian is kept, and corrected by what the last step brought: Broyden's method with a memory of one step (Kelley,
+//! Jacobian is kept, and corrected by what the last steps brought: Broyden's method with a memory of two steps (Kelley,
 //! Iterative Methods for Linear and Nonlinear Equations, 1995). A search ends with a step whose error is not looked at
 //! where the rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential
 //! Equations II, section IV.8). What a pose gets does not depend on the poses beside it.
@@ -20,7 +20,7 @@ pub(crate) const LEVER: f64 = 0.3;
 /// Error at which the search ends, m: a few roundings of a pose.
 const ENOUGH: f64 = 1e-13;
 /// The same where the parameters vary, which each step leaves a hundredth to a thousandth of the error for.
-const ENOUGH_VARIED: f64 = 3e-10;
+const ENOUGH_VARIED: f64 = 1e-10;
 /// Error from which on a Jacobian is good enough for the steps to come, m.
 const CALM: f64 = 1e-4;
 /// Step at which it ends where an error is left that the joints cannot remove, rad.
@@ -50,11 +50,13 @@ pub(crate) struct Plan {
     pub longest: f64,
     /// Rate from which on errors fall too slowly to go on.
     pub hopeless: f64,
+    /// Foreseen error at which the search ends without another look, m.
+    pub foreseen: f64,
 }
 
 impl Plan {
     /// Error at which the search ends, m.
-    fn enough(&self) -> f64 {
+    pub fn enough(&self) -> f64 {
         if self.varied { ENOUGH_VARIED } else { ENOUGH }
     }
 
@@ -70,7 +72,10 @@ pub(crate) struct Search {
     /// The best readings so far, N; the start when a search begins.
     pub best: Vec<Lane>,
     trial: Vec<Lane>,
-    step: Vec<Lane>,
+    /// The step that is worked out, the last one, and the one before, in units.
+    next: Vec<Lane>,
+    last: Vec<Lane>,
+    older: Vec<Lane>,
     /// Motions of the task's rows by the moving readings, in metres and units.
     pub columns: Vec<[Lane; 6]>,
     pub model: AimedScratch,
@@ -83,7 +88,9 @@ impl Search {
             best: lanes.clone(),
             trial: lanes.clone(),
             columns: vec![[Lane::ZERO; 6]; lanes.len()],
-            step: lanes,
+            next: lanes.clone(),
+            last: lanes.clone(),
+            older: lanes,
             model: aimed.scratch(),
         }
     }
@@ -93,8 +100,9 @@ impl Search {
 struct Progress {
     /// Smallest squared error.
     least: Lane,
-    /// Squared length of the last step.
+    /// Squared length of the last step, and of the one before.
     length: Lane,
+    older: Lane,
     /// What the smallest error leaves of position and orientation, squared.
     left: [Lane; 2],
     /// Squared ratio of the last error to the smallest before it; zero where there was none.
@@ -192,7 +200,7 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
         }
         progress.find_step::<I, M>(plan, &mut factor, (&error, norm), search);
         search.advance(plan, &progress);
-        progress.foresee(norm, plan.enough(), search);
+        progress.foresee(norm, plan.foreseen, search);
         progress.settle(norm, plan.varied);
     }
     [progress.left[0].sqrt(), progress.left[1].sqrt() * (1.0 / plan.turn_weight)]
@@ -205,6 +213,7 @@ impl Progress {
         Self {
             least: infinite,
             length: infinite,
+            older: infinite,
             left: [infinite; 2],
             rate: NO,
             open: YES,
@@ -259,9 +268,7 @@ impl Progress {
         search: &mut Search,
     ) {
         let longest = Lane::splat(plan.longest * plan.longest);
-        let before = self.length;
-        let (length, along) = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
-        self.length = length;
+        let length = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
         let mut fresh = self.stale;
         if longest.any_below(length) {
             let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
@@ -269,29 +276,35 @@ impl Progress {
             fresh = longest.where_below(length, YES, fresh);
             let columns = &search.columns[..plan.moving.len()];
             dispatch_on(I::LEVEL, Damp { columns, damping: self.damping, factor });
-            (self.length, _) = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
+            step_for::<I, M>(plan, &factor.solve::<I>(error), search);
         }
-        self.lengthen(plan, fresh, along / before, search);
+        self.correct::<I>(plan, fresh, search);
     }
 
-    /// Broyden's update for the last step: `share` of this step points along that one. Flag `fresh`: the Jacobian is new, or
-    /// the step damped, and stays as it is.
+    /// Broyden's updates of the step for the two before it. Flag `fresh`: the Jacobian is new, or the step damped, and stays as
+    /// it is.
     #[inline(always)]
-    fn lengthen(&mut self, plan: &Plan, fresh: Lane, share: Lane, search: &mut Search) {
-        let (low, high) = (Lane::splat(-UNSURE), Lane::splat(UNSURE));
-        let share = low.where_below(share, share, low);
-        let share = share.where_below(high, share, high);
-        let factor = NO.where_below(fresh, YES, YES / (YES - share));
-        for step in search.step.iter_mut().take(plan.moving.len()) {
-            *step = *step * factor;
+    fn correct<I: Isa>(&mut self, plan: &Plan, fresh: Lane, search: &mut Search) {
+        let moving = plan.moving.len();
+        let share = held(dot::<I>(&search.older[..moving], &search.next) / self.older, fresh);
+        for (next, last) in search.next.iter_mut().zip(&search.last).take(moving) {
+            *next = I::mul_add(*last, share, *next);
         }
-        self.length = self.length * factor * factor;
+        let share = held(dot::<I>(&search.last[..moving], &search.next) / self.length, fresh);
+        let factor = YES / (YES - share);
+        for next in search.next.iter_mut().take(moving) {
+            *next = *next * factor;
+        }
+        self.older = NO.where_below(fresh, Lane::splat(f64::INFINITY), self.length);
+        self.length = squared::<I>(&search.next[..moving]);
+        std::mem::swap(&mut search.older, &mut search.last);
+        std::mem::swap(&mut search.last, &mut search.next);
     }
 
     /// Takes over the next trials where they will be near enough, and ends their searches.
     #[inline(always)]
-    fn foresee(&mut self, norm: Lane, enough: f64, search: &mut Search) {
-        let near = (norm * self.rate).where_below(Lane::splat(enough * enough), self.open, NO);
+    fn foresee(&mut self, norm: Lane, foreseen: f64, search: &mut Search) {
+        let near = (norm * self.rate).where_below(Lane::splat(foreseen * foreseen), self.open, NO);
         let near = self.rate.where_below(Lane::splat(STEADY * STEADY), near, NO);
         let near = NO.where_below(self.rate, near, NO);
         for (best, trial) in search.best.iter_mut().zip(&search.trial) {
@@ -368,20 +381,37 @@ pub(crate) fn fill_pose_columns<I: Isa>(aimed: &Aimed, plan: &Plan, alone: bool,
     fill_columns::<I, PoseGoal, 6>(aimed, plan, &frame, YES, search);
 }
 
-/// J^T y, the step; gives its squared length, and its product with the step before.
+/// J^T y, the next step; gives its squared length.
 #[inline(always)]
-fn step_for<I: Isa, const M: usize>(plan: &Plan, y: &[Lane; M], search: &mut Search) -> (Lane, Lane) {
-    let (mut length, mut along) = (NO, NO);
-    for (step, column) in search.step.iter_mut().zip(&search.columns).take(plan.moving.len()) {
+fn step_for<I: Isa, const M: usize>(plan: &Plan, y: &[Lane; M], search: &mut Search) -> Lane {
+    let mut length = NO;
+    for (next, column) in search.next.iter_mut().zip(&search.columns).take(plan.moving.len()) {
         let mut sum = NO;
         for (value, row) in column.iter().zip(y) {
             sum = I::mul_add(*value, *row, sum);
         }
-        along = I::mul_add(sum, *step, along);
-        *step = sum;
+        *next = sum;
         length = I::mul_add(sum, sum, length);
     }
-    (length, along)
+    length
+}
+
+/// A step's share along another, as far as it can be trusted; none where the flag `fresh` holds.
+#[inline(always)]
+fn held(share: Lane, fresh: Lane) -> Lane {
+    let (low, high) = (Lane::splat(-UNSURE), Lane::splat(UNSURE));
+    let share = low.where_below(share, share, low);
+    let share = share.where_below(high, share, high);
+    NO.where_below(fresh, NO, share)
+}
+
+#[inline(always)]
+fn dot<I: Isa>(u: &[Lane], v: &[Lane]) -> Lane {
+    let mut sum = NO;
+    for (u, v) in u.iter().zip(v) {
+        sum = I::mul_add(*u, *v, sum);
+    }
+    sum
 }
 
 /// Factors anew with other damping: rare, and so kept out of the way of what is not.
@@ -404,7 +434,7 @@ impl Search {
     /// The next trials: a step on from those that were better, half the way back from the others.
     #[inline(always)]
     fn advance(&mut self, plan: &Plan, progress: &Progress) {
-        for ((&k, &unit), step) in plan.moving.iter().zip(&plan.unit).zip(&self.step) {
+        for ((&k, &unit), step) in plan.moving.iter().zip(&plan.unit).zip(&self.last) {
             let best = self.best[k];
             let back = (self.trial[k] + best) * 0.5;
             let next = NO.where_below(progress.better, best + *step * unit, back);
