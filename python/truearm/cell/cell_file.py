@@ -187,7 +187,8 @@ class Cell:
 
         The direction is that from flange to target, or the flange's z where they coincide.
         """
-        base_from_flange = self._flange(readings[None])[0]
+        # Readings of a step are checked already, and this is on the way of every pose.
+        base_from_flange = self.arm.flange_chain.pose((self.arm.coupling @ readings)[None])[0]
         turn, lever = base_from_flange[:3, :3], self.flange_from_target[:3, 3]
         length = math.hypot(*lever)
         along = lever / length if length > 0.0 else np.array([0.0, 0.0, 1.0])

@@ -16,6 +16,8 @@ from truearm.units import to_si
 Floats = NDArray[np.float64]
 
 SHORTEST_LINK_M: Final = 1e-6
+# Square of what two segments span; of less they count as parallel.
+PARALLEL_M4: Final = 1e-12
 # How far the plate reaches beyond the effective area.
 RIM_M: Final = 0.02
 
@@ -39,7 +41,7 @@ class Clearance:
     """
 
     def __init__(self, arm: Robot, flange_from_target: Floats, panel: Panel, sizes: ClearanceSection) -> None:
-        self._arm, self._panel = arm, panel
+        self._coupling, self._base, self._panel = arm.coupling.T, arm.base[:3, 3], panel
         tip = flange_from_target[:3, 3]
         self._tool = [Chain(*_rows(arm), arm.flange @ _at(share * tip)) for share in (0.5, 1.0)]
         self._radii = to_si(sizes.link_radius_mm + sizes.column_radius_mm, "mm")
@@ -53,14 +55,12 @@ class Clearance:
 
     def places(self, readings: Floats, world_from_base: Floats) -> Places:
         """Where links and tool are at readings (n, N) of an arm whose base stands at a frame (4, 4)."""
-        values = self._arm.joints_from_readings(readings)
-        base = np.broadcast_to(self._arm.base[:3, 3], (len(values), 3))
-        links = [
-            chain.position(np.ascontiguousarray(values[:, : chain.joint_count])) for chain in self._chains
-        ]
-        tool = [chain.position(values) for chain in self._tool]
-        turn, shift = world_from_base[:3, :3].T, world_from_base[:3, 3]
-        placed = np.stack([base, *links, *tool], axis=1) @ turn + shift
+        values, chains = readings @ self._coupling, [*self._chains, *self._tool]
+        in_base = np.empty((len(values), 1 + len(chains), 3))
+        in_base[:, 0] = self._base
+        for k, chain in enumerate(chains, 1):
+            in_base[:, k] = chain.position(np.ascontiguousarray(values[:, : chain.joint_count]))
+        placed = in_base @ world_from_base[:3, :3].T + world_from_base[:3, 3]
         return Places(placed[:, :-2], placed[:, -2:])
 
     def tool_gaps(self, places: Places, carriages: Floats) -> Floats:
@@ -79,7 +79,8 @@ class Clearance:
         """
         panel, links = self._panel, places.links
         top = carriages + panel.offset_m + panel.axes[:, :2] @ (0.5 * panel.area_m)
-        begin, along = links[:, :-1, None], np.diff(links, axis=1)[:, :, None]
+        begin = links[:, :-1, None]
+        along = links[:, 1:, None] - begin
         return np.asarray(_between(begin, along, top, -self._column * panel.normal).min(axis=1) - self._radii)
 
 
@@ -98,12 +99,17 @@ def _between(begin: Floats, along: Floats, top: Floats, down: Floats) -> Floats:
     aa, bb, ab = _dot(along, along), float(down @ down), along @ down
     to_a, to_b = _dot(along, apart), apart @ down
     crossing = aa * bb - ab * ab
-    parallel = crossing <= 0.0
-    s = np.where(parallel, 0.0, (ab * to_b - to_a * bb) / np.where(parallel, 1.0, crossing))
-    t = np.clip((ab * np.clip(s, 0.0, 1.0) + to_b) / bb, 0.0, 1.0)
-    s = np.clip((ab * t - to_a) / np.maximum(aa, SHORTEST_LINK_M**2), 0.0, 1.0)
+    # Of segments that are parallel any place of the first one will do to begin with.
+    s = _share((ab * to_b - to_a * bb) / np.maximum(crossing, PARALLEL_M4))
+    t = _share((ab * s + to_b) / bb)
+    s = _share((ab * t - to_a) / np.maximum(aa, SHORTEST_LINK_M**2))
     nearest = apart + s[..., None] * along - t[..., None] * down
     return np.asarray(np.sqrt(_dot(nearest, nearest)))
+
+
+def _share(values: Floats) -> Floats:
+    """Values brought to between 0 and 1; np.clip takes several times as long for few."""
+    return np.asarray(np.minimum(np.maximum(values, 0.0), 1.0))
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

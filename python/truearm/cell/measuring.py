@@ -100,7 +100,7 @@ class Process:
         self._crew.stop()
 
     def _steps(self) -> str:
-        while (step := self._session.next_step()) is not None:
+        for step in self._session.steps_left():
             if step.kind != "registration" and not self._prediction.is_registered:
                 self._register()
             measured = self._do(step)
@@ -115,7 +115,7 @@ class Process:
         expected = self._prediction.expected(step)
         point, likely_m = self._prediction.point(expected), self._prediction.likely_m
         rules = Rules(self._process.contacts, self._process.attempts, self._agree_m, likely_m)
-        readings, placed, joints = self._session.readings_of(step.step), False, step.readings
+        readings, placed, joints = self._known_of(step), False, step.readings
         verdict = judge(readings, point, rules)
         self._decide(step, verdict)
         while verdict.decision == "again":
@@ -138,6 +138,10 @@ class Process:
             placed = reading.valid and not verdict.suspicious
         self._tell(step, readings, verdict, point)
         return verdict.decision == "accept"
+
+    def _known_of(self, step: Step) -> list[Stored]:
+        """Readings that a former process left; it can have left some of its last step alone."""
+        return self._session.readings_of(step.step) if step.step == self._done_before else []
 
     def _keep(
         self, step: Step, reading: Reading, joints: Floats, expected: Floats, verdict: Verdict, attempt: int

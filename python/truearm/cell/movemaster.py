@@ -56,9 +56,9 @@ def tenths(readings: Floats) -> Tenths:
     return np.rint(np.asarray(readings) / (0.1 * RADIANS_PER_DEGREE)).astype(np.int64)
 
 
-def readings_of(count: Tenths) -> Floats:
+def readings_of(count: Sequence[int] | Tenths) -> Floats:
     """Readings (N,) in rad of whole tenths of a degree."""
-    return np.asarray(count * (0.1 * RADIANS_PER_DEGREE), dtype=np.float64)
+    return np.asarray(np.asarray(count) * (0.1 * RADIANS_PER_DEGREE), dtype=np.float64)
 
 
 def listed(values: Sequence[int] | Tenths) -> str:

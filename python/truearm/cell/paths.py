@@ -1,7 +1,7 @@
 """Whether arm and table keep apart on their ways, under nominal kinematics."""
 
 import math
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Final
 
 import numpy as np
@@ -43,8 +43,8 @@ class Paths:
         tool = clearance.tool_gaps(arm, carriages) - TOOL_MARGIN_M
         links = clearance.gaps(arm, carriages) - clearance.margin_m
         margins = np.minimum(tool, links) - self._uncertain_m
-        ends = np.cumsum([len(way) for way in ways])
-        return [margins[:, end - len(way) : end] for way, end in zip(ways, ends.tolist(), strict=True)]
+        ends = accumulate(len(way) for way in ways)
+        return [margins[:, end - len(way) : end] for way, end in zip(ways, ends, strict=True)]
 
 
 def _along(stops: list[Floats], step: float) -> Floats:

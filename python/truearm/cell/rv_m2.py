@@ -11,6 +11,7 @@ The command set has no way to end a motion. Increments are kept so short that th
 most, and a stop takes hold after the one under way.
 """
 
+import math
 import threading
 import time
 from typing import Final
@@ -35,7 +36,8 @@ from truearm.rotations import rigid_inverse
 from truearm.units import RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
-Tenths = NDArray[np.int64]
+# Few numbers at a time: plain ones are quicker than arrays.
+Tenths = tuple[int, ...]
 
 # The read-out may be off by its rounding, half a unit, and by the rounding of what is added up in it.
 READOUT_TOLERANCE: Final = 0.11
@@ -73,11 +75,11 @@ class RvM2:
         )
         self._count: Tenths | None = None
         self._guesses: list[Tenths] = []
-        self._low, self._high = np.rint(arm.limits.T / (0.1 * RADIANS_PER_DEGREE))
+        self._low, self._high = np.rint(arm.limits.T / (0.1 * RADIANS_PER_DEGREE)).tolist()
         self._leg = max(1, round(10.0 * settings.leg_s * movemaster.SPEEDS_DEG_S[settings.speed]))
         self._busy = threading.RLock()
         self._still_at = 0.0
-        self._seen_at = -np.inf
+        self._seen_at = -math.inf
         self._silences = 0
 
     @property
@@ -103,13 +105,12 @@ class RvM2:
 
     def move_joints(self, readings: Floats) -> None:
         """See Robot. The arm ends at whole tenths of a degree."""
-        target = tenths(readings)
+        target = _count_of(readings)
         self._check_limits(target)
         with self._busy:
-            done = self._known_count()
-            legs = int(np.ceil(np.abs(target - done).max() / self._leg))
+            legs = math.ceil(_longest(_apart(target, self._known_count())) / self._leg)
             for _ in range(legs + TRIES):
-                if np.array_equal(self._known_count(), target):
+                if self._known_count() == target:
                     return
                 self._move_leg(target)
             raise DeviceError(
@@ -146,7 +147,7 @@ class RvM2:
 
     def _go_to_origin(self) -> None:
         self._check_error()
-        origin = tenths(np.array(self._settings.origin_deg) * RADIANS_PER_DEGREE)
+        origin = _count_of(np.array(self._settings.origin_deg) * RADIANS_PER_DEGREE)
         for _ in range(TRIES):
             self._port.send("NT")
             self._port.send(f"SP {self._settings.speed}")
@@ -168,35 +169,35 @@ class RvM2:
         return self._count
 
     def _check_limits(self, target: Tenths) -> None:
-        low, high = self._low, self._high
-        outside = (target < low) | (target > high)
-        if outside.any():
-            joint = int(outside.argmax())
-            raise RefusedError(
-                f"joint {joint + 1} at {target[joint] / 10:.1f} deg",
-                where=self._port.where,
-                rule=f"Its limits are {low[joint] / 10:g} to {high[joint] / 10:g} deg",
-            )
+        for joint, (low, count, high) in enumerate(zip(self._low, target, self._high, strict=True)):
+            if not low <= count <= high:
+                raise RefusedError(
+                    f"joint {joint + 1} at {count / 10:.1f} deg",
+                    where=self._port.where,
+                    rule=f"Its limits are {low / 10:g} to {high / 10:g} deg",
+                )
 
     def _move_leg(self, target: Tenths) -> None:
         """One increment straight towards the target, and a look at where that led."""
         before = self._known_count()
-        share = min(1.0, self._leg / float(np.abs(target - before).max()))
-        step = np.rint(share * (target - before)).astype(np.int64)
+        way = _apart(target, before)
+        share = min(1.0, self._leg / _longest(way))
+        step = tuple(round(share * each) for each in way)
+        there, beyond = (tuple(b + n * s for b, s in zip(before, step, strict=True)) for n in (1, 2))
         self._port.send(f"MJ {movemaster.listed(step)}")
-        self._count, self._guesses = None, [before + step, before, before + 2 * step]
-        self._seen_at = -np.inf
+        self._count, self._guesses = None, [there, before, beyond]
+        self._seen_at = -math.inf
         seconds = MOTION_MARGIN * self._seconds(step)
         self._still_at = time.monotonic() + seconds
         self._locate(self._guesses, self._port.limit_s + seconds)
-        if np.array_equal(self._known_count(), before):
+        if self._known_count() == before:
             # Lost, or only late: sent again too early it would be done twice.
             self._port.pause(self._port.limit_s)
-            self._locate([before, before + step], self._port.limit_s + seconds)
+            self._locate([before, there], self._port.limit_s + seconds)
         self._still_at = 0.0
 
     def _seconds(self, step: Tenths) -> float:
-        return float(np.abs(step).max()) / 10.0 / movemaster.SPEEDS_DEG_S[self._settings.speed]
+        return _longest(step) / 10.0 / movemaster.SPEEDS_DEG_S[self._settings.speed]
 
     def _locate(self, guesses: list[Tenths], limit_s: float, *, strict: bool = True) -> bool:
         """Ask where the arm is until the answer fits, and take the count that it fits.
@@ -210,7 +211,7 @@ class RvM2:
             if seen is not None and self._fits(seen, guesses[0]):
                 self._count = guesses[0]
                 return True
-            if seen is not None and last is not None and np.array_equal(seen, last):
+            if seen is not None and seen == last:
                 found = self._recognised(seen, guesses) if strict else None
                 if found is not None:
                     self._count = found
@@ -232,26 +233,27 @@ class RvM2:
         self._port.drain()
         self._port.send("WH")
         try:
-            return movemaster.parse_numbers(self._port.receive(limit_s, doing="say where it is"))
+            numbers = movemaster.parse_numbers(self._port.receive(limit_s, doing="say where it is"))
         except DeviceSilentError:
             self._silences += 1
             if self._silences >= TRIES // 2:
                 raise
             return None
+        return None if numbers is None else tuple(numbers.tolist())
 
     def _recognised(self, seen: Tenths, guesses: list[Tenths]) -> Tenths | None:
         for guess in guesses:
             if self._fits(seen, guess):
                 return guess
         for seed in guesses:
-            found = movemaster.readings_near(self._arm, np.asarray(0.1 * seen), readings_of(seed))
-            if found is not None and self._fits(seen, tenths(found)):
-                return tenths(found)
+            found = movemaster.readings_near(self._arm, 0.1 * np.array(seen), readings_of(seed))
+            if found is not None and self._fits(seen, _count_of(found)):
+                return _count_of(found)
         return None
 
     def _fits(self, seen: Tenths, count: Tenths) -> bool:
-        nominal = movemaster.whereabouts(self._arm, readings_of(count))
-        fits = bool(np.abs(nominal - 0.1 * seen).max() <= READOUT_TOLERANCE)
+        nominal = movemaster.whereabouts(self._arm, readings_of(count)).tolist()
+        fits = all(abs(a - 0.1 * b) <= READOUT_TOLERANCE for a, b in zip(nominal, seen, strict=True))
         if fits:
             self._silences, self._seen_at = 0, time.monotonic()
         return fits
@@ -282,3 +284,15 @@ class RvM2:
                 where=self._port.where,
                 way_out="Release the button, reset the controller, and start again: the session continues",
             )
+
+
+def _count_of(readings: Floats) -> Tenths:
+    return tuple(tenths(readings).tolist())
+
+
+def _apart(target: Tenths, start: Tenths) -> Tenths:
+    return tuple(to - at for to, at in zip(target, start, strict=True))
+
+
+def _longest(way: Tenths) -> int:
+    return max(map(abs, way))

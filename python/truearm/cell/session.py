@@ -25,6 +25,10 @@ from truearm.rotations import quaternion_from_matrix
 Floats = NDArray[np.float64]
 
 ADD_READING: Final = "INSERT INTO readings VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)"
+STEPS_LEFT: Final = (
+    "SELECT * FROM steps WHERE step > coalesce((SELECT max(step) FROM outcomes), -1) ORDER BY step LIMIT ?"
+)
+STEPS_AT_ONCE: Final = 100
 MAGIC: Final = b"SQLite format 3\x00"
 
 
@@ -127,11 +131,13 @@ class Session:
 
     def next_step(self) -> Step | None:
         """The first step that has no outcome."""
-        row = self._db.execute(
-            "SELECT * FROM steps WHERE step > coalesce((SELECT max(step) FROM outcomes), -1) "
-            "ORDER BY step LIMIT 1"
-        ).fetchone()
-        return None if row is None else _step(row)
+        rows = self.rows(STEPS_LEFT, (1,))
+        return _step(rows[0]) if rows else None
+
+    def steps_left(self) -> Iterator[Step]:
+        """The steps that have no outcome, each of which has to get one before the next is asked for."""
+        while rows := self.rows(STEPS_LEFT, (STEPS_AT_ONCE,)):
+            yield from map(_step, rows)
 
     def steps(self, kind: str) -> list[Step]:
         """All steps of a kind."""
