@@ -56,9 +56,10 @@ def killed(found: dict) -> list[str]:
     kill = found["kill"]
     return [
         row(
-            f"`kill -9` at {kill['kills']} random moments of a session",
+            f"`kill -9` at {kill['kills']} random moments of {kill['sessions']} sessions",
             "every acknowledged reading there once, the session completes, the same calibration",
-            f"{kill['acknowledged']} acknowledged, none lost, none doubled; the same {kill['poses']} of "
+            f"{kill['in_time']} before the end of the session; {kill['acknowledged']} poses acknowledged, "
+            f"none lost, none doubled; the same {kill['poses']} of "
             f"{kill['of']} poses as without kills, the same data to the bit",
         )
     ]
@@ -110,7 +111,7 @@ def long_session(found: dict) -> list[str]:
             f"{content['poses']}-pose session",
             "memory flat, below 1 ms of process time a pose beside waiting",
             f"{content['process_ms_a_pose']:.2f} ms a pose, two readings each; memory grew by "
-            f"{content['grown_mb']:.1f} MB",
+            f"{content['grown_mb']:.1f} MB to {content['memory_mb']:.0f} MB in the last three quarters",
         )
     ]
 

@@ -5,6 +5,7 @@ import resource
 import signal
 import socket
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -52,25 +53,28 @@ def finished(session):
 
 @pytest.mark.slow
 def test_killed_at_random_moments_nothing_is_lost_or_doubled(tmp_path):
-    kills, count = sized((2, 12), (200, 500))
+    sessions, kills, count = sized((1, 2, 12), (4, 50, 250))
+    with ThreadPoolExecutor(sessions) as side_by_side:
+        numbers = range(sessions)
+        found = list(side_by_side.map(lambda n: killed_session(tmp_path / str(n), n, kills, count), numbers))
+    total = {key: sum(each[key] for each in found) for key in found[0]}
+    record("kill", sessions=sessions, kills=sessions * kills, **total)
+
+
+def killed_session(folder, seed, kills, count):
+    """A session that is killed again and again, beside one that is not; what came of it."""
     # Noise that follows from the pose makes a session that was killed comparable with one that was not.
     text = cell_text(simulate={"repeatable": True, "speed": 100.0}, process={"stretch": 20})
-    poses = poses_of(Cell.from_toml(text), count, seed=5)
-    write_poses(tmp_path / "poses.csv", poses)
-    killed, whole = tmp_path / "killed.db", tmp_path / "whole.db"
-    said = []
-    with simulated(tmp_path, text) as cell:
-        done = measuring(cell, tmp_path / "poses.csv", whole)
+    poses = poses_of(Cell.from_toml(text), count, seed=5 + seed)
+    folder.mkdir()
+    write_poses(folder / "poses.csv", poses)
+    killed, whole = folder / "killed.db", folder / "whole.db"
+    with simulated(folder, text) as cell:
+        done = measuring(cell, folder / "poses.csv", whole)
         told = done.communicate()[1]
         assert done.returncode == 0, told[-2000:]
-        for number, moment in enumerate(moments(kills, 2.5)):
-            process = measuring(cell, tmp_path / "poses.csv", killed)
-            said += acknowledged(killed_after(process, moment, once_it_measures=number % 2 == 0))
-            stored = outcomes(killed) if killed.exists() else []
-            poses_stored = [step for step in stored if step[0] == "pose"]
-            assert len(set(poses_stored)) == len(poses_stored)
-            assert set(said) <= set(stored)
-        last = measuring(cell, tmp_path / "poses.csv", killed)
+        said, in_time = kill_often(cell, folder / "poses.csv", killed, moments(kills, 2.5, seed))
+        last = measuring(cell, folder / "poses.csv", killed)
         told = last.communicate()[1]
         said += acknowledged(told)
         assert last.returncode == 0, told[-2000:]
@@ -80,7 +84,21 @@ def test_killed_at_random_moments_nothing_is_lost_or_doubled(tmp_path):
     assert summary["measured"] + len(summary["skipped"]) == count
     assert table["pose"].is_unique
     assert content == expected, "the calibration of a session that was killed is another"
-    record("kill", kills=kills, acknowledged=len(said), poses=len(table), of=len(reference))
+    return {"in_time": in_time, "acknowledged": len(said), "poses": len(table), "of": len(reference)}
+
+
+def kill_often(cell, poses, session, at):
+    """Kill at moments; what was acknowledged, and how many kills came before the session was complete."""
+    said, in_time = [], 0
+    for number, moment in enumerate(at):
+        process = measuring(cell, poses, session)
+        said += acknowledged(killed_after(process, moment, once_it_measures=number % 2 == 0))
+        in_time += process.returncode == -signal.SIGKILL
+        stored = outcomes(session) if session.exists() else []
+        poses_stored = [step for step in stored if step[0] == "pose"]
+        assert len(set(poses_stored)) == len(poses_stored)
+        assert set(said) <= set(stored)
+    return said, in_time
 
 
 @pytest.mark.slow

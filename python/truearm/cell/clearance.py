@@ -45,7 +45,9 @@ class Clearance:
         tip = flange_from_target[:3, 3]
         self._tool = [Chain(*_rows(arm), arm.flange @ _at(share * tip)) for share in (0.5, 1.0)]
         self._radii = to_si(sizes.link_radius_mm + sizes.column_radius_mm, "mm")
-        self._column = to_si(sizes.column_mm, "mm")
+        self._top = panel.offset_m + panel.axes[:, :2] @ (0.5 * panel.area_m)
+        self._down = -to_si(sizes.column_mm, "mm") * panel.normal
+        self._beyond_m = panel.area_m + RIM_M
         self.margin_m = to_si(sizes.margin_mm, "mm")
         self._chains = [
             Chain(arm.convention, list(arm.joints[:k]), np.array(arm.table[:k]), arm.base, np.eye(4))
@@ -67,7 +69,7 @@ class Clearance:
         """Distances of the tool from the plate (n, m), m; negative below its face. As for gaps."""
         panel = self._panel
         seen = (places.tool[:, :, None] - (carriages + panel.offset_m)) @ panel.axes
-        beside = np.maximum(-RIM_M - seen[..., :2], seen[..., :2] - (panel.area_m + RIM_M)).max(axis=-1)
+        beside = np.maximum(-RIM_M - seen[..., :2], seen[..., :2] - self._beyond_m).max(axis=-1)
         return np.asarray(np.maximum(seen[..., 2], beside).min(axis=1))
 
     def gaps(self, places: Places, carriages: Floats) -> Floats:
@@ -77,11 +79,10 @@ class Clearance:
             places: Where the arm is (n).
             carriages: Places of the carriage (m, 3), each combined with every place of the arm, m.
         """
-        panel, links = self._panel, places.links
-        top = carriages + panel.offset_m + panel.axes[:, :2] @ (0.5 * panel.area_m)
-        begin = links[:, :-1, None]
-        along = links[:, 1:, None] - begin
-        return np.asarray(_between(begin, along, top, -self._column * panel.normal).min(axis=1) - self._radii)
+        begin = places.links[:, :-1, None]
+        along = places.links[:, 1:, None] - begin
+        distances = _between(begin, along, carriages + self._top, self._down)
+        return np.asarray(distances.min(axis=1) - self._radii)
 
 
 def _between(begin: Floats, along: Floats, top: Floats, down: Floats) -> Floats:

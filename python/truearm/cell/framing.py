@@ -20,8 +20,9 @@ def framed(number: int, text: str) -> str:
 
 def unframed(line: str) -> tuple[int, str] | None:
     """Number and text of a line, None where it is damaged."""
-    match = FRAME.fullmatch(line.strip())
-    if match is None or int(match[3], 16) != _sum(line.strip()[:-5]):
+    text = line.strip()
+    match = FRAME.fullmatch(text)
+    if match is None or int(match[3], 16) != _sum(text[:-5]):
         return None
     return int(match[1]), match[2]
 

@@ -152,9 +152,11 @@ class LinePort:
             raise gone(self.device, self.address, str(error)) from None
         if not data:
             return False
-        *lines, self._rest = END_OF_LINE.split(self._rest + data)
-        self._rest = self._rest[-LONGEST_LINE:]
-        self._lines.extend(line.decode("ascii", "replace") for line in lines if line)
+        *lines, rest = END_OF_LINE.split(self._rest + data)
+        self._rest = rest[-LONGEST_LINE:] if rest else rest
+        for line in lines:
+            if line:
+                self._lines.append(line.decode("ascii", "replace"))
         return True
 
     def _open_channel(self) -> Channel:

@@ -275,8 +275,8 @@ class Process:
         if verdict.decision == "give up":
             self._say(f"{step.kind} {step.pose + 1} skipped: {verdict.reason}")
             return
-        points = [r.point for r in readings if r.attempt in verdict.attempts and r.point is not None]
-        residual_mm = MM_PER_METRE * math.dist(mean_point([point.tolist() for point in points]), expected)
+        points = [r.point.tolist() for r in readings if r.attempt in verdict.attempts and r.point is not None]
+        residual_mm = MM_PER_METRE * math.dist(mean_point(points), expected.tolist())
         self._say(f"{step.kind} {step.pose + 1} stored, {residual_mm:.3f} mm from the prediction")
 
     def _say(self, text: str) -> None:

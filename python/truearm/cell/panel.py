@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -43,14 +44,18 @@ class Panel:
         axes = np.column_stack([AXES[u], across, AXES[normal]])
         return cls(area_m, counts, offset_m, axes, least_angle_rad)
 
-    @property
+    @cached_property
     def normal(self) -> Floats:
         """Out of the face, towards the pin (3,)."""
         return np.asarray(self.axes[:, 2])
 
     def point(self, carriage: Floats, counts: Floats) -> Floats:
         """The point in the table's frame (3,) that the panel shows at `counts` (2,), m."""
-        return np.asarray(carriage + self.offset_m + self.axes[:, :2] @ (counts * self.area_m / self.counts))
+        return np.asarray(carriage + self.offset_m + self._metres_of_counts @ counts)
+
+    @cached_property
+    def _metres_of_counts(self) -> Floats:
+        return np.asarray(self.axes[:, :2] * (self.area_m / self.counts))
 
     def seen(self, carriage: Floats, point: Floats) -> Floats:
         """A point in the table's frame as the panel sees it (3,): along u, along v, above its face; m."""

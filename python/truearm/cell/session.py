@@ -29,6 +29,7 @@ STEPS_LEFT: Final = (
     "SELECT * FROM steps WHERE step > coalesce((SELECT max(step) FROM outcomes), -1) ORDER BY step LIMIT ?"
 )
 STEPS_AT_ONCE: Final = 100
+NO_FEATURES: Final = "{}"
 MAGIC: Final = b"SQLite format 3\x00"
 
 
@@ -164,7 +165,11 @@ class Session:
             turn = quaternion_from_matrix(reading.pose_in_world[:3, :3]).tolist()
         head = (step, attempt, reading.time_s, _listed(joints))
         quality = (reading.sigma_m, int(reading.valid), reading.reason)
-        tail = (reading.temperature_c, json.dumps(reading.features), reading.raw)
+        tail = (
+            reading.temperature_c,
+            json.dumps(reading.features) if reading.features else NO_FEATURES,
+            reading.raw,
+        )
         self._db.execute(ADD_READING, (*head, *point, *turn, *quality, *expected.tolist(), *tail))
 
     def add_outcome(self, step: int, outcome: str, *, reason: str = "", attempts: Sequence[int] = ()) -> None:
