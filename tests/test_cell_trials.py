@@ -53,7 +53,7 @@ def finished(session):
 
 @pytest.mark.slow
 def test_killed_at_random_moments_nothing_is_lost_or_doubled(tmp_path):
-    sessions, kills, count = sized((1, 2, 12), (4, 50, 250))
+    sessions, kills, count = sized((1, 2, 12), (4, 50, 100))
     with ThreadPoolExecutor(sessions) as side_by_side:
         numbers = range(sessions)
         found = list(side_by_side.map(lambda n: killed_session(tmp_path / str(n), n, kills, count), numbers))
@@ -98,6 +98,7 @@ def kill_often(cell, poses, session, at):
         poses_stored = [step for step in stored if step[0] == "pose"]
         assert len(set(poses_stored)) == len(poses_stored)
         assert set(said) <= set(stored)
+        say(f"{session}: kill {number + 1}, {len(poses_stored)} poses stored")
     return said, in_time
 
 
