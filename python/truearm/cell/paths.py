@@ -53,7 +53,7 @@ def _along(stops: list[Floats], step: float) -> Floats:
     listed = [stop.tolist() for stop in stops]
     places = [listed[0]]
     for a, b in pairwise(listed):
-        count = math.ceil(max(abs(y - x) for x, y in zip(a, b, strict=True)) / step) + 1
-        shares = [k / count for k in range(1, count + 1)]
-        places += [[x + share * (y - x) for x, y in zip(a, b, strict=True)] for share in shares]
+        leg = [(x, y - x) for x, y in zip(a, b, strict=True)]
+        count = math.ceil(max(abs(way) for _, way in leg) / step) + 1
+        places += [[x + k / count * way for x, way in leg] for k in range(1, count + 1)]
     return np.array(places)
