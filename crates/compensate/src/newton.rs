@@ -182,6 +182,8 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
     let mut progress = Progress::new();
     let mut factor = Factor::<M>::NONE;
     search.trial.copy_from_slice(&search.best);
+    search.last.fill(NO);
+    search.older.fill(NO);
     for step in 0..=plan.steps {
         let stale = progress.any_stale();
         let frame = if stale {
@@ -281,8 +283,8 @@ impl Progress {
         self.correct::<I>(plan, fresh, search);
     }
 
-    /// Broyden's updates of the step for the two before it. Flag `fresh`: the Jacobian is new, or the step damped, and stays as
-    /// it is.
+    /// Broyden's updates of the step for the two before it. Flag `fresh`: the Jacobian is new, or the step damped, and
+    /// stays as it is.
     #[inline(always)]
     fn correct<I: Isa>(&mut self, plan: &Plan, fresh: Lane, search: &mut Search) {
         let moving = plan.moving.len();
@@ -318,8 +320,8 @@ impl Progress {
 
     /// Which poses need a Jacobian at their next trial: those with a large error, and those that did not improve.
     ///
-    /// Where the parameters vary no Jacobian of the chain is better than that of the start, once corrected, as long as errors
-    /// fall with it.
+    /// Where the parameters vary no Jacobian of the chain is better than that of the start, once corrected, as long as
+    /// errors fall with it.
     #[inline(always)]
     fn settle(&mut self, norm: Lane, varied: bool) {
         let mut far = Lane::splat(CALM * CALM).where_below(norm, YES, NO);
