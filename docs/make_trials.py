@@ -58,7 +58,7 @@ def killed(found: dict) -> list[str]:
         row(
             f"`kill -9` at {kill['kills']} random moments of {kill['sessions']} sessions",
             "every acknowledged reading there once, the session completes, the same calibration",
-            f"{kill['in_time']} before the end of the session; {kill['acknowledged']} poses acknowledged, "
+            f"{kill['in_time']} before the end of the session; {kill['acknowledged']} steps acknowledged, "
             f"none lost, none doubled; the same {kill['poses']} of "
             f"{kill['of']} poses as without kills, the same data to the bit",
         )
