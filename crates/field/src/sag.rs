@@ -1,8 +1,9 @@
 //! The `sag` block: each joint gives way in proportion to what it carries.
 //!
 //! A joint with stiffness s under the weights w_k of the links behind it turns by `sum_k w_k g_jk / s`, where g_jk is the
-//! derivative by joint j of the height at which link k ends: the lever of that weight. Weights and stiffness are not known apart: the block has one number for each pair of joints, rad
-//! for each metre of lever. Levers are those of the nominal arm, and up is the z axis of the base.
+//! derivative by joint j of the height at which link k ends: the lever of that weight. Weights and stiffness are not
+//! known apart: the block has one number for each pair of joints, rad for each metre of lever. Levers are those of the
+//! nominal arm, and up is the z axis of the base.
 
 use truearm_kinematics::{
     Chain, Isa, Kernel, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters, dispatch, lever_count,
