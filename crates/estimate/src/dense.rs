@@ -72,15 +72,25 @@ impl Cholesky {
         to_vec(column.as_ref())
     }
 
+    /// The matrix that holds the factor, for another use.
+    pub fn into_matrix(self) -> Mat<f64> {
+        self.lower
+    }
+
     /// A^-1, both triangles, (n, n).
     pub fn inverse(&self) -> Mat<f64> {
-        let n = self.len();
-        let mut out = Mat::zeros(n, n);
-        let mut memory = faer::dyn_stack::MemBuffer::new(inverse::inverse_scratch::<f64>(n, self.par));
-        let stack = faer::dyn_stack::MemStack::new(&mut memory);
-        inverse::inverse(out.as_mut(), self.lower.as_ref(), self.par, stack);
+        let mut out = Mat::zeros(self.len(), self.len());
+        self.inverse_lower(out.as_mut());
         mirror_lower(&mut out);
         out
+    }
+
+    /// Overwrites the lower triangle of `out` (n, n) with that of A^-1.
+    pub fn inverse_lower(&self, out: MatMut<f64>) {
+        let mut memory =
+            faer::dyn_stack::MemBuffer::new(inverse::inverse_scratch::<f64>(self.len(), self.par));
+        let stack = faer::dyn_stack::MemStack::new(&mut memory);
+        inverse::inverse(out, self.lower.as_ref(), self.par, stack);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::kernel::{Input, InputKind, Value};
+use crate::kernel::{Input, InputKind};
 
 /// Largest number of cells that are active at once along one input (cubic memberships).
 pub const MOST_ACTIVE: usize = 4;
@@ -203,6 +203,12 @@ impl Active {
             .filter(|entry| *entry.1 != 0.0)
             .map(|(&cell, &grade)| (cell as usize, grade))
     }
+
+    /// The cells' values by their grades, given those of all cells.
+    #[inline]
+    pub fn weigh(&self, values: &[f64]) -> f64 {
+        self.nonzero().map(|(cell, grade)| grade * values[cell]).sum()
+    }
 }
 
 /// The prior of one axis's cells, and the kernel between values that it implies through the memberships.
@@ -216,9 +222,9 @@ pub struct CellKernel {
 
 impl CellKernel {
     /// The prior of an axis's cells under a kernel.
-    pub fn new(axis: Axis, kernel: impl Fn(f64) -> Value) -> Self {
+    pub fn new(axis: Axis, kernel: impl Fn(f64) -> f64) -> Self {
         let raw: Vec<f64> = (0..axis.count)
-            .map(|apart| kernel(axis.input.distance_of(axis.spacing * apart as f64)).kernel)
+            .map(|apart| kernel(axis.input.distance_of(axis.spacing * apart as f64)))
             .collect();
         let mut cells = Self { axis, correlation: raw };
         const SAMPLES: usize = 16;
@@ -238,13 +244,17 @@ impl CellKernel {
     /// Kernel between two values, given the cells that they excite.
     #[inline]
     pub fn implied(&self, a: &Active, b: &Active) -> f64 {
-        let mut sum = 0.0;
-        for (i, p) in a.nonzero() {
-            for (j, q) in b.nonzero() {
-                sum += p * q * self.correlation[i.abs_diff(j)];
-            }
-        }
-        sum
+        b.nonzero().map(|(j, grade)| grade * self.with_cell(a, j)).sum()
+    }
+
+    /// Kernel between a value, given the cells that it excites, and each cell, (count,).
+    pub fn line(&self, a: &Active) -> Vec<f64> {
+        (0..self.axis.count).map(|j| self.with_cell(a, j)).collect()
+    }
+
+    #[inline]
+    fn with_cell(&self, a: &Active, j: usize) -> f64 {
+        a.nonzero().map(|(i, grade)| grade * self.correlation[i.abs_diff(j)]).sum()
     }
 
     /// Prior variance at a value, as if the axis went on beyond its last cells.
@@ -273,7 +283,7 @@ impl CellKernel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::{matern, squared_exponential};
+    use crate::kernel::Shape;
     use proptest::prelude::*;
 
     fn closed(degree: usize) -> Axis {
@@ -306,9 +316,9 @@ mod tests {
 
         #[test]
         fn implied_kernel_is_close_to_the_kernel(a in 0.0..6.2f64, b in 0.0..6.2f64) {
-            let cells = CellKernel::new(closed(2), |d| squared_exponential(d, 0.3));
+            let cells = CellKernel::new(closed(2), |d| Shape::SquaredExponential.at(d, 0.3));
             let implied = cells.implied(&cells.axis.active(a), &cells.axis.active(b));
-            let exact = squared_exponential(Input::ANGLE.distance(a, b), 0.3).kernel;
+            let exact = Shape::SquaredExponential.at(Input::ANGLE.distance(a, b), 0.3);
             prop_assert!((implied - exact).abs() < 0.06, "{implied} {exact}");
         }
     }
@@ -316,7 +326,7 @@ mod tests {
     #[test]
     fn prior_variance_goes_on_where_there_are_no_cells() {
         for degree in [2, 3] {
-            let cells = CellKernel::new(open(degree), |d| matern(d, 0.2));
+            let cells = CellKernel::new(open(degree), |d| Shape::Matern.at(d, 0.2));
             let inside = cells.axis.active(3.4);
             assert!((cells.variance(3.4) - cells.implied(&inside, &inside)).abs() < 1e-12);
             let outside = 3.4 + 10.0 * cells.axis.spacing - TAU;
@@ -333,7 +343,7 @@ mod tests {
 
     #[test]
     fn spread_is_the_product_with_the_correlation_matrix() {
-        let cells = CellKernel::new(open(2), |d| matern(d, 0.2));
+        let cells = CellKernel::new(open(2), |d| Shape::Matern.at(d, 0.2));
         let (count, inner) = (cells.axis.count, 2);
         let values: Vec<f64> = (0..count * inner).map(|k| (k as f64).sin()).collect();
         let spread = cells.spread(&values, inner);

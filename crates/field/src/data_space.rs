@@ -14,7 +14,7 @@ use truearm_estimate::dense::{Cholesky, parallelism};
 use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::model::{BlockPlan, Excited, Implied, Model};
-use crate::pairs::covariance;
+use crate::pairs::write_covariance;
 use crate::posterior::{LeaveOneOut, Query, Solution};
 use crate::product::{product, times};
 
@@ -40,11 +40,10 @@ impl DataSpace {
         let rows = training.row_count();
         let error = || FieldError::NotPositiveDefinite { rows };
         let kernels = Implied { cells: &model.cells, excited: &excited };
-        let matrix = covariance(training, &model.by_column, &model.hyper, &kernels);
-        let dense = MatRef::from_column_major_slice(&matrix, rows, rows).to_owned();
-        drop(matrix);
+        let mut matrix = Mat::zeros(rows, rows);
+        write_covariance(training, &model.by_column, &model.hyper, &kernels, matrix.as_mut());
         cancel.check()?;
-        let factor = Cholesky::new(dense, parallelism()).ok_or_else(error)?;
+        let factor = Cholesky::new(matrix, parallelism()).ok_or_else(error)?;
         let setup = MatRef::from_row_major_slice(&training.setup, rows, training.setup_width);
         let mut spread = setup.to_owned();
         factor.solve(spread.as_mut());
@@ -167,10 +166,11 @@ impl DataSpace {
         let mut out = Vec::new();
         for block in blocks {
             let rows: Vec<usize> = block.iter().flat_map(|&pose| training.rows(pose)).collect();
-            let precision = Mat::from_fn(rows.len(), rows.len(), |i, j| {
-                let setup = root.col(rows[i]).transpose() * root.col(rows[j]);
-                inverse[(rows[i], rows[j])] - setup
-            });
+            let own = Mat::from_fn(root.nrows(), rows.len(), |k, i| root[(k, rows[i])]);
+            let mut precision = product(own.transpose(), own.as_ref()) * faer::Scale(-1.0);
+            for j in 0..rows.len() {
+                (0..rows.len()).for_each(|i| precision[(i, j)] += inverse[(rows[i], rows[j])]);
+            }
             let error = FieldError::NotPositiveDefinite { rows: rows.len() };
             let factor = Cholesky::new(precision, parallelism()).ok_or(error)?;
             let local: Vec<f64> = rows.iter().map(|&row| alpha[row]).collect();
@@ -208,7 +208,7 @@ impl DataSpace {
         let (learned, lost) = self.reduced(query, poses.clone());
         for (index, pose) in poses.enumerate() {
             let excited = self.model.cells.excite(query.values_of(pose));
-            let priors = self.model.variances(&excited, &excited);
+            let priors = self.model.variances(&excited);
             for i in 0..rows {
                 for j in 0..rows {
                     let (a, b) = (index * rows + i, index * rows + j);
@@ -223,14 +223,16 @@ impl DataSpace {
 
     /// Covariance (n m, n m) of all rows of a query with one another.
     pub fn joint(&self, query: &Query) -> Mat<f64> {
+        let training = &self.model.training;
         let (learned, lost) = self.reduced(query, 0..query.poses());
         let excited: Vec<Excited> =
             (0..query.poses()).map(|pose| self.model.cells.excite(query.values_of(pose))).collect();
         let mut joint = product(learned.transpose(), learned.as_ref()) * faer::Scale(-1.0);
         joint += product(lost.transpose(), lost.as_ref());
         let prior = |a: usize| -> Vec<f64> {
-            let covariance = |b| query.cross((a, b), &self.model.variances(&excited[a], &excited[b]));
-            (0..=a).flat_map(covariance).collect()
+            let covariances = self.model.covariances(&excited[a], &excited[..=a]);
+            let covariances = covariances.chunks_exact(training.columns.len());
+            covariances.enumerate().flat_map(|(b, covariances)| query.cross((a, b), covariances)).collect()
         };
         let priors: Vec<Vec<f64>> = (0..query.poses()).into_par_iter().map(prior).collect();
         for (a, blocks) in priors.iter().enumerate() {
@@ -268,8 +270,8 @@ impl DataSpace {
     fn cross(&self, excited: &Excited, rows: &[f64], mut out: MatMut<f64>) {
         let training = &self.model.training;
         let columns = training.columns.len();
-        for pose in 0..training.pose_count() {
-            let variances = self.model.variances(excited, &self.excited[pose]);
+        let covariances = self.model.covariances(excited, &self.excited);
+        for (pose, variances) in covariances.chunks_exact(columns).enumerate() {
             for row in training.rows(pose) {
                 let entries = training.jacobian_row(row);
                 for (k, own) in rows.chunks_exact(columns).enumerate() {

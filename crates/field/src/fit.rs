@@ -9,11 +9,11 @@ use crate::extrapolation::extrapolation_factor;
 use crate::hyper::Hyper;
 use crate::kernel::Input;
 use crate::linear::training;
-use crate::optimise::Limits;
+use crate::optimise::{Curvature, Limits};
 use crate::outliers::{self, Judgement};
 use crate::posterior::{Posterior, Solution};
 use crate::refine::relinearised;
-use crate::select::{Found, contest_major, prune_major, refine, select_major};
+use crate::select::{Found, contest_major, prune_major, refine_with, select_major};
 use crate::training::Training;
 use crate::widening::with_widenings;
 
@@ -96,7 +96,7 @@ pub fn fit_field(
     let point = Point { parameters: &constant.parameters, setup: &constant.setup };
     let mut training = training(problem, point, options)?;
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
-    let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0 };
+    let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0, curvature: None };
     let mut hyper = search.first(&training, noise)?;
     let mut judged = search.judge(search.posterior(&training, &hyper)?)?;
     training = judged.posterior.training().clone();
@@ -157,6 +157,7 @@ struct Search<'a> {
     options: &'a FieldOptions,
     evidence: f64,
     evaluations: usize,
+    curvature: Curvature,
 }
 
 impl Search<'_> {
@@ -179,7 +180,7 @@ impl Search<'_> {
         let chosen = select_major(&small, joints, noise, &self.options.cancel)?;
         let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
         let evidence = Evidence::new(&middle, &self.options.cancel);
-        let mut found = refine(&evidence, chosen.hyper, SEARCH)?;
+        let mut found = refine_with(&evidence, chosen.hyper, chosen.curvature, SEARCH)?;
         found.evaluations += chosen.evaluations;
         let found = contest_major(&evidence, found, joints)?;
         let mut found = prune_major(&evidence, found)?;
@@ -198,7 +199,8 @@ impl Search<'_> {
             return Ok(hyper);
         }
         let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0));
-        let found = refine(&Evidence::new(&large, &self.options.cancel), hyper, POLISH)?;
+        let evidence = Evidence::new(&large, &self.options.cancel);
+        let found = refine_with(&evidence, hyper, self.curvature.take(), POLISH)?;
         self.note(&found);
         Ok(found.hyper)
     }
@@ -206,6 +208,7 @@ impl Search<'_> {
     fn note(&mut self, found: &Found) {
         self.evidence = found.value;
         self.evaluations += found.evaluations;
+        self.curvature = found.curvature.clone();
     }
 
     fn posterior(&self, training: &Training, hyper: &Hyper) -> Result<Posterior, FieldError> {
@@ -223,7 +226,7 @@ impl Search<'_> {
 }
 
 fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Found, FieldError> {
-    let better = refine(evidence, found.hyper, limits)?;
+    let better = refine_with(evidence, found.hyper, found.curvature, limits)?;
     Ok(Found { evaluations: found.evaluations + better.evaluations, ..better })
 }
 

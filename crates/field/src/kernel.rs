@@ -5,6 +5,8 @@
 //! features, with u scaled so that the data's range is pi. At short distances both are half the squared
 //! distance.
 
+use truearm_kinematics::{Isa, Kernel, Lane, dispatch, exp};
+
 /// What kind of values an input takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InputKind {
@@ -50,27 +52,60 @@ impl Input {
     }
 }
 
-/// A kernel and its derivative by the logarithm of the length scale.
+/// How a kernel falls with the distance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// exp(-D / l^2).
+    SquaredExponential,
+    /// Matern 5/2 of r = sqrt(2 D) / l: (1 + sqrt5 r + 5 r^2 / 3) exp(-sqrt5 r) (Rasmussen and Williams 2006, eq. 4.17).
+    Matern,
+}
+
+/// Kernels of eight distances and their derivatives by the logarithm of the length scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Value {
-    pub kernel: f64,
-    pub by_log_length: f64,
+    pub kernel: Lane,
+    pub by_log_length: Lane,
 }
 
-/// exp(-D / l^2).
-#[inline]
-pub fn squared_exponential(distance: f64, length: f64) -> Value {
-    let exponent = distance / (length * length);
-    let kernel = (-exponent).exp();
-    Value { kernel, by_log_length: 2.0 * exponent * kernel }
+impl Shape {
+    /// Kernels of eight distances.
+    #[inline(always)]
+    pub fn of<I: Isa>(self, distance: Lane, length: f64) -> Value {
+        match self {
+            Self::SquaredExponential => {
+                let exponent = distance * (1.0 / (length * length));
+                let kernel = exp::<I>(-exponent);
+                Value { kernel, by_log_length: exponent * kernel * 2.0 }
+            }
+            Self::Matern => {
+                let s = (distance * 10.0).sqrt() * (1.0 / length);
+                let decay = exp::<I>(-s);
+                let (linear, square) = (s + Lane::splat(1.0), s * s * (1.0 / 3.0));
+                Value { kernel: (linear + square) * decay, by_log_length: square * linear * decay }
+            }
+        }
+    }
+
+    /// The kernel of one distance.
+    pub fn at(self, distance: f64, length: f64) -> f64 {
+        dispatch(Of { shape: self, distance, length }).kernel.0[0]
+    }
 }
 
-/// Matern 5/2 of r = sqrt(2 D) / l: (1 + sqrt5 r + 5 r^2 / 3) exp(-sqrt5 r) (Rasmussen and Williams 2006, eq. 4.17).
-#[inline]
-pub fn matern(distance: f64, length: f64) -> Value {
-    let s = (10.0 * distance).sqrt() / length;
-    let decay = (-s).exp();
-    Value { kernel: (1.0 + s + s * s / 3.0) * decay, by_log_length: s * s * (1.0 + s) * decay / 3.0 }
+struct Of {
+    shape: Shape,
+    distance: f64,
+    length: f64,
+}
+
+impl Kernel for Of {
+    type Output = Value;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Value {
+        self.shape.of::<I>(Lane::splat(self.distance), self.length)
+    }
 }
 
 #[cfg(test)]
@@ -79,13 +114,29 @@ mod tests {
 
     #[test]
     fn derivatives_match_finite_differences() {
-        for kernel in [squared_exponential, matern] {
+        for shape in [Shape::SquaredExponential, Shape::Matern] {
             for distance in [0.0, 1e-4, 0.03, 0.7, 2.0] {
                 let (length, step) = (0.37_f64, 1e-6_f64);
-                let difference = (kernel(distance, length * step.exp()).kernel
-                    - kernel(distance, length * (-step).exp()).kernel)
+                let difference = (shape.at(distance, length * step.exp())
+                    - shape.at(distance, length * (-step).exp()))
                     / (2.0 * step);
-                assert!((difference - kernel(distance, length).by_log_length).abs() < 1e-8);
+                let value = dispatch(Of { shape, distance, length });
+                assert!((difference - value.by_log_length.0[7]).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn kernels_match_their_formulas() {
+        for distance in [0.0_f64, 1e-4, 0.03, 0.7, 2.0] {
+            let length = 0.37;
+            let s = (10.0 * distance).sqrt() / length;
+            let pairs = [
+                (Shape::SquaredExponential, (-distance / (length * length)).exp()),
+                (Shape::Matern, (1.0 + s + s * s / 3.0) * (-s).exp()),
+            ];
+            for (shape, expected) in pairs {
+                assert!((shape.at(distance, length) / expected - 1.0).abs() < 1e-14, "{shape:?} {distance}");
             }
         }
     }

@@ -22,6 +22,7 @@ mod compiled_axis;
 mod compiled_table;
 mod conservative;
 mod conservative_fit;
+mod continuous;
 mod data_space;
 mod error;
 mod evidence;

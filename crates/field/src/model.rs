@@ -2,7 +2,7 @@
 
 use crate::cells::{Active, Axis, CellKernel, Grid};
 use crate::hyper::{Hyper, Product};
-use crate::kernel::{matern, squared_exponential};
+use crate::kernel::Shape;
 use crate::pairs::{ByColumn, PairKernels, PairTable};
 use crate::sag::{Levers, Sag, alike};
 use crate::training::Training;
@@ -33,10 +33,10 @@ impl Cells {
         };
         let own = |k: usize| {
             let axis = axis(k, hyper.own_length, OWN_CELLS);
-            by_column.own[k].map(|_| CellKernel::new(axis, |d| matern(d, hyper.own_length)))
+            by_column.own[k].map(|_| CellKernel::new(axis, |d| Shape::Matern.at(d, hyper.own_length)))
         };
         let smooth = |k: usize, length: f64| {
-            CellKernel::new(axis(k, length, CELLS), |d| squared_exponential(d, length))
+            CellKernel::new(axis(k, length, CELLS), |d| Shape::SquaredExponential.at(d, length))
         };
         let product = |product: &Product| {
             let joints = product.joints.iter().zip(&product.lengths);
@@ -69,55 +69,56 @@ impl Cells {
         }
     }
 
-    /// Prior correlations of two configurations.
-    fn kernels(&self, a: &Excited, b: &Excited) -> Correlations {
-        let own = self.own.iter().zip(a.own.iter().zip(&b.own)).map(|(cells, pair)| match (cells, pair) {
-            (Some(cells), (Some(a), Some(b))) => cells.implied(a, b),
-            _ => 0.0,
-        });
-        let smooth = self.smooth.iter().zip(a.smooth.iter().zip(&b.smooth));
-        let product = |(index, axes): (usize, &Vec<(usize, CellKernel)>)| {
-            let pairs = a.products[index].iter().zip(&b.products[index]);
-            axes.iter().zip(pairs).map(|((_, cells), (a, b))| cells.implied(a, b)).product()
-        };
-        Correlations {
-            own: own.collect(),
-            sag: self.loads(&a.levers, &b.levers),
-            smooth: smooth.map(|(cells, (a, b))| cells.implied(a, b)).sum(),
-            products: self.products.iter().enumerate().map(product).collect(),
+    /// Prior correlations of one configuration with others.
+    pub fn fill(&self, here: &Excited, others: &[Excited], table: &mut PairTable) {
+        table.clear(self.own.len(), self.products.len(), others.len());
+        for (k, column) in table.own.iter_mut().enumerate() {
+            if let (Some(cells), Some(active)) = (&self.own[k], &here.own[k]) {
+                let line = cells.line(active);
+                let values = others.iter().map(|other| other.own[k].as_ref().map_or(0.0, |a| a.weigh(&line)));
+                column.iter_mut().zip(values).for_each(|(out, value)| *out = value);
+            }
+        }
+        for (k, (cells, active)) in self.smooth.iter().zip(&here.smooth).enumerate() {
+            let line = cells.line(active);
+            let values = others.iter().map(|other| other.smooth[k].weigh(&line));
+            table.smooth.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        }
+        for (index, (column, axes)) in table.products.iter_mut().zip(&self.products).enumerate() {
+            column.fill(1.0);
+            for (k, (_, cells)) in axes.iter().enumerate() {
+                let line = cells.line(&here.products[index][k]);
+                let values = others.iter().map(|other| other.products[index][k].weigh(&line));
+                column.iter_mut().zip(values).for_each(|(product, value)| *product *= value);
+            }
+        }
+        for (i, other) in others.iter().enumerate() {
+            self.fill_loads(&here.levers, &other.levers, table, i);
         }
     }
-}
 
-impl Cells {
-    /// How alike the loads of the joints are under two sets of levers, (I,).
-    fn loads(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
+    /// How alike the loads of the joints are under two sets of levers.
+    fn fill_loads(&self, here: &[f64], there: &[f64], table: &mut PairTable, at: usize) {
         let mut loads = vec![0.0; self.own.len()];
-        alike(self.geometry.joint_count(), a, b, &mut loads);
-        loads
+        alike(self.geometry.joint_count(), here, there, &mut loads);
+        table.sag.iter_mut().zip(&loads).for_each(|(column, load)| column[at] = *load);
     }
 
     /// Prior variances of the blocks at one configuration, cells beyond the axes included.
-    fn unbounded(&self, values: &[f64]) -> Correlations {
-        let of = |k: usize, cells: &CellKernel| cells.variance(values[k]);
-        let own = |(k, cells): (usize, &Option<CellKernel>)| cells.as_ref().map_or(0.0, |cells| of(k, cells));
-        let product = |axes: &Vec<(usize, CellKernel)>| axes.iter().map(|(k, cells)| of(*k, cells)).product();
-        let levers = self.geometry.at(values);
-        Correlations {
-            own: self.own.iter().enumerate().map(own).collect(),
-            sag: self.loads(&levers, &levers),
-            smooth: self.smooth.iter().enumerate().map(|(k, cells)| of(k, cells)).sum(),
-            products: self.products.iter().map(product).collect(),
+    fn unbounded(&self, values: &[f64]) -> PairTable {
+        let mut table = PairTable::default();
+        table.clear(self.own.len(), self.products.len(), 1);
+        for (k, (column, cells)) in table.own.iter_mut().zip(&self.own).enumerate() {
+            column[0] = cells.as_ref().map_or(0.0, |cells| cells.variance(values[k]));
         }
+        table.smooth[0] = self.smooth.iter().zip(values).map(|(cells, &value)| cells.variance(value)).sum();
+        for (column, axes) in table.products.iter_mut().zip(&self.products) {
+            column[0] = axes.iter().map(|(k, cells)| cells.variance(values[*k])).product();
+        }
+        let levers = self.geometry.at(values);
+        self.fill_loads(&levers, &levers, &mut table, 0);
+        table
     }
-}
-
-/// Prior correlations of two configurations, by block.
-struct Correlations {
-    own: Vec<f64>,
-    sag: Vec<f64>,
-    smooth: f64,
-    products: Vec<f64>,
 }
 
 /// Excited cells of one configuration.
@@ -137,14 +138,7 @@ pub struct Implied<'a> {
 
 impl PairKernels for Implied<'_> {
     fn fill(&self, j: usize, table: &mut PairTable) {
-        table.clear(self.cells.own.len(), self.cells.products.len(), self.excited.len() - j);
-        for (i, other) in self.excited[j..].iter().enumerate() {
-            let kernels = self.cells.kernels(&self.excited[j], other);
-            table.own.iter_mut().zip(kernels.own).for_each(|(column, value)| column[i] = value);
-            table.sag.iter_mut().zip(kernels.sag).for_each(|(column, value)| column[i] = value);
-            table.smooth[i] = kernels.smooth;
-            table.products.iter_mut().zip(kernels.products).for_each(|(column, value)| column[i] = value);
-        }
+        self.cells.fill(&self.excited[j], &self.excited[j..], table);
     }
 }
 
@@ -233,9 +227,16 @@ impl Model {
         Some(Sag { levers: self.training.geometry.clone(), outputs, weights })
     }
 
-    /// Prior covariance of each column's CEP at two configurations, (P,).
-    pub fn variances(&self, a: &Excited, b: &Excited) -> Vec<f64> {
-        self.combined(&self.cells.kernels(a, b))
+    /// Prior covariance of each column's CEP at one configuration and at others, (n, P).
+    pub fn covariances(&self, here: &Excited, others: &[Excited]) -> Vec<f64> {
+        let mut table = PairTable::default();
+        self.cells.fill(here, others, &mut table);
+        self.combined(&table, others.len())
+    }
+
+    /// Prior variance of each column's CEP at a configuration, (P,).
+    pub fn variances(&self, here: &Excited) -> Vec<f64> {
+        self.covariances(here, std::slice::from_ref(here))
     }
 
     /// What the cells leave out of each column's prior variance at a configuration beyond their axes, (P,).
@@ -243,33 +244,30 @@ impl Model {
     /// No row excites the cells that would be there: their share of the posterior variance is the prior's.
     pub fn beyond(&self, values: &[f64]) -> Vec<f64> {
         let excited = self.cells.excite(values);
-        let whole = self.combined(&self.cells.unbounded(values));
-        whole
-            .iter()
-            .zip(self.variances(&excited, &excited))
-            .map(|(all, held)| (all - held).max(0.0))
-            .collect()
+        let whole = self.combined(&self.cells.unbounded(values), 1);
+        whole.iter().zip(self.variances(&excited)).map(|(all, held)| (all - held).max(0.0)).collect()
     }
 
-    fn combined(&self, kernels: &Correlations) -> Vec<f64> {
-        let mut variances: Vec<f64> = self
-            .training
-            .columns
-            .iter()
-            .map(|column| (self.hyper.constant * column.constant).powi(2))
-            .collect();
-        for (class, columns) in self.by_column.driven.iter().enumerate() {
-            let products = self.hyper.products.iter().zip(&kernels.products);
-            let products: f64 = products.map(|(product, k)| product.amplitudes[class].powi(2) * k).sum();
-            let value = self.hyper.smooth[class].powi(2) * kernels.smooth + products;
-            columns.iter().for_each(|&p| variances[p] += value);
-        }
-        for (k, entry) in self.by_column.own.iter().enumerate() {
-            if let Some((p, lever)) = entry {
-                variances[*p] += (self.hyper.own * lever).powi(2) * kernels.own[k];
-                variances[*p] += (self.hyper.sag * lever).powi(2) * kernels.sag[k];
+    /// Prior covariances of each column's CEP, (count, P).
+    fn combined(&self, table: &PairTable, count: usize) -> Vec<f64> {
+        let width = self.training.columns.len();
+        let constants: Vec<f64> = (0..width).map(|p| self.constant_deviation(p).powi(2)).collect();
+        let mut out = constants.repeat(count);
+        for (i, variances) in out.chunks_exact_mut(width).enumerate() {
+            for (class, columns) in self.by_column.driven.iter().enumerate() {
+                let products = self.hyper.products.iter().zip(&table.products);
+                let products: f64 =
+                    products.map(|(product, kernels)| product.amplitudes[class].powi(2) * kernels[i]).sum();
+                let value = self.hyper.smooth[class].powi(2) * table.smooth[i] + products;
+                columns.iter().for_each(|&p| variances[p] += value);
+            }
+            for (k, entry) in self.by_column.own.iter().enumerate() {
+                if let Some((p, lever)) = entry {
+                    variances[*p] += (self.hyper.own * lever).powi(2) * table.own[k][i];
+                    variances[*p] += (self.hyper.sag * lever).powi(2) * table.sag[k][i];
+                }
             }
         }
-        variances
+        out
     }
 }

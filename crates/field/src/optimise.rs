@@ -20,7 +20,12 @@ pub struct Optimum {
     pub point: Vec<f64>,
     pub value: f64,
     pub evaluations: usize,
+    /// What the search learned of the curvature.
+    pub curvature: Curvature,
 }
+
+/// Approximation of the inverse of the negative Hessian; `None` where none is known.
+pub type Curvature = Option<Inverse>;
 
 /// Longest step in any logarithm: a factor of about four.
 const LONGEST_STEP: f64 = 1.4;
@@ -34,29 +39,30 @@ struct Search<'a, F> {
     evaluations: usize,
 }
 
-/// Maximises `function` over logarithms that start at `start`.
+/// Maximises `function` over logarithms that start at `start`, with what an earlier search learned of its curvature.
 ///
 /// # Errors
 /// Those of the function at the start; elsewhere a point where it fails counts as infinitely bad, except when the
 /// caller asked to stop.
 pub fn maximise<F>(
     function: F,
-    start: &[f64],
+    (start, curvature): (&[f64], Curvature),
     ranges: &[Range],
     limits: Limits,
 ) -> Result<Optimum, FieldError>
 where
     F: FnMut(&[f64]) -> Result<Score, FieldError>,
 {
-    Search { function, ranges, limits, evaluations: 0 }.run(start)
+    Search { function, ranges, limits, evaluations: 0 }.run(start, curvature)
 }
 
 impl<F: FnMut(&[f64]) -> Result<Score, FieldError>> Search<'_, F> {
-    fn run(&mut self, start: &[f64]) -> Result<Optimum, FieldError> {
+    fn run(&mut self, start: &[f64], curvature: Curvature) -> Result<Optimum, FieldError> {
         let mut point = self.clamped(start);
         let mut here = self.evaluate(&point)?;
-        let mut inverse = Inverse::identity(point.len(), 0.1);
-        let mut fresh = true;
+        let known = curvature.filter(|inverse| inverse.size == point.len());
+        let mut fresh = known.is_none();
+        let mut inverse = known.unwrap_or_else(|| Inverse::identity(point.len(), 0.1));
         while self.evaluations < self.limits.evaluations {
             let free = self.free(&point, &here.gradient);
             let direction = limited(inverse.times(&here.gradient, &free));
@@ -78,7 +84,8 @@ impl<F: FnMut(&[f64]) -> Result<Score, FieldError>> Search<'_, F> {
                 break;
             }
         }
-        Ok(Optimum { point, value: here.value, evaluations: self.evaluations })
+        let curvature = (!fresh).then_some(inverse);
+        Ok(Optimum { point, value: here.value, evaluations: self.evaluations, curvature })
     }
 
     fn evaluate(&mut self, point: &[f64]) -> Result<Score, FieldError> {
@@ -142,13 +149,22 @@ fn limited(mut direction: Vec<f64>) -> Vec<f64> {
     direction
 }
 
-/// Approximation of the negative Hessian's inverse.
-struct Inverse {
+/// A symmetric positive definite matrix.
+#[derive(Debug, Clone)]
+pub struct Inverse {
     size: usize,
     entries: Vec<f64>,
 }
 
 impl Inverse {
+    /// The same without one coordinate.
+    pub fn without(&self, coordinate: usize) -> Self {
+        let kept = (0..self.entries.len())
+            .filter(|k| k / self.size != coordinate && k % self.size != coordinate)
+            .map(|k| self.entries[k]);
+        Self { size: self.size - 1, entries: kept.collect() }
+    }
+
     fn identity(size: usize, scale: f64) -> Self {
         let entries = (0..size * size).map(|k| if k / size == k % size { scale } else { 0.0 }).collect();
         Self { size, entries }
@@ -213,7 +229,7 @@ mod tests {
     #[test]
     fn finds_the_maximum() {
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let optimum = maximise(valley, &[0.0; 4], &ranges(1e3), limits).unwrap();
+        let optimum = maximise(valley, (&[0.0; 4], None), &ranges(1e3), limits).unwrap();
         assert!(optimum.point.iter().all(|x| (x - 0.5).abs() < 1e-4), "{optimum:?}");
     }
 
@@ -226,7 +242,7 @@ mod tests {
             seen.extend(point.to_vec());
             valley(point)
         };
-        let optimum = maximise(watched, &[9.0; 4], &ranges, limits).unwrap();
+        let optimum = maximise(watched, (&[9.0; 4], None), &ranges, limits).unwrap();
         assert!(optimum.point.iter().all(|x| (x - 1.2_f64.ln()).abs() < 1e-9), "{optimum:?}");
         assert!(seen.iter().all(|x| (1e-3_f64.ln()..=1.2_f64.ln()).contains(x)));
     }
@@ -236,7 +252,7 @@ mod tests {
         let mut ranges = ranges(1e3);
         ranges[1].high = 1.1;
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let optimum = maximise(valley, &[-1.0; 4], &ranges, limits).unwrap();
+        let optimum = maximise(valley, (&[-1.0; 4], None), &ranges, limits).unwrap();
         assert!((optimum.point[1] - 1.1_f64.ln()).abs() < 1e-12);
         assert!([0, 2, 3].iter().all(|&k| (optimum.point[k] - 0.5_f64).abs() < 1e-4), "{optimum:?}");
     }
@@ -247,9 +263,9 @@ mod tests {
             if point[0] > 0.4 { Err(FieldError::NotPositiveDefinite { rows: 1 }) } else { valley(point) }
         };
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let optimum = maximise(fails_beyond, &[-1.0; 4], &ranges(1e3), limits).unwrap();
+        let optimum = maximise(fails_beyond, (&[-1.0; 4], None), &ranges(1e3), limits).unwrap();
         assert!(optimum.point[0] <= 0.4 && optimum.value > valley(&[-1.0; 4]).unwrap().value + 10.0);
-        let refused = maximise(fails_beyond, &[1.0; 4], &ranges(1e3), limits).unwrap_err();
+        let refused = maximise(fails_beyond, (&[1.0; 4], None), &ranges(1e3), limits).unwrap_err();
         assert_eq!(refused, FieldError::NotPositiveDefinite { rows: 1 });
     }
 
@@ -261,7 +277,7 @@ mod tests {
             if left == 0 { Err(FieldError::Estimate(EstimateError::Cancelled)) } else { valley(point) }
         };
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let stopped = maximise(stops, &[0.0; 4], &ranges(1e3), limits).unwrap_err();
+        let stopped = maximise(stops, (&[0.0; 4], None), &ranges(1e3), limits).unwrap_err();
         assert_eq!(stopped, FieldError::Estimate(EstimateError::Cancelled));
         assert_eq!(left, 0, "nothing is evaluated after the request");
     }
@@ -269,7 +285,7 @@ mod tests {
     #[test]
     fn evaluations_are_bounded() {
         let limits = Limits { evaluations: 3, gain: 0.0 };
-        let optimum = maximise(valley, &[-3.0; 4], &ranges(1e3), limits).unwrap();
+        let optimum = maximise(valley, (&[-3.0; 4], None), &ranges(1e3), limits).unwrap();
         assert_eq!(optimum.evaluations, 3);
         assert!(optimum.value > valley(&[-3.0; 4]).unwrap().value);
     }

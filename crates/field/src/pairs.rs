@@ -6,8 +6,10 @@
 //! The sums over the parameters of a class are formed first, for all rows at once, so that the inner loops run over
 //! contiguous rows; nothing of the size of the matrix is kept but the matrix.
 
+use faer::prelude::ReborrowMut;
+use faer::{ColRef, MatMut};
 use rayon::prelude::*;
-use truearm_kinematics::{Isa, Kernel, dispatch};
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
 use crate::hyper::{Hyper, OWN_LEVER};
 use crate::kernel::InputKind;
@@ -46,8 +48,8 @@ pub trait PairKernels: Sync {
 /// The Jacobian by columns, with what each column is driven by.
 pub struct ByColumn {
     pub rows: usize,
-    /// (P, R).
-    pub jacobian: Vec<f64>,
+    /// (P, R), and room behind each column for a step.
+    jacobian: Vec<f64>,
     /// Pose of each row.
     pub pose: Vec<usize>,
     /// Columns of each class that blocks drive.
@@ -56,15 +58,28 @@ pub struct ByColumn {
     pub own: Vec<Option<(usize, f64)>>,
     /// Column and prior variance of each constant.
     pub constant: Vec<(usize, f64)>,
+    /// Columns that are summed together.
+    groups: Vec<Group>,
 }
+
+/// Columns of one class with one prior variance of their constants.
+struct Group {
+    /// The class whose blocks drive them, by its index.
+    class: Option<usize>,
+    constant: f64,
+    columns: Vec<usize>,
+}
+
+/// Rows that are summed at a time: sums stay in registers.
+const STEP: usize = 4 * LANES;
 
 impl ByColumn {
     pub fn new(training: &Training) -> Self {
         let (rows, width) = (training.row_count(), training.columns.len());
-        let mut jacobian = vec![0.0; rows * width];
+        let mut jacobian = vec![0.0; (rows + STEP) * width];
         for row in 0..rows {
             for (p, value) in training.jacobian_row(row).iter().enumerate() {
-                jacobian[p * rows + row] = *value;
+                jacobian[p * (rows + STEP) + row] = *value;
             }
         }
         let of_class = |class: Class| {
@@ -80,6 +95,15 @@ impl ByColumn {
             }
         }
         let constant = training.columns.iter().enumerate().filter(|(_, column)| column.constant > 0.0);
+        let mut groups: Vec<Group> = Vec::new();
+        for (p, column) in training.columns.iter().enumerate() {
+            let class = column.driven.then(|| Class::of(column.parameter).index());
+            let constant = column.constant.powi(2);
+            match groups.iter_mut().find(|group| group.class == class && group.constant == constant) {
+                Some(group) => group.columns.push(p),
+                None => groups.push(Group { class, constant, columns: vec![p] }),
+            }
+        }
         Self {
             rows,
             jacobian,
@@ -89,31 +113,27 @@ impl ByColumn {
             driven: [of_class(Class::Theta), of_class(Class::Angle), of_class(Class::Length)],
             own,
             constant: constant.map(|(p, column)| (p, column.constant.powi(2))).collect(),
+            groups,
         }
     }
 
     /// Column `p` from row `first` on.
     #[inline(always)]
     pub fn column(&self, p: usize, first: usize) -> &[f64] {
-        &self.jacobian[p * self.rows + first..(p + 1) * self.rows]
+        &self.from(p, first)[..self.rows - first]
     }
 
-    /// `out[r] = sum over p of J[r, p] weight_p J[c, p]` for rows r from `first` on.
+    /// Entry of a row.
     #[inline(always)]
-    pub fn products(
-        &self,
-        terms: impl Iterator<Item = (usize, f64)>,
-        row: usize,
-        first: usize,
-        out: &mut [f64],
-    ) {
-        out.fill(0.0);
-        for (p, weight) in terms {
-            let factor = weight * self.jacobian[p * self.rows + row];
-            for (sum, value) in out.iter_mut().zip(self.column(p, first)) {
-                *sum += factor * value;
-            }
-        }
+    pub fn entry(&self, p: usize, row: usize) -> f64 {
+        self.jacobian[p * (self.rows + STEP) + row]
+    }
+
+    /// Column `p` from row `first` on, with zeros behind it for a whole step.
+    #[inline(always)]
+    fn from(&self, p: usize, first: usize) -> &[f64] {
+        let width = self.rows + STEP;
+        &self.jacobian[p * width + first..(p + 1) * width]
     }
 }
 
@@ -126,14 +146,45 @@ pub struct ClassSums {
 
 impl ClassSums {
     #[inline(always)]
-    pub fn fill(&mut self, by_column: &ByColumn, row: usize, first: usize) {
+    pub fn fill<I: Isa>(&mut self, by_column: &ByColumn, row: usize, first: usize) {
         let count = by_column.rows - first;
-        self.constant.resize(count, 0.0);
-        by_column.products(by_column.constant.iter().copied(), row, first, &mut self.constant);
-        for (class, sums) in self.classes.iter_mut().enumerate() {
-            sums.resize(count, 0.0);
-            by_column.products(by_column.driven[class].iter().map(|&p| (p, 1.0)), row, first, sums);
+        let room = count.next_multiple_of(STEP);
+        self.constant.resize(room, 0.0);
+        self.classes.iter_mut().for_each(|sums| sums.resize(room, 0.0));
+        for start in (0..room).step_by(STEP) {
+            let mut constant = [Lane::ZERO; STEP / LANES];
+            let mut classes = [[Lane::ZERO; STEP / LANES]; 3];
+            for group in &by_column.groups {
+                let mut sum = [Lane::ZERO; STEP / LANES];
+                for &p in &group.columns {
+                    let factor = Lane::splat(by_column.entry(p, row));
+                    let values = by_column.from(p, first + start)[..STEP].as_chunks().0;
+                    for (sum, values) in sum.iter_mut().zip(values) {
+                        *sum = I::mul_add(factor, Lane(*values), *sum);
+                    }
+                }
+                let variance = Lane::splat(group.constant);
+                for (total, sum) in constant.iter_mut().zip(&sum) {
+                    *total = I::mul_add(variance, *sum, *total);
+                }
+                if let Some(class) = group.class {
+                    for (total, sum) in classes[class].iter_mut().zip(&sum) {
+                        *total += *sum;
+                    }
+                }
+            }
+            write(&mut self.constant[start..start + STEP], &constant);
+            for (sums, found) in self.classes.iter_mut().zip(&classes) {
+                write(&mut sums[start..start + STEP], found);
+            }
         }
+    }
+}
+
+#[inline(always)]
+fn write(out: &mut [f64], lanes: &[Lane; STEP / LANES]) {
+    for (out, lane) in out.as_chunks_mut().0.iter_mut().zip(lanes) {
+        *out = lane.0;
     }
 }
 
@@ -142,6 +193,7 @@ impl ClassSums {
 struct RowFactors {
     classes: [Vec<f64>; 3],
     own: Vec<Vec<f64>>,
+    by_pose: Vec<f64>,
 }
 
 impl RowFactors {
@@ -154,29 +206,34 @@ impl RowFactors {
         (pose, first): (usize, usize),
     ) {
         let poses = &by_column.pose[first..];
+        let by_pose = &mut self.by_pose;
         for (class, factors) in self.classes.iter_mut().enumerate() {
             let smooth = hyper.smooth[class].powi(2);
-            factors.clear();
-            factors.extend(poses.iter().map(|i| smooth * table.smooth[i - pose]));
+            by_pose.clear();
+            by_pose.extend(table.smooth.iter().map(|kernel| smooth * kernel));
             for (product, kernels) in hyper.products.iter().zip(&table.products) {
                 let variance = product.amplitudes[class].powi(2);
-                let terms = poses.iter().map(|i| variance * kernels[i - pose]);
-                factors.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+                by_pose.iter_mut().zip(kernels).for_each(|(sum, kernel)| *sum += variance * kernel);
             }
+            repeat(by_pose, poses, pose, factors);
         }
         self.own.resize(by_column.own.len(), Vec::new());
         let tables = table.own.iter().zip(&table.sag);
         for ((factors, (kernels, loads)), own) in self.own.iter_mut().zip(tables).zip(&by_column.own) {
-            let lever = own.map_or(0.0, |(_, lever)| lever);
-            let sag = (hyper.sag * lever).powi(2);
-            let (variance, anew) = ((hyper.own * lever).powi(2), (hyper.repeatability * lever).powi(2));
-            factors.clear();
-            factors.extend(poses.iter().map(|i| {
-                let varying = variance * kernels[i - pose] + sag * loads[i - pose];
-                varying + if *i == pose { anew } else { 0.0 }
-            }));
+            let Some((_, lever)) = own else { continue };
+            let (variance, sag) = ((hyper.own * lever).powi(2), (hyper.sag * lever).powi(2));
+            by_pose.clear();
+            by_pose.extend(kernels.iter().zip(loads).map(|(kernel, load)| variance * kernel + sag * load));
+            by_pose[0] += (hyper.repeatability * lever).powi(2);
+            repeat(by_pose, poses, pose, factors);
         }
     }
+}
+
+/// Values of poses from `first` on, for each row the one of its pose.
+fn repeat(values: &[f64], poses: &[usize], first: usize, out: &mut Vec<f64>) {
+    out.clear();
+    out.extend(poses.iter().map(|pose| values[pose - first]));
 }
 
 struct PoseColumns<'a> {
@@ -185,7 +242,7 @@ struct PoseColumns<'a> {
     hyper: &'a Hyper,
     factors: &'a RowFactors,
     pose: usize,
-    out: &'a mut [f64],
+    out: MatMut<'a, f64>,
 }
 
 impl Kernel for PoseColumns<'_> {
@@ -193,29 +250,25 @@ impl Kernel for PoseColumns<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        let Self { training, by_column, hyper, factors, pose, out } = self;
+        let Self { training, by_column, hyper, factors, pose, mut out } = self;
         let rows = training.rows(pose);
         let first = rows.start;
+        let mut column = Vec::new();
         let mut sums = ClassSums::default();
         for (k, row) in rows.enumerate() {
-            let column = &mut out[k * by_column.rows + first..(k + 1) * by_column.rows];
-            sums.fill(by_column, row, first);
+            sums.fill::<I>(by_column, row, first);
             let constant = hyper.constant * hyper.constant;
-            for (value, sum) in column.iter_mut().zip(&sums.constant) {
-                *value = constant * sum;
-            }
+            column.clear();
+            column.extend(sums.constant[..by_column.rows - first].iter().map(|sum| constant * sum));
             for (sums, factors) in sums.classes.iter().zip(&factors.classes) {
-                add_products(column, sums, factors, 1.0);
+                add_products(&mut column, sums, factors, 1.0);
             }
             for (own, factors) in by_column.own.iter().zip(&factors.own) {
                 let Some((p, _)) = own else { continue };
-                add_products(
-                    column,
-                    by_column.column(*p, first),
-                    factors,
-                    by_column.jacobian[p * by_column.rows + row],
-                );
+                add_products(&mut column, by_column.column(*p, first), factors, by_column.entry(*p, row));
             }
+            let mut out = out.rb_mut().col_mut(k).subrows_mut(first, column.len());
+            out.copy_from(ColRef::from_slice(&column));
         }
     }
 }
@@ -228,34 +281,34 @@ pub fn add_products(out: &mut [f64], a: &[f64], b: &[f64], scale: f64) {
     }
 }
 
-/// The lower triangle of the rows' covariance with noise on its diagonal, column-major (R, R).
-pub fn covariance(
+/// Writes the rows' covariance with noise on its diagonal, (R, R), into the lower triangle of `matrix`.
+pub fn write_covariance(
     training: &Training,
     by_column: &ByColumn,
     hyper: &Hyper,
     kernels: &impl PairKernels,
-) -> Vec<f64> {
-    let rows = by_column.rows;
-    let mut matrix = vec![0.0; rows * rows];
+    mut matrix: MatMut<f64>,
+) {
     let scratch = || (PairTable::default(), RowFactors::default());
-    by_pose(training, &mut matrix).into_par_iter().for_each_init(scratch, |(table, factors), (pose, out)| {
-        kernels.fill(pose, table);
-        factors.fill(by_column, hyper, table, (pose, training.rows(pose).start));
-        dispatch(PoseColumns { training, by_column, hyper, factors, pose, out });
-    });
-    for row in 0..rows {
-        matrix[row * rows + row] += training.noise_variance(row, hyper.noise);
+    by_pose(training, matrix.rb_mut()).into_par_iter().for_each_init(
+        scratch,
+        |(table, factors), (pose, out)| {
+            kernels.fill(pose, table);
+            factors.fill(by_column, hyper, table, (pose, training.rows(pose).start));
+            dispatch(PoseColumns { training, by_column, hyper, factors, pose, out });
+        },
+    );
+    for row in 0..by_column.rows {
+        matrix[(row, row)] += training.noise_variance(row, hyper.noise);
     }
-    matrix
 }
 
 /// Columns of the matrix that belong to each pose.
-fn by_pose<'a>(training: &Training, matrix: &'a mut [f64]) -> Vec<(usize, &'a mut [f64])> {
-    let rows = training.row_count();
+fn by_pose<'a>(training: &Training, matrix: MatMut<'a, f64>) -> Vec<(usize, MatMut<'a, f64>)> {
     let mut rest = matrix;
     let mut parts = Vec::with_capacity(training.pose_count());
     for pose in 0..training.pose_count() {
-        let (head, tail) = rest.split_at_mut(training.rows(pose).len() * rows);
+        let (head, tail) = rest.split_at_col_mut(training.rows(pose).len());
         parts.push((pose, head));
         rest = tail;
     }

@@ -270,7 +270,7 @@ impl Posterior {
         let mut out = Vec::with_capacity(query.poses() * rows);
         for pose in 0..query.poses() {
             let excited = model.cells.excite(query.values_of(pose));
-            let mut variances = model.variances(&excited, &excited);
+            let mut variances = model.variances(&excited);
             let beyond = model.beyond(query.values_of(pose));
             variances.iter_mut().zip(beyond).for_each(|(variance, more)| *variance += more);
             out.extend((0..rows).map(|i| scale * query.prior(pose, (i, i), &variances)));

@@ -11,7 +11,7 @@ use truearm_estimate::Cancel;
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
-use crate::optimise::{Limits, maximise};
+use crate::optimise::{Curvature, Limits, maximise};
 use crate::training::Training;
 
 /// A joint must bring this many nats to stay.
@@ -30,6 +30,8 @@ pub struct Found {
     pub hyper: Hyper,
     pub value: f64,
     pub evaluations: usize,
+    /// What the search learned of the evidence's curvature.
+    pub curvature: Curvature,
 }
 
 /// Hyper-parameters of three joints at the most, fitted to a small training set from several starts.
@@ -57,7 +59,7 @@ pub fn select_major(
         return Err(FieldError::Length { what: "starts", found: 0, expected: 1 });
     };
     while best.hyper.major_joints().len() > MOST {
-        best = cheapest_removal(&evidence, &best.hyper, &mut evaluations)?;
+        best = cheapest_removal(&evidence, &best, &mut evaluations)?;
     }
     Ok(Found { evaluations, ..best })
 }
@@ -96,7 +98,7 @@ pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result
 pub fn prune_major(evidence: &Evidence, mut best: Found) -> Result<Found, FieldError> {
     while best.hyper.major_joints().len() > FEWEST {
         let mut evaluations = best.evaluations;
-        let candidate = cheapest_removal(evidence, &best.hyper, &mut evaluations)?;
+        let candidate = cheapest_removal(evidence, &best, &mut evaluations)?;
         if best.value - candidate.value >= WORTH {
             best.evaluations = evaluations;
             break;
@@ -107,14 +109,15 @@ pub fn prune_major(evidence: &Evidence, mut best: Found) -> Result<Found, FieldE
 }
 
 /// The removal that costs least, among those that leave more than joints of the wrist.
-fn cheapest_removal(evidence: &Evidence, from: &Hyper, evaluations: &mut usize) -> Result<Found, FieldError> {
+fn cheapest_removal(evidence: &Evidence, from: &Found, evaluations: &mut usize) -> Result<Found, FieldError> {
     let mut best: Option<Found> = None;
-    for position in 0..from.major_joints().len() {
-        let candidate = from.without_major(position);
+    for position in 0..from.hyper.major_joints().len() {
+        let candidate = from.hyper.without_major(position);
         if candidate.major_is_wrist() {
             continue;
         }
-        let found = refine(evidence, candidate, REFIT)?;
+        let known = from.curvature.as_ref().map(|inverse| inverse.without(Hyper::major_length(position)));
+        let found = refine_with(evidence, candidate, known, REFIT)?;
         *evaluations += found.evaluations;
         if best.as_ref().is_none_or(|best| found.value > best.value) {
             best = Some(found);
@@ -128,11 +131,25 @@ fn cheapest_removal(evidence: &Evidence, from: &Hyper, evaluations: &mut usize) 
 /// # Errors
 /// [`FieldError`] of the evidence.
 pub fn refine(evidence: &Evidence, start: Hyper, limits: Limits) -> Result<Found, FieldError> {
+    refine_with(evidence, start, None, limits)
+}
+
+/// The same with what is known of the evidence's curvature.
+///
+/// # Errors
+/// [`FieldError`] of the evidence.
+pub fn refine_with(
+    evidence: &Evidence,
+    start: Hyper,
+    curvature: Curvature,
+    limits: Limits,
+) -> Result<Found, FieldError> {
     let score = |logs: &[f64]| evidence.score(&start.with_logs(logs));
-    let optimum = maximise(score, &start.to_logs(), &start.ranges(), limits)?;
+    let optimum = maximise(score, (&start.to_logs(), curvature), &start.ranges(), limits)?;
     Ok(Found {
         hyper: start.with_logs(&optimum.point),
         value: optimum.value,
         evaluations: optimum.evaluations,
+        curvature: optimum.curvature,
     })
 }

@@ -59,7 +59,7 @@ fn covariance_grows_away_from_the_data_up_to_the_prior() {
         assert!(sums[0] < sums[1] && sums[1] < sums[2], "{sums:?}");
         let far = at(1.3);
         let excited = prior.cells.excite(&far);
-        let held = prior.variances(&excited, &excited);
+        let held = prior.variances(&excited);
         let beyond = prior.beyond(&far);
         for (p, found) in variances(&posterior, &far).iter().enumerate() {
             let most = held[p] + beyond[p];

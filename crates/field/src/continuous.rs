@@ -1,0 +1,180 @@
+//! The continuous kernels between the poses of one training set.
+//!
+//! All is kept by pose j with the poses j.. in runs of eight: a run that no pose fills holds zeros, whose kernels nothing
+//! is multiplied with.
+
+use rayon::prelude::*;
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, exp};
+
+use crate::hyper::{Hyper, Product};
+use crate::kernel::Shape;
+use crate::pairs::{PairKernels, PairTable};
+use crate::sag::alike;
+use crate::training::Training;
+
+/// What kernels of one pose with the poses from it on are made of, computed once.
+pub struct Pairing {
+    /// Poses from it on.
+    count: usize,
+    /// Distances by each input, (I, count).
+    pub distances: Vec<Vec<f64>>,
+    /// How alike the loads of each joint are, (N, count).
+    pub loads: Vec<Vec<f64>>,
+}
+
+/// Kernels of one pose with the poses from it on, under given hyper-parameters.
+pub struct PoseKernels {
+    /// Of each input, (I, count).
+    pub own: Vec<Slopes>,
+    /// Summed over the inputs.
+    pub smooth: Slopes,
+    /// For each product, (count,).
+    pub products: Vec<Vec<f64>>,
+}
+
+/// Kernels and their derivatives by the logarithm of the length scale, (count,).
+pub struct Slopes {
+    pub kernel: Vec<f64>,
+    pub by_log_length: Vec<f64>,
+}
+
+/// The kernels of all poses.
+pub struct Continuous<'a> {
+    pairings: &'a [Pairing],
+    pub poses: Vec<PoseKernels>,
+}
+
+/// Room for a number of poses in runs of eight.
+pub fn padded(count: usize) -> usize {
+    count.next_multiple_of(LANES)
+}
+
+/// What all kernels of a training set are made of, by pose.
+pub fn pairings(training: &Training) -> Vec<Pairing> {
+    (0..training.pose_count()).into_par_iter().map(|pose| Pairing::new(training, pose)).collect()
+}
+
+impl Pairing {
+    fn new(training: &Training, j: usize) -> Self {
+        let (count, joints) = (training.pose_count() - j, training.geometry.joint_count());
+        let mut distances = vec![vec![0.0; padded(count)]; training.inputs.len()];
+        for (k, (input, distances)) in training.inputs.iter().zip(&mut distances).enumerate() {
+            for (i, distance) in distances[..count].iter_mut().enumerate() {
+                *distance = input.distance(training.values_of(j + i)[k], training.values_of(j)[k]);
+            }
+        }
+        let mut loads = vec![vec![0.0; padded(count)]; joints];
+        let mut pair = vec![0.0; joints];
+        for i in 0..count {
+            alike(joints, training.levers_of(j), training.levers_of(j + i), &mut pair);
+            loads.iter_mut().zip(&pair).for_each(|(column, load)| column[i] = *load);
+        }
+        Self { count, distances, loads }
+    }
+}
+
+impl<'a> Continuous<'a> {
+    /// Under given hyper-parameters.
+    pub fn new(pairings: &'a [Pairing], hyper: &Hyper) -> Self {
+        let poses = pairings.par_iter().map(|pairing| dispatch(Fill { pairing, hyper })).collect();
+        Self { pairings, poses }
+    }
+}
+
+impl PairKernels for Continuous<'_> {
+    fn fill(&self, j: usize, table: &mut PairTable) {
+        let (pairing, kernels) = (&self.pairings[j], &self.poses[j]);
+        table.clear(kernels.own.len(), kernels.products.len(), pairing.count);
+        let copy = |column: &mut Vec<f64>, values: &Vec<f64>| {
+            column.copy_from_slice(&values[..pairing.count]);
+        };
+        table.own.iter_mut().zip(&kernels.own).for_each(|(column, own)| copy(column, &own.kernel));
+        table.sag.iter_mut().zip(&pairing.loads).for_each(|(column, loads)| copy(column, loads));
+        table.products.iter_mut().zip(&kernels.products).for_each(|(column, values)| copy(column, values));
+        copy(&mut table.smooth, &kernels.smooth.kernel);
+    }
+}
+
+struct Fill<'a> {
+    pairing: &'a Pairing,
+    hyper: &'a Hyper,
+}
+
+impl Kernel for Fill<'_> {
+    type Output = PoseKernels;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> PoseKernels {
+        let Self { pairing: Pairing { distances, count, .. }, hyper } = self;
+        let mut own = Vec::with_capacity(distances.len());
+        let mut smooth = Slopes::zeros(*count);
+        for distances in distances {
+            let mut slopes = Slopes::zeros(*count);
+            slopes.add::<I>(Shape::Matern, distances, hyper.own_length);
+            own.push(slopes);
+            smooth.add::<I>(Shape::SquaredExponential, distances, hyper.smooth_length);
+        }
+        let mut products = Vec::with_capacity(hyper.products.len());
+        for product in &hyper.products {
+            products.push(product_kernels::<I>(product, distances, *count));
+        }
+        PoseKernels { own, smooth, products }
+    }
+}
+
+impl Slopes {
+    fn zeros(count: usize) -> Self {
+        let zeros = || vec![0.0; padded(count)];
+        Self { kernel: zeros(), by_log_length: zeros() }
+    }
+
+    #[inline(always)]
+    fn add<I: Isa>(&mut self, shape: Shape, distances: &[f64], length: f64) {
+        let (kernels, slopes) = (runs_mut(&mut self.kernel), runs_mut(&mut self.by_log_length));
+        for ((distance, kernel), slope) in runs(distances).iter().zip(kernels).zip(slopes) {
+            let value = shape.of::<I>(Lane(*distance), length);
+            *kernel = (Lane(*kernel) + value.kernel).0;
+            *slope = (Lane(*slope) + value.by_log_length).0;
+        }
+    }
+}
+
+/// Kernels of a product, (count,): one exponential of the sum of its exponents.
+#[inline(always)]
+fn product_kernels<I: Isa>(product: &Product, distances: &[Vec<f64>], count: usize) -> Vec<f64> {
+    let mut kernels = vec![0.0; padded(count)];
+    for (k, factor) in exponent_factors(product) {
+        for (sum, distance) in runs_mut(&mut kernels).iter_mut().zip(runs(&distances[k])) {
+            *sum = I::mul_add(Lane(*distance), Lane::splat(-factor), Lane(*sum)).0;
+        }
+    }
+    for kernel in runs_mut(&mut kernels) {
+        *kernel = exp::<I>(Lane(*kernel)).0;
+    }
+    kernels
+}
+
+/// Inputs of a product, and what their distances are multiplied with in its exponent.
+pub fn exponent_factors(product: &Product) -> impl Iterator<Item = (usize, f64)> {
+    product.joints.iter().zip(&product.lengths).map(|(&k, length)| (k, 1.0 / (length * length)))
+}
+
+/// Sum of the products of two padded runs of numbers, in a fixed order.
+#[inline(always)]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sum = Lane::ZERO;
+    for (a, b) in runs(a).iter().zip(runs(b)) {
+        sum += Lane(*a) * Lane(*b);
+    }
+    sum.sum()
+}
+
+#[inline(always)]
+fn runs(values: &[f64]) -> &[[f64; LANES]] {
+    values.as_chunks().0
+}
+
+#[inline(always)]
+fn runs_mut(values: &mut [f64]) -> &mut [[f64; LANES]] {
+    values.as_chunks_mut().0
+}
