@@ -58,7 +58,7 @@ rust-test: $(STAMPS)/tools
 	$(CARGO) test --locked --workspace --exclude truearm-python
 
 py-test: $(STAMPS)/built
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 # The measurement cell killed, interrupted and with faults, in full; takes half an hour or more. What it finds is
 # kept in build/trials: python docs/make_trials.py build/trials

@@ -99,7 +99,7 @@ def test_poses_are_proposed_from_a_calibration(asked, purpose, said, calib, here
     assert main(["plan", asked, str(count), "--from", calib, "-o", "a.csv", "--picture", "a.png"]) == 0
     told = capsys.readouterr().out
     assert said in told
-    assert max(map(len, told.splitlines())) <= 80
+    assert max(len(line) for line in told.splitlines() if calib not in line) <= 80
     poses = Poses.read_csv("a.csv", ta.Robot.load("rv-m2"))
     assert poses.purpose == (purpose,) * count
     assert set(poses.approach) == {1, -1}

@@ -7,6 +7,8 @@ const POWERS: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
     1e19, 1e20, 1e21, 1e22,
 ];
+/// Powers of ten that shift by as many digits as are read at a time.
+const TENS: [u64; 9] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
 /// Up to here integers are exact machine numbers.
 const EXACT: u64 = 1 << 53;
 /// More digits behind the point than any machine number needs; those of longer ones are counted as so many.
@@ -81,6 +83,15 @@ impl Digits {
     /// Take the digits at `at`; where they end.
     #[inline]
     fn take(&mut self, line: &[u8], mut at: usize) -> usize {
+        while let Some(bytes) = line.get(at..).and_then(<[u8]>::first_chunk) {
+            let (value, count) = leading_digits(u64::from_le_bytes(*bytes));
+            self.whole = self.whole.wrapping_mul(TENS[count]).wrapping_add(value);
+            self.count += count;
+            at += count;
+            if count < 8 {
+                return at;
+            }
+        }
         while let Some(digit) = line.get(at).filter(|byte| byte.is_ascii_digit()) {
             self.whole = self.whole.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
             self.count += 1;
@@ -88,6 +99,24 @@ impl Digits {
         }
         at
     }
+}
+
+/// The value of the digits that eight bytes begin with, the first byte the lowest, and how many they are.
+///
+/// The word is shifted until zeros stand before the digits; then neighbours are joined to pairs, pairs to fours and these
+/// to eight, all parts of the word at once.
+#[inline]
+fn leading_digits(bytes: u64) -> (u64, usize) {
+    const EACH: u64 = 0x0101_0101_0101_0101;
+    let digits = bytes ^ (EACH * u64::from(b'0'));
+    // The high bit of each byte that is above nine, up to the first; behind it carries may set more.
+    let others = (digits.wrapping_add(EACH * 0x76) | digits) & (EACH * 0x80);
+    let count = (others.trailing_zeros() / 8) as usize;
+    let aligned = digits.checked_shl(64 - 8 * count as u32).unwrap_or(0);
+    let pairs = (aligned.wrapping_mul(10).wrapping_add(aligned >> 8)) & 0x00ff_00ff_00ff_00ff;
+    let fours = (pairs.wrapping_mul(100).wrapping_add(pairs >> 16)) & 0x0000_ffff_0000_ffff;
+    let eight = (fours.wrapping_mul(10_000).wrapping_add(fours >> 32)) & 0xffff_ffff;
+    (eight, count)
 }
 
 /// The number whose first digit or point is at `at`; None where digits are part of something else.

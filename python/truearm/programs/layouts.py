@@ -107,13 +107,17 @@ class Joints:
 
     def to_readings(self, values: Floats) -> Floats:
         """As in JointLayout."""
-        readings: Floats = values * np.array(self.units)
+        readings: Floats = values * np.array(self.units) if self._scaled else values
         return readings
 
     def from_readings(self, q: Floats, near: Floats) -> Floats:
         """As in JointLayout."""
-        values: Floats = q / np.array(self.units)
+        values: Floats = q / np.array(self.units) if self._scaled else q
         return values
+
+    @property
+    def _scaled(self) -> bool:
+        return any(unit != 1.0 for unit in self.units)
 
 
 @dataclass(frozen=True)

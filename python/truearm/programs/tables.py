@@ -91,17 +91,26 @@ class Targets:
 
     def numbers(self, which: Integers, width: int) -> Integers:
         """Places of the numbers of targets `which` (n,) of one layout, (n, width)."""
+        span = self._span(which, width)
+        if span is not None:
+            return np.arange(span.start, span.stop).reshape(-1, width)
         return self.first[which][:, None] + np.arange(width)
 
     def of(self, column: NDArray[Any], which: Integers, width: int) -> NDArray[Any]:
         """A column of the numbers of targets `which` (n,) of one layout, (n, width); a view if it can be."""
-        count, run = len(which), run_of(which)
-        if isinstance(run, slice):
-            start, stop = int(self.first[run.start]), int(self.first[run.stop])
-            if stop - start == count * width:
-                return column[start:stop].reshape(count, width)
-        found: NDArray[Any] = column[self.numbers(which, width)]
+        span = self._span(which, width)
+        found: NDArray[Any] = (
+            column[self.numbers(which, width)] if span is None else column[span].reshape(-1, width)
+        )
         return found
+
+    def _span(self, which: Integers, width: int) -> slice | None:
+        """Where the numbers of targets stand that follow one another; None where others are between them."""
+        run = run_of(which)
+        if not isinstance(run, slice):
+            return None
+        start, stop = int(self.first[run.start]), int(self.first[run.stop])
+        return slice(start, stop) if stop - start == len(which) * width else None
 
 
 @dataclass(frozen=True, eq=False)
