@@ -16,6 +16,7 @@ from truearm.simulation import Imperfections, VirtualArm
 SIZES = (100, 1000, 10_000)
 GROWTH = (100, 300, 1000, 3000, 10_000)
 TARGET = 15.0
+ROUNDS = 3
 ARM_UNKNOWNS = 18
 NOISE_M = 4e-5
 # How far the start is from the truth: what a closed-form start leaves.
@@ -93,7 +94,7 @@ def ours(model):
 
 def run():
     """Compare, and check that both reach the same minimum."""
-    single, double = (measured_with_threads("calibration", threads) for threads in (1, 2))
+    single, double = _with_one_and_two_threads()
     comparisons = []
     for poses in SIZES:
         model = problem(poses)
@@ -114,9 +115,18 @@ def run():
     ]
     remarks = [
         "Both minimise the same squares over the same unknowns from the same start; ours also gives the "
-        "covariance. Two threads pass when they are no slower than one, within 3 % of timing noise."
+        "covariance. Two threads pass when they are no slower than one, within 3 % of timing noise; both are "
+        f"timed {ROUNDS} times in turn, and the best of each is compared."
     ]
     return Results("Constant calibration", comparisons, series, remarks)
+
+
+def _with_one_and_two_threads():
+    """Seconds by size with one thread and with two; a slow moment of the machine shall not count."""
+    rounds = [[measured_with_threads("calibration", threads) for threads in (1, 2)] for _ in range(ROUNDS)]
+    return (
+        {size: min(one[size] for one in found) for size in found[0]} for found in zip(*rounds, strict=True)
+    )
 
 
 def check_same_minimum(model, minimum, fit):

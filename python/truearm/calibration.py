@@ -396,7 +396,8 @@ class Calibration:
     def field_inputs(self, rows: Floats, features: Features | None) -> Floats:
         """Inputs (n, I) of the field at readings (n, N): joint values, then features."""
         columns = feature_columns(features, self.options.features, len(rows))
-        return np.hstack([self.robot.joints_from_readings(rows), columns])
+        values = self.robot.values_of(rows)
+        return np.hstack([values, columns]) if columns.size else values
 
     def _at(self, rows: Floats, features: Features | None) -> tuple[Floats, Floats]:
         """Joint values (n, N) and parameters (n, L, 5) of readings."""

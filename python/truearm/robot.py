@@ -134,7 +134,7 @@ class Robot(RobotData):
     def joints_from_readings(self, q: ArrayLike) -> Floats:
         """Denavit-Hartenberg joint values of readings `q`, (n, N) or (N,)."""
         rows, single = self._readings(q)
-        values = self._values(rows)
+        values = self.values_of(rows)
         return values[0] if single else values
 
     def readings_from_joints(self, q_dh: ArrayLike) -> Floats:
@@ -146,13 +146,13 @@ class Robot(RobotData):
     def position(self, q: ArrayLike, out: Floats | None = None) -> Floats:
         """Tool points in the base frame, m: (n, 3) for readings `q` (n, N), (3,) for (N,)."""
         rows, single = self._readings(q)
-        result = self.chain.position(self._values(rows), out=_batched(out, single=single))
+        result = self.chain.position(self.values_of(rows), out=_batched(out, single=single))
         return result[0] if single else result
 
     def pose(self, q: ArrayLike, out: Floats | None = None) -> Floats:
         """base_from_tool: (n, 4, 4) for readings `q` (n, N), (4, 4) for (N,)."""
         rows, single = self._readings(q)
-        result = self.chain.pose(self._values(rows), out=_batched(out, single=single))
+        result = self.chain.pose(self.values_of(rows), out=_batched(out, single=single))
         return result[0] if single else result
 
     def parameter_jacobian(self, q: ArrayLike, pose: bool = False, out: Floats | None = None) -> Floats:
@@ -167,14 +167,14 @@ class Robot(RobotData):
             (n, 3, 5 N), or (n, 6, 5 N) with translation first; without n for one reading.
         """
         rows, single = self._readings(q)
-        values, target = self._values(rows), _batched(out, single=single)
+        values, target = self.values_of(rows), _batched(out, single=single)
         result = self.chain.parameter_jacobian(values, pose=pose, out=target)
         return result[0] if single else result
 
     def joint_jacobian(self, q: ArrayLike, pose: bool = False) -> Floats:
         """Derivatives with respect to the readings: (n, 3, N), (n, 6, N) with `pose`; no n for (N,)."""
         rows, single = self._readings(q)
-        result = self.chain.joint_jacobian(self._values(rows), pose=pose) @ self.coupling
+        result = self.chain.joint_jacobian(self.values_of(rows), pose=pose) @ self.coupling
         return result[0] if single else result
 
     def to_dict(self) -> dict[str, Any]:
@@ -200,7 +200,8 @@ class Robot(RobotData):
     def _readings(self, q: ArrayLike) -> tuple[Floats, bool]:
         return as_rows(q, self.joint_count, what=f"joint readings of {self.name}")
 
-    def _values(self, readings: Floats) -> Floats:
+    def values_of(self, readings: Floats) -> Floats:
+        """Joint values (n, N) of readings (n, N) that were checked."""
         return readings if self._uncoupled else np.ascontiguousarray(readings @ self.coupling.T)
 
     @cached_property

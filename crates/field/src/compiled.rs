@@ -108,10 +108,13 @@ impl Compiled {
             return Err(FieldError::Length { what: "constants", found, expected });
         }
         let mut out = Vec::with_capacity(poses * self.parameter_count);
+        let group = constants.repeat(LANES);
         let chunk = if self.threaded(values) { poses } else { POSES_PER_TASK };
         for first in (0..poses).step_by(chunk.max(1)) {
             let (from, last) = (out.len(), poses.min(first + chunk));
-            (first..last).for_each(|_| out.extend_from_slice(constants));
+            let length = from + (last - first) * self.parameter_count;
+            (0..(last - first) / LANES).for_each(|_| out.extend_from_slice(&group));
+            out.extend_from_slice(&group[..length - out.len()]);
             self.add(&values[first * self.input_count..last * self.input_count], &mut out[from..])?;
         }
         Ok(out)
