@@ -38,9 +38,8 @@ def test_it_is_never_below_the_exact_one(calibration, readings):
 
 
 def test_it_is_not_far_above(calibration, readings):
-    ratio = calibration.conservative_std(readings, tool=np.zeros(3)) / roots(
-        calibration, readings, np.zeros(3)
-    )
+    centre = calibration.conservative.content()["centre"]
+    ratio = calibration.conservative_std(readings, tool=centre) / roots(calibration, readings, centre)
     assert (np.median(ratio, axis=0) < 1.8).all()
     assert calibration.conservative.content()["looseness"] == pytest.approx(np.median(ratio, axis=0), rel=0.1)
 
@@ -49,6 +48,17 @@ def test_nor_at_what_was_measured(calibration):
     q = calibration.rows.data.readings
     bound, exact = calibration.conservative_std(q), roots(calibration, q, None)
     assert (bound >= exact).all()
+
+
+def test_a_far_tool_whose_position_alone_was_measured_is_not_far_above():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
+    far = calibration.model.setup.targets[0, 0]
+    assert np.linalg.norm(far) > 0.05
+    q = calibration.rows.data.readings
+    ratio = calibration.conservative_std(q, tool=far) / roots(calibration, q, far)
+    assert (ratio[:, 0] >= 1.0).all()
+    assert np.median(ratio[:, 0]) < 2.5
 
 
 def test_it_is_the_same_when_read_even_without_the_measurements(calibration, readings, tmp_path):
@@ -79,8 +89,8 @@ def test_outside_the_limits_stands_the_largest_value(calibration):
     q = calibration.robot.limits[:, 1] + np.pi / 3
     ranges = calibration.conservative.content()["ranges"]
     assert any(bounds is not None for bounds in ranges)
-    largest = calibration.conservative.content()["largest"]
-    assert calibration.conservative_std(q, tool=np.zeros(3)) == pytest.approx(largest)
+    bounds = calibration.conservative.content()
+    assert calibration.conservative_std(q, tool=bounds["centre"]) == pytest.approx(bounds["largest"])
 
 
 def test_compensation_judges_by_it(calibration):

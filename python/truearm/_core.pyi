@@ -360,7 +360,9 @@ class Conservative:
         """
 
     def content(self) -> dict[str, Any]:
-        """All but the tables: level, largest, ranges (None for any) and looseness (median ratio to exact)."""
+        """All but the tables: level, largest, ranges (None for any), looseness (median ratio to exact), and
+        centre, the point whose position is meant, in the flange's frame, m.
+        """
 
     def blocks(self) -> list[dict[str, Any]]:
         """The tables, as Field.blocks."""

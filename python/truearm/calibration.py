@@ -303,7 +303,8 @@ class Calibration:
         """
         rows, single = self._readings(q)
         found = self.conservative.std(self.field_inputs(rows, features))
-        found[:, 0] += np.linalg.norm(at_tool(self.robot, tool)[:3, 3]) * found[:, 1]
+        apart = at_tool(self.robot, tool)[:3, 3] - self.conservative.content()["centre"]
+        found[:, 0] += np.linalg.norm(apart) * found[:, 1]
         return found[0] if single else found
 
     @property
@@ -319,12 +320,14 @@ class Calibration:
         """Bounds of the standard deviation: those of the file, or worked out, which takes a few seconds."""
         return self.stored_conservative or conservative_of(self)
 
-    def flange_variances(self, q: ArrayLike, features: Features | None) -> tuple[Floats, Floats, Floats]:
-        """Inputs (n, I), and variances (n, 6) of the flange's pose: now, and before any measurement."""
+    def pose_variances(
+        self, q: ArrayLike, tool: ArrayLike | None, features: Features | None
+    ) -> tuple[Floats, Floats, Floats]:
+        """Inputs (n, I), and variances (n, 6) of a tool's pose: now, and before any measurement."""
         rows, _ = self._readings(q)
         inputs, jacobian = (
             self.field_inputs(rows, features),
-            self._jacobian(rows, features, np.eye(4), pose=True),
+            self._jacobian(rows, features, tool, pose=True),
         )
         covariance = self.spread.covariance(inputs, jacobian)
         return inputs, np.einsum("nii->ni", covariance), self.spread.prior(inputs, jacobian)

@@ -2,8 +2,8 @@
 
 The exact standard deviation of a calibration needs the measurements and takes a millisecond. For compensation
 and for controllers a calibration file carries bounds of it as tables over the configuration: one number for
-the flange's position, the root of the sum of its coordinates' variances (m), and one for its rotation vector
-(rad).
+the position of a point of the flange's frame, the root of the sum of its coordinates' variances (m), and one
+for the rotation vector (rad). The point, the centre, is the middle of what was measured.
 """
 
 from collections.abc import Sequence
@@ -35,6 +35,8 @@ MAJOR: Final = (1, 2)
 OPEN_REACH_M: Final = 0.5
 PRIOR_MARGIN: Final = 1.1
 """Over the largest prior seen: it is sampled as well."""
+FLANGE: Final = (0.0, 0.0, 0.0)
+"""The centre where a file does not say."""
 SMALLEST: Final = 1e-12
 """What was not asked for has no uncertainty; its logarithm is still taken."""
 
@@ -81,7 +83,8 @@ def conservative_of(calibration: "Calibration") -> Conservative:
     """
     reach, rng = Reach.of(calibration), np.random.default_rng(SEED)
     count = _sample_count(calibration)
-    (fitted, prior), (fresh, _) = (_exact(calibration, reach.draw(count, rng)) for _ in range(2))
+    centre: Floats = calibration.model.setup.targets.mean(axis=(0, 1))
+    (fitted, prior), (fresh, _) = (_exact(calibration, centre, reach.draw(count, rng)) for _ in range(2))
     largest = np.maximum(PRIOR_MARGIN * prior.max(axis=0), np.maximum(fitted[1], fresh[1]).max(axis=0))
     robot = calibration.robot
     plan = {
@@ -90,6 +93,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
         "ranges": _input_ranges(robot, reach.limits),
         "together": _together(calibration),
         "largest": largest.tolist(),
+        "centre": centre.tolist(),
     }
     return Conservative.fit(plan, fitted, fresh)
 
@@ -117,17 +121,17 @@ def unpack(content: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Conserva
         }
         for number, block in enumerate(content["blocks"])
     ]
-    return Conservative(content, blocks)
+    return Conservative({"centre": FLANGE, **content}, blocks)
 
 
-def _exact(calibration: "Calibration", drawn: Floats) -> tuple[tuple[Floats, Floats], Floats]:
+def _exact(calibration: "Calibration", centre: Floats, drawn: Floats) -> tuple[tuple[Floats, Floats], Floats]:
     """Inputs with exact values (n, 2), and the prior's (n, 2), of readings and features (n, N + F)."""
     joints = calibration.robot.joint_count
     names = calibration.options.features
     parts = []
     for rows in np.array_split(drawn, max(len(drawn) // AT_ONCE, 1)):
         features = dict(zip(names, rows[:, joints:].T, strict=True))
-        parts.append(calibration.flange_variances(rows[:, :joints], features))
+        parts.append(calibration.pose_variances(rows[:, :joints], centre, features))
     inputs, exact, prior = (np.concatenate(part) for part in zip(*parts, strict=True))
     return (inputs, _roots(exact)), _roots(prior)
 

@@ -68,4 +68,7 @@ pub struct ConservativeContent {
     pub largest: [f64; 2],
     pub ranges: Vec<Option<[f64; 2]>>,
     pub looseness: [f64; 2],
+    /// The flange's origin where a file does not say.
+    #[serde(default)]
+    pub centre: [f64; 3],
 }

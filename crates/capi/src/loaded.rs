@@ -111,6 +111,7 @@ fn conservative(
         largest: stored.largest,
         ranges: stored.ranges.iter().map(|range| range.unwrap_or(any)).collect(),
         looseness: stored.looseness,
+        centre: stored.centre,
     })?)
 }
 

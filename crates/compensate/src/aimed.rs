@@ -17,7 +17,7 @@ use crate::spread::Spread;
 pub(crate) struct Aimed {
     pub model: Arc<Model>,
     pub chain: Chain,
-    /// Distance of the tool from the flange, m.
+    /// Distance of the tool from the point whose standard deviation is bounded, m.
     pub reach: f64,
 }
 
@@ -25,7 +25,7 @@ impl Aimed {
     pub fn new(model: Arc<Model>, flange_from_tool: &Transform) -> Result<Self, CompensateError> {
         flange_from_tool.check("the tool")?;
         let chain = model.chain.with_end(model.chain.end().compose(flange_from_tool))?;
-        let reach = flange_from_tool.translation.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let reach = model.spread.as_ref().map_or(0.0, |spread| spread.reach(flange_from_tool.translation));
         Ok(Self { model, chain, reach })
     }
 

@@ -90,6 +90,14 @@ impl Spread {
         }
     }
 
+    /// Distance of a tool from the point whose standard deviation is bounded, m; zero where that of the tool itself is known.
+    pub(crate) fn reach(&self, flange_from_tool: [f64; 3]) -> f64 {
+        match self {
+            Self::Constant(_) => 0.0,
+            Self::Field(bounds) => bounds.reach(flange_from_tool),
+        }
+    }
+
     /// Memory for bounds.
     pub(crate) fn scratch(&self) -> Option<FieldScratch> {
         match self {

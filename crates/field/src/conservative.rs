@@ -1,9 +1,10 @@
 //! A standard deviation that costs next to nothing to evaluate and is never too small.
 //!
-//! Two numbers of a configuration: `s_p`, the root of the trace of the covariance of the flange's position (m), and
-//! `s_r`, that of its rotation vector (rad). A point of the tool at the distance `r` from the flange deviates by no more
-//! than `s_p + r s_r`: by Minkowski's inequality the root mean square of `p + w x r` is at most that of `p` plus `r` times
-//! that of `w`. Each is `exp(level + sum of tables)`: B-spline tables over every input and one over a few
+//! Two numbers of a configuration: `s_p`, the root of the trace of the covariance of the position (m) of a point of the
+//! flange's frame, the centre, and `s_r`, that of the rotation vector (rad). A point of the tool at the distance `r` from
+//! the centre deviates by no more than `s_p + r s_r`: by Minkowski's inequality the root mean square of `p + w x r` is at
+//! most that of `p` plus `r` times that of `w`. The centre is where was measured: of the flange itself positions alone tell
+//! little. Each is `exp(level + sum of tables)`: B-spline tables over every input and one over a few
 //! inputs together, fitted to exact values and raised, see [`Conservative::fit`]. Where an input leaves the range
 //! that the tables were fitted in, and nowhere above, stands the largest value that the prior allows.
 
@@ -25,6 +26,8 @@ pub struct ConservativeParts {
     pub level: [f64; BOUNDED],
     /// Never exceeded, and the value outside the ranges; m and rad.
     pub largest: [f64; BOUNDED],
+    /// The point whose position is meant, in the flange's frame, m.
+    pub centre: [f64; 3],
     /// Where each input may lie, (I,); infinite for whole turns.
     pub ranges: Vec<[f64; 2]>,
     /// Median ratio to the exact values at configurations that took no part in the fit.
@@ -51,7 +54,8 @@ impl Conservative {
         length("ranges of the standard deviation", parts.ranges.len(), parts.tables.input_count)?;
         parts.tables.check()?;
         let weights = parts.tables.blocks.iter().flat_map(|block| &block.weights);
-        if !weights.chain(&parts.level).chain(&parts.largest).all(|value| value.is_finite()) {
+        let others = parts.level.iter().chain(&parts.largest).chain(&parts.centre);
+        if !weights.chain(others).all(|value| value.is_finite()) {
             return Err(FieldError::NotFinite { what: "tables of the standard deviation" });
         }
         let compiled = parts.tables.compiled();
@@ -61,6 +65,12 @@ impl Conservative {
     /// What it is made of.
     pub fn parts(&self) -> &ConservativeParts {
         &self.parts
+    }
+
+    /// Distance of a point of the flange's frame from the centre, m.
+    pub fn reach(&self, point: [f64; 3]) -> f64 {
+        let apart = point.iter().zip(&self.parts.centre).map(|(a, b)| (a - b).powi(2));
+        apart.sum::<f64>().sqrt()
     }
 
     /// Inputs of a configuration: joints in order, then features.

@@ -57,6 +57,8 @@ pub struct ConservativePlan {
     pub together: Vec<usize>,
     /// What is never exceeded, m and rad.
     pub largest: [f64; BOUNDED],
+    /// The point whose position the samples are of, in the flange's frame, m.
+    pub centre: [f64; 3],
 }
 
 impl Conservative {
@@ -78,6 +80,7 @@ impl Conservative {
             tables: bank(plan, grids, &solved),
             level: [solved[0].level, solved[1].level],
             largest: plan.largest,
+            centre: plan.centre,
             ranges: plan.ranges.iter().zip(&plan.kinds).map(limits).collect(),
             looseness: [1.0; BOUNDED],
         };

@@ -10,6 +10,7 @@ const JOINTS: usize = 4;
 const RANGES: [[f64; 2]; JOINTS] = [[-6.3, 6.3], [-2.0, 1.0], [-2.5, 2.5], [0.1, 0.6]];
 const KINDS: [InputKind; JOINTS] = [InputKind::Angle, InputKind::Angle, InputKind::Angle, InputKind::Line];
 const LARGEST: [f64; 2] = [2e-3, 5e-3];
+const CENTRE: [f64; 3] = [0.1, -0.2, 0.3];
 
 /// Valleys about two points, on a slope: tables over single inputs cannot follow that.
 fn exact(q: &[f64]) -> [f64; 2] {
@@ -46,6 +47,7 @@ fn plan() -> ConservativePlan {
         ranges: RANGES.to_vec(),
         together: vec![1, 2],
         largest: LARGEST,
+        centre: CENTRE,
     }
 }
 
@@ -60,6 +62,13 @@ fn ratios(field: &Conservative, drawn: &Drawn, k: usize) -> Vec<f64> {
         found.iter().zip(&drawn.std).skip(k).step_by(2).map(|(found, exact)| found / exact).collect();
     ratios.sort_by(f64::total_cmp);
     ratios
+}
+
+#[test]
+fn a_tool_is_as_far_as_it_is_from_the_centre() {
+    let field = fitted();
+    assert_eq!(field.reach(CENTRE), 0.0);
+    assert!((field.reach([0.1, 0.1, 0.7]) - 0.5).abs() < 1e-15);
 }
 
 #[test]

@@ -38,6 +38,7 @@ struct Stored {
     largest: [f64; BOUNDED],
     ranges: Vec<StoredRange>,
     looseness: [f64; BOUNDED],
+    centre: [f64; 3],
 }
 
 /// What the tables are over, by keyword.
@@ -48,6 +49,7 @@ pub struct Plan {
     ranges: Vec<(f64, f64)>,
     together: Vec<usize>,
     largest: [f64; BOUNDED],
+    centre: [f64; 3],
 }
 
 #[pymethods]
@@ -64,6 +66,7 @@ impl Conservative {
             largest: stored.largest,
             ranges,
             looseness: stored.looseness,
+            centre: stored.centre,
         };
         Ok(Self { core: Core::new(parts).map_err(Failure::into_exception)? })
     }
@@ -82,6 +85,7 @@ impl Conservative {
             ranges: plan.ranges.iter().map(|&range| range.into()).collect(),
             together: plan.together,
             largest: plan.largest,
+            centre: plan.centre,
         };
         let arrays = [&fitted.0, &fitted.1, &fresh.0, &fresh.1].map(numbers);
         let core = quick(py, || {
@@ -100,6 +104,7 @@ impl Conservative {
         stored.set_item("largest", parts.largest)?;
         stored.set_item("ranges", parts.ranges.iter().map(range).collect::<Vec<_>>())?;
         stored.set_item("looseness", parts.looseness)?;
+        stored.set_item("centre", parts.centre)?;
         Ok(stored)
     }
 
