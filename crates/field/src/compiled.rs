@@ -222,16 +222,15 @@ impl Evaluate<'_> {
         }
         let mut room = bank.sag.as_ref().map(Loads::scratch);
         let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
+        let mut inputs = vec![Lane::ZERO; bank.input_count];
         let (wide, width) = (bank.input_count * LANES, bank.parameter_count);
         for (values, out) in values.chunks(wide).zip(out.chunks_mut(width * LANES)) {
-            let input = |index: usize| {
-                let mut lane = Lane::ZERO;
-                for (value, pose) in lane.0.iter_mut().zip(values.chunks_exact(bank.input_count)) {
-                    *value = pose[index];
+            for (k, pose) in values.chunks_exact(bank.input_count).enumerate() {
+                for (lane, value) in inputs.iter_mut().zip(pose) {
+                    lane.0[k] = *value;
                 }
-                lane
-            };
-            bank.group::<I, K>(input, &mut excited, &mut room, out);
+            }
+            bank.group::<I, K>(|input| inputs[input], &mut excited, &mut room, out);
         }
     }
 }
