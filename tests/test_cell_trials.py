@@ -59,6 +59,7 @@ def test_killed_at_random_moments_nothing_is_lost_or_doubled(tmp_path):
         found = list(side_by_side.map(lambda n: killed_session(tmp_path / str(n), n, kills, count), numbers))
     total = {key: sum(each[key] for each in found) for key in found[0]}
     record("kill", sessions=sessions, kills=sessions * kills, **total)
+    assert total["poses"] == total["of"] > 0
 
 
 def killed_session(folder, seed, kills, count):
@@ -259,15 +260,22 @@ def test_a_device_that_goes_away_stops_the_robot(tmp_path):
     record("device-gone", said=str(raised.value))
 
 
+@pytest.fixture
+def interruptible():
+    """Where the trials run in the background Ctrl-C is ignored, and those they start would inherit that."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_in_any_state_ends_within_two_seconds(tmp_path):
     count = sized(1, 30)
     text = cell_text(simulate={"speed": 4.0}, process={"stretch": 20})
     write_poses(tmp_path / "poses.csv", poses_of(Cell.from_toml(text), sized(60, 600), seed=2))
     slowest = 0.0
     session = tmp_path / "session.db"
-    # Where the trials run in the background Ctrl-C is ignored, and those they start would inherit that.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
     with simulated(tmp_path, text) as cell:
         for moment in moments(count, sized(6.0, 10.0), seed=3):
             process = measuring(cell, tmp_path / "poses.csv", session)

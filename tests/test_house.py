@@ -53,6 +53,14 @@ def test_each_crate_stands_on_the_one_below(workspace):
         assert lower in workspace[upper]
 
 
+def test_no_unit_test_is_in_a_crate_without_their_harness():
+    for manifest in (ROOT / "crates").glob("*/Cargo.toml"):
+        if not tomllib.loads(manifest.read_text()).get("lib", {}).get("test", True):
+            sources = sorted((manifest.parent / "src").rglob("*.rs"))
+            assert sources, manifest
+            assert not [path for path in sources if "#[test]" in path.read_text()], manifest
+
+
 def test_one_version_for_all():
     workspace = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]
     version = workspace["package"]["version"]

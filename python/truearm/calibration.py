@@ -303,8 +303,7 @@ class Calibration:
         """
         rows, single = self._readings(q)
         found = self.conservative.std(self.field_inputs(rows, features))
-        apart = at_tool(self.robot, tool)[:3, 3] - self.conservative.content()["centre"]
-        found[:, 0] += np.linalg.norm(apart) * found[:, 1]
+        found[:, 0] += np.linalg.norm(at_tool(self.robot, tool)[:3, 3] - self._bounded_point) * found[:, 1]
         return found[0] if single else found
 
     @property
@@ -320,10 +319,18 @@ class Calibration:
         """Bounds of the standard deviation: those of the file, or worked out, which takes a few seconds."""
         return self.stored_conservative or conservative_of(self)
 
+    @cached_property
+    def _bounded_point(self) -> Floats:
+        """The point (3,) of the flange's frame whose position is bounded, m."""
+        return np.array(self.conservative.content()["centre"])
+
     def pose_variances(
         self, q: ArrayLike, tool: ArrayLike | None, features: Features | None
     ) -> tuple[Floats, Floats, Floats]:
-        """Inputs (n, I), and variances (n, 6) of a tool's pose: now, and before any measurement."""
+        """Inputs (n, I) of readings, and variances (n, 6) of a tool's pose: now, and before any measurement.
+
+        They are in the base frame, m^2 and rad^2.
+        """
         rows, _ = self._readings(q)
         inputs, jacobian = (
             self.field_inputs(rows, features),

@@ -1,7 +1,7 @@
 //! The continuous kernels between the poses of one training set.
 //!
-//! All is kept by pose j with the poses j.. in runs of eight: a run that no pose fills holds zeros, whose kernels nothing
-//! is multiplied with.
+//! All is kept by pose j with the poses j.. in runs of eight. Places that no pose fills hold distances of zero, whose kernels
+//! are one: what they are multiplied with must be zero there.
 
 use rayon::prelude::*;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, exp};

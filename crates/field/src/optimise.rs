@@ -234,6 +234,24 @@ mod tests {
     }
 
     #[test]
+    fn what_one_search_learned_of_the_curvature_shortens_the_next() {
+        let limits = Limits { evaluations: 200, gain: 1e-12 };
+        let first = maximise(valley, (&[0.0; 4], None), &ranges(1e3), limits).unwrap();
+        assert!(first.curvature.is_some());
+        let again = |curvature| maximise(valley, (&[0.4; 4], curvature), &ranges(1e3), limits).unwrap();
+        let (cold, warm) = (again(None), again(first.curvature));
+        assert!(warm.point.iter().all(|x| (x - 0.5).abs() < 1e-4), "{warm:?}");
+        assert!(warm.evaluations < cold.evaluations, "{} {}", warm.evaluations, cold.evaluations);
+    }
+
+    #[test]
+    fn curvature_without_a_coordinate_keeps_the_others() {
+        let inverse = Inverse { size: 3, entries: (0..9).map(f64::from).collect() };
+        let fewer = inverse.without(1);
+        assert_eq!((fewer.size, fewer.entries), (2, vec![0.0, 2.0, 6.0, 8.0]));
+    }
+
+    #[test]
     fn stays_within_bounds() {
         let limits = Limits { evaluations: 200, gain: 1e-12 };
         let ranges = ranges(1.2);
