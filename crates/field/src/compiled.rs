@@ -12,13 +12,13 @@ use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::cells::MOST_ACTIVE;
 use crate::compiled_axis::{CompiledAxis, Excited};
-use crate::compiled_table::{Line, MOST_LANES, Numbered, Sheet};
+use crate::compiled_table::{Line, MOST_LANES, Numbered, Row, Sheet};
 use crate::sag::{Loads, SagScratch};
 
 /// Below this many poses threads cost more than they bring.
 const THREADED_POSES: usize = 4096;
 /// Their inputs and outputs stay in the nearest caches.
-const POSES_PER_TASK: usize = 256;
+const POSES_PER_TASK: usize = 128;
 
 /// A bank prepared for evaluation, see [`Bank::compiled`].
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +31,12 @@ pub struct Compiled {
     lines: Vec<Line>,
     sheets: Vec<Sheet>,
     sag: Option<Loads>,
+    /// Of each joint's loads the single sum that takes them, (J,).
+    sag_singles: Vec<usize>,
+    /// Parameters that lines and sag drive, each with one sum.
+    singles: Vec<usize>,
+    /// Whether the first sheet begins with the single sums.
+    joined: bool,
 }
 
 impl Compiled {
@@ -44,10 +50,17 @@ impl Compiled {
             lines: Vec::new(),
             sheets: Vec::new(),
             sag: bank.sag.as_ref().map(Loads::new),
+            sag_singles: Vec::new(),
+            singles: Vec::new(),
+            joined: false,
         };
         let mut blocks: Vec<&Block> = bank.blocks.iter().collect();
         blocks.sort_by_key(|block| Reverse(block.grid.axes.len()));
         blocks.into_iter().for_each(|block| compiled.push(block));
+        let loaded = compiled.sag.as_ref().map_or(Vec::new(), |sag| sag.outputs.clone());
+        compiled.sag_singles = loaded.into_iter().map(|output| compiled.single(output)).collect();
+        let Self { sheets, singles, .. } = &mut compiled;
+        compiled.joined = sheets.first_mut().is_some_and(|sheet| sheet.begin_with(singles));
         compiled
     }
 
@@ -55,11 +68,12 @@ impl Compiled {
         let inputs = block.grid.inputs.iter().zip(&block.grid.axes);
         let axes: Vec<usize> =
             inputs.map(|(&input, axis)| self.axis(CompiledAxis::new(input, axis))).collect();
-        let axes: Vec<Numbered<'_>> = axes.into_iter().map(|axis| (axis, &self.axes[axis])).collect();
         if let (&[axis], &[output]) = (&axes[..], &block.outputs[..]) {
-            self.lines.push(Line::new(block, axis, output));
+            let single = self.single(output);
+            self.lines.push(Line::new(block, (axis, &self.axes[axis]), single));
             return;
         }
+        let axes: Vec<Numbered<'_>> = axes.into_iter().map(|axis| (axis, &self.axes[axis])).collect();
         for first in (0..block.outputs.len()).step_by(MOST_LANES * LANES) {
             let outputs = &block.outputs[first..block.outputs.len().min(first + MOST_LANES * LANES)];
             let place = self.sheets.iter().position(|sheet| sheet.outputs == outputs).unwrap_or_else(|| {
@@ -74,6 +88,13 @@ impl Compiled {
         self.axes.iter().position(|known| *known == axis).unwrap_or_else(|| {
             self.axes.push(axis);
             self.axes.len() - 1
+        })
+    }
+
+    fn single(&mut self, output: usize) -> usize {
+        self.singles.iter().position(|known| *known == output).unwrap_or_else(|| {
+            self.singles.push(output);
+            self.singles.len() - 1
         })
     }
 
@@ -139,6 +160,13 @@ impl Compiled {
 pub struct FieldScratch {
     three: Vec<Excited<3>>,
     four: Vec<Excited<MOST_ACTIVE>>,
+    sums: SumScratch,
+}
+
+#[derive(Debug, Clone)]
+struct SumScratch {
+    rows: Vec<Row>,
+    singles: Vec<Lane>,
     sag: Option<SagScratch>,
 }
 
@@ -159,6 +187,15 @@ impl Compiled {
         FieldScratch {
             three: vec![Excited::NONE; self.axes.len() - count(MOST_ACTIVE)],
             four: vec![Excited::NONE; count(MOST_ACTIVE)],
+            sums: self.sum_scratch(),
+        }
+    }
+
+    fn sum_scratch(&self) -> SumScratch {
+        let rows = self.sheets.iter().map(|sheet| sheet.row_count(self.active));
+        SumScratch {
+            rows: vec![Row::NONE; rows.max().unwrap_or(0)],
+            singles: vec![Lane::ZERO; self.singles.len().max(LANES)],
             sag: self.sag.as_ref().map(Loads::scratch),
         }
     }
@@ -168,10 +205,11 @@ impl Compiled {
     /// `inputs` are I lanes; `scratch` is this bank's own.
     #[inline(always)]
     pub fn excite_and_add<I: Isa>(&self, inputs: &[Lane], scratch: &mut FieldScratch, rows: &mut [f64]) {
+        let FieldScratch { three, four, sums } = scratch;
         if self.active == MOST_ACTIVE {
-            self.group::<I, MOST_ACTIVE>(|input| inputs[input], &mut scratch.four, &mut scratch.sag, rows);
+            self.group::<I, MOST_ACTIVE>(|input| inputs[input], four, sums, rows);
         } else {
-            self.group::<I, 3>(|input| inputs[input], &mut scratch.three, &mut scratch.sag, rows);
+            self.group::<I, 3>(|input| inputs[input], three, sums, rows);
         }
     }
 
@@ -180,20 +218,36 @@ impl Compiled {
         &self,
         input: impl Fn(usize) -> Lane,
         excited: &mut [Excited<K>],
-        room: &mut Option<SagScratch>,
-        rows: &mut [f64],
+        sums: &mut SumScratch,
+        out: &mut [f64],
     ) {
+        let (width, SumScratch { rows, singles, sag: room }) = (self.parameter_count, sums);
+        let poses = LANES.min(out.len() / width);
         for (axis, excited) in self.axes.iter().zip(excited.iter_mut()) {
             axis.excite::<I, K>(input(axis.input), excited);
         }
+        singles.fill(Lane::ZERO);
         for line in &self.lines {
-            line.add::<I, K>(excited, rows, self.parameter_count);
-        }
-        for sheet in &self.sheets {
-            sheet.add::<I, K>(excited, rows, self.parameter_count);
+            line.add::<I, K>(excited, poses, singles);
         }
         if let (Some(sag), Some(room)) = (&self.sag, room) {
-            sag.add::<I>(input, room, rows, self.parameter_count);
+            for (load, &single) in sag.at::<I>(input, poses == 1, room).iter().zip(&self.sag_singles) {
+                singles[single] += *load;
+            }
+        }
+        let mut begin = [Lane::ZERO; LANES];
+        if self.joined {
+            begin.copy_from_slice(&singles[..LANES]);
+            I::transpose(&mut begin);
+        } else {
+            for (sum, &output) in singles.iter().zip(&self.singles) {
+                for (out, value) in out.chunks_exact_mut(width).zip(&sum.0) {
+                    out[output] += value;
+                }
+            }
+        }
+        for sheet in &self.sheets {
+            sheet.add::<I, K>(excited, &begin, rows, out, width);
         }
     }
 }
@@ -220,7 +274,7 @@ impl Evaluate<'_> {
         if bank.axes.is_empty() && bank.sag.is_none() {
             return;
         }
-        let mut room = bank.sag.as_ref().map(Loads::scratch);
+        let mut sums = bank.sum_scratch();
         let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
         let mut inputs = vec![Lane::ZERO; bank.input_count];
         let (wide, width) = (bank.input_count * LANES, bank.parameter_count);
@@ -230,7 +284,7 @@ impl Evaluate<'_> {
                     lane.0[k] = *value;
                 }
             }
-            bank.group::<I, K>(|input| inputs[input], &mut excited, &mut room, out);
+            bank.group::<I, K>(|input| inputs[input], &mut excited, &mut sums, out);
         }
     }
 }

@@ -100,6 +100,17 @@ impl CompiledAxis {
         if self.closed { cell } else { cell + EMPTY }
     }
 
+    /// Cells of a row along this axis: a turn's first ones again behind its last, so that no run of excited cells breaks.
+    pub fn row_room(&self) -> usize {
+        self.room() + if self.closed { MOST_ACTIVE - 1 } else { 0 }
+    }
+
+    /// Where rows keep a cell of the axis.
+    pub fn places(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
+        let turn = if self.closed { self.count } else { self.row_room() };
+        (self.place(cell)..self.row_room()).step_by(turn)
+    }
+
     /// Cells of the axis.
     pub fn cell_count(&self) -> usize {
         self.count

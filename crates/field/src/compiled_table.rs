@@ -1,6 +1,6 @@
 //! Weights laid out for evaluation: one output over one input, or many outputs over up to three.
 
-use truearm_kinematics::{Isa, LANES, Lane};
+use truearm_kinematics::{Isa, LANES, Lane, Pick};
 
 use crate::bank::Block;
 use crate::cells::MOST_AXES;
@@ -9,36 +9,54 @@ use crate::compiled_axis::{CompiledAxis, Excited};
 /// Lanes of outputs whose sums fit into registers.
 pub const MOST_LANES: usize = 5;
 
+/// A compiled axis and its index.
+pub type Numbered<'a> = (usize, &'a CompiledAxis);
+
 /// One output over one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    pub axis: usize,
-    pub output: usize,
-    /// (cells,).
-    pub weights: Vec<f64>,
+    axis: usize,
+    /// Which of the single sums it adds to.
+    single: usize,
+    /// (cells,), with those that a turn repeats.
+    weights: Vec<f64>,
 }
 
 impl Line {
-    /// Adds to the outputs (up to 8, `width`) of the poses.
-    #[inline(always)]
-    pub fn add<I: Isa, const K: usize>(&self, excited: &[Excited<K>], out: &mut [f64], width: usize) {
-        let (excited, poses) = (&excited[self.axis], LANES.min(out.len() / width));
-        let mut sum = Lane::ZERO;
-        for k in 0..K {
-            let mut weight = Lane::ZERO;
-            if poses == LANES {
-                for p in 0..LANES {
-                    weight.0[p] = self.weights[excited.cell[k][p] as usize];
-                }
-            } else {
-                for p in 0..poses {
-                    weight.0[p] = self.weights[excited.cell[k][p] as usize];
-                }
-            }
-            sum = I::mul_add(excited.grade[k], weight, sum);
+    pub fn new(block: &Block, (axis, cells): Numbered<'_>, single: usize) -> Self {
+        let mut weights = vec![0.0; cells.row_room()];
+        for (cell, weight) in block.weights.iter().enumerate() {
+            cells.places(cell).for_each(|place| weights[place] = *weight);
         }
-        for (out, sum) in out.chunks_exact_mut(width).zip(&sum.0) {
-            out[self.output] += sum;
+        Self { axis, single, weights }
+    }
+
+    /// Adds to the single sums of up to 8 poses.
+    #[inline(always)]
+    pub fn add<I: Isa, const K: usize>(&self, excited: &[Excited<K>], poses: usize, singles: &mut [Lane]) {
+        let Excited { cell, grade } = &excited[self.axis];
+        let mut weights = [Lane::ZERO; K];
+        if poses == LANES {
+            for p in 0..LANES {
+                self.take(cell[0][p], p, &mut weights);
+            }
+        } else {
+            for p in 0..poses.min(LANES) {
+                self.take(cell[0][p], p, &mut weights);
+            }
+        }
+        let mut sum = singles[self.single];
+        for k in 0..K {
+            sum = I::mul_add(grade[k], weights[k], sum);
+        }
+        singles[self.single] = sum;
+    }
+
+    #[inline(always)]
+    fn take<const K: usize>(&self, first: u64, pose: usize, weights: &mut [Lane; K]) {
+        let row = &self.weights[first as usize..first as usize + K];
+        for k in 0..K {
+            weights[k].0[pose] = row[k];
         }
     }
 }
@@ -48,41 +66,85 @@ impl Line {
 pub struct Sheet {
     pub outputs: Vec<usize>,
     tables: Vec<Table>,
+    /// Of all tables, (rows, cells, lanes).
+    weights: Vec<Lane>,
+    /// How the sums reach the parameters.
+    ways: Vec<Way>,
+    /// Where in the single sums the numbers of each lane begin; empty if they begin with nothing.
+    begin: Vec<Pick>,
 }
 
-/// Weights of one block, (cells, lanes), over up to three axes, the last running fastest.
+/// From sums to eight parameters.
+#[derive(Debug, Clone, PartialEq)]
+struct Way {
+    /// First of the parameters, a multiple of eight.
+    parameter: usize,
+    /// First of the two lanes of sums.
+    lane: usize,
+    pick: Pick,
+}
+
+/// One block over up to three axes.
 #[derive(Debug, Clone, PartialEq)]
 struct Table {
-    /// The last axis and its cells.
-    last: (usize, usize),
-    /// The one before and its cells.
-    middle: Option<(usize, usize)>,
-    first: Option<usize>,
+    /// Its first cell in the sheet.
+    first: usize,
+    /// Its cells, with those that a turn repeats.
+    cells: usize,
+    /// The axis along rows.
+    last: usize,
+    /// Cells of a row, with those that a turn repeats: what is excited together lies together.
+    row_cells: usize,
+    /// The other axes, each with its cells.
+    outer: Vec<(usize, usize)>,
     /// Whether all its axes close.
     closed: bool,
-    weights: Vec<Lane>,
 }
 
-/// A compiled axis and its index.
-pub type Numbered<'a> = (usize, &'a CompiledAxis);
+/// A row of a table that eight poses excite.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// First excited cell, in the sheet.
+    cell: [u64; LANES],
+    /// Product of the grades along the other axes.
+    grade: Lane,
+}
 
-impl Line {
-    pub fn new(block: &Block, (axis, cells): Numbered<'_>, output: usize) -> Self {
-        let mut weights = vec![0.0; cells.room()];
-        for (cell, weight) in block.weights.iter().enumerate() {
-            weights[cells.place(cell)] = *weight;
-        }
-        Self { axis, output, weights }
-    }
+impl Row {
+    /// Without any effect.
+    pub const NONE: Self = Self { cell: [0; LANES], grade: Lane::ZERO };
 }
 
 impl Sheet {
     pub fn new(outputs: &[usize]) -> Self {
-        Self { outputs: outputs.to_vec(), tables: Vec::new() }
+        Self {
+            outputs: outputs.to_vec(),
+            tables: Vec::new(),
+            weights: Vec::new(),
+            ways: ways(outputs),
+            begin: Vec::new(),
+        }
+    }
+
+    /// Lets the sums begin with single ones of the given outputs; whether it could.
+    pub fn begin_with(&mut self, singles: &[usize]) -> bool {
+        let known = singles.iter().all(|output| self.outputs.contains(output));
+        if !known || singles.len() > LANES {
+            return false;
+        }
+        let source = |output| singles.iter().position(|single| single == output);
+        let lanes = self.outputs.chunks(LANES);
+        self.begin = lanes.map(|outputs| Pick::new(outputs.iter().map(source))).collect();
+        true
     }
 
     fn lanes(&self) -> usize {
         self.outputs.len().div_ceil(LANES)
+    }
+
+    /// Rows that a pose excites, with so many cells excited along each axis.
+    pub fn row_count(&self, active: usize) -> usize {
+        self.tables.iter().map(|table| table.row_count(active)).sum()
     }
 
     /// Takes in a block's outputs from `offset` on, over the given axes.
@@ -91,36 +153,55 @@ impl Sheet {
     /// whose grades add up to one.
     pub fn push(&mut self, block: &Block, offset: usize, axes: &[Numbered<'_>]) {
         let axes = &axes[..axes.len().min(MOST_AXES)];
-        let room = |k: usize| axes.get(k).map_or(1, |axis| axis.1.room());
-        let shape = [room(0), room(1), room(2)];
+        let Some((last, outer)) = axes.split_last() else { return };
         let lanes = self.lanes();
-        let mut weights = vec![Lane::ZERO; shape.iter().product::<usize>() * lanes];
+        let outer: Vec<(usize, usize)> = outer.iter().map(|&(axis, cells)| (axis, cells.room())).collect();
+        let table = Table {
+            first: self.weights.len() / lanes,
+            cells: outer.iter().map(|axis| axis.1).product::<usize>() * last.1.row_room(),
+            last: last.0,
+            row_cells: last.1.row_room(),
+            outer,
+            closed: axes.iter().all(|axis| axis.1.is_closed()),
+        };
+        let mut weights = vec![Lane::ZERO; table.cells * lanes];
         for (cell, source) in block.weights.chunks_exact(block.outputs.len()).enumerate() {
-            let target = &mut weights[place(axes, cell) * lanes..][..lanes];
-            for (i, weight) in source[offset..offset + self.outputs.len()].iter().enumerate() {
-                target[i / LANES].0[i % LANES] = *weight;
+            for place in places(axes, cell) {
+                let target = &mut weights[place * lanes..][..lanes];
+                for (i, weight) in source[offset..offset + self.outputs.len()].iter().enumerate() {
+                    target[i / LANES].0[i % LANES] = *weight;
+                }
             }
         }
-        let mut from_last = axes.iter().map(|&(axis, cells)| (axis, cells.room())).rev();
-        let Some(last) = from_last.next() else { return };
-        let middle = from_last.next();
-        let first = from_last.next().map(|(axis, _)| axis);
-        let closed = axes.iter().all(|axis| axis.1.is_closed());
-        let table = Table { last, middle, first, closed, weights };
-        if !self.tables.iter_mut().any(|larger| larger.absorb(&table, lanes)) {
-            self.tables.push(table);
+        let Self { tables, weights: all, .. } = self;
+        if !tables.iter().any(|larger| larger.absorb(&table, all, &weights, lanes)) {
+            tables.push(table);
+            all.extend(weights);
         }
     }
 
-    /// Adds to the outputs (up to 8, `width`) of the poses.
+    /// Adds to the outputs (up to 8, `width`) of the poses; of `singles` each lane is a pose's.
     #[inline(always)]
-    pub fn add<I: Isa, const K: usize>(&self, excited: &[Excited<K>], out: &mut [f64], width: usize) {
+    pub fn add<I: Isa, const K: usize>(
+        &self,
+        excited: &[Excited<K>],
+        singles: &[Lane; LANES],
+        rows: &mut [Row],
+        out: &mut [f64],
+        width: usize,
+    ) {
+        let mut free = &mut rows[..];
+        for table in &self.tables {
+            let (own, rest) = free.split_at_mut(table.row_count(K));
+            table.excite(excited, own);
+            free = rest;
+        }
         match self.lanes() {
-            1 => self.poses::<I, K, 1>(excited, out, width),
-            2 => self.poses::<I, K, 2>(excited, out, width),
-            3 => self.poses::<I, K, 3>(excited, out, width),
-            4 => self.poses::<I, K, 4>(excited, out, width),
-            _ => self.poses::<I, K, MOST_LANES>(excited, out, width),
+            1 => self.poses::<I, K, 1>(excited, singles, rows, out, width),
+            2 => self.poses::<I, K, 2>(excited, singles, rows, out, width),
+            3 => self.poses::<I, K, 3>(excited, singles, rows, out, width),
+            4 => self.poses::<I, K, 4>(excited, singles, rows, out, width),
+            _ => self.poses::<I, K, MOST_LANES>(excited, singles, rows, out, width),
         }
     }
 
@@ -128,114 +209,147 @@ impl Sheet {
     fn poses<I: Isa, const K: usize, const W: usize>(
         &self,
         excited: &[Excited<K>],
+        singles: &[Lane; LANES],
+        rows: &[Row],
         out: &mut [f64],
         width: usize,
     ) {
-        for (pose, out) in out.chunks_exact_mut(width).enumerate() {
+        let (cells, _) = self.weights.as_chunks::<W>();
+        for (pose, out) in (0..LANES).zip(out.chunks_exact_mut(width)) {
             let mut sums = [Lane::ZERO; W];
-            for table in &self.tables {
-                table.add::<I, K, W>(excited, pose, &mut sums);
+            for (sum, pick) in sums.iter_mut().zip(&self.begin) {
+                *sum = I::pick(&singles[pose], &Lane::ZERO, pick);
             }
-            for (outputs, sums) in self.outputs.chunks(LANES).zip(&sums) {
-                for (&output, sum) in outputs.iter().zip(&sums.0) {
-                    out[output] += sum;
+            let mut rows = rows.iter();
+            for table in &self.tables {
+                let last = &excited[table.last].grade;
+                for row in rows.by_ref().take(table.row_count(K)) {
+                    let first = row.cell[pose] as usize;
+                    let mut part = [Lane::ZERO; W];
+                    for (grade, weights) in last.iter().zip(&cells[first..first + K]) {
+                        weigh::<I, W>(grade.0[pose], weights, &mut part);
+                    }
+                    weigh::<I, W>(row.grade.0[pose], &part, &mut sums);
                 }
+            }
+            let mut found = [Lane::ZERO; MOST_LANES + 1];
+            found[..W].copy_from_slice(&sums);
+            for way in &self.ways {
+                let picked = I::pick(&found[way.lane], &found[way.lane + 1], &way.pick);
+                let last = out.len().min(way.parameter + LANES);
+                I::add_to(&picked, &mut out[way.parameter..last]);
             }
         }
     }
+}
+
+/// How sums of the given outputs reach their parameters.
+fn ways(outputs: &[usize]) -> Vec<Way> {
+    let mut left: Vec<(usize, usize)> = outputs.iter().copied().enumerate().collect();
+    let mut ways = Vec::new();
+    while let Some(&(sum, output)) = left.first() {
+        let (parameter, lane) = (output / LANES * LANES, sum / LANES);
+        let mut from = [None; LANES];
+        left.retain(|&(sum, output)| {
+            let (here, source) = (output.wrapping_sub(parameter), sum - lane * LANES);
+            let taken = here < LANES && source < 2 * LANES && from[here].is_none();
+            if taken {
+                from[here] = Some(source);
+            }
+            !taken
+        });
+        ways.push(Way { parameter, lane, pick: Pick::new(from) });
+    }
+    ways
 }
 
 /// Where a table over the given axes keeps a cell of their grid.
-fn place(axes: &[Numbered<'_>], cell: usize) -> usize {
-    let (mut rest, mut stride, mut index) = (cell, 1, 0);
+fn places(axes: &[Numbered<'_>], cell: usize) -> impl Iterator<Item = usize> {
+    let (mut rest, mut start, mut stride) = (cell, 0, 1);
+    let mut along_row = None;
     for (_, axis) in axes.iter().rev() {
-        index += axis.place(rest % axis.cell_count()) * stride;
+        let along = rest % axis.cell_count();
         rest /= axis.cell_count();
-        stride *= axis.room();
+        if along_row.is_none() {
+            along_row = Some(axis.places(along));
+            stride = axis.row_room();
+        } else {
+            start += axis.place(along) * stride;
+            stride *= axis.room();
+        }
     }
-    index
+    along_row.into_iter().flatten().map(move |place| start + place)
 }
 
 impl Table {
+    fn row_count(&self, active: usize) -> usize {
+        active.pow(self.outer.len() as u32)
+    }
+
     /// Takes in a table over one of its axes, where that changes no sum; says whether it did.
-    fn absorb(&mut self, other: &Table, lanes: usize) -> bool {
-        let axis = other.last.0;
-        let middle_cells = self.middle.map_or(1, |middle| middle.1);
-        let stride = match (self.middle, self.first) {
-            _ if self.last.0 == axis => 1,
-            (Some(middle), _) if middle.0 == axis => self.last.1,
-            (_, Some(first)) if first == axis => middle_cells * self.last.1,
-            _ => return false,
-        };
-        if other.middle.is_some() || !self.closed || !other.closed {
+    ///
+    /// `all` are the weights of the sheet, `weights` those of the other table.
+    fn absorb(&self, other: &Table, all: &mut [Lane], weights: &[Lane], lanes: usize) -> bool {
+        if !other.outer.is_empty() || !self.closed || !other.closed {
             return false;
         }
-        for (cell, target) in self.weights.chunks_exact_mut(lanes).enumerate() {
-            let along = cell / stride % other.last.1;
-            for (sum, weight) in target.iter_mut().zip(&other.weights[along * lanes..]) {
+        let mut stride = (self.last == other.last).then_some((1, self.row_cells));
+        let mut behind = self.row_cells;
+        for &(axis, cells) in self.outer.iter().rev() {
+            if axis == other.last {
+                stride = Some((behind, cells));
+            }
+            behind *= cells;
+        }
+        let Some((stride, count)) = stride else { return false };
+        let own = all[self.first * lanes..].chunks_exact_mut(lanes).take(self.cells);
+        for (cell, target) in own.enumerate() {
+            let along = cell / stride % count;
+            for (sum, weight) in target.iter_mut().zip(&weights[along * lanes..]) {
                 *sum += *weight;
             }
         }
         true
     }
 
+    /// The rows that eight poses excite.
     #[inline(always)]
-    fn add<I: Isa, const K: usize, const W: usize>(
-        &self,
-        excited: &[Excited<K>],
-        pose: usize,
-        sums: &mut [Lane; W],
-    ) {
-        let (weights, _) = self.weights.as_chunks::<W>();
-        let last = &excited[self.last.0];
-        let Some((middle, middle_count)) = self.middle else {
-            row::<I, K, W>(weights, last, pose, sums);
-            return;
-        };
-        let middle = &excited[middle];
-        let Some(first) = self.first else {
-            plane::<I, K, W>(weights, self.last.1, [middle, last], pose, sums);
-            return;
-        };
-        let first = &excited[first];
-        let plane_cells = middle_count * self.last.1;
-        for k in 0..K {
-            let mut part = [Lane::ZERO; W];
-            let weights = &weights[first.cell[k][pose] as usize * plane_cells..];
-            plane::<I, K, W>(weights, self.last.1, [middle, last], pose, &mut part);
-            weigh::<I, W>(first.grade[k].0[pose], &part, sums);
+    fn excite<const K: usize>(&self, excited: &[Excited<K>], rows: &mut [Row]) {
+        let row_cells = self.row_cells as u64;
+        let mut first = excited[self.last].cell[0];
+        for cell in &mut first {
+            *cell += self.first as u64;
+        }
+        match self.outer[..] {
+            [(axis, _)] => {
+                let outer = &excited[axis];
+                for (k, row) in rows.iter_mut().enumerate().take(K) {
+                    *row = Row { cell: beyond(&first, &outer.cell[k], row_cells), grade: outer.grade[k] };
+                }
+            }
+            [(axis, _), (next, cells)] => {
+                let (outer, inner) = (&excited[axis], &excited[next]);
+                for (j, rows) in rows.chunks_exact_mut(K).enumerate().take(K) {
+                    let start = beyond(&first, &outer.cell[j], cells as u64 * row_cells);
+                    for (k, row) in rows.iter_mut().enumerate() {
+                        let cell = beyond(&start, &inner.cell[k], row_cells);
+                        *row = Row { cell, grade: outer.grade[j] * inner.grade[k] };
+                    }
+                }
+            }
+            _ => rows.fill(Row { cell: first, grade: Lane::splat(1.0) }),
         }
     }
 }
 
-/// Adds the excited cells of a grid over two axes, rows of so many cells.
+/// So many cells beyond `start` for each of `steps`.
 #[inline(always)]
-fn plane<I: Isa, const K: usize, const W: usize>(
-    weights: &[[Lane; W]],
-    cells: usize,
-    axes: [&Excited<K>; 2],
-    pose: usize,
-    sums: &mut [Lane; W],
-) {
-    let [outer, inner] = axes;
-    for k in 0..K {
-        let mut part = [Lane::ZERO; W];
-        row::<I, K, W>(&weights[outer.cell[k][pose] as usize * cells..], inner, pose, &mut part);
-        weigh::<I, W>(outer.grade[k].0[pose], &part, sums);
+fn beyond(start: &[u64; LANES], steps: &[u64; LANES], cells: u64) -> [u64; LANES] {
+    let mut found = *start;
+    for (found, steps) in found.iter_mut().zip(steps) {
+        *found += steps * cells;
     }
-}
-
-/// Adds the excited cells of one axis.
-#[inline(always)]
-fn row<I: Isa, const K: usize, const W: usize>(
-    weights: &[[Lane; W]],
-    axis: &Excited<K>,
-    pose: usize,
-    sums: &mut [Lane; W],
-) {
-    for k in 0..K {
-        weigh::<I, W>(axis.grade[k].0[pose], &weights[axis.cell[k][pose] as usize], sums);
-    }
+    found
 }
 
 #[inline(always)]

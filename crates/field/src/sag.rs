@@ -44,7 +44,7 @@ pub struct SagScratch {
 pub struct Loads {
     levers: Levers,
     /// Parameter that each joint's loads drive, (J,).
-    outputs: Vec<usize>,
+    pub outputs: Vec<usize>,
     /// Of each lever its weight and those of the same joint behind it, (L,).
     heights: Vec<f64>,
 }
@@ -144,31 +144,26 @@ impl Loads {
         self.levers.scratch()
     }
 
-    /// Adds to the parameters (up to 8, `width`) of the poses whose inputs `input` gives.
+    /// What the loads add to the outputs, for up to 8 poses whose inputs `input` gives.
     #[inline(always)]
-    pub fn add<I: Isa>(
+    pub fn at<'a, I: Isa>(
         &self,
         input: impl Fn(usize) -> Lane,
-        scratch: &mut SagScratch,
-        rows: &mut [f64],
-        width: usize,
-    ) {
+        alone: bool,
+        scratch: &'a mut SagScratch,
+    ) -> &'a [Lane] {
         let SagScratch { joints, loads, frames, one } = scratch;
         for (k, lane) in joints.iter_mut().enumerate() {
             *lane = input(k);
         }
         let Levers { chain, nominal } = &self.levers;
-        let parameters = if rows.len() == width {
+        let parameters = if alone {
             one.move_to::<I>(chain, joints);
             LaneParameters::One(one)
         } else {
             LaneParameters::Shared(nominal)
         };
         chain.loads::<I>(joints, parameters, &self.heights, frames, loads);
-        for (load, &output) in loads.iter().zip(&self.outputs) {
-            for (row, value) in rows.chunks_exact_mut(width).zip(&load.0) {
-                row[output] += value;
-            }
-        }
+        loads
     }
 }

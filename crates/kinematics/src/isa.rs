@@ -6,7 +6,7 @@
 use std::sync::OnceLock;
 
 use crate::error::KinematicsError;
-use crate::lane::{LANES, Lane};
+use crate::lane::{LANES, Lane, Pick};
 
 /// What differs between instruction sets: whether a multiplication fuses with an addition, and how rows are moved.
 pub trait Isa {
@@ -24,6 +24,28 @@ pub trait Isa {
             for k in 0..LANES {
                 lane.0[k] = source[k].0[i];
             }
+        }
+    }
+
+    /// Eight numbers out of sixteen.
+    #[inline(always)]
+    fn pick(low: &Lane, high: &Lane, pick: &Pick) -> Lane {
+        let mut out = Lane::ZERO;
+        for (i, out) in out.0.iter_mut().enumerate() {
+            *out = match pick.from[i] as usize {
+                from if pick.taken >> i & 1 == 0 || from >= 2 * LANES => 0.0,
+                from if from < LANES => low.0[from],
+                from => high.0[from - LANES],
+            };
+        }
+        out
+    }
+
+    /// Add the first numbers of a lane to `to`, up to eight.
+    #[inline(always)]
+    fn add_to(lane: &Lane, to: &mut [f64]) {
+        for (to, value) in to.iter_mut().zip(&lane.0) {
+            *to += value;
         }
     }
 
@@ -133,7 +155,7 @@ impl Isa for Plain {
 
 #[cfg(target_arch = "x86_64")]
 mod vector {
-    use super::{InstructionSet, Isa, Kernel, LANES, Lane};
+    use super::{InstructionSet, Isa, Kernel, LANES, Lane, Pick};
     use crate::x86;
 
     pub struct Avx2;
@@ -177,6 +199,18 @@ mod vector {
         fn transpose(block: &mut [Lane; LANES]) {
             // SAFETY: this instruction set is only used on processors that have it.
             unsafe { x86::transpose_avx512(block) }
+        }
+
+        #[inline(always)]
+        fn pick(low: &Lane, high: &Lane, pick: &Pick) -> Lane {
+            // SAFETY: as above.
+            unsafe { x86::pick_avx512(low, high, pick) }
+        }
+
+        #[inline(always)]
+        fn add_to(lane: &Lane, to: &mut [f64]) {
+            // SAFETY: as above.
+            unsafe { x86::add_to_avx512(lane, to) }
         }
 
         #[inline(always)]

@@ -10,6 +10,29 @@ pub const LANES: usize = 8;
 #[repr(C, align(64))]
 pub struct Lane(pub [f64; LANES]);
 
+/// Which of sixteen numbers, those of two lanes, become the numbers of one; see [`crate::Isa::pick`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[repr(align(64))]
+pub struct Pick {
+    pub(crate) from: [u64; LANES],
+    /// A bit for each number: where it is not set stands zero.
+    pub(crate) taken: u8,
+}
+
+impl Pick {
+    /// Of up to eight numbers where they come from: 0 to 7 in the first lane, 8 to 15 in the second; the others are zero.
+    pub fn new(sources: impl IntoIterator<Item = Option<usize>>) -> Self {
+        let mut pick = Self { from: [0; LANES], taken: 0 };
+        for (i, source) in sources.into_iter().enumerate().take(LANES) {
+            if let Some(source) = source.filter(|&source| source < 2 * LANES) {
+                pick.from[i] = source as u64;
+                pick.taken |= 1 << i;
+            }
+        }
+        pick
+    }
+}
+
 impl Lane {
     /// Zero for every pose.
     pub const ZERO: Lane = Lane([0.0; LANES]);

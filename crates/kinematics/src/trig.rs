@@ -60,13 +60,13 @@ fn reduced<I: Isa>(angle: Lane) -> (Lane, Lane) {
     (quadrant(shifted, s, c, 0), quadrant(shifted, c, s, 1))
 }
 
+/// By Estrin's scheme: half as many steps that wait for each other as Horner's has.
 #[inline(always)]
 fn polynomial<I: Isa>(coefficients: &[f64; 7], x: Lane) -> Lane {
-    let mut sum = Lane::splat(coefficients[6]);
-    for i in (0..6).rev() {
-        sum = I::mul_add(sum, x, Lane::splat(coefficients[i]));
-    }
-    sum
+    let c = |i: usize| Lane::splat(coefficients[i]);
+    let (x2, pair) = (x * x, |i: usize| I::mul_add(c(i + 1), x, c(i)));
+    let (low, high) = (I::mul_add(pair(2), x2, pair(0)), I::mul_add(c(6), x2, pair(4)));
+    I::mul_add(high, x2 * x2, low)
 }
 
 /// `even` or `odd` by the lowest bit of the quarter turns, with the sign of the second bit; `shift` quarter turns on.

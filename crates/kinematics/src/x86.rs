@@ -4,12 +4,13 @@
 use std::arch::x86_64::{
     __m128d, __m256d, __m512d, _mm_add_pd, _mm_mul_pd, _mm_sfence, _mm256_fmadd_pd, _mm256_loadu_pd,
     _mm256_permute2f128_pd, _mm256_storeu_pd, _mm256_stream_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
-    _mm512_fmadd_pd, _mm512_loadu_pd, _mm512_shuffle_f64x2, _mm512_storeu_pd, _mm512_stream_pd,
-    _mm512_unpackhi_pd, _mm512_unpacklo_pd,
+    _mm512_add_pd, _mm512_fmadd_pd, _mm512_loadu_epi64, _mm512_loadu_pd, _mm512_mask_storeu_pd,
+    _mm512_maskz_loadu_pd, _mm512_maskz_permutex2var_pd, _mm512_shuffle_f64x2, _mm512_storeu_pd,
+    _mm512_stream_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd,
 };
 use std::mem::transmute;
 
-use crate::lane::{LANES, Lane};
+use crate::lane::{LANES, Lane, Pick};
 
 type Eight = __m512d;
 type Fours = [__m256d; 2];
@@ -59,6 +60,36 @@ pub fn mul_add_sse2(a: Lane, b: Lane, c: Lane) -> Lane {
             _mm_add_pd(_mm_mul_pd(a[2], b[2]), c[2]),
             _mm_add_pd(_mm_mul_pd(a[3], b[3]), c[3]),
         ])
+    }
+}
+
+/// Eight numbers out of sixteen, see [`crate::Isa::pick`].
+///
+/// # Safety
+/// The processor must have AVX-512F.
+#[inline(always)]
+pub unsafe fn pick_avx512(low: &Lane, high: &Lane, pick: &Pick) -> Lane {
+    // SAFETY: loads are of the eight numbers of a lane or a pick; the caller vouches for the instructions.
+    unsafe {
+        let from = _mm512_loadu_epi64(pick.from.as_ptr().cast());
+        let (low, high) = (_mm512_loadu_pd(low.0.as_ptr()), _mm512_loadu_pd(high.0.as_ptr()));
+        transmute::<Eight, Lane>(_mm512_maskz_permutex2var_pd(pick.taken, low, from, high))
+    }
+}
+
+/// Adds the first numbers of a lane to `to`, see [`crate::Isa::add_to`].
+///
+/// # Safety
+/// The processor must have AVX-512F.
+#[inline(always)]
+pub unsafe fn add_to_avx512(lane: &Lane, to: &mut [f64]) {
+    let count = to.len().min(LANES);
+    let mask = (0xff_u16 >> (LANES - count)) as u8;
+    // SAFETY: the mask leaves the numbers that `to` has; the caller vouches for the instructions.
+    unsafe {
+        let before = _mm512_maskz_loadu_pd(mask, to.as_ptr());
+        let after = _mm512_add_pd(before, _mm512_loadu_pd(lane.0.as_ptr()));
+        _mm512_mask_storeu_pd(to.as_mut_ptr(), mask, after);
     }
 }
 
