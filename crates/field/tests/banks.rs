@@ -32,6 +32,36 @@ fn bank(degree: usize) -> Bank {
     Bank { blocks, ..Bank::empty(INPUTS, PARAMETERS) }
 }
 
+/// Whole turns only: a block over one input is over one of those of larger ones, and single outputs are among theirs.
+fn turning_bank(degree: usize) -> Bank {
+    let (mut random, outputs) = (Random::new(3), [7, 0, 3, 8, 9, 1, 4, 5, 6]);
+    let mut blocks: Vec<Block> = [vec![0], vec![1], vec![0, 1], vec![1, 2, 0], vec![2]]
+        .iter()
+        .map(|inputs| block("turning", inputs, &outputs, degree, &mut random))
+        .collect();
+    for block in &mut blocks {
+        for axis in &mut block.grid.axes {
+            let turn = (0..100).map(|i| 0.063 * f64::from(i)).collect::<Vec<_>>();
+            *axis = Axis::covering(Input::ANGLE, turn.into_iter(), 0.7, 2.0, degree);
+            assert!(axis.closed);
+        }
+        let cells = block.grid.cell_count() * outputs.len();
+        block.weights = (0..cells).map(|_| random.normal()).collect();
+    }
+    blocks.push(block("own", &[1], &[8], degree, &mut random));
+    blocks.push(block("own", &[0], &[8], degree, &mut random));
+    blocks.push(block("own", &[2], &[3], degree, &mut random));
+    Bank { blocks, ..Bank::empty(INPUTS, PARAMETERS) }
+}
+
+/// More outputs than the sums of one pass, some of them twice.
+fn bank_of_many_outputs(degree: usize) -> Bank {
+    let mut random = Random::new(4);
+    let outputs: Vec<usize> = (0..47).map(|k| (3 * k + k / 9) % PARAMETERS).collect();
+    let blocks = vec![block("major", &[0, 1], &outputs, degree, &mut random)];
+    Bank { blocks, ..Bank::empty(INPUTS, PARAMETERS) }
+}
+
 fn values(poses: usize) -> Vec<f64> {
     let mut random = Random::new(2);
     (0..poses * INPUTS).map(|_| random.between(-7.0, 7.0)).collect()
@@ -74,21 +104,33 @@ fn grades(axis: &Axis, value: f64) -> Vec<f64> {
     (0..axis.count).map(of).collect()
 }
 
+/// What a bank should give for one configuration: of every block every cell.
+fn summed(bank: &Bank, q: &[f64]) -> Vec<f64> {
+    let mut wanted = vec![0.0; PARAMETERS];
+    for block in &bank.blocks {
+        let axes = block.grid.inputs.iter().zip(&block.grid.axes);
+        let memberships = axes.fold(vec![1.0], |so_far: Vec<f64>, (&input, axis)| {
+            let along = grades(axis, q[input]);
+            so_far.iter().flat_map(|a| along.iter().map(move |b| a * b)).collect()
+        });
+        for (grade, weights) in memberships.iter().zip(block.weights.chunks(block.outputs.len())) {
+            for (&output, weight) in block.outputs.iter().zip(weights) {
+                wanted[output] += grade * weight;
+            }
+        }
+    }
+    wanted
+}
+
 #[test]
-fn a_block_is_the_sum_of_its_cells_weights_times_b_splines() {
+fn a_bank_is_the_sum_of_its_cells_weights_times_b_splines() {
     for degree in [2, 3] {
-        let bank = bank(degree);
-        let block = &bank.blocks[2];
-        for q in values(20).chunks(INPUTS) {
-            let (first, second) = (grades(&block.grid.axes[0], q[0]), grades(&block.grid.axes[1], q[1]));
-            let mut wanted = 0.0;
-            for (i, a) in first.iter().enumerate() {
-                for (j, b) in second.iter().enumerate() {
-                    wanted += a * b * block.weights[(i * second.len() + j) * 2 + 1];
+        for bank in [bank(degree), turning_bank(degree), bank_of_many_outputs(degree)] {
+            for q in values(20).chunks(INPUTS) {
+                for (found, wanted) in evaluate(&bank, q).iter().zip(summed(&bank, q)) {
+                    assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
                 }
             }
-            let found = evaluate(&bank, q)[3];
-            assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
         }
     }
 }

@@ -1,0 +1,57 @@
+//! Eight numbers at once: taken out of sixteen, and added to what is there.
+#![allow(clippy::unwrap_used, reason = "a test may stop")]
+
+use proptest::prelude::*;
+use truearm_kinematics::{InstructionSet, Isa, Kernel, LANES, Lane, Pick, dispatch_on};
+
+struct Picking<'a>(&'a [Lane; 2], &'a Pick);
+
+impl Kernel for Picking<'_> {
+    type Output = Lane;
+
+    fn run<I: Isa>(self) -> Lane {
+        I::pick(&self.0[0], &self.0[1], self.1)
+    }
+}
+
+struct Adding<'a>(&'a Lane, &'a mut [f64]);
+
+impl Kernel for Adding<'_> {
+    type Output = ();
+
+    fn run<I: Isa>(self) {
+        I::add_to(self.0, self.1);
+    }
+}
+
+proptest! {
+    #[test]
+    fn numbers_come_from_where_they_are_picked(
+        numbers in prop::array::uniform16(-1.0..1.0),
+        sources in prop::collection::vec(prop::option::of(0..20_usize), 0..12),
+    ) {
+        let lanes = [Lane::from_fn(|i| numbers[i]), Lane::from_fn(|i| numbers[LANES + i])];
+        let pick = Pick::new(sources.iter().copied());
+        let wanted = |i: usize| {
+            let source = sources.get(i).copied().flatten();
+            source.and_then(|source| numbers.get(source)).copied().unwrap_or(0.0)
+        };
+        for set in InstructionSet::ALL {
+            prop_assert_eq!(dispatch_on(set, Picking(&lanes, &pick)), Lane::from_fn(wanted));
+        }
+    }
+
+    #[test]
+    fn no_more_is_added_to_than_is_there(
+        numbers in prop::array::uniform8(-1.0..1.0),
+        before in prop::collection::vec(-1.0..1.0, 0..12),
+    ) {
+        for set in InstructionSet::ALL {
+            let mut found = before.clone();
+            dispatch_on(set, Adding(&Lane(numbers), &mut found));
+            for (i, (found, before)) in found.iter().zip(&before).enumerate() {
+                prop_assert_eq!(*found, numbers.get(i).map_or(*before, |number| before + number));
+            }
+        }
+    }
+}
