@@ -1,10 +1,10 @@
 //! Which joints the `major` block varies with, chosen by the evidence.
 //!
-//! Backward elimination from all joints on a small training set: the joint whose absence costs least after refitting
-//! goes, until three are left; length scales alone do not tell, since a long one may still carry a first harmonic.
-//! Elimination is greedy and its set small, so its choice then stands against the usual ones (the arm's first three
-//! joints, and the two or three after the first, about which gravity does not turn) on a larger set. A joint must
-//! bring [`WORTH`] nats to stay; two stay always.
+//! Usual are the arm's first three joints, and the two or three after the first, about which gravity does not turn: they
+//! stand against each other. Against them stands what backward elimination from all joints ends at on a small training set:
+//! the joint whose absence costs least after refitting goes, until three are left; length scales alone do not tell, since a
+//! long one may still carry a first harmonic. It is the best of dozens of choices, and so has to be far ahead
+//! (docs/decisions/0004). A joint must bring [`WORTH`] nats to stay; two stay always.
 
 use truearm_estimate::Cancel;
 
@@ -16,6 +16,8 @@ use crate::training::Training;
 
 /// A joint must bring this many nats to stay.
 const WORTH: f64 = 3.0;
+/// So many nats the best of all choices may be ahead of the usual ones by chance.
+const CHANCE: f64 = 25.0;
 /// Joints of the `major` block at the most: its grid grows with their power.
 const MOST: usize = 3;
 /// One joint alone is what `smooth` blocks hold already.
@@ -34,7 +36,20 @@ pub struct Found {
     pub curvature: Curvature,
 }
 
-/// Hyper-parameters of three joints at the most, fitted to a small training set from several starts.
+/// The usual joints of an arm, those that the search begins with first.
+fn usual_joints(count: usize) -> impl Iterator<Item = Vec<usize>> {
+    [0..3, 1..3, 1..4].into_iter().map(move |joints| joints.filter(|&joint| joint < count).collect())
+}
+
+/// What is left of the evidence of `found` once its joints, and how they were chosen, are counted against it.
+fn net(found: &Found, joints: usize) -> f64 {
+    let major = found.hyper.major_joints();
+    let chance = if usual_joints(joints).any(|usual| usual == major) { 0.0 } else { CHANCE };
+    found.value - WORTH * major.len() as f64 - chance
+}
+
+/// Hyper-parameters of three joints at the most, fitted to a small training set from several starts: the first of the
+/// usual joints, or what elimination ends at.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
@@ -45,36 +60,47 @@ pub fn select_major(
     cancel: &Cancel,
 ) -> Result<Found, FieldError> {
     let evidence = Evidence::new(training, cancel);
+    let first = usual_joints(joints).next().unwrap_or_default();
+    let usual = started(&evidence, &first, joints, noise)?;
     let all: Vec<usize> = (0..joints).collect();
+    let mut other = started(&evidence, &all, joints, noise)?;
+    let mut evaluations = usual.evaluations + other.evaluations;
+    while other.hyper.major_joints().len() > MOST {
+        other = cheapest_removal(&evidence, &other, &mut evaluations)?;
+    }
+    let best = if net(&other, joints) > net(&usual, joints) { other } else { usual };
+    Ok(Found { evaluations, ..best })
+}
+
+/// The best that several starts with the same joints come to.
+fn started(
+    evidence: &Evidence,
+    major: &[usize],
+    joints: usize,
+    noise: [f64; 2],
+) -> Result<Found, FieldError> {
     let mut evaluations = 0;
     let mut best: Option<Found> = None;
-    for start in Hyper::starts(&all, joints, noise) {
-        let found = refine(&evidence, start, FIRST)?;
+    for start in Hyper::starts(major, joints, noise) {
+        let found = refine(evidence, start, FIRST)?;
         evaluations += found.evaluations;
         if best.as_ref().is_none_or(|best| found.value > best.value) {
             best = Some(found);
         }
     }
-    let Some(mut best) = best else {
-        return Err(FieldError::Length { what: "starts", found: 0, expected: 1 });
-    };
-    while best.hyper.major_joints().len() > MOST {
-        best = cheapest_removal(&evidence, &best, &mut evaluations)?;
-    }
+    let best = best.ok_or(FieldError::Length { what: "starts", found: 0, expected: 1 })?;
     Ok(Found { evaluations, ..best })
 }
 
-/// The best of what elimination found and of the usual joints, a nat for a nat but [`WORTH`] a joint.
+/// The best of `found` and the usual joints, by what is left of their evidence.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
 pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result<Found, FieldError> {
-    let net = |found: &Found| found.value - WORTH * found.hyper.major_joints().len() as f64;
     let mut evaluations = found.evaluations;
     let present = found.hyper.clone();
     let mut best = found;
-    for usual in [0..3, 1..3, 1..4] {
-        let rival: Vec<usize> = usual.filter(|&joint| joint < joints).collect();
+    for rival in usual_joints(joints) {
         if rival == present.major_joints() || rival.is_empty() {
             continue;
         }
@@ -84,7 +110,7 @@ pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result
         }
         let candidate = refine(evidence, rival, RIVAL)?;
         evaluations += candidate.evaluations;
-        if net(&candidate) > net(&best) {
+        if net(&candidate, joints) > net(&best, joints) {
             best = candidate;
         }
     }
