@@ -122,6 +122,21 @@ def test_constants_are_updated_too(known):
     assert (std_mm(found.calibration, q) > 0.98 * std_mm(calibration, q)).all()
 
 
+@pytest.mark.parametrize("model", ["variable", "constant"])
+def test_heights_that_only_frame_and_tool_share_stay_together(model):
+    # No pose of a SCARA tells its own height from those of frame, tool and sliding joint: known to metres, not to millimetres.
+    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=2)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(80)), model=model)
+    new = arm.measure(arm.poses(15, seed=9), seed=9)
+    found = ta.update(calibration, new)
+    own = calibration.validation.holdout[model].position.mean
+    assert found.verdict == "holds"
+    for checked in (found.before, found.after):
+        assert checked.position.mean < 2.0 * own
+    kept = ta.evaluate(found.calibration, new, keep_frames=True)
+    assert kept.errors[model].position.mean < 2.0 * own
+
+
 def test_orientation_and_its_target_are_updated():
     arm = VirtualArm.paper(seed=2)
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(50), orientation=True), model="constant")

@@ -122,7 +122,9 @@ def confounding(facts: Facts) -> Figure | None:
         return None
     covariance = details.covariance[:size, :size]
     deviation = np.sqrt(np.diagonal(covariance))
-    correlation = covariance / np.outer(deviation, deviation)
+    scale = np.outer(deviation, deviation)
+    # An update holds constants that its poses do not tell: they go with nothing.
+    correlation = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
     off = np.where(np.eye(size, dtype=bool), 0.0, correlation)
     row, column = np.unravel_index(int(np.argmax(np.abs(off))), off.shape)
     strong = int((np.abs(np.triu(off)) > CONFOUNDED).sum())

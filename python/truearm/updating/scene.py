@@ -1,6 +1,7 @@
 """New measurements against a calibration: residuals, derivatives, and how they may scatter."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from truearm.updating.unknowns import OPEN, Unknowns
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+RANK: Final = 1e-9
+"""Columns reach no farther than this share of the farthest in directions that they do not have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,15 +118,20 @@ class Scene:
         return (moved[:frame] if frame else None), moved[frame:]
 
     def covariance(self, calibration: Calibration, state: State) -> Floats:
-        """Covariance (R, R) of the residuals of an unchanged arm, without what is found anew."""
+        """Covariance (R, R) of the residuals of an unchanged arm, without what is found anew.
+
+        What a frame or tool found anew can make up for is its own: along these directions an arm's parameters and the
+        old set-up may be unknown by metres, each known with the other alone (the height of a SCARA and of its tool).
+        """
         jacobian, _ = linearise(self.problem, self.parameters, state.setup)
-        spread = calibration.spread
+        spread, seen = calibration.spread, self.seen.reshape(-1)
         whole = spread.joint(self.inputs, jacobian, self._known_setup_jacobian(calibration, state))
-        anew = spread.noise(jacobian, self.orientation)
+        anew = self.linear(state).jacobian[:, self.unknowns.std >= OPEN]
+        expected = _without(whole[np.ix_(seen, seen)], anew)
+        noise = spread.noise(jacobian, self.orientation)
         own = np.zeros(len(self.data)) if self.data.sigma_m is None else np.nan_to_num(self.data.sigma_m)
-        whole += block_diag(*(anew + (own[:, None, None] ** 2) * np.diag(~self.orientation)))
-        seen = self.seen.reshape(-1)
-        return np.asarray(whole[np.ix_(seen, seen)])
+        scatter = block_diag(*(noise + (own[:, None, None] ** 2) * np.diag(~self.orientation)))
+        return np.asarray(expected + scatter[np.ix_(seen, seen)])
 
     @property
     def _turns(self) -> int:
@@ -174,3 +183,14 @@ class Scene:
                 tied = self.unknowns.std[self.unknowns.group(k)] < OPEN
                 found[rows, :, number * width : (number + 1) * width] = own[rows] * tied
         return found
+
+
+def _without(covariance: Floats, columns: Floats) -> Floats:
+    """A covariance (R, R) without its parts along the columns (R, k)."""
+    if columns.shape[1] == 0:
+        return covariance
+    along, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    along = along[:, sizes > RANK * sizes[0]]
+    part = along @ (along.T @ covariance)
+    rest = covariance - part
+    return np.asarray(rest - (rest @ along) @ along.T)
