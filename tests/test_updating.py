@@ -124,7 +124,7 @@ def test_constants_are_updated_too(known):
 
 @pytest.mark.parametrize("model", ["variable", "constant"])
 def test_heights_that_only_frame_and_tool_share_stay_together(model):
-    # No pose of a SCARA tells its own height from those of frame, tool and sliding joint: known to metres, not to millimetres.
+    # No pose of a SCARA tells its own height from those of frame, tool and sliding joint.
     arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=2)
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(80)), model=model)
     new = arm.measure(arm.poses(15, seed=9), seed=9)

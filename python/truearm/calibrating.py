@@ -1,6 +1,7 @@
 """From measurements to a calibration: split, fit, validate, and fit to all rows."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from truearm.calibration import Calibration
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
+from truearm.doubts import doubts
 from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
@@ -76,7 +78,7 @@ def calibrate(
         hyper = _kept_hyper(trained)
         final = fit_rows(task, given.select(order), hyper)
     variable = _variable_details(task, final, final if hyper is None else trained)
-    return Calibration(
+    found = Calibration(
         robot=robot,
         options=chosen,
         groups=tuple(task.groups),
@@ -95,6 +97,8 @@ def calibrate(
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
+    doubted = doubts(task.arm, found.models, validation, found.model_name)
+    return replace(found, notices=(*found.notices, *doubted))
 
 
 def _options(options: Options | None, more: Mapping[str, Any]) -> Options:

@@ -1,5 +1,6 @@
 """The three fits of one set of rows: frame and tool alone, constants, and what varies."""
 
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -122,11 +123,12 @@ def fit_rows(task: Task, data: Measurements, hyper: Hyper | None = None) -> Fits
     """
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
     began = time.perf_counter()
+    _check_enough(task, data, setup_unknowns(task))
     with task.stages("finding frame and tool"), core_errors(data):
         nominal = fit_constant(task.problem(measured, []), fit_options(task))
     with task.stages("asking what the poses determine"):
         found = identify(task.arm, measured, nominal.setup)
-        _check_enough(task, data, found)
+        _check_enough(task, data, found.total_rank)
     with task.stages("fitting the constants"), core_errors(data):
         chosen = task.problem(measured, task.columns(found.determined))
         constant = fit_constant(
@@ -251,18 +253,24 @@ def feature_ranges(values: Floats) -> list[float]:
     return [float(reach) for reach in np.ptp(values, axis=0)] if values.shape[1] else []
 
 
-def _check_enough(task: Task, data: Measurements, found: Identifiability) -> None:
+def _check_enough(task: Task, data: Measurements, rank: int) -> None:
     """Refuse rows that leave nothing to tell the unknowns from the noise with."""
     values = _measured_values(task, data)
-    if values > found.total_rank:
+    if values > rank:
         return
-    unknowns = found.parameters + setup_unknowns(task)
-    per_row = max(values // len(data), 1)
+    unknowns = len(task.arm.candidates.constant) + setup_unknowns(task)
+    needed = unknowns // max(values // max(len(data), 1), 1) + 1
+    split = task.options.split
+    if split.train_size is None and not split.split_by and split.holdout_range is None:
+        poses = math.ceil(needed / (1.0 - split.holdout))
+        way_out = f"Measure at least {poses} poses: {split.holdout:.0%} are held out"
+    else:
+        way_out = f"Measure at least {needed} poses to train on, or use a larger --train-size"
     raise WorkError(
-        f"{values} measured values in {len(data)} rows cannot determine up to {unknowns} unknowns",
+        f"{values} measured values in {len(data)} training rows cannot determine up to {unknowns} unknowns",
         where=", ".join(data.files),
         rule="There must be more measured values than unknowns",
-        way_out=f"Measure at least {unknowns // per_row + 1} poses to train on, or use a larger --train-size",
+        way_out=way_out,
     )
 
 

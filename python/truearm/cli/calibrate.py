@@ -124,6 +124,7 @@ def command(
       truearm calibrate ur10 m.csv -o result --model constant --seed 3
     """
     from truearm.calibrating import calibrate
+    from truearm.doubts import NO_HELP
     from truearm.measurements import Measurements
     from truearm.options import Options
     from truearm.robot import Robot
@@ -168,6 +169,9 @@ def command(
         return
     print_results(calibration)
     print_places(output)
+    if any(notice.kind == NO_HELP for notice in calibration.notices):
+        suggest(f"truearm report {output / CALIBRATION_NAME}")
+        return
     suggest(
         f"truearm evaluate {output / CALIBRATION_NAME} OTHER.csv",
         f"truearm compensate {output / CALIBRATION_NAME} PROGRAM --dry-run",

@@ -120,8 +120,9 @@ class Scene:
     def covariance(self, calibration: Calibration, state: State) -> Floats:
         """Covariance (R, R) of the residuals of an unchanged arm, without what is found anew.
 
-        What a frame or tool found anew can make up for is its own: along these directions an arm's parameters and the
-        old set-up may be unknown by metres, each known with the other alone (the height of a SCARA and of its tool).
+        What a frame or tool found anew can make up for is its own: along these directions an arm's parameters
+        and the old set-up may be unknown by metres, each known with the other alone (the height of a SCARA
+        and of its tool).
         """
         jacobian, _ = linearise(self.problem, self.parameters, state.setup)
         spread, seen = calibration.spread, self.seen.reshape(-1)

@@ -1,0 +1,73 @@
+"""Whether what a calibration found can be true: signs of wrong data or of another robot."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import Notice
+from truearm.identified import IdentifiedArm
+from truearm.models import CONSTANT, NOMINAL, ArmModel
+from truearm.parameters import KIND_COUNT, A, D
+from truearm.units import to_si
+from truearm.validation import Validation
+
+Floats = NDArray[np.float64]
+
+FAR_M: Final = 0.02
+FAR_RAD: Final = 0.1
+"""Arms are off by millimetres and milliradians; joints that were never mastered by a little more."""
+LARGE_MM: Final = 10.0
+"""No arm that fits its table misses by so much once it is calibrated."""
+MOST_NAMED: Final = 4
+NO_HELP: Final = "no_help"
+CHECKS: Final = (
+    "Check that readings and points belong together row by row, the order of the columns, units, a device "
+    "frame that is right-handed, and the robot"
+)
+
+
+def doubts(
+    arm: IdentifiedArm, models: Mapping[str, ArmModel], validation: Validation, best: str
+) -> list[Notice]:
+    """What speaks against a calibration whose model `best` is used."""
+    return [*_no_help(validation, best), *_far_from_nominal(arm, models[CONSTANT])]
+
+
+def _no_help(validation: Validation, best: str) -> list[Notice]:
+    before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
+    if after < min(before, LARGE_MM):
+        return []
+    text = (
+        f"The calibration does not help: on held-out rows {after:.4g} mm are left on average, without it "
+        f"{before:.4g} mm. Do not use it before the reason is found. {CHECKS}."
+    )
+    return [Notice(NO_HELP, text)]
+
+
+def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
+    found, nominal = constant.constants, arm.table
+    length = np.isin(np.arange(KIND_COUNT), (D, A))
+    change = found - nominal
+    change[:, ~length] = np.arctan2(np.sin(change[:, ~length]), np.cos(change[:, ~length]))
+    share = np.abs(change) / np.where(length, FAR_M, FAR_RAD)
+    if arm.world_is_known:
+        share[0] = 0.0
+    names = dict(zip(arm.candidates.columns, arm.candidates.names, strict=True))
+    order = [int(k) for k in np.argsort(-share, axis=None) if share.flat[k] > 1.0 and int(k) in names]
+    if not order:
+        return []
+    texts = [_from_to(names[k], k, nominal, found) for k in order[:MOST_NAMED]]
+    rest = f" and {len(order) - MOST_NAMED} more" if len(order) > MOST_NAMED else ""
+    text = (
+        f"{', '.join(texts)}{rest}: so far from its table no {arm.robot.name} is. It is another robot, or "
+        "the table or the data are wrong."
+    )
+    return [Notice("far_from_nominal", text)]
+
+
+def _from_to(name: str, place: int, nominal: Floats, found: Floats) -> str:
+    unit = "mm" if place % KIND_COUNT in (D, A) else "deg"
+    before, after = (float(table.flat[place]) / to_si(1.0, unit) for table in (nominal, found))
+    return f"{name} comes out {after:.1f} {unit} where {before:.1f} is nominal"
