@@ -25,7 +25,9 @@ class Shift:
         count = len(q)
         refused = np.zeros(count, dtype=bool)
         refused[[place for place in self.refuse if place < count]] = True
-        refusals = [SimpleNamespace(number=place + 1, reason="too far") for place in np.flatnonzero(refused)]
+        refusals = [
+            SimpleNamespace(number=place + 1, reason="too far", code=5) for place in np.flatnonzero(refused)
+        ]
         return SimpleNamespace(
             q=np.where(refused[:, None], np.nan, q + self.by_rad),
             correction_mm=np.full(count, 1.5),

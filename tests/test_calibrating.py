@@ -1,6 +1,7 @@
 """Calibrating virtual arms whose errors are known."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -499,3 +500,31 @@ def test_too_few_rows_say_how_many_are_enough():
     assert said is not None
     enough = int(said[1])
     assert ta.calibrate(arm.robot, arm.measure(arm.poses(enough)), model="constant").validation.n_holdout > 0
+
+
+def test_what_is_no_robot_and_no_measurements_is_said(tmp_path):
+    arm = VirtualArm.paper(seed=4)
+    data = arm.measure(arm.poses(40))
+    cases: list[tuple[Any, Any, str]] = [
+        ("ur10", data, "robot is of type str.*Robot.load"),
+        (arm.robot, "data.csv", "measurements are of type str.*read_csv"),
+        (arm.robot, arm.measure_table(arm.poses(5)), "of type DataFrame.*from_dataframe"),
+        (arm.robot, [data, 3], "of type list"),
+    ]
+    for robot, given, words in cases:
+        with pytest.raises(ta.UsageError, match=words):
+            ta.calibrate(robot, given)
+    wrong: list[dict[str, Any]] = [
+        {"train_size": "50"},
+        {"train_size": 50.5},
+        {"holdout": "0.3"},
+        {"seed": 1.5},
+    ]
+    for options in wrong:
+        with pytest.raises(ta.UsageError, match=r"It must be a (whole )?number"):
+            ta.calibrate(arm.robot, data, **options)
+    found = ta.calibrate(arm.robot, data, model="constant")
+    with pytest.raises(ta.InputError, match="this is a directory"):
+        found.save(tmp_path)
+    with pytest.raises(ta.InputError, match="one waypoint has"):
+        ta.Compensator(found).correct(arm.poses(2))

@@ -175,3 +175,15 @@ def test_a_directory_takes_files_of_the_same_names():
     Path("out").mkdir(exist_ok=True)
     assert run("-o", "out") == 0
     assert Path("out/demo.mod").exists()
+
+
+def test_refusals_of_positions_alone_name_the_tool(arm, capsys):
+    table = arm.measure(arm.poses(60, seed=1))
+    ta.calibrate(ABB, table, ta.Options.of(model="constant")).save(Path("points.calib"))
+    np.savetxt("path.csv", arm.poses(3, seed=5), delimiter=",", header="q1,q2,q3,q4,q5,q6", comments="")
+    command = ["compensate", "points.calib", "path.csv", "--controller", "nominal", "-o", "out.csv"]
+    assert main([*command, "--largest-std-mm", "1e-4"]) == 1
+    told = capsys.readouterr().err
+    assert "3 of 3 targets cannot be corrected" in told
+    assert "sure of tools near the points that were measured" in told
+    assert not Path("out.csv").exists()

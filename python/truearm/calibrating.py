@@ -64,7 +64,7 @@ def calibrate(
         WorkError: If the rows determine too little.
     """
     chosen = _options(options, more)
-    given = data if isinstance(data, Measurements) else Measurements.concatenate(data)
+    given = _measured(robot, data)
     notices = check_against(given, robot)
     given = given.deduplicated()
     task = _task(robot, given, chosen, threads, stages)
@@ -99,6 +99,23 @@ def calibrate(
     )
     doubted = doubts(task.arm, found.models, validation, found.model_name)
     return replace(found, notices=(*found.notices, *doubted))
+
+
+def _measured(robot: object, data: object) -> Measurements:
+    if not isinstance(robot, Robot):
+        raise UsageError(
+            f"the robot is of type {type(robot).__name__}",
+            rule="A truearm.Robot is needed",
+            way_out='Load it: Robot.load("ur10"), or from a TOML or URDF file',
+        )
+    parts = [data] if isinstance(data, Measurements) else data
+    if not isinstance(parts, Sequence) or not all(isinstance(part, Measurements) for part in parts):
+        raise UsageError(
+            f"the measurements are of type {type(data).__name__}",
+            rule="truearm.Measurements, or a list of them, are needed",
+            way_out="Read them: Measurements.read_csv(path), Measurements.from_dataframe(table)",
+        )
+    return parts[0] if len(parts) == 1 else Measurements.concatenate(parts)
 
 
 def _options(options: Options | None, more: Mapping[str, Any]) -> Options:

@@ -172,6 +172,8 @@ class Compensator:
         """
         try:
             readings = np.ascontiguousarray(q, dtype=np.float64)
+            if readings.ndim != 1:
+                raise ValueError(f"shape {readings.shape}: one waypoint has (N,), joints() takes many")
             corrected, refusal = self._corrector(self._tool(tool)).one(readings, self._features)
         except (TypeError, ValueError) as error:
             raise InputError(str(error), where="joint readings") from None

@@ -68,8 +68,10 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file completely or not at all: a neighbour is written, then renamed.
 
     Raises:
-        InputError: If the directory does not exist or may not be written to.
+        InputError: If the directory does not exist or may not be written to, or is what the path names.
     """
+    if path.is_dir():
+        raise InputError("this is a directory", where=str(path), rule="A file is to be written")
     data = content.encode() if isinstance(content, str) else content
     try:
         handle, neighbour = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from numbers import Integral, Real
 from typing import Any, Final, Literal
 
 from truearm.core_set import FIRST_TARGET, USES, Use
@@ -22,6 +23,8 @@ CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
     "frame": ("free", "world"),
     "degree": (2, 3),
 }
+WHOLE: Final = ("train_size", "seed", "judge_target")
+NUMBERS: Final = ("holdout", "prior_mm", "prior_mrad", "parallel_within_deg")
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,7 @@ class Options:
                     rule=f"There are {list_names(sorted(set(known) - set(parts)))}",
                     way_out=did_you_mean(name, known),
                 )
+        _check_numbers(given)
         splitting = {name: given.pop(name) for name in SplitRule.__dataclass_fields__ if name in given}
         if isinstance(splitting.get("holdout_range"), str):
             splitting["holdout_range"] = HoldoutRange.parse(splitting["holdout_range"])
@@ -126,6 +130,15 @@ class Options:
         scheme: dict[str, Any] = content.pop("scheme")
         lists = {name: list(scheme[name]) for name in ("scheme_joints", "cells")}
         return split | content | scheme | lists | {"features": list(self.features)}
+
+
+def _check_numbers(given: Mapping[str, Any]) -> None:
+    whole = {name: given[name] for name in WHOLE if given.get(name) is not None}
+    numbers = {name: given[name] for name in NUMBERS if name in given}
+    for values, kind, words in ((whole, Integral, "a whole number"), (numbers, Real, "a number")):
+        for name, value in values.items():
+            if not isinstance(value, kind):
+                raise UsageError(f"{name} is {value!r}", rule=f"It must be {words}")
 
 
 def _words(value: Any) -> tuple[str, ...]:  # noqa: ANN401

@@ -58,7 +58,8 @@ def compensate_program(
         )
     program = read_program(Path(path), written_in, author, _frames(frames))
     refuse_contradiction(program, declared, force=chosen.force)
-    models = Models(author, Inverse(author), declared, compensator, compensator.task)
+    positions_only = not calibration.selection.orientation
+    models = Models(author, Inverse(author), declared, compensator, compensator.task, positions_only)
     mark = mark_text(version("truearm"), calibration.data_hash)
     done = rewrite(program, models, chosen, mark=mark, tell=tell)
     return done.with_facts(

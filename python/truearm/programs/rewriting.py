@@ -27,6 +27,8 @@ from truearm.robot import Robot
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+UNSURE: Final = 8
+"""Code of refusals where the calibration is less certain than allowed."""
 NAMED: Final = 10
 Tell = Callable[[str, int, int], None]
 
@@ -42,6 +44,11 @@ class Refusal(Protocol):
     @property
     def reason(self) -> str:
         """Why, in words that end a sentence."""
+        ...
+
+    @property
+    def code(self) -> int:
+        """Why, for programs."""
         ...
 
 
@@ -75,6 +82,7 @@ class Models:
         controller: What the controller computes with.
         compensator: From programming to calibrated.
         task: What it meets; another than "pose" needs to know the tool for joint targets as well.
+        positions_only: Whether the calibration was fitted to positions alone.
     """
 
     programming: Robot
@@ -82,6 +90,7 @@ class Models:
     controller: Controller
     compensator: Compensator
     task: str = "pose"
+    positions_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -208,6 +217,7 @@ class _State:
     known: Bools
     reasons: dict[int, str] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
+    unsure: bool = False
 
     def __post_init__(self) -> None:
         self.corrected = np.array(self.nominal)
@@ -240,8 +250,19 @@ class _State:
                 self.std_mm[rows] = found.std_mm
             for refusal in found.refusals:
                 self.refused[int(which[refusal.number - 1])] = refusal.reason
+            self.unsure |= any(refusal.code == UNSURE for refusal in found.refusals)
             refused = which[np.asarray(found.refused, dtype=bool)]
             self.corrected[refused] = self.nominal[refused]
+
+    def _why_unsure(self) -> str:
+        """What can be done where the calibration is unsure because it knows positions alone."""
+        if not (self.unsure and self.models.positions_only):
+            return ""
+        return (
+            ". This calibration knows positions alone, so it is sure of tools near the points that were "
+            "measured: state the program's tool (tool of the robot file, --frames), measure orientation "
+            "too or more points on the tool, or allow more with --largest-std-mm"
+        )
 
     def settle(self, choices: Choices) -> tuple[Listed, ...]:
         """Refused targets that are kept as they are, or an error."""
@@ -253,7 +274,7 @@ class _State:
                 f"{len(listed)} of {len(self.program.targets)} targets cannot be corrected:\n"
                 + describe(self.program, listed),
                 way_out="Change them or the limits; --on-refusal keep-nominal leaves such targets as "
-                "they are where that makes no step",
+                f"they are where that makes no step{self._why_unsure()}",
             )
         steps = [target for target in sorted(self.refused) if self._makes_a_step(target)]
         if steps:
