@@ -19,6 +19,7 @@ Texts = NDArray[np.str_]
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
+REMARKS: Final = ("#", "sep=", "SEP=")
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,7 @@ def split_table(text: str, delimiter: str, *, where: str) -> Table:
         InputError: If a name is missing or repeated, a line has another number of fields, or there
             are no data rows.
     """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     try:
         lines = [line for line in csv.reader(io.StringIO(text), delimiter=delimiter, strict=True) if line]
     except csv.Error as error:
@@ -188,6 +190,13 @@ def quoted_delimiter(mark: str) -> str:
 
 
 def _check_header(header: Sequence[str], where: str) -> None:
+    if header[0].startswith(REMARKS):
+        raise InputError(
+            f'the first line is a remark: "{header[0]}"',
+            where=where,
+            rule="The first line must name the columns",
+            way_out="Delete it, or bring the file in with: truearm import FILE --skip-lines 1 ...",
+        )
     if all(_as_number(name) is not None for name in header):
         raise InputError(
             "the first line holds numbers only",
@@ -196,7 +205,11 @@ def _check_header(header: Sequence[str], where: str) -> None:
         )
     empty = [position for position, name in enumerate(header, start=1) if not name]
     if empty:
-        raise InputError(f"{list_rows(empty, 'column')} has no name", where=where)
+        raise InputError(
+            f"{list_rows(empty, 'column')} {'has' if len(empty) == 1 else 'have'} no name",
+            where=where,
+            way_out="Name them, or delete them if they are empty",
+        )
     repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if repeated:
         raise InputError(f'column "{repeated[0]}" occurs more than once', where=where)

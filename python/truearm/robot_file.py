@@ -217,7 +217,9 @@ def _rule(detail: ErrorDetails) -> str:
         "finite_number": "Must be a finite number",
         "string_type": "Must be text in quotes",
         "string_too_short": "Must not be empty",
-        "list_type": "Must be a list in square brackets",
+        "list_type": "Write [[link]], with two brackets, for each"
+        if detail["loc"] == ("link",)
+        else "Must be a list in square brackets",
         "model_type": "Must be a section of its own",
         "greater_than_equal": f"Must be at least {context.get('ge', 0)}",
         "too_short": f"Must have {context.get('min_length')} entries",

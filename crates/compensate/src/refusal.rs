@@ -68,10 +68,10 @@ impl fmt::Display for Refusal {
         match self.reason {
             Reason::NotFinite => write!(out, "a reading is not a finite number"),
             Reason::PositionNotReached => {
-                write!(out, "the tool stays {:.3e} mm from its target{FAR}", value * 1e3)
+                write!(out, "the tool stays {} mm from its target{FAR}", in_thousandths(value))
             }
             Reason::OrientationNotReached => {
-                write!(out, "the tool stays turned {:.3e} mrad from its target{FAR}", value * 1e3)
+                write!(out, "the tool stays turned {} mrad from its target{FAR}", in_thousandths(value))
             }
             Reason::JointLimit => {
                 write!(out, "joint {joint} would be at {}, its limit is {}", unit.of(value), unit.of(limit))
@@ -89,6 +89,12 @@ impl fmt::Display for Refusal {
             Reason::Branch => write!(out, "the solution lies on another branch of the arm than its seed"),
         }
     }
+}
+
+/// A thousand times a value, in powers of ten where it would be zero.
+fn in_thousandths(value: f64) -> String {
+    let shown = 1e3 * value;
+    if shown < 1e-3 { format!("{shown:.1e}") } else { format!("{shown:.4}") }
 }
 
 /// What makes a target unreachable.

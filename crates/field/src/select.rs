@@ -61,34 +61,26 @@ pub fn select_major(
 ) -> Result<Found, FieldError> {
     let evidence = Evidence::new(training, cancel);
     let first = usual_joints(joints).next().unwrap_or_default();
-    let usual = started(&evidence, &first, joints, noise)?;
-    let all: Vec<usize> = (0..joints).collect();
-    let mut other = started(&evidence, &all, joints, noise)?;
-    let mut evaluations = usual.evaluations + other.evaluations;
+    let (mut begun, mut usual) = (0, None::<Found>);
+    for start in Hyper::starts(&first, joints, noise) {
+        let found = refine(&evidence, start, FIRST)?;
+        begun += found.evaluations;
+        if usual.as_ref().is_none_or(|usual| found.value > usual.value) {
+            usual = Some(found);
+        }
+    }
+    let usual = usual.ok_or(FieldError::Length { what: "starts", found: 0, expected: 1 })?;
+    let all = refine(&evidence, usual.hyper.with_major((0..joints).collect()), FIRST)?;
+    let mut evaluations = begun + all.evaluations;
+    // With fewer joints it can hardly be more.
+    if all.value - WORTH * FEWEST as f64 - CHANCE <= net(&usual, joints) {
+        return Ok(Found { evaluations, ..usual });
+    }
+    let mut other = all;
     while other.hyper.major_joints().len() > MOST {
         other = cheapest_removal(&evidence, &other, &mut evaluations)?;
     }
     let best = if net(&other, joints) > net(&usual, joints) { other } else { usual };
-    Ok(Found { evaluations, ..best })
-}
-
-/// The best that several starts with the same joints come to.
-fn started(
-    evidence: &Evidence,
-    major: &[usize],
-    joints: usize,
-    noise: [f64; 2],
-) -> Result<Found, FieldError> {
-    let mut evaluations = 0;
-    let mut best: Option<Found> = None;
-    for start in Hyper::starts(major, joints, noise) {
-        let found = refine(evidence, start, FIRST)?;
-        evaluations += found.evaluations;
-        if best.as_ref().is_none_or(|best| found.value > best.value) {
-            best = Some(found);
-        }
-    }
-    let best = best.ok_or(FieldError::Length { what: "starts", found: 0, expected: 1 })?;
     Ok(Found { evaluations, ..best })
 }
 
