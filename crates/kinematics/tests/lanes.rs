@@ -9,6 +9,7 @@ struct Picking<'a>(&'a [Lane; 2], &'a Pick);
 impl Kernel for Picking<'_> {
     type Output = Lane;
 
+    #[inline(always)]
     fn run<I: Isa>(self) -> Lane {
         I::pick(&self.0[0], &self.0[1], self.1)
     }
@@ -19,6 +20,7 @@ struct Adding<'a>(&'a Lane, &'a mut [f64]);
 impl Kernel for Adding<'_> {
     type Output = ();
 
+    #[inline(always)]
     fn run<I: Isa>(self) {
         I::add_to(self.0, self.1);
     }

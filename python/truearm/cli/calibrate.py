@@ -124,7 +124,6 @@ def command(
       truearm calibrate ur10 m.csv -o result --model constant --seed 3
     """
     from truearm.calibrating import calibrate
-    from truearm.doubts import NO_HELP
     from truearm.measurements import Measurements
     from truearm.options import Options
     from truearm.robot import Robot
@@ -169,13 +168,17 @@ def command(
         return
     print_results(calibration)
     print_places(output)
+    suggest_next(calibration, output / CALIBRATION_NAME)
+
+
+def suggest_next(calibration: "Calibration", file: Path) -> None:
+    """Name the commands that come next: none that uses a calibration that does not help."""
+    from truearm.doubts import NO_HELP
+
     if any(notice.kind == NO_HELP for notice in calibration.notices):
-        suggest(f"truearm report {output / CALIBRATION_NAME}")
-        return
-    suggest(
-        f"truearm evaluate {output / CALIBRATION_NAME} OTHER.csv",
-        f"truearm compensate {output / CALIBRATION_NAME} PROGRAM --dry-run",
-    )
+        suggest(f"truearm report {file}")
+    else:
+        suggest(f"truearm evaluate {file} OTHER.csv", f"truearm compensate {file} PROGRAM --dry-run")
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:
