@@ -35,7 +35,8 @@ CASES = [
     Case("IRB 120 400", IRB120, "irb120_faro.csv", 400, 0.195, 0.066, largest=0.40),
     Case("UR5 400", UR5, "ur5_gtpn.csv", 400, 0.38, 0.336, coverage_within=0.06),
     Case("UR10 C 100", UR10, "ur10_ipa_C.csv", 100, 0.45, 0.15),
-    Case("IRB 120 100", IRB120, "irb120_faro.csv", 100, 0.21, 0.098),
+    # Its split is the widest of ten: they cover 93.8 to 98.3 %.
+    Case("IRB 120 100", IRB120, "irb120_faro.csv", 100, 0.21, 0.098, coverage_within=0.035),
 ]
 ABOUT = 0.06
 """How far "about" may be from a stated constant figure, as a share of it."""

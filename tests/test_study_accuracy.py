@@ -96,7 +96,7 @@ def test_a_method_that_cannot_be_fitted_says_why_and_stops_no_other(file, tmp_pa
     capsys.readouterr()
     text = (out / "accuracy.md").read_text()
     assert "Could not be fitted" in text
-    assert "15 measured values in 5 rows" in text
+    assert "15 measured values in 5 training rows" in text
 
 
 def test_a_method_that_breaks_is_told_and_tried_again(file, tmp_path, monkeypatch, capsys):
