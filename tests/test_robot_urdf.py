@@ -51,6 +51,9 @@ def urdf(chain: Chain) -> str:
     return "".join(parts) + "</robot>"
 
 
+ONE_JOINT = urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 1")])
+
+
 def forward(chain: Chain, q: Floats) -> Floats:
     """The definition of a URDF: origin, then motion along or about the axis, joint by joint."""
     pose, values = np.eye(4), iter(q)
@@ -179,17 +182,19 @@ def test_the_tip_is_chosen_behind_a_hash(tmp_path: Path) -> None:
         ("<sdf/>", "the XML is a <sdf>"),
         ("", "not XML"),
         ('<robot name="a"><link name="b"/></robot>', "no joint moves"),
-        ('<robot name="a"><joint name="j"/></robot>', "cannot be read"),
+        ('<robot name="a"><joint name="j"/></robot>', 'joint "j": it has no type'),
+        ('<robot name="a">\n<joint type="fixed"/></robot>', "line 2, a joint without a name: it has no name"),
+        (ONE_JOINT.replace("<child", "<kid"), 'joint "j0": it has no child link'),
+        (ONE_JOINT.replace('<link name="l0"/>', ""), 'its parent "l0" is no link of the file'),
+        (ONE_JOINT.replace('xyz="0 0 0"', 'xyz="0 0"'), 'xyz="0 0" of <origin> in line .*3 finite numbers'),
+        (ONE_JOINT.replace('rpy="0 0 0"', 'rpy="0 0 nan"'), 'rpy="0 0 nan".*3 finite numbers'),
+        (ONE_JOINT.replace('lower="-2"', 'lower="low"'), 'lower="low" of <limit> in line .*a finite number'),
+        (ONE_JOINT.replace('lower="-2"', 'lower="${-limit}"'), r"\$\{-limit\}.*is xacro.*Expand it first"),
+        (ONE_JOINT.replace("<axis", "<xacro:axis"), "<xacro:axis> in line .* is xacro"),
         (urdf([("floating", (0, 0, 0), (0, 0, 0), "0 0 1")]), 'joint "j0": its type is floating'),
         (urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 0")]), "has no direction"),
-        (
-            urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 1")]).replace('lower="-2"', 'lower="3"'),
-            "limits 3 to 2",
-        ),
-        (
-            urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 1")]).replace("<axis", '<mimic joint="x"/><axis'),
-            'follows joint "x".*coupling',
-        ),
+        (ONE_JOINT.replace('lower="-2"', 'lower="3"'), "limits 3 to 2"),
+        (ONE_JOINT.replace("<axis", '<mimic joint="x"/><axis'), 'follows joint "x".*coupling'),
     ],
 )
 def test_bad_files_are_explained(tmp_path: Path, content: str, message: str) -> None:

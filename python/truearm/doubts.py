@@ -35,9 +35,14 @@ def doubts(
     return [*_no_help(validation, best), *_far_from_nominal(arm, models[CONSTANT])]
 
 
+def helps(before_mm: float, after_mm: float) -> bool:
+    """Whether a calibration that leaves `after_mm` on average of `before_mm` is one to use."""
+    return after_mm < min(before_mm, LARGE_MM)
+
+
 def _no_help(validation: Validation, best: str) -> list[Notice]:
     before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
-    if after < min(before, LARGE_MM):
+    if helps(before, after):
         return []
     text = (
         f"The calibration does not help: on held-out rows {after:.4g} mm are left on average, without it "

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
-from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.dh_from_axes import Axis, dh_from_axes
 from truearm.errors import InputError, did_you_mean, list_names
 from truearm.files import read_text
+from truearm.urdf_checks import check_urdf
 from truearm.urdf_names import UrdfNames
 
 Floats = NDArray[np.float64]
@@ -110,7 +110,7 @@ def _parse(text: str) -> Any:  # noqa: ANN401
     """The parser's robot: links and joints with their origins, axes and limits."""
     from yourdfpy import URDF  # noqa: PLC0415
 
-    _check_is_urdf(text)
+    check_urdf(text)
     try:
         model = URDF.load(io.BytesIO(text.encode()), build_scene_graph=False, load_meshes=False)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
@@ -119,18 +119,6 @@ def _parse(text: str) -> Any:  # noqa: ANN401
             rule="Every joint needs a name, a type, a parent, a child and numbers in its attributes",
         ) from None
     return model.robot
-
-
-def _check_is_urdf(text: str) -> None:
-    roots: list[str] = []
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = lambda name, _: roots.append(name) if not roots else None
-    try:
-        parser.Parse(text.encode(), True)
-    except expat.ExpatError as error:
-        raise InputError(f"not XML: {error}", rule="A URDF is an XML file") from None
-    if roots != ["robot"]:
-        raise InputError(f"the XML is a <{roots[0]}>", rule="A URDF is a <robot>")
 
 
 def _only(candidates: Sequence[str], argument: str, links: Sequence[str]) -> str:

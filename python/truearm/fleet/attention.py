@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from truearm.doubts import helps
 from truearm.fleet.fleet_file import LimitsSection
 
 Row = Mapping[str, Any]
@@ -66,7 +67,7 @@ def order(found: Sequence[Reason]) -> tuple[int, float]:
 
 def _no_gain(arm: Row) -> Iterator[Reason]:
     before, after = arm["nominal_mean_mm"], arm["mean_mm"]
-    if after >= before:
+    if not helps(before, after):
         words = f"The calibration does not help: {after:.3f} mm on average, {before:.3f} before."
         yield Reason("no_gain", words, after / before)
 

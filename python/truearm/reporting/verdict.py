@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.doubts import helps
 from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
@@ -12,7 +13,7 @@ from truearm.reporting.parts import Card, Head, Table, Tone
 from truearm.validation import Statistics
 
 GOOD: Final = 0.6
-"""A calibration that leaves less than this part of the error is a good one; above one it does harm."""
+"""A calibration that leaves less than this part of the error is a good one."""
 STATISTICS: Final = ("mean", "rms", "p95", "p99", "max")
 HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
 
@@ -56,7 +57,7 @@ def verdict(facts: Facts) -> str:
         f"On {poses} it has never seen, the arm now misses by {numbers[0]} mm on average and {numbers[1]} mm"
     )
     said = f"{start} at most; before {numbers[2]} and {numbers[3]}."
-    if after.mean >= before.mean:
+    if not helps(before.mean, after.mean):
         return f"{said} The calibration does not help: do not use it before the reason is found."
     return said
 
@@ -64,8 +65,10 @@ def verdict(facts: Facts) -> str:
 def tone(facts: Facts) -> Tone:
     """How good that is."""
     validation = facts.calibration.validation
-    left = validation.holdout[facts.best].position.mean / validation.holdout[NOMINAL].position.mean
-    return "good" if left < GOOD else "fair" if left < 1.0 else "bad"
+    before, after = (validation.holdout[name].position.mean for name in (NOMINAL, facts.best))
+    if not helps(before, after):
+        return "bad"
+    return "good" if after < GOOD * before else "fair"
 
 
 def cards(facts: Facts) -> list[Card]:
