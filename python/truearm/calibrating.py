@@ -34,6 +34,7 @@ from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
 from truearm.splitting import Split, split_rows
+from truearm.turning_sense import check_turns
 from truearm.uncertainty import VariableSpread, noises_of
 from truearm.unexplained import unexplained
 from truearm.validation import Validation
@@ -68,6 +69,8 @@ def calibrate(
     notices = check_against(given, robot)
     given = given.deduplicated()
     task = _task(robot, given, chosen, threads, stages)
+    if task.selection.orientation:
+        check_turns(given, robot)
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))
     with stages("judging on held-out rows"):

@@ -20,6 +20,8 @@ FAR_RAD: Final = 0.1
 """Arms are off by millimetres and milliradians; joints that were never mastered by a little more."""
 LARGE_MM: Final = 10.0
 """No arm that fits its table misses by so much once it is calibrated."""
+LARGE_MRAD: Final = 50.0
+"""Nor turns its tool by so much more or less."""
 MOST_NAMED: Final = 4
 NO_HELP: Final = "no_help"
 CHECKS: Final = (
@@ -32,7 +34,11 @@ def doubts(
     arm: IdentifiedArm, models: Mapping[str, ArmModel], validation: Validation, best: str
 ) -> list[Notice]:
     """What speaks against a calibration whose model `best` is used."""
-    return [*_no_help(validation, best), *_far_from_nominal(arm, models[CONSTANT])]
+    return [
+        *_no_help(validation, best),
+        *_turns_otherwise(validation, best),
+        *_far_from_nominal(arm, models[CONSTANT]),
+    ]
 
 
 def helps(before_mm: float, after_mm: float) -> bool:
@@ -49,6 +55,18 @@ def _no_help(validation: Validation, best: str) -> list[Notice]:
         f"{before:.4g} mm. Do not use it before the reason is found. {CHECKS}."
     )
     return [Notice(NO_HELP, text)]
+
+
+def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:
+    turned = validation.holdout[best].orientation
+    if turned is None or turned.mean < LARGE_MRAD:
+        return []
+    text = (
+        f"Orientations do not fit the arm: on held-out rows {turned.mean:.4g} mrad are left on average. "
+        "Check how they were noted (order of the quaternion, convention of Euler angles, into which frame "
+        "they turn), or calibrate with positions alone: --use position."
+    )
+    return [Notice("orientation_misfit", text)]
 
 
 def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:

@@ -19,6 +19,7 @@ from truearm.measurements import Measurements
 from truearm.models import ArmModel
 from truearm.plausibility import check_against
 from truearm.registration import register
+from truearm.turning_sense import check_turns
 from truearm.validation import Errors
 
 Floats = NDArray[np.float64]
@@ -115,6 +116,8 @@ def evaluate(
             where=", ".join(data.files),
             rule="A calibration is judged at measured points",
         )
+    if selection.orientation:
+        check_turns(data, calibration.robot)
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
     frame, judged = _divide(data, chosen)
     with stages("finding frame and tool"):

@@ -34,8 +34,8 @@ def check_urdf(text: str) -> None:
     """Check what a parser would stumble over.
 
     Raises:
-        InputError: If the text is not XML or no URDF, is xacro that was not expanded, a number is none, a joint
-            has no name, type, parent or child, or names a link that there is not.
+        InputError: If the text is not XML or no URDF, is xacro that was not expanded, a number is none, a
+            joint has no name, type, parent or child, or names a link that there is not.
     """
     elements = _Elements()
     try:

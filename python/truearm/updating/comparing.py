@@ -14,6 +14,7 @@ from truearm.fitted_rows import OVERWHELMING
 from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
+from truearm.turning_sense import check_turns
 from truearm.updating.estimating import Estimate, estimate, left_out, surprise
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
@@ -112,6 +113,8 @@ def update(
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
     task = _task(calibration, data, chosen, stages)
+    if task.selection.orientation:
+        check_turns(data, calibration.robot)
     unknowns = Unknowns.of(calibration, task, chosen)
     _check_kept(calibration, task, unknowns, chosen)
     _check_enough(data, task, unknowns)

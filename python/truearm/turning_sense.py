@@ -1,0 +1,95 @@
+"""Whether measured orientations can be of a given robot: the order and the sense of their quaternions."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.measurements import Measurements
+from truearm.robot import Robot
+from truearm.rotations import matrix_from_quaternion
+
+Floats = NDArray[np.float64]
+
+MISFIT: Final = 0.2
+"""Turns from pose to pose that are off by so much (sine of the angle) are not those of the robot, nor are
+positions that are off by this part of their spread."""
+FIT: Final = 0.05
+"""Those that are off by less are: no arm is off by 0.05 rad or a twentieth of its reach."""
+FEWEST_POSES: Final = 6
+AXES: Final = 3
+
+W_FIRST: Final = (0, 1, 2, 3)
+W_LAST: Final = (3, 0, 1, 2)
+READINGS: Final = (
+    (W_FIRST, True, "they turn the other way: target_from_world, where world_from_target is wanted"),
+    (W_LAST, False, "their columns hold x y z w, where qw qx qy qz are named"),
+    (W_LAST, True, "their columns hold x y z w, where qw qx qy qz are named, and turn the other way"),
+)
+"""Other readings of the four columns: the place of w x y z, whether conjugate, and words."""
+
+
+def check_turns(measurements: Measurements, robot: Robot) -> None:
+    """Check that the tool turns and moves as the nominal arm's does, whatever frame and tool are.
+
+    Raises:
+        InputError: If it does not, and does so once the quaternions are read in another order or sense.
+    """
+    turned = measurements.orientations
+    if turned is None:
+        return
+    points = measurements.targets[:, 0]
+    for group in measurements.groups:
+        seen = (
+            (measurements.group == group) & np.isfinite(turned).all(axis=1) & np.isfinite(points).all(axis=1)
+        )
+        if seen.sum() < FEWEST_POSES:
+            continue
+        rows, quaternions = measurements.select(seen), turned[seen]
+        flanges = robot.pose(rows.readings)
+        if _misfit(flanges, points[seen], quaternions) < MISFIT:
+            continue
+        for order, conjugate, words in READINGS:
+            sense = np.where((np.arange(4) > 0) & conjugate, -1.0, 1.0)
+            if _misfit(flanges, points[seen], quaternions[:, order] * sense) < FIT:
+                raise InputError(
+                    f"the quaternions do not turn as {robot.name} does; {words}",
+                    where=f"{', '.join(rows.files)}, group {group}",
+                    rule="qw qx qy qz, w first, turn vectors of the target into the world",
+                    way_out="Put the columns right (truearm import), or use positions alone: --use position",
+                )
+
+
+def _misfit(flanges: Floats, points: Floats, quaternions: Floats) -> float:
+    """How little measured poses can be those of the arm, its frame and its tool unknown.
+
+    Turns from pose to pose, seen from the world, give the frame's orientation; the rest is then linear.
+
+    Args:
+        flanges: Poses of the nominal flange (n, 4, 4).
+        points: Measured positions (n, 3).
+        quaternions: Measured orientations (n, 4), w first.
+
+    Returns:
+        The larger of the median distance between turns and that between positions, over their spread.
+    """
+    of_arm, of_tool = _turns(flanges[:, :3, :3]), _turns(matrix_from_quaternion(quaternions))
+    u, _, vt = np.linalg.svd(of_tool.T @ of_arm)
+    world_from_base = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    between_turns = np.linalg.norm(of_tool - of_arm @ world_from_base.T, axis=1)
+    wanted = (points @ world_from_base - flanges[:, :3, 3]).reshape(-1)
+    unknown = np.concatenate(
+        [flanges[:, :3, :3], np.broadcast_to(np.eye(AXES), flanges[:, :3, :3].shape)], axis=2
+    )
+    unknown = unknown.reshape(-1, 2 * AXES)
+    left = wanted - unknown @ np.linalg.lstsq(unknown, wanted)[0]
+    between_points = np.linalg.norm(left.reshape(-1, AXES), axis=1)
+    spread = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    return float(max(np.median(between_turns), np.median(between_points) / np.median(spread)))
+
+
+def _turns(frames: Floats) -> Floats:
+    """Axis times sine of the angle (n - 1, 3) of the turn from each frame to the next, in the world."""
+    turns = frames[1:] @ np.swapaxes(frames[:-1], 1, 2)
+    return 0.5 * np.stack([turns[:, i - 1, i - 2] - turns[:, i - 2, i - 1] for i in range(AXES)], axis=1)
