@@ -98,6 +98,10 @@ def test_a_dry_run_shows_a_table_and_a_diff_and_writes_nothing(capsys):
     table = printed.split("--- demo.mod")[0]
     assert max(map(len, table.splitlines())) <= 80
     assert sorted(Path().iterdir()) == before
+    named = printed.splitlines()[-1].split()
+    assert named[-2:] == ["-o", "OUT"]
+    assert main([*named[1:-1], "named.mod"]) == 0
+    assert Path("named.mod").exists()
 
 
 def test_what_was_rewritten_is_not_rewritten_again(capsys):

@@ -11,7 +11,7 @@ from tests.test_programs_rapid import GO, NOTHING, SEEN, module, numbers, points
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.programs.configuration import nearest_turns, with_turns
-from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
+from truearm.programs.declaring import declared_controller, may_differ, payload_notices, refuse_contradiction
 from truearm.programs.densify import Spacing
 from truearm.programs.folding import constant
 from truearm.programs.frames import Frames
@@ -97,10 +97,17 @@ def test_controllers_that_may_differ_must_be_declared():
     for name, language in (("kuka-kr-6-r900", "KRL"), ("abb-irb-120", "RAPID"), ("ur10e", "KRL")):
         with pytest.raises(UsageError, match="not declared.*--controller"):
             declared_controller(None, language_of(Path("p"), language), Robot.load(name))
+        assert may_differ(Robot.load(name))
         assert (
             declared_controller("nominal", language_of(Path("p"), language), Robot.load(name)).kind
             == "nominal"
         )
+
+
+def test_other_controllers_need_not():
+    arm = Robot.load("rv-m2")
+    assert not may_differ(arm)
+    assert declared_controller(None, language_of(Path("p"), "MELFA BASIC"), arm).kind == "nominal"
 
 
 def test_a_nominal_controller_contradicts_points_of_an_accurate_one():

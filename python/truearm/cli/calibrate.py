@@ -174,11 +174,15 @@ def command(
 def suggest_next(calibration: "Calibration", file: Path) -> None:
     """Name the commands that come next: none that uses a calibration that does not help."""
     from truearm.doubts import NO_HELP
+    from truearm.programs.declaring import may_differ
 
     if any(notice.kind == NO_HELP for notice in calibration.notices):
         suggest(f"truearm report {file}")
     else:
-        suggest(f"truearm evaluate {file} OTHER.csv", f"truearm compensate {file} PROGRAM --dry-run")
+        declared = " --controller MODEL" if may_differ(calibration.robot) else ""
+        suggest(
+            f"truearm evaluate {file} OTHER.csv", f"truearm compensate {file} PROGRAM{declared} --dry-run"
+        )
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:

@@ -9,6 +9,7 @@ import typer
 import truearm as ta
 from truearm.cli.arguments import AsJson, CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm
 from truearm.cli.console import print_json, say, suggest, warn
+from truearm.cli.given import given_options
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
@@ -19,6 +20,7 @@ OnRefusal = Literal["stop", "keep-nominal"]
 
 
 def command(
+    context: typer.Context,
     calibration: CalibFile,
     program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="The program, or one of its files.")],
     output: Annotated[
@@ -129,7 +131,8 @@ def command(
         print_rewritten(done, dry_run=dry_run)
         for path in paths:
             say(f"Written: {path}")
-        _suggest(calibration, program, dry_run=dry_run)
+        options = given_options(context, "dry_run", "output", "report", "as_json")
+        _suggest(f"{calibration} {program}{options}", calibration, dry_run=dry_run)
 
 
 def _place(output: str) -> Path:
@@ -140,9 +143,9 @@ def _place(output: str) -> Path:
     return place
 
 
-def _suggest(calibration: Path, program: Path, *, dry_run: bool) -> None:
+def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:
     if dry_run:
-        suggest(f"truearm compensate {calibration} {program} -o OUT")
+        suggest(f"truearm compensate {asked} -o OUT")
     else:
         when = "Run it slowly at first. Whether the arm is as it was calibrated tells:"
         suggest(f"truearm evaluate {calibration} MEASURED.csv", when=when)

@@ -12,6 +12,8 @@ UNIVERSAL: Final = (
     "Controllers of Universal Robots compute with the factory kinematics of the very arm (calibration.conf)"
 )
 UR_MODEL: Final = re.compile(r"\bur-?\d{1,2}e?\b")
+MAKERS: Final = re.compile(r"\b(abb|fanuc|kuka)\b")
+"""Makers whose controllers can hold the kinematics of the very arm, an option."""
 SAME_PAYLOAD_KG: Final = 0.05
 
 
@@ -33,6 +35,11 @@ def declared_controller(declaration: str | None, language: Language, robot: Robo
             "if it has none",
         )
     return Controller.nominal(robot)
+
+
+def may_differ(robot: Robot) -> bool:
+    """Whether controllers of arms of this name may compute with another model than the nominal one."""
+    return _is_universal(robot) or MAKERS.search(robot.name.lower()) is not None
 
 
 def refuse_contradiction(program: Program, controller: Controller, *, force: bool) -> None:
