@@ -324,6 +324,8 @@ def test_waypoints_on_a_line_are_passed():
     inserted = [line for line in lines if line.endswith("C_DIS")]
     assert 2 <= done.inserted == len(inserted)
     assert all(line.startswith("  LIN {X ") for line in inserted)
+    across = [float(line.split("Y ")[1].split(",")[0]) for line in inserted]
+    assert (np.diff(across) < 0.0).all() or (np.diff(across) > 0.0).all(), "in the order of the way"
     last = next(line for line in lines if "LIN" in line and "E1" in line)
     assert lines.index(inserted[-1]) + 1 == lines.index(last)
     folded = src.replace("  LIN", ";FOLD LIN P2\nLIN").replace("\nEND", "\n;ENDFOLD\nEND")

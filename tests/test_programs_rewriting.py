@@ -138,10 +138,10 @@ class Wavy(Shift):
         return found
 
 
-def long_line():
+def long_line(target="p1"):
     ends = [[-40, 20, 15, 5, 50, 0], [40, 20, 15, -5, 50, 0]]
     data = "\n".join(f"CONST robtarget p{n}:={numbers(q, placed=NOTHING)};" for n, q in enumerate(ends))
-    return program_of("MoveJ p0,v100,fine,tG;\n    MoveL p1,v100,fine,tG;", data)
+    return program_of(f"MoveJ p0,v100,fine,tG;\n    MoveL {target},v100,fine,tG;", data)
 
 
 def test_waypoints_are_inserted_until_the_line_is_straight_enough():
@@ -162,10 +162,21 @@ def test_waypoints_are_inserted_until_the_line_is_straight_enough():
     order = written.moves.target
     said = obeyed(written, ABB, np.zeros((len(written.targets), 6)))[order]
     points_said = (ABB.pose(said) @ tool_of_module())[:, :3, 3]
-    steps = np.linalg.norm(np.diff(points_said, axis=0), axis=1)
-    assert steps.min() > 0.0095
+    along = points_said @ (points_said[-1] - points_said[0]) / np.linalg.norm(points_said[-1] - points_said[0])
+    assert np.diff(along).min() > 0.0095, "each waypoint lies behind the one before"
     bent = rewritten(program, given, spacing=Spacing.of(0.001, 100.0))
     assert [notice.kind for notice in bent.notices] == ["deviation"]
+
+
+@pytest.mark.parametrize("target", ["Offs(p1,0,0,-20)", "RelTool(p1,0,0,20)"])
+def test_a_line_to_a_shifted_target_gets_no_waypoints(target):
+    given = models(ABB)
+    given = type(given)(given.programming, given.inverse, given.controller, Wavy(np.zeros(6)))
+    program = long_line(target)
+    done = rewritten(program, given, spacing=Spacing.of(0.1, 10.0))
+    assert done.inserted == 0
+    assert done.changed[program.moves.target].all()
+    assert [notice.kind for notice in done.notices] == ["deviation"]
 
 
 def tool_of_module():

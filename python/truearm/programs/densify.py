@@ -123,6 +123,12 @@ class Densifier:
         return points
 
     def _lines(self, move: int, environment: Environment, q: Floats) -> list[tuple[int, int, str]] | None:
+        """Lines that say readings (n, N); None where a waypoint cannot be said with certainty.
+
+        A waypoint is written out in numbers, without the offsets that the move's own target has.
+        """
+        if not environment.places_as_stored:
+            return None
         program, moves = self._program, self._program.moves
         target, file = int(moves.target[move]), int(moves.source[move])
         layout = program.layouts[int(program.targets.layout[target])]
@@ -131,6 +137,8 @@ class Densifier:
             values, decimals = self._encoder.pose_numbers(which, layout, environment, q)
         elif of_joints(layout):
             values, decimals = self._encoder.joint_numbers(which, layout, q)
+        if self._encoder.reasons.pop(target, None) is not None:
+            return None
         source = program.sources[file]
         line, _ = source.place(int(moves.at[move]))
         offset = source.line_starts[line - 1]

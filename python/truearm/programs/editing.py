@@ -32,7 +32,9 @@ def edited(program: Program, written: Written, inserted: Mapping[int, Sequence[W
             numbers, spelled = _spelled(numbers, lettered)
             words += spelled
         _, starts, ends, values, decimals = numbers
-        out.append(splice_numbers(source.content, (starts, ends), values, decimals, sorted(words)))
+        # Words for one place keep their order: waypoints before a line follow each other.
+        words.sort(key=lambda word: word[:2])
+        out.append(splice_numbers(source.content, (starts, ends), values, decimals, words))
     return out
 
 

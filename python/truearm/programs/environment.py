@@ -80,6 +80,11 @@ class Environment:
         )
 
     @property
+    def places_as_stored(self) -> bool:
+        """Whether a target is placed where it is stored, without an offset."""
+        return np.array_equal(self.before, np.eye(4)) and np.array_equal(self.after, np.eye(4))
+
+    @property
     def why_not_poses(self) -> str:
         """Why a Cartesian target cannot be changed here; empty if it can."""
         return self.problem or self.cartesian_problem or self.tool.unknown or self.work_object.unknown
