@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from tests.cell_support import cell_text, measured, poses_of, virtual, write_poses
@@ -207,3 +208,20 @@ def test_a_check_is_held_against_the_same_pose_where_the_first_contact_was_given
     first, check = pair
     np.testing.assert_array_equal(first, [7.0, 3.0, 0.0])
     np.testing.assert_array_equal(check, [7.0, 4.0, 0.0])
+
+
+def test_orientations_near_a_half_turn_are_averaged_in_files_of_any_name(tmp_path):
+    steps = [Step(0, "pose", 0, "", 0, np.zeros(5))]
+    turns = Rotation.from_rotvec([[np.pi - 1e-5, 0.0, 0.0], [np.pi + 1e-5, 0.0, 0.0]]).as_matrix()
+    with Session.create(tmp_path / "a#1 %25?.db", steps, {}) as known:
+        for attempt, turn in enumerate(turns, start=1):
+            pose = np.eye(4)
+            pose[:3, :3] = turn
+            reading = Reading(np.zeros(3), 1e-4, 0.0, True, "", pose_in_world=pose)
+            known.add_reading(0, attempt, reading, np.zeros(5), np.zeros(3))
+        known.add_outcome(0, "measured", attempts=[1, 2])
+        row = accepted_table(known).iloc[0]
+    found = Rotation.from_quat([row[name] for name in ("qx", "qy", "qz", "qw")])
+    wanted = Rotation.from_rotvec([np.pi, 0.0, 0.0])
+    assert (found * wanted.inv()).magnitude() < 1e-9
+    assert not (tmp_path / "a").exists()

@@ -314,6 +314,17 @@ def test_the_mark_stands_behind_the_line_that_begins_the_module():
         assert content.startswith(b"&ACCESS RVP\r\n")
 
 
+def test_a_target_that_shifts_another_one_is_left_alone():
+    first, second = (pose_text([a, -90, 100, 0, 45, 0], decimals=5) for a in (-20, 20))
+    src = ALREADY + f"DECL E6POS XP1={first}\nDECL FRAME XOFF={{X 1,Y 2,Z 3,A 0,B 0,C 0}}\n"
+    src += f"DECL E6POS XSHIFT={second}\nPTP XP1\nLIN XP1:XOFF\nPTP XSHIFT\nLIN XSHIFT:XP1\nEND\n"
+    program = read("a.src", src, KUKA)
+    done = rewritten(program, models(KUKA))
+    names = {program.targets.names[k]: bool(done.changed[k]) for k in program.targets.names}
+    assert not names["XSHIFT"]
+    assert b"XOFF={X 1,Y 2,Z 3,A 0,B 0,C 0}" in done.contents[0]
+
+
 def test_waypoints_on_a_line_are_passed():
     ends = [pose_text(q_deg, decimals=5) for q_deg in ([-30, -90, 100, 0, 45, 0], [30, -90, 100, 0, 45, 0])]
     src = ALREADY + f"PTP {ends[0]}\n  LIN {ends[1]}\nEND\n"

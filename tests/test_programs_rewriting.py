@@ -162,7 +162,9 @@ def test_waypoints_are_inserted_until_the_line_is_straight_enough():
     order = written.moves.target
     said = obeyed(written, ABB, np.zeros((len(written.targets), 6)))[order]
     points_said = (ABB.pose(said) @ tool_of_module())[:, :3, 3]
-    along = points_said @ (points_said[-1] - points_said[0]) / np.linalg.norm(points_said[-1] - points_said[0])
+    along = (
+        points_said @ (points_said[-1] - points_said[0]) / np.linalg.norm(points_said[-1] - points_said[0])
+    )
     assert np.diff(along).min() > 0.0095, "each waypoint lies behind the one before"
     bent = rewritten(program, given, spacing=Spacing.of(0.001, 100.0))
     assert [notice.kind for notice in bent.notices] == ["deviation"]

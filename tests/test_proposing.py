@@ -8,6 +8,7 @@ from tests.remastered import remastered
 from truearm._core import CoreError, choose_informative
 from truearm.proposing import Candidates, acceptance_poses, next_poses
 from truearm.simulation import VirtualArm
+from truearm.updating import UpdateOptions
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +84,14 @@ def test_acceptance_poses_lie_apart_and_notice_small_changes(known):
     shift[2] = 1.5 * found.noticed["joint3"]
     told = ta.update(calibration, remastered(arm, candidates.readings[found.rows], shift, seed=8))
     assert told.offsets[2].moved
+
+
+def test_what_is_noticed_hardly_depends_on_how_far_things_may_have_moved(known):
+    candidates = Candidates(known[1], known[0].poses(60, seed=2))
+    usual = acceptance_poses(candidates, 12)
+    loose = acceptance_poses(candidates, 12, UpdateOptions(offset_deg=4.0, tool_mm=20.0))
+    for name in ("joint2", "joint3"):
+        assert 0.8 < loose.noticed[name] / usual.noticed[name] < 1.5
 
 
 def test_a_model_of_constants_proposes_as_well(known):

@@ -29,6 +29,7 @@ from truearm.models import CONSTANT, ArmModel
 from truearm.options import Options
 from truearm.revision import Revision
 from truearm.robot import Robot
+from truearm.rotations import rigid_motion
 from truearm.scheme_fitting import SchemeDetails
 from truearm.solving import solve
 from truearm.summary import summarise
@@ -248,9 +249,10 @@ class Calibration:
     def position_std(
         self, q: ArrayLike, *, tool: ArrayLike | None = None, features: Features | None = None
     ) -> Floats:
-        """Standard deviation of each coordinate in the base frame, (n, 3), m.
+        """Standard deviation of each coordinate along the axes of the base frame, (n, 3), m.
 
-        This is the arm's part alone: no noise of a measurement, no uncertainty of where a device stands.
+        It holds where the base stands as the device saw it in the set-up with most rows. How far the arm's
+        own base frame is from there, no measurement of the tool tells. Noise of a measurement is no part.
         """
         return self._std(q, tool, features, pose=False)
 
@@ -332,11 +334,9 @@ class Calibration:
         They are in the base frame, m^2 and rad^2.
         """
         rows, _ = self._readings(q)
-        inputs, jacobian = (
-            self.field_inputs(rows, features),
-            self._jacobian(rows, features, tool, pose=True),
-        )
-        covariance = self.spread.covariance(inputs, jacobian)
+        jacobian = self._jacobian(rows, features, tool, pose=True)
+        covariance = self._covariance(rows, features, tool, jacobian)
+        inputs = self.field_inputs(rows, features)
         return inputs, np.einsum("nii->ni", covariance), self.spread.prior(inputs, jacobian)
 
     def variation_std(
@@ -369,9 +369,20 @@ class Calibration:
     def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)
         jacobian = self._jacobian(rows, features, tool, pose=pose)
-        covariance = self.spread.covariance(self.field_inputs(rows, features), jacobian)
+        covariance = self._covariance(rows, features, tool, jacobian)
         found: Floats = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
         return found[0] if single else found
+
+    def _covariance(
+        self, rows: Floats, features: Features | None, tool: ArrayLike | None, jacobian: Floats
+    ) -> Floats:
+        """Covariance (n, m, m) of a tool's position, or pose, where the base stands as the device saw it."""
+        points = self.position(rows, tool=tool, features=features)
+        frame = rigid_motion(points)
+        if jacobian.shape[1] > frame.shape[1]:
+            turns = np.broadcast_to(np.eye(3, 6, 3), frame.shape)
+            frame = np.concatenate([frame, turns], axis=1)
+        return self.spread.covariance(self.field_inputs(rows, features), jacobian, frame)
 
     def _jacobian(
         self, rows: Floats, features: Features | None, tool: ArrayLike | None, *, pose: bool

@@ -33,6 +33,7 @@ Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
 Stages = Callable[[str], AbstractContextManager[Any]]
 
+FRAME_UNKNOWNS: Final = 6
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
 
@@ -284,9 +285,14 @@ def _measured_values(task: Task, data: Measurements) -> int:
     return 3 * int(points + turned)
 
 
+def frame_unknowns(task: Task) -> int:
+    """Unknowns of the frame of one set-up: none where it is known, or only distances were measured."""
+    return 0 if task.arm.world_is_known or task.selection.distances else FRAME_UNKNOWNS
+
+
 def setup_unknowns(task: Task) -> int:
     """Unknowns of all set-ups: frames, targets, orientations of targets; without anchors."""
-    frame = 0 if task.arm.world_is_known or task.selection.distances else 6
+    frame = frame_unknowns(task)
     points = 1 if task.selection.distances else len(task.selection.targets)
     return len(task.groups) * (frame + 3 * points + (3 if task.selection.orientation else 0))
 

@@ -27,6 +27,17 @@ def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
     return _wxyz(Rotation.from_matrix(m.reshape(-1, 3, 3))).reshape(*m.shape[:-2], 4)
 
 
+def rigid_motion(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Change (n, 3, 6) of points (n, 3) with a translation and a rotation vector about the origin."""
+    jacobian = np.zeros((len(points), 3, 6))
+    jacobian[:, :, :3] = np.eye(3)
+    x, y, z = points.T
+    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+    return jacobian
+
+
 def quaternion_from_euler(angles: ArrayLike, sequence: str) -> NDArray[np.float64]:
     """Quaternions (n, 4), w first, of Euler angles (n, 3) in rad.
 

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from truearm._core import Posterior
 from truearm.core_set import core_set
 from truearm.errors import WorkError
-from truearm.fitting import Task, feature_values, field_options
+from truearm.fitting import (
+    FRAME_UNKNOWNS,
+    Task,
+    feature_values,
+    field_options,
+    frame_unknowns,
+    setup_unknowns,
+)
+from truearm.measurements import Measurements
 from truearm.models import CONSTANT
 
 if TYPE_CHECKING:
@@ -27,8 +35,12 @@ AXES: Final = 3
 class Spread(Protocol):
     """Knows how uncertain the arm's parameters are."""
 
-    def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
-        """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I)."""
+    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
+        """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I).
+
+        With `frame` (n, m, 6), derivatives by a motion of the base, it is that of what the device of the
+        set-up with most rows sees: what its frame can take over from parameters counts once.
+        """
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) of the same before any measurement."""
@@ -44,6 +56,37 @@ class Spread(Protocol):
         """Covariance (n, m, m) of what a measurement shows anew; `orientation` (m,) tells rows in rad."""
 
 
+@dataclass(frozen=True)
+class FramePlace:
+    """Where a set-up's frame stands among the unknowns of all set-ups.
+
+    Attributes:
+        start: Its first unknown; None where no frame was fitted.
+        count: Unknowns of all set-ups, S.
+    """
+
+    start: int | None
+    count: int
+
+    @classmethod
+    def of(cls, task: Task, data: Measurements | None) -> "FramePlace":
+        """The frame of the set-up with most rows, or the first where rows were left out of the file."""
+        count = setup_unknowns(task)
+        if frame_unknowns(task) == 0:
+            return cls(None, count)
+        groups = list(task.groups)
+        often = groups[0] if data is None else max(groups, key=lambda name: (data.group == name).sum())
+        return cls(groups.index(often) * (count // len(groups)), count)
+
+    def among_all(self, frame: Floats | None) -> Floats | None:
+        """Derivatives (n, m, S) by all of them, of those (n, m, 6) by the frame."""
+        if frame is None or self.start is None:
+            return None
+        found = np.zeros((*frame.shape[:2], self.count))
+        found[:, :, self.start : self.start + frame.shape[2]] = frame
+        return found
+
+
 @dataclass(frozen=True, eq=False)
 class ConstantSpread:
     """Constants: one covariance for the whole arm, and behind it of the set-ups."""
@@ -52,6 +95,7 @@ class ConstantSpread:
     of_all: Floats
     before: Floats
     noises: tuple[float, float]
+    place: "FramePlace"
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "ConstantSpread":
@@ -61,18 +105,27 @@ class ConstantSpread:
         scale = calibration.constant.prior_scale if scaled else 1.0
         before = scale * np.where(np.isin(np.array(columns) % 5, LENGTHS), length, angle)
         details = calibration.constant
-        return cls(columns, details.covariance, before**2, (details.noise_m, details.noise_rad))
+        data = None if calibration.rows is None else calibration.rows.data
+        place = FramePlace.of(task_of(calibration), data)
+        noises = details.noise_m, details.noise_rad
+        return cls(columns, details.covariance, before**2, noises, place)
 
     @property
-    def of_constants(self) -> Floats:
-        """Covariance of the constants alone."""
-        size = len(self.columns)
-        return self.of_all[:size, :size]
+    def with_frame(self) -> Floats:
+        """Covariance of the constants, and behind them of the frame where one was fitted."""
+        own = list(range(len(self.columns)))
+        if self.place.start is not None:
+            start = len(own) + self.place.start
+            own += range(start, start + FRAME_UNKNOWNS)
+        return self.of_all[np.ix_(own, own)]
 
-    def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
+    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
         """Covariance (n, m, m), the same rule everywhere."""
-        chosen = jacobian[:, :, self.columns]
-        return np.asarray(chosen @ self.of_constants @ chosen.transpose(0, 2, 1))
+        rows, setup = jacobian[:, :, self.columns], self.place.among_all(frame)
+        if setup is not None:
+            rows = np.concatenate([rows, setup], axis=2)
+        size = rows.shape[2]
+        return np.asarray(rows @ self.of_all[:size, :size] @ rows.transpose(0, 2, 1))
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) that the prior of the constants gives."""
@@ -100,6 +153,7 @@ class VariableSpread:
     posterior: Posterior
     inflation: float
     noises: tuple[float, float]
+    place: "FramePlace"
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "VariableSpread":
@@ -125,12 +179,14 @@ class VariableSpread:
         columns = list(calibration.arm.candidates.columns)
         point = calibration.models[CONSTANT]
         posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
-        return cls(columns, posterior, details.inflation, noises_of(details.hyper))
+        place = FramePlace.of(task, rows.data)
+        return cls(columns, posterior, details.inflation, noises_of(details.hyper), place)
 
-    def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
+    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
         """Covariance (n, m, m) at inputs (n, I)."""
         chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
-        return self.posterior.covariance(np.ascontiguousarray(inputs), chosen) * self.inflation**2
+        setup = self.place.among_all(frame)
+        return self.posterior.covariance(np.ascontiguousarray(inputs), chosen, setup) * self.inflation**2
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) that constants and field have before any measurement."""
@@ -176,12 +232,15 @@ class UpdatedSpread:
             raise WorkError("this calibration was not updated", rule="Only an updated one has this spread")
         return cls(before, revision.directions, revision.covariance)
 
-    def covariance(self, inputs: Floats, jacobian: Floats) -> Floats:
-        """Covariance (n, m, m); both parts counted in full, though they have something in common."""
+    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
+        """Covariance (n, m, m); both parts counted in full, though they have something in common.
+
+        The frame is that of the calibration that was updated: with it its parameters were found.
+        """
         size = self.offsets.shape[1]
         moved = jacobian @ self.offsets
         own = moved @ self.of_all[:size, :size] @ moved.transpose(0, 2, 1)
-        return self.before.covariance(inputs, jacobian) + np.asarray(own)
+        return self.before.covariance(inputs, jacobian, frame) + np.asarray(own)
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) before any measurement."""

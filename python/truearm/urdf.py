@@ -179,12 +179,13 @@ def _direction(joint: Any) -> Floats:  # noqa: ANN401
 
 def _limits(joint: Any) -> tuple[float, float]:  # noqa: ANN401
     limit = joint.limit
-    if joint.type == "continuous" or limit is None or limit.lower is None or limit.upper is None:
+    if joint.type == "continuous" or limit is None or limit.lower is limit.upper is None:
         return -np.inf, np.inf
-    if limit.lower >= limit.upper:
+    lower, upper = limit.lower or 0.0, limit.upper or 0.0
+    if lower >= upper:
         raise InputError(
-            f"limits {limit.lower:g} to {limit.upper:g}",
+            f"limits {lower:g} to {upper:g}",
             where=f'joint "{joint.name}"',
             rule="The lower limit must be below the upper one",
         )
-    return limit.lower, limit.upper
+    return lower, upper

@@ -210,3 +210,12 @@ fn every_status_and_reason_has_words() {
     assert_eq!(truearm_abi_version(), TRUEARM_ABI_VERSION);
     assert_eq!(text(truearm_version()), env!("CARGO_PKG_VERSION"));
 }
+
+#[test]
+fn a_workspace_serves_the_corrector_that_it_was_made_for() {
+    let (mut rig, mut other) = (Rig::new(), Rig::new());
+    std::mem::swap(&mut rig.workspace, &mut other.workspace);
+    assert_eq!(rig.correct(&HOME).0, Status::OtherWorkspace);
+    std::mem::swap(&mut rig.workspace, &mut other.workspace);
+    assert_eq!(rig.correct(&HOME).0, Status::Ok);
+}

@@ -23,7 +23,7 @@ pub(crate) struct Aimed {
 
 impl Aimed {
     pub fn new(model: Arc<Model>, flange_from_tool: &Transform) -> Result<Self, CompensateError> {
-        flange_from_tool.check("the tool")?;
+        flange_from_tool.check("tool")?;
         let chain = model.chain.with_end(model.chain.end().compose(flange_from_tool))?;
         let reach = model.spread.as_ref().map_or(0.0, |spread| spread.reach(flange_from_tool.translation));
         Ok(Self { model, chain, reach })

@@ -44,7 +44,7 @@ impl Default for Limits {
             shift_change: 0.05,
             turn_change: 0.05,
             residual: 1e-9,
-            residual_turn: 1e-9,
+            residual_turn: 1e-8,
         }
     }
 }

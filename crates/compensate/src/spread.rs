@@ -9,6 +9,8 @@ use crate::model::Model;
 
 /// What is left of a variance by less than this part is rounding.
 const ROUNDING: f64 = 1e-12;
+/// Unknowns of a frame.
+const FRAME: usize = 6;
 
 /// Standard deviation of the tool's position: the root of the sum of the variances of x, y and z.
 #[derive(Debug, Clone)]
@@ -20,23 +22,31 @@ pub enum Spread {
 }
 
 /// Covariance of some of the parameters, as a factor whose product with itself it is.
+///
+/// Behind them may stand the frame that a device gave the base, a translation and a rotation vector of the base frame:
+/// what parameters and frame can take over from each other is then uncertain together only.
 #[derive(Debug, Clone)]
 pub struct ConstantSpread {
     columns: Vec<usize>,
+    /// Unknowns of the frame, 6 or none.
+    frame: usize,
     /// Lower triangle, row by row: the covariance is F F^T.
     factor: Vec<f64>,
 }
 
 impl ConstantSpread {
-    /// From the covariance (P, P), row-major, of the parameters `columns` (P ascending indices, 5 link + k).
+    /// From the covariance (P, P) or (P + 6, P + 6), row-major, of the parameters `columns` (P ascending indices,
+    /// 5 link + k) and of the frame.
     ///
     /// # Errors
     /// [`CompensateError::Length`] and [`CompensateError::NotFinite`].
     pub fn new(columns: Vec<usize>, covariance: &[f64]) -> Result<ConstantSpread, CompensateError> {
-        let count = columns.len();
+        let with_frame = columns.len() + FRAME;
+        let frame = if covariance.len() == with_frame * with_frame { FRAME } else { 0 };
+        let count = columns.len() + frame;
         check_length("the covariance", covariance.len(), count * count)?;
         check_finite("the covariance", covariance)?;
-        Ok(ConstantSpread { factor: semidefinite_factor(covariance, count), columns })
+        Ok(ConstantSpread { factor: semidefinite_factor(covariance, count), columns, frame })
     }
 
     fn check(&self, model: &Model) -> Result<(), CompensateError> {
@@ -53,14 +63,17 @@ impl ConstantSpread {
 
     /// Variance of the end's position: |J F|^2.
     #[inline(always)]
-    fn variance<I: Isa>(&self, scratch: &AimedScratch) -> Lane {
+    fn variance<I: Isa>(&self, end: &[Lane; 3], scratch: &AimedScratch) -> Lane {
+        let count = self.columns.len();
+        let moved = moved_with_frame(end);
         let mut sum = Lane::ZERO;
-        for column in 0..self.columns.len() {
+        for column in 0..count + self.frame {
             let mut motion = [Lane::ZERO; 3];
-            for (row, screw) in scratch.screws[..self.columns.len()].iter().enumerate().skip(column) {
+            for row in column..count + self.frame {
+                let linear = if row < count { &scratch.screws[row].linear } else { &moved[row - count] };
                 let factor = Lane::splat(self.factor[row * (row + 1) / 2 + column]);
                 for i in 0..3 {
-                    motion[i] = I::mul_add(screw.linear[i], factor, motion[i]);
+                    motion[i] = I::mul_add(linear[i], factor, motion[i]);
                 }
             }
             for value in motion {
@@ -69,6 +82,13 @@ impl ConstantSpread {
         }
         sum
     }
+}
+
+/// How a point moves with translations and rotations of the frame it is in.
+#[inline(always)]
+fn moved_with_frame(point: &[Lane; 3]) -> [[Lane; 3]; FRAME] {
+    let (zero, one, [x, y, z]) = (Lane::ZERO, Lane::splat(1.0), *point);
+    [[one, zero, zero], [zero, one, zero], [zero, zero, one], [zero, -z, y], [z, zero, -x], [-y, x, zero]]
 }
 
 impl Spread {
@@ -117,8 +137,8 @@ impl Spread {
     ) -> Lane {
         match self {
             Self::Constant(spread) => {
-                aimed.sweep_columns::<I>(readings, alone, &spread.columns, scratch);
-                spread.variance::<I>(scratch).sqrt()
+                let end = aimed.sweep_columns::<I>(readings, alone, &spread.columns, scratch);
+                spread.variance::<I>(&end.position, scratch).sqrt()
             }
             Self::Field(bounds) => {
                 let poses = if alone { 1 } else { LANES };

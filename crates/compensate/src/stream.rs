@@ -2,7 +2,8 @@
 //!
 //! What is added to the set-points follows the wanted correction with bounded rate and acceleration. Switched on or
 //! off it ramps. Where a set-point is refused, is not finite or comes late, the last correction is held for a
-//! moment and then ramped down, until good set-points come again.
+//! moment and then ramped down, until good set-points come again. Where that would lead a joint out of its limits it
+//! stays at the limit.
 
 use std::sync::Arc;
 
@@ -182,7 +183,12 @@ impl Stream {
         let share = self.gain * self.gain * (3.0 - 2.0 * self.gain);
         let mut lag = 0.0_f64;
         for (joint, follower) in self.joints.iter_mut().enumerate() {
-            lag = lag.max(follower.follow(share * self.wanted[joint], elapsed));
+            let aim = share * self.wanted[joint];
+            follower.follow(aim, elapsed);
+            if let Some(limits) = self.corrector.options.limits.joints.get(joint) {
+                follower.confine(limits.map(|limit| limit - self.readings[joint]));
+            }
+            lag = lag.max((aim - follower.applied).abs());
             out[joint] = self.readings[joint] + follower.applied;
         }
         Step { phase, gain: self.gain, lag, fault }
@@ -249,10 +255,10 @@ impl Follower {
         Self { largest_rate, acceleration, applied: 0.0, rate: 0.0, aim: 0.0 }
     }
 
-    /// One step towards `aim`; how far from it the applied value is then.
+    /// One step towards `aim`.
     ///
     /// The rate is that of the aim plus one that closes what was left before, from which it can still stop in time.
-    fn follow(&mut self, aim: f64, elapsed: f64) -> f64 {
+    fn follow(&mut self, aim: f64, elapsed: f64) {
         if elapsed > SHORTEST {
             let left = self.aim - self.applied;
             let brake = self.acceleration * elapsed;
@@ -265,7 +271,14 @@ impl Follower {
             self.settle(aim, brake * elapsed);
             self.aim = aim;
         }
-        (aim - self.applied).abs()
+    }
+
+    /// Keeps the applied value within what is left to the limits; where nothing is, it does not lead further out.
+    fn confine(&mut self, [low, high]: [f64; 2]) {
+        let within = self.applied.clamp(low.min(0.0), high.max(0.0));
+        if within != self.applied {
+            (self.applied, self.rate) = (within, 0.0);
+        }
     }
 
     /// Arrives where only rounding is left.

@@ -95,6 +95,29 @@ fn bad_options_are_refused() {
     assert!(matches!(make(options), Some(CompensateError::Length { .. })));
 }
 
+/// A parameter that only turns the base is as uncertain as the frame, which turns the other way.
+#[test]
+fn what_the_frame_takes_over_does_not_count() {
+    let scene = scene();
+    let columns = vec![0];
+    let size = columns.len() + 6;
+    let (mut alone, mut together) = (vec![0.0; 1], vec![0.0; size * size]);
+    alone[0] = 4e-6;
+    let direction: Vec<f64> = (0..size).map(|k| if k == 0 { 2e-3 } else { 0.0 }).collect();
+    let joint_axis = 6; // The turn about z, behind the parameter, three translations and two turns.
+    let with_frame = |k: usize| if k == joint_axis { -2e-3 } else { direction[k] };
+    (0..size * size).for_each(|k| together[k] = with_frame(k / size) * with_frame(k % size));
+    let std = |covariance: &[f64]| {
+        let model = Model::new(scene.chain.clone(), &scene.constants, &scene.coupling).unwrap();
+        let spread = Spread::Constant(ConstantSpread::new(columns.clone(), covariance).unwrap());
+        let model = std::sync::Arc::new(model.with_spread(spread).unwrap());
+        let corrector = Corrector::new(model, scene.programming(), &tool(), Options::default()).unwrap();
+        one(&corrector, &Q).1.std_m
+    };
+    assert!(std(&alone) > 1e-4);
+    assert!(std(&together) < 1e-12, "{}", std(&together));
+}
+
 #[test]
 fn standard_deviation_of_constants() {
     let scene = scene();

@@ -227,3 +227,22 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_held_correction_leads_no_joint_out_of_its_limits() {
+    let mut stream = stream();
+    let (mut out, mut readings) = ([0.0; JOINTS], START);
+    run(&mut stream, 0.0, 2.0);
+    let wanted: Vec<f64> = stream.applied().collect();
+    let joint = (0..JOINTS).find(|&joint| wanted[joint].abs() > 1e-5).unwrap();
+    let limit = 3.0 * wanted[joint].signum();
+    for k in 0..400 {
+        let share = f64::from(k) / 399.0;
+        readings[joint] = START[joint] + share * (limit - START[joint]);
+        let step = stream.step(Some(&readings), &[], CYCLE, &mut out);
+        assert!(out[joint].abs() <= 3.0, "{} at {k}", out[joint]);
+        if k == 399 {
+            assert!(step.lag > 0.0);
+        }
+    }
+}

@@ -14,7 +14,7 @@ use crate::measurements::Noise;
 use crate::minimise::{Minimum, Objective, Reason, State};
 use crate::noise::Squares;
 use crate::packets::Packets;
-use crate::robust::{Robust, scale_from_median};
+use crate::robust::Robust;
 use crate::rows::{Point, residuals_of};
 use crate::setup::Setup;
 use crate::start::initial_setup;
@@ -51,7 +51,7 @@ pub struct ConstantOptions {
     pub prior: Option<Prior>,
     /// Known noise; estimated from the residuals where there is none.
     pub noise: Option<Noise>,
-    /// Loss of a pose's residuals; `None` is least squares, as are distances always.
+    /// Loss of a pose's residuals, or of a distance's; `None` is least squares.
     pub robust: Option<Robust>,
     /// A set-up to start from, instead of the closed form.
     pub start: Option<Setup>,
@@ -252,8 +252,7 @@ impl Fit<'_> {
         let rows = position.rows() + orientation.rows();
         let of = |squares: &Squares| match self.options.robust {
             Some(Robust::Huber | Robust::Cauchy) => {
-                let mut absolute: Vec<f64> = squares.sizes();
-                scale_from_median(&mut absolute) * (rows / (rows - unknowns).max(1.0)).sqrt()
+                squares.robust_noise((rows / (rows - unknowns).max(1.0)).sqrt())
             }
             _ => squares.noise(unknowns * squares.rows() / rows),
         };

@@ -1,6 +1,10 @@
 //! Weights of rows from noise, and noise from residuals.
 
 use crate::measurements::Noise;
+use crate::robust::scale_from_median;
+
+/// Over the largest square a variance under which the median of what is left is below that of a standard normal.
+const ABOVE_ALL: f64 = 3.0;
 
 /// Weight (inverse variance) of a row: its own sigma on top of the noise, thinned by the outlier weight.
 #[inline(always)]
@@ -28,9 +32,22 @@ impl Squares {
         self.rows.len() as f64
     }
 
-    /// Sizes of the residuals.
-    pub fn sizes(&self) -> Vec<f64> {
-        self.rows.iter().map(|row| row.0.sqrt()).collect()
+    /// The noise on top of the rows' own variances under which the median of the sizes is what it would be without
+    /// outliers, times `widened` for what the unknowns took of them; 0 when the rows' own sigmas explain more.
+    pub fn robust_noise(&self, widened: f64) -> f64 {
+        let scale = |variance: f64| {
+            let sizes = self.rows.iter().map(|(square, own, _)| (square / (own + variance)).sqrt());
+            widened * scale_from_median(&mut sizes.collect::<Vec<f64>>())
+        };
+        if !self.has_own {
+            return scale(1.0);
+        }
+        let largest = self.rows.iter().map(|row| row.0).fold(0.0, f64::max) * widened * widened;
+        let smallest = largest * 1e-12;
+        if largest == 0.0 || scale(smallest) <= 1.0 {
+            return 0.0;
+        }
+        bisect(|variance| scale(variance) - 1.0, smallest, ABOVE_ALL * largest).sqrt()
     }
 
     /// The noise for which the weighted squares add up to the degrees of freedom, or 0 when the rows' own
@@ -93,5 +110,14 @@ mod tests {
         assert!((squares.noise(0.0) - 1.0).abs() < 1e-8);
         let explained = alike(5.0);
         assert_eq!(explained.noise(0.0), 0.0);
+    }
+
+    #[test]
+    fn robust_noise_is_on_top_of_own_sigma_too() {
+        let scale = 1.0 / 0.674_489_750_196_081_7;
+        assert!((alike(0.0).robust_noise(1.0) - 2.0 * scale).abs() < 1e-12);
+        let on_top = ((2.0 * scale).powi(2) - 3.0).sqrt();
+        assert!((alike(3.0).robust_noise(1.0) - on_top).abs() < 1e-8);
+        assert_eq!(alike(9.0).robust_noise(1.0), 0.0);
     }
 }

@@ -197,6 +197,9 @@ fn prepared<'py, D: Dimension>(
         let text = format!("out has shape {:?}, it must be {:?}", array.shape(), shape.slice());
         return Err(CoreError::new_err(text));
     }
+    if !array.is_c_contiguous() {
+        return Err(not_contiguous("out"));
+    }
     Ok(array)
 }
 
@@ -211,7 +214,7 @@ pub fn contiguous<'a, D: Dimension>(
     array.as_slice().map_err(|_| not_contiguous(name))
 }
 
-fn not_contiguous(name: &str) -> PyErr {
+pub fn not_contiguous(name: &str) -> PyErr {
     CoreError::new_err(format!(
         "{name} is not C-contiguous and aligned: pass numpy.ascontiguousarray({name})"
     ))

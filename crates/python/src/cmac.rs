@@ -12,6 +12,7 @@ use truearm_field::cmac::{
     Scales, Sensor, Trained, TrainingEnd, TrainingOptions,
 };
 
+use crate::chain::{contiguous, not_contiguous};
 use crate::door::{CoreError, Failure, long, quick, with_threads};
 use crate::measured::matrix;
 
@@ -185,8 +186,11 @@ impl Network {
         if out.shape() != expected {
             return Err(shape("out", out.shape(), &expected));
         }
+        if !out.is_c_contiguous() {
+            return Err(not_contiguous("out"));
+        }
         {
-            let inputs = s.as_slice().map_err(|_| not_contiguous("s"))?;
+            let inputs = contiguous("s", &s)?;
             let mut borrowed =
                 out.try_readwrite().map_err(|error| CoreError::new_err(format!("out: {error}")))?;
             let values = borrowed.as_slice_mut().map_err(|_| not_contiguous("out"))?;
@@ -296,10 +300,6 @@ impl Network {
 
 fn shape(name: &str, got: &[usize], wanted: &[usize]) -> PyErr {
     CoreError::new_err(format!("{name} has shape {got:?}, it must be {wanted:?}"))
-}
-
-fn not_contiguous(name: &str) -> PyErr {
-    CoreError::new_err(format!("{name} is not C-contiguous: pass numpy.ascontiguousarray({name})"))
 }
 
 #[pymethods]

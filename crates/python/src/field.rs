@@ -20,7 +20,7 @@ use truearm_field::{
 };
 
 use crate::blocks::{block_from, block_into, sag_block};
-use crate::chain::Chain;
+use crate::chain::{Chain, contiguous};
 use crate::door::{CoreError, Failure, long, quick, with_threads};
 use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
 use crate::measured::{Setup, matrix, vector};
@@ -322,7 +322,7 @@ const HELD_POSES: usize = 64;
 
 /// The numbers of an array row by row, copied only where they do not lie so.
 pub(crate) fn numbers<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> Cow<'a, [f64]> {
-    match array.as_slice() {
+    match contiguous("array", array) {
         Ok(slice) => Cow::Borrowed(slice),
         Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
     }

@@ -126,13 +126,8 @@ impl Regions {
             let text = format!("features has shape {shape:?}, it must be (n, {})", self.core.dimensions());
             return Err(CoreError::new_err(text));
         }
-        let found = match features.as_slice() {
-            Ok(points) => quick(py, || self.core.find_all(points))?,
-            Err(_) => {
-                let points = numbers(&features);
-                quick(py, || self.core.find_all(&points))?
-            }
-        };
+        let points = numbers(&features);
+        let found = quick(py, || self.core.find_all(&points))?;
         Ok(integers(py, found.into_iter().map(|region| region as i64)))
     }
 

@@ -97,13 +97,16 @@ def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
     merged |= {axis: float(np.mean([row[axis] for row in rows])) for axis in "xyz"}
     merged["sigma"] = float(np.mean([row["sigma"] for row in rows]) / np.sqrt(len(rows)))
     if all(row["qw"] is not None for row in rows):
-        turns = np.mean([[row[name] for name in TURN] for row in rows], axis=0)
-        merged |= dict(zip(TURN, (turns / np.linalg.norm(turns)).tolist(), strict=True))
+        turns = np.array([[row[name] for name in TURN] for row in rows], dtype=np.float64)
+        turns *= np.where(turns @ turns[0] < 0.0, -1.0, 1.0)[:, None]
+        turn = turns.mean(axis=0)
+        merged |= dict(zip(TURN, (turn / np.linalg.norm(turn)).tolist(), strict=True))
     merged |= {"approach": first["approach"], "readings": len(rows)}
     if all(row["temperature_c"] is not None for row in rows):
         merged["temperature_c"] = float(np.mean([row["temperature_c"] for row in rows]))
     features = [json.loads(row["features"]) for row in rows]
-    merged |= {name: float(np.mean([each[name] for each in features])) for name in features[0]}
+    common = [name for name in features[0] if all(name in each for each in features)]
+    merged |= {name: float(np.mean([each[name] for each in features])) for name in common}
     return merged
 
 

@@ -78,7 +78,7 @@ class Session:
         self._acquire()
         mode = "rwc" if writing else "ro"
         self._db = sqlite3.connect(
-            f"file:{path.resolve()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
+            f"{path.resolve().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
         )
         try:
             if writing:

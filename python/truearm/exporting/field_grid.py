@@ -1,5 +1,6 @@
 """The calibration sampled on a grid of readings, for software that can look up a table."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -87,7 +88,7 @@ def grid_table(
             "this calibration has no field: its parameters are constant",
             way_out="Export them with --to urdf or --to dh-toml",
         )
-    count = int(np.prod([axis.count for axis in axes]))
+    count = math.prod(axis.count for axis in axes)
     if count > LARGEST:
         raise UsageError(f"the grid has {count} points", where="--grid", rule=f"At most {LARGEST}")
     robot = calibration.robot

@@ -66,8 +66,9 @@ def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -
     )
     content.setdefault("format", FORMAT)
     content.setdefault(found.kind, {})[key or name] = written
-    write_whole(path, tomli_w.dumps(content))
-    Frames.load(path)
+    text = tomli_w.dumps(content)
+    Frames.parse(text, where=str(path))
+    write_whole(path, text)
     if not former:
         return []
     return [

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from truearm.errors import WorkError
 from truearm.framing.identified_frame import IdentifiedFrame, far_rows
 from truearm.registration import register
+from truearm.rotations import rigid_motion
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def object_from_points(
     residuals = touched - point_in_object @ transform[:3, :3].T - transform[:3, 3]
     freedom = residuals.size - 6
     noise = float(np.sqrt(np.square(residuals).sum() / freedom))
-    jacobian = _jacobian(point_in_object @ transform[:3, :3].T).reshape(-1, 6)
+    jacobian = rigid_motion(point_in_object @ transform[:3, :3].T).reshape(-1, 6)
     pseudo_inverse = np.linalg.pinv(jacobian)
     covariance = noise**2 * pseudo_inverse @ pseudo_inverse.T
     if tip_covariance is not None:
@@ -60,14 +61,3 @@ def _check_spread(points: Floats) -> None:
             rule="Three points that span a plane tell where an object is",
             way_out="Touch points far from each other, some more than three",
         )
-
-
-def _jacobian(arm: Floats) -> Floats:
-    """Change (n, 3, 6) of points that are at `arm` (n, 3) from the origin, with translation and rotation."""
-    jacobian = np.zeros((len(arm), 3, 6))
-    jacobian[:, :, :3] = np.eye(3)
-    x, y, z = arm.T
-    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
-    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
-    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
-    return jacobian

@@ -237,6 +237,8 @@ class KrlReading:
         for number, operand in enumerate(chain):
             if number == which:
                 continue
+            if isinstance(operand, Named):
+                self._storage.read.add(operand.name)
             frame = self._frames.constant("tool", operand)
             problem = problem or (f"its offset: {frame.unknown}" if frame.unknown else "")
             before, after = (before @ frame.true, after) if number < which else (before, after @ frame.true)
@@ -249,7 +251,7 @@ class KrlReading:
             problem = chain[0].problem()
             return problem if problem else ([self._add(file, chain[0], "")], 0)
         why = ""
-        for which in reversed(range(len(chain))):
+        for which in self._likely(chain):
             operand = chain[which]
             if isinstance(operand, Named) and operand.name not in {"$nullframe", "$world"}:
                 found = self._stored(operand)
@@ -257,6 +259,13 @@ class KrlReading:
                     return found, which
                 why = why or found
         return why or RUN_TIME
+
+    def _likely(self, chain: Operands) -> list[int]:
+        """Places of operands: those that are declared as targets first, the last before the others."""
+        kinds = [
+            self._storage.kinds.get(operand.name) if isinstance(operand, Named) else None for operand in chain
+        ]
+        return sorted(range(len(chain)), key=lambda which: (kinds[which] not in TARGET_KINDS, -which))
 
     def _stored(self, variable: Named) -> list[int] | str:
         keys = self._storage.elements(variable)

@@ -51,6 +51,8 @@ _VARIABLE: Final = re.compile(rf"\s*\(?\s*({NAME})\s*\)?\s*\Z")
 _COMBINED: Final = re.compile(rf"\s*({NAME})\s*([*/+-])\s*({NAME})\s*\Z")
 _DISTANCE: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*\Z")
 _SETTING: Final = re.compile(r"\s*(Tool|Base|Cnt)\b\s*(.*?)\s*\Z|\s*M_Tool\s*=\s*(.*?)\s*\Z", re.IGNORECASE)
+_SET_WITHIN: Final = re.compile(r"\b(Then|Else)\s+(Tool|Base)\b|\bM_Tool\s*=(?!=)", re.IGNORECASE)
+"""A setting in one branch of a line."""
 _LABEL: Final = re.compile(r"\s*\*")
 _BRANCHING: Final = re.compile(
     r"(?<![\w.])(GoSub|GoTo|If|Then|Else|EndIf|For|Next|While|WEnd|Select|Case|Break|CallP|Return|On|"
@@ -198,7 +200,7 @@ class Reader:
         branching = _LABEL.match(statement.text) or _BRANCHING.search(statement.text)
         if branching is not None:
             self._follows, self._blended = False, True
-            if self._several:
+            if self._several or _SET_WITHIN.search(statement.text) is not None:
                 self._tool = self._base = _UNKNOWN_TOOL
         if motion is not None:
             self._motion(statement, motion)

@@ -1,5 +1,6 @@
 """The poses that check an old calibration best: those that show most of what is likely to have changed."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import choose_telling
+from truearm.identified import IdentifiedArm
 from truearm.planning.spreading import fill, least_distance
 from truearm.proposing.candidates import Candidates
 from truearm.proposing.next_poses import check_count
@@ -66,7 +68,8 @@ def acceptance_poses(candidates: Candidates, count: int, options: UpdateOptions 
     core = {"noise": candidates.noise, "points": np.ascontiguousarray(candidates.points), "apart": apart}
     rows, values = choose_telling(unchanged + flat @ flat.T, unchanged, core, count)
     picked = np.array(rows, dtype=np.int64)
-    return Acceptance(picked, np.array(values), _noticed(candidates, unchanged, columns, names, picked))
+    told = _told(candidates, unchanged, columns, picked)
+    return Acceptance(picked, np.array(values), _noticed(candidates.calibration.arm, chosen, names, told))
 
 
 def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, list[str]]:
@@ -88,9 +91,8 @@ def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, li
     return whole, [*names[:joints], *names[joints:], *frame, *tool, *(f"payload{k + 1}" for k in turning)]
 
 
-def _noticed(
-    candidates: Candidates, unchanged: Floats, columns: Floats, names: list[str], rows: NDArray[np.int64]
-) -> dict[str, float]:
+def _told(candidates: Candidates, unchanged: Floats, columns: Floats, rows: NDArray[np.int64]) -> Floats:
+    """Standard deviations (k,) of the changes once the rows are measured, in those before."""
     size = columns.shape[1]
     places = (rows[:, None] * size + np.arange(size)).reshape(-1)
     spread = unchanged[np.ix_(places, places)].copy()
@@ -99,9 +101,14 @@ def _noticed(
         spread[own, own] += candidates.noise[row]
     scaled = columns[rows].reshape(len(places), -1)
     precision = scaled.T @ np.linalg.solve(spread, scaled) + np.eye(scaled.shape[1])
-    std = np.sqrt(np.diag(np.linalg.inv(precision)))
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision))))
+
+
+def _noticed(
+    arm: IdentifiedArm, options: UpdateOptions, names: Sequence[str], std: Floats
+) -> dict[str, float]:
+    """Smallest changes by name that would be noticed, as in Acceptance."""
     found: dict[str, float] = {}
-    arm, options = candidates.calibration.arm, UpdateOptions()
     for k, name in enumerate(names):
         if name.startswith("joint") and std[k] < 0.5:
             prismatic = arm.robot.joints[int(name.removeprefix("joint")) - 1] == "prismatic"

@@ -1,5 +1,8 @@
 //! Single waypoints: corrections and predictions, without allocation, lock, log or panic.
 
+use std::sync::Arc;
+
+use truearm_compensate::Corrector;
 use truearm_kinematics::Transform;
 
 use super::guard::{check_array, copy_in, copy_out, guarded, put};
@@ -30,13 +33,11 @@ pub unsafe extern "C" fn truearm_correct(
     guarded(|| {
         // SAFETY: as the caller promises.
         let (corrector, mut held) = unsafe {
-            (&borrow(corrector)?.core, Held::take(workspace, readings, joints, features, feature_count)?)
+            let core = &borrow(corrector)?.core;
+            (core, Held::take(core, workspace, (readings, joints), (features, feature_count))?)
         };
         check_array(out, out_size, corrector.joint_count())?;
         let (workspace, memory) = held.parts();
-        if memory.readings.len() != corrector.joint_count() {
-            return Err(Status::WrongSize);
-        }
         let found = corrector.correct(&memory.readings, &memory.features, &mut memory.out, workspace);
         // SAFETY: as the caller promises.
         unsafe { put(correction, Waypoint::of(&found))? };
@@ -115,12 +116,10 @@ unsafe fn predict(
 ) -> Result<Transform, Status> {
     // SAFETY: as the caller promises.
     let (corrector, mut held) = unsafe {
-        (&borrow(corrector)?.core, Held::take(workspace, readings.0, readings.1, features.0, features.1)?)
+        let core = &borrow(corrector)?.core;
+        (core, Held::take(core, workspace, readings, features)?)
     };
     let (workspace, memory) = held.parts();
-    if memory.readings.len() != corrector.joint_count() {
-        return Err(Status::WrongSize);
-    }
     corrector.predict(&memory.readings, &memory.features, workspace).ok_or(Status::NotFinite)
 }
 
@@ -134,17 +133,19 @@ impl Held {
     /// # Safety
     /// `pointer` was made and not freed while this lives; the arrays have the sizes given.
     unsafe fn take(
+        corrector: &Arc<Corrector>,
         pointer: *mut WorkspaceHandle,
-        readings: *const f64,
-        joints: usize,
-        features: *const f64,
-        feature_count: usize,
+        (readings, joints): (*const f64, usize),
+        (features, feature_count): (*const f64, usize),
     ) -> Result<Self, Status> {
         // SAFETY: the handle lives as long as this, by the caller's promise; the turn keeps others off its memory.
         unsafe {
             check(pointer)?;
             let turn = Turn::take(&(*pointer).busy)?;
             let mut held = Self { pointer, _turn: turn };
+            if !Arc::ptr_eq(corrector, &(*pointer).of) {
+                return Err(Status::OtherWorkspace);
+            }
             let (_, memory) = held.parts();
             copy_in(readings, joints, &mut memory.readings)?;
             copy_in(features, feature_count, &mut memory.features)?;

@@ -53,6 +53,8 @@ pub struct CorrectorHandle {
 /// Memory of one thread.
 pub struct WorkspaceHandle {
     pub(super) mark: u64,
+    /// The corrector that it was made for.
+    pub(super) of: Arc<Corrector>,
     pub(super) busy: AtomicBool,
     pub(super) core: Workspace,
     pub(super) memory: Memory,

@@ -207,6 +207,7 @@ pub unsafe extern "C" fn truearm_workspace_new(
             let core = &borrow(corrector)?.core;
             out.write(give(WorkspaceHandle {
                 mark: WorkspaceHandle::MARK,
+                of: Arc::clone(core),
                 busy: AtomicBool::new(false),
                 core: core.workspace(),
                 memory: Memory::new(core.joint_count(), core.feature_count()),

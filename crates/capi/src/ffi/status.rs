@@ -36,6 +36,8 @@ pub enum Status {
     NotStarted = -11,
     /// A mistake in this library.
     Internal = -12,
+    /// The workspace was made for another corrector.
+    OtherWorkspace = -13,
 }
 
 /// Version of this interface; a program compares it with truearm_abi_version().
@@ -77,6 +79,7 @@ pub extern "C" fn truearm_status_text(status: i32) -> *const c_char {
         -10 => c"an option breaks its rule",
         -11 => c"there was no set-point yet",
         -12 => c"a mistake in this library: please report it",
+        -13 => c"the workspace was made for another corrector",
         _ => c"no status of this library",
     };
     text.as_ptr()

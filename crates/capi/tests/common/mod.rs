@@ -138,8 +138,8 @@ impl Rig {
 
     pub fn correct(&self, q: &[f64; JOINTS]) -> (Status, [f64; JOINTS], Waypoint) {
         let mut out = [-1.0; JOINTS];
-        let mut found = std::mem::MaybeUninit::<Waypoint>::uninit();
-        // SAFETY: all pointers are to memory of the sizes given; the correction is written by a call with such sizes.
+        let mut found = std::mem::MaybeUninit::<Waypoint>::zeroed();
+        // SAFETY: all pointers are to memory of the sizes given; zeros are a correction too.
         unsafe {
             let status = truearm_correct(
                 self.corrector,

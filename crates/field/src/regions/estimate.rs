@@ -58,11 +58,14 @@ impl Held<'_> {
         Some(ceps)
     }
 
-    /// Lengths of the residuals at the first target, (n,), m.
+    /// Lengths of the residuals at the first target, (n,), m; NaN where it was not measured.
     pub fn errors(&self, problem: &Problem<'_>, ceps: &[f64]) -> Vec<f64> {
         let rows = self.rows(problem, ceps);
-        let length = |pose: &[f64]| pose.iter().take(3).map(|r| r * r).sum::<f64>().sqrt();
-        rows.residual.chunks_exact(rows.rows.max(1)).map(length).collect()
+        let length = |(pose, residual): (usize, &[f64])| {
+            let seen = problem.measurements.has_target(pose, 0);
+            if seen { residual.iter().take(3).map(|r| r * r).sum::<f64>().sqrt() } else { f64::NAN }
+        };
+        rows.residual.chunks_exact(rows.rows.max(1)).enumerate().map(length).collect()
     }
 }
 
