@@ -59,7 +59,13 @@ def test_outputs_are_those_of_the_appendix() -> None:
     np.testing.assert_array_equal(found[0], cells)
     np.testing.assert_allclose(found[1], grades, atol=1e-13)
     expected = (grades[:, :, None] * weights[cells]).sum(1) / grades.sum(1)[:, None]
-    np.testing.assert_allclose(network().with_weights(weights).output(s), expected, atol=1e-12)
+    made = network().with_weights(weights)
+    np.testing.assert_allclose(made.output(s), expected, atol=1e-12)
+    by_columns = np.asfortranarray(s)
+    with pytest.raises(_core.CoreError, match="s is not C-contiguous"):
+        made.output(by_columns)
+    with pytest.raises(_core.CoreError, match="out is not C-contiguous"):
+        made.output(s, np.asfortranarray(np.zeros((500, 15))))
 
 
 def test_the_cmac_jumps_where_the_fcmac_does_not() -> None:

@@ -117,6 +117,18 @@ def test_an_arm_without_a_wave_is_one_region_with_its_true_ceps() -> None:
     np.testing.assert_allclose(division.ceps[0], expected, atol=1e-9)
 
 
+def test_regions_whose_tests_were_not_measured_are_not_called_accurate() -> None:
+    class Blind(Arm):
+        def points(self, q: Floats) -> Floats:
+            tests = len(q) == MEASURING["tests"]
+            return np.full((len(q), 3), np.nan) if tests else super().points(q)
+
+    division = Blind().divide(accuracy=1e-9)
+    assert division.regions.count == 1
+    assert np.isnan(division.error[0])
+    assert "accurate" not in str(division.ended[0])
+
+
 @pytest.mark.parametrize("halving", ["longest", "best"])
 @pytest.mark.parametrize("order", ["worst", "breadth"])
 def test_the_demanded_accuracy_ends_division(halving: str, order: str) -> None:
@@ -183,6 +195,7 @@ def test_passive_division_judges_on_rows_it_did_not_use() -> None:
     leaves = division.regions.leaves
     assert len(leaves) > 4
     leaf_of = division.regions.find(features)
+    np.testing.assert_array_equal(division.regions.find(np.asfortranarray(features)), leaf_of)
     for leaf in leaves:
         inside = leaf_of == leaf
         batches = {test: count for region, count, test in division.batches if region == leaf}

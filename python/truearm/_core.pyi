@@ -446,8 +446,8 @@ class ArmModel:
             coupling: Joint values from readings (N, N).
             field: What is added to the constants, over joint values and features.
             feature_count: Features of the field.
-            covariance: Ascending parameter indices (P) and their covariance (P, P), or (P + 6, P + 6) with that
-                of the base's place as a device saw it behind it: translation, rotation vector.
+            covariance: Ascending parameter indices (P) and their covariance (P, P), or (P + 6, P + 6) with
+                that of the base's place as a device saw it behind it: translation, rotation vector.
             bounds: Bounds of the standard deviation, in place of a covariance.
         """
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -20,13 +21,16 @@ from truearm.models import ArmModel
 from truearm.plausibility import check_against
 from truearm.registration import register
 from truearm.turning_sense import check_turns
-from truearm.validation import Errors
+from truearm.units import MM_PER_METRE
+from truearm.validation import Errors, row_errors
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 MOST_FRAME_ROWS: Final = 400
 FEWEST_FRAME_ROWS: Final = 3
+FAR: Final = 8.0
+"""Times the median distance, and the constants' noise: what no row misses by that belongs to the others."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +137,8 @@ def evaluate(
     with stages("judging"):
         chosen_rows = data.select(judged)
         errors = judge(task, models, chosen_rows, data.select(frame if len(frame) else judged))
+    if not (chosen.keep_frames or chosen.keep_tool):
+        notices = [*notices, *_spoiled(task, calibration, data.select(frame))]
     statistics = {name: found.statistics() for name, found in errors.items()}
     return Evaluation(len(frame), len(judged), statistics, tuple(notices), HeldRows.of(chosen_rows, errors))
 
@@ -171,6 +177,29 @@ def _setup(
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
     with core_errors(data):
         return fit_constant(task.problem(measured, []), fit_options(task, parameters=parameters)).setup
+
+
+def _spoiled(task: Task, calibration: Calibration, data: Measurements) -> list[Notice]:
+    """What rows that found frame and tool lie far from where the others put them."""
+    model = calibration.model
+    parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
+    with core_errors(data):
+        options = fit_options(task, parameters=parameters, robust="cauchy")
+        setup = fit_constant(task.problem(measured, []), options).setup
+    left = row_errors(task.arm, data, task.selection, task.groups, parameters, setup).distance_m
+    far = left > FAR * max(float(np.nanmedian(left)), calibration.constant.noise_m)
+    if not far.any():
+        return []
+    named = ", ".join(
+        f"{data.rows[k]} of {Path(data.sources[k]).name} ({MM_PER_METRE * left[k]:.3g} mm)"
+        for k in np.flatnonzero(far)
+    )
+    text = (
+        "Among the rows that found frame and tool some lie far from where the others put them, and move "
+        f"both: row {named}. Take them out, or let more rows find the frame (--frame-rows)."
+    )
+    return [Notice("far_rows", text, tuple(data.rows[far].tolist()))]
 
 
 def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:

@@ -1,6 +1,6 @@
 """Rows that a model was judged on and took no part in, each with its errors."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.measurements import Measurements
+from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
 
 Floats = NDArray[np.float64]
@@ -37,6 +38,22 @@ class HeldRows:
     def of(cls, data: Measurements, errors: Mapping[str, RowErrors]) -> "HeldRows":
         """Those of judged rows."""
         return cls(data.readings, data.rows, data.sources, errors)
+
+    def without(self, outliers: Sequence[Mapping[str, Any]]) -> NDArray[np.bool_]:
+        """Which rows are none of the outliers, given with file and row, (n,)."""
+        named = {(entry["file"], entry["row"]) for entry in outliers}
+        own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
+        return np.array([row not in named for row in own], dtype=bool)
+
+    def means_without_mm(self, outliers: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+        """Mean position error of each model at the other rows, mm; empty without an outlier here."""
+        kept = self.without(outliers)
+        if kept.all() or not kept.any():
+            return {}
+        return {
+            name: float(MM_PER_METRE * np.nanmean(found.distance_m[kept]))
+            for name, found in self.errors.items()
+        }
 
     def pack(self, arrays: Arrays) -> dict[str, Any]:
         """JSON values; arrays are added to `arrays`."""

@@ -54,6 +54,8 @@ enum truearm_status
     TRUEARM_STATUS_NOT_STARTED = -11,
     // A mistake in this library.
     TRUEARM_STATUS_INTERNAL = -12,
+    // The workspace was made for another corrector.
+    TRUEARM_STATUS_OTHER_WORKSPACE = -13,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

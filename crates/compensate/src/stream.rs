@@ -273,11 +273,10 @@ impl Follower {
         }
     }
 
-    /// Keeps the applied value within what is left to the limits; where nothing is, it does not lead further out.
+    /// Keeps the applied value within what is left to the limits, unless the set-point itself is beyond them.
     fn confine(&mut self, [low, high]: [f64; 2]) {
-        let within = self.applied.clamp(low.min(0.0), high.max(0.0));
-        if within != self.applied {
-            (self.applied, self.rate) = (within, 0.0);
+        if low <= 0.0 && 0.0 <= high && !(low..=high).contains(&self.applied) {
+            (self.applied, self.rate) = (self.applied.clamp(low, high), 0.0);
         }
     }
 

@@ -174,15 +174,19 @@ def command(
 def suggest_next(calibration: "Calibration", file: Path) -> None:
     """Name the commands that come next: none that uses a calibration that does not help."""
     from truearm.doubts import NO_HELP
-    from truearm.programs.declaring import may_differ
 
     if any(notice.kind == NO_HELP for notice in calibration.notices):
         suggest(f"truearm report {file}")
     else:
-        declared = " --controller MODEL" if may_differ(calibration.robot) else ""
-        suggest(
-            f"truearm evaluate {file} OTHER.csv", f"truearm compensate {file} PROGRAM{declared} --dry-run"
-        )
+        suggest(f"truearm evaluate {file} OTHER.csv", compensate_command(calibration, file))
+
+
+def compensate_command(calibration: "Calibration", file: Path) -> str:
+    """The command that shows what a calibration does to a program."""
+    from truearm.programs.declaring import may_differ
+
+    declared = " --controller MODEL" if may_differ(calibration.robot) else ""
+    return f"truearm compensate {file} PROGRAM{declared} --dry-run"
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:
@@ -301,4 +305,10 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
     ]
     more = f" and {len(outliers) - len(named)} more" if len(outliers) > len(named) else ""
     fate = "taken out of the variable fit" if calibration.variable is not None else "not taken out of the fit"
-    say_wrapped(f"Outliers, {fate}: {', '.join(named)}{more}; summary.json has them all.")
+    hint = "" if calibration.variable is not None else " --robust huber gives them less weight."
+    say_wrapped(f"Outliers, {fate}: {', '.join(named)}{more}.{hint}")
+    held = None if calibration.selection.distances else calibration.held
+    means = {} if held is None else held.means_without_mm(outliers)
+    if means:
+        said = ", ".join(f"{name} {mean:.3f}" for name, mean in means.items())
+        say_wrapped(f"Mean error without those of them that were held out: {said} mm.")

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, MeasurementFiles, Use
+from truearm.cli.calibrate import compensate_command
 from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
@@ -66,7 +67,4 @@ def command(
     say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
     print_errors(found.errors, f"{found.n_judged} rows")
     others = " ".join(map(str, measurements))
-    suggest(
-        f"truearm report {calibration} {others} -o other.html",
-        f"truearm compensate {calibration} PROGRAM --dry-run",
-    )
+    suggest(f"truearm report {calibration} {others} -o other.html", compensate_command(known, calibration))

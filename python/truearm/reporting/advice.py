@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
@@ -48,10 +50,6 @@ def advise(facts: Facts, known: Known | None) -> list[Advice]:
     return sorted(found, key=lambda advice: -advice.weight_mm)[:MOST]
 
 
-def _mean_mm(facts: Facts, model: str | None = None) -> float:
-    return facts.calibration.validation.holdout[model or facts.best].position.mean
-
-
 def _outliers(facts: Facts) -> Iterator[Advice]:
     outliers = facts.summary["outliers"]
     if not outliers:
@@ -66,13 +64,13 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
         f"{named}{more}, up to {largest} mm off. Measure these poses again; a blocked beam, a loose "
         "target or an unsettled arm shows at once."
     )
-    yield Advice("outliers", "Look at the outliers.", words, _mean_mm(facts) + share)
+    yield Advice("outliers", "Look at the outliers.", words, facts.mean_mm() + share)
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     if facts.best != VARIABLE:
         return
-    floor, mean = distance_at_floor_mm(facts), _mean_mm(facts)
+    floor, mean = distance_at_floor_mm(facts), facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
         words = (
@@ -90,15 +88,17 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
 
 
 def _tail(facts: Facts) -> Iterator[Advice]:
-    found = facts.calibration.validation.holdout[facts.best].position
-    if found.p99 > LONG_TAIL * found.mean and facts.held is not None:
-        far, mean = short(found.p99, found.mean)
+    if facts.held is None:
+        return
+    mean, p99 = facts.mean_mm(), float(np.nanquantile(facts.kept_errors_mm(facts.best), 0.99))
+    if p99 > LONG_TAIL * mean:
+        far, near = short(p99, mean)
         words = (
-            f"One pose in a hundred misses by more than {far} mm, the mean is {mean} mm. Look where the "
+            f"One pose in a hundred misses by more than {far} mm, the mean is {near} mm. Look where the "
             "worst poses lie, in their table and along the joints: more poses there, or a second look at "
             "them."
         )
-        yield Advice("long_tail", "Look at the worst poses.", words, 0.5 * found.p99)
+        yield Advice("long_tail", "Look at the worst poses.", words, 0.5 * p99)
 
 
 def _where(facts: Facts, known: Known) -> Iterator[Advice]:
@@ -132,21 +132,21 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
             f"What the poses do not show stays nominal: {listed(hidden)}. Larger turns of the joints, and "
             "a target mounted away from the last axis, would show it."
         )
-        yield Advice("unseen_parameters", "Show what cannot be seen.", words, 0.1 * _mean_mm(facts))
+        yield Advice("unseen_parameters", "Show what cannot be seen.", words, 0.1 * facts.mean_mm())
     if selection.distances or selection.orientation or len(selection.targets) > 2:
         return
     words = (
         "How the tool is turned follows from positions alone and is judged by nothing here. If the tool "
         "is long or its direction matters, measure orientation or three targets on it."
     )
-    yield Advice("no_orientation", "Measure orientation.", words, 0.05 * _mean_mm(facts))
+    yield Advice("no_orientation", "Measure orientation.", words, 0.05 * facts.mean_mm())
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
     held = facts.calibration.validation.n_holdout
     if held < FEW_HELD:
         words = f"The errors above are those of {count_of(held, 'pose')}; another draw would give others."
-        yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * _mean_mm(facts))
+        yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * facts.mean_mm())
 
 
 def _intervals(facts: Facts) -> Iterator[Advice]:
@@ -156,11 +156,11 @@ def _intervals(facts: Facts) -> Iterator[Advice]:
             f"Only {percent(covered)} of the held-out coordinates lie within their 95 % intervals: the "
             "held-out poses are not like those that trained, or something moved between them."
         )
-        yield Advice("narrow_intervals", "Do not trust the intervals.", words, _mean_mm(facts))
+        yield Advice("narrow_intervals", "Do not trust the intervals.", words, facts.mean_mm())
 
 
 def _what_varies(facts: Facts) -> Iterator[Advice]:
-    mean, constant = _mean_mm(facts), _mean_mm(facts, CONSTANT)
+    mean, constant = facts.mean_mm(), facts.mean_mm(CONSTANT)
     if facts.best == CONSTANT and not facts.calibration.selection.distances:
         words = "Here parameters were held constant; --model variable shows what varies over the workspace."
         yield Advice("try_variable", "Let the parameters vary.", words, 0.5 * mean)

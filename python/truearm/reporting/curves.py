@@ -119,9 +119,9 @@ def _says(name: str, unit: str, q: Floats, values: Floats, joint_unit: str, sure
     if sure is None:
         start = f"{name} varies by {_four(reach)} {unit} over the measured range."
         return start + _wave(q, values, joint_unit, unit)
-    start = f"{name} varies by {_four(reach)} {unit}; twice the standard deviation is {_four(sure)}"
+    start = f"{name} varies by {_four(reach)} {unit}; its 95 % band is {_four(2.0 * sure)} wide"
     if reach < 2.0 * sure:
-        return f"{start}: no more than the uncertainty."
+        return f"{start}: the data cannot tell whether it varies."
     return f"{start}.{_wave(q, values, joint_unit, unit)}"
 
 
@@ -131,7 +131,7 @@ def _wave(q: Floats, values: Floats, joint_unit: str, unit: str) -> str:
         return ""
     return (
         f" A wave with a period of {short(wave.period)[0]} {joint_unit} and an amplitude of "
-        f"{_four(wave.amplitude)} {unit} makes {100 * wave.share:.0f} % of the curve."
+        f"{_four(wave.amplitude)} {unit} makes {100 * wave.share:.0f} % of what a parabola leaves of it."
     )
 
 

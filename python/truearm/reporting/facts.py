@@ -63,6 +63,21 @@ class Facts:
             return {}
         return {name: MM_PER_METRE * found.distance_m for name, found in self.held.errors.items()}
 
+    def mean_mm(self, model: str | None = None) -> float:
+        """Mean held-out position error of a model, the best by default, mm; outliers are no part of it."""
+        name = model or self.best
+        if self.held is None:
+            return self.calibration.validation.holdout[name].position.mean
+        return float(np.nanmean(self.kept_errors_mm(name)))
+
+    def kept_errors_mm(self, model: str) -> Floats:
+        """Lengths of held-out errors of a model (k,), mm, without outliers; none where rows are not known."""
+        if self.held is None:
+            return np.empty(0)
+        found = self.errors_mm[model]
+        kept = found[self.held.without(self.summary["outliers"])]
+        return kept if np.isfinite(kept).any() else found
+
     @property
     def joints(self) -> tuple[str, ...]:
         """Kind of each joint."""

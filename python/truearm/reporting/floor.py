@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from truearm.reporting.facts import Facts
+from truearm.units import MM_PER_METRE
 
 MEAN_LENGTH: Final = float(np.sqrt(8.0 / np.pi))
 """Mean length of a vector of three normal coordinates of deviation one: the Maxwell distribution's."""
@@ -13,6 +14,13 @@ MEAN_SIZE: Final = float(np.sqrt(2.0 / np.pi))
 
 
 def distance_at_floor_mm(facts: Facts) -> float:
-    """Mean position error that the unexplained part alone would leave, mm."""
+    """Mean position error that the unexplained part, and the rows' own sigma, alone would leave, mm."""
     factor = MEAN_SIZE if facts.calibration.selection.distances else MEAN_LENGTH
-    return factor * float(facts.summary["noise_mm"])
+    return factor * float(np.hypot(facts.summary["noise_mm"], _stated_sigma_mm(facts)))
+
+
+def _stated_sigma_mm(facts: Facts) -> float:
+    rows = facts.calibration.rows
+    if rows is None or rows.data.sigma_m is None:
+        return 0.0
+    return MM_PER_METRE * float(np.sqrt(np.square(np.nan_to_num(rows.data.sigma_m)).mean()))

@@ -36,8 +36,9 @@ class Wave:
 def strongest_wave(x: Floats, y: Floats) -> Wave | None:
     """The wave that takes most of the variance of y (n,) over evenly spaced x (n,), a parabola aside.
 
-    Each period is tried by least squares with sine, cosine and parabola together. None where no wave makes
-    a third of the variance, or the curve is none but a parabola.
+    Each period is tried by least squares with sine, cosine and parabola together. A wave takes more than
+    those that are a little longer or shorter: what goes on growing with the period has none that can be told.
+    None where no wave makes a third of the variance, or the curve is none but a parabola.
     """
     span, step = float(x[-1] - x[0]), float(x[1] - x[0])
     longest, shortest = span / FEWEST_TURNS, POINTS_A_TURN * step
@@ -46,16 +47,25 @@ def strongest_wave(x: Floats, y: Floats) -> Wave | None:
     total = float(left @ left)
     if longest <= shortest or np.ptp(left) <= FLAT * np.ptp(y):
         return None
-    best = Wave(0.0, 0.0, 0.0)
-    for period in 1.0 / np.linspace(1.0 / longest, 1.0 / shortest, TRIED):
-        angle = 2.0 * np.pi * x / period
-        basis = np.column_stack([trend, np.cos(angle), np.sin(angle)])
-        found = np.linalg.lstsq(basis, y, rcond=None)[0]
-        rest = y - basis @ found
-        share = 1.0 - float(rest @ rest) / total
-        if share > best.share:
-            best = Wave(float(period), float(np.hypot(found[-2], found[-1])), share)
-    return best if best.share >= SHARE else None
+    found = [
+        _wave(trend, x, y, float(period), total)
+        for period in 1.0 / np.linspace(1.0 / longest, 1.0 / shortest, TRIED)
+    ]
+    peaks = [
+        wave
+        for before, wave, behind in zip(found, found[1:], found[2:], strict=False)
+        if wave.share >= max(before.share, behind.share)
+    ]
+    best = max(peaks, key=lambda wave: wave.share, default=found[0])
+    return best if peaks and best.share >= SHARE else None
+
+
+def _wave(trend: Floats, x: Floats, y: Floats, period: float, total: float) -> Wave:
+    angle = 2.0 * np.pi * x / period
+    basis = np.column_stack([trend, np.cos(angle), np.sin(angle)])
+    found = np.linalg.lstsq(basis, y, rcond=None)[0]
+    rest = y - basis @ found
+    return Wave(period, float(np.hypot(found[-2], found[-1])), 1.0 - float(rest @ rest) / total)
 
 
 def _residual(basis: Floats, y: Floats) -> Floats:
