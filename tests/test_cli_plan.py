@@ -131,6 +131,7 @@ def test_poses_of_a_cell_are_proposed_that_it_can_measure(calib, tmp_path, capsy
         (["--from", "CALIB"], "--next N --from CALIB"),
         (["--next", "5", "--acceptance", "5", "--from", "CALIB"], "--next N --from CALIB"),
         (["--next", "0", "--from", "CALIB"], "0 poses"),
+        (["--acceptance", "3000", "--from", "CALIB"], "At most 200 are proposed"),
         (["ur10", "--next", "5", "--from", "CALIB"], "the calibration is of RV-M2"),
         (["--next", "5", "--from", "CALIB", "--group", "x"], 'no set-up "x"'),
         ([], "no robot is named"),

@@ -446,8 +446,9 @@ class ArmModel:
             coupling: Joint values from readings (N, N).
             field: What is added to the constants, over joint values and features.
             feature_count: Features of the field.
-            covariance: Ascending parameter indices (P) and their covariance (P, P), or (P + 6, P + 6) with
-                that of the base's place as a device saw it behind it: translation, rotation vector.
+            covariance: Ascending parameter indices (P) and their covariance (P, P), or (P + 9, P + 9) with
+                those of the motion of the base (translation, rotation vector) and of the tool (translation in
+                the flange's frame) as a device saw them behind them.
             bounds: Bounds of the standard deviation, in place of a covariance.
         """
 

@@ -35,7 +35,7 @@ from truearm.plausibility import check_against
 from truearm.robot import Robot
 from truearm.splitting import Split, split_rows
 from truearm.turning_sense import check_turns
-from truearm.uncertainty import FramePlace, VariableSpread, noises_of
+from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.unexplained import unexplained
 from truearm.validation import Validation
 
@@ -180,7 +180,7 @@ def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> V
     if fits.variable is None or details is None:
         return None
     columns = list(task.arm.candidates.columns)
-    noises, place = noises_of(details.hyper), FramePlace.of(task, fits.data)
+    noises, place = noises_of(details.hyper), SetupPlace.of(task, fits.data)
     return VariableSpread(columns, fits.variable.posterior, details.inflation, noises, place)
 
 

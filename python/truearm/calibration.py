@@ -251,8 +251,9 @@ class Calibration:
     ) -> Floats:
         """Standard deviation of each coordinate along the axes of the base frame, (n, 3), m.
 
-        It holds where the base stands as the device saw it in the set-up with most rows. How far the arm's
-        own base frame is from there, no measurement of the tool tells. Noise of a measurement is no part.
+        It holds for base and tool as the device saw them in the set-up with most rows. Where the arm's own
+        base and flange are, no measurement of a target tells; work objects and tools that are found through the
+        calibrated arm take it over. Noise of a measurement is no part.
         """
         return self._std(q, tool, features, pose=False)
 
@@ -376,13 +377,14 @@ class Calibration:
     def _covariance(
         self, rows: Floats, features: Features | None, tool: ArrayLike | None, jacobian: Floats
     ) -> Floats:
-        """Covariance (n, m, m) of a tool's position, or pose, where the base stands as the device saw it."""
+        """Covariance (n, m, m) of a tool's position, or pose, as the device saw base and target."""
+        flange = self.pose(rows, tool=np.eye(4), features=features)
         points = self.position(rows, tool=tool, features=features)
-        frame = rigid_motion(points)
-        if jacobian.shape[1] > frame.shape[1]:
-            turns = np.broadcast_to(np.eye(3, 6, 3), frame.shape)
-            frame = np.concatenate([frame, turns], axis=1)
-        return self.spread.covariance(self.field_inputs(rows, features), jacobian, frame)
+        moved = np.concatenate([rigid_motion(points), flange[:, :3, :3]], axis=2)
+        if jacobian.shape[1] > moved.shape[1]:
+            turns = np.broadcast_to(np.eye(3, moved.shape[2], 3), moved.shape)
+            moved = np.concatenate([moved, turns], axis=1)
+        return self.spread.covariance(self.field_inputs(rows, features), jacobian, moved)
 
     def _jacobian(
         self, rows: Floats, features: Features | None, tool: ArrayLike | None, *, pose: bool

@@ -6,7 +6,6 @@ the position of a point of the flange's frame, the root of the sum of its coordi
 for the rotation vector (rad). The point, the centre, is the middle of what was measured.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -30,8 +29,8 @@ ENDS: Final = 0.1
 """Configurations are drawn so far beyond a range, as a share of it, and then brought back to its ends."""
 SEED: Final = 0
 AT_ONCE: Final = 500
-MAJOR: Final = (1, 2)
-"""Joints that are tabulated together where the evidence named none: shoulder and elbow of most arms."""
+TOGETHER: Final = 3
+"""So many joints, those that place the wrist, are tabulated together as well."""
 OPEN_REACH_M: Final = 0.5
 PRIOR_MARGIN: Final = 1.1
 """Over the largest prior seen: it is sampled as well."""
@@ -91,7 +90,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
         "angles": [joint == "revolute" for joint in robot.joints]
         + [False] * len(calibration.options.features),
         "ranges": _input_ranges(robot, reach.limits),
-        "together": _together(calibration),
+        "together": list(range(min(TOGETHER, robot.joint_count))),
         "largest": largest.tolist(),
         "centre": centre.tolist(),
     }
@@ -177,9 +176,3 @@ def _input_ranges(robot: "Robot", limits: Floats) -> list[tuple[float, float]]:
     ends = np.stack([robot.coupling * low, robot.coupling * high])
     ranges = np.column_stack([ends.min(axis=0).sum(axis=1), ends.max(axis=0).sum(axis=1)])
     return [(float(a), float(b)) for a, b in np.vstack([ranges, limits[joints:]])]
-
-
-def _together(calibration: "Calibration") -> Sequence[int]:
-    named = [] if calibration.variable is None else calibration.variable.hyper.get("major_joints", [])
-    joints = [int(joint) for joint in named] or list(MAJOR)
-    return [joint for joint in joints if joint < calibration.robot.joint_count]

@@ -71,7 +71,10 @@ class Inverse:
         return found
 
     def near(self, base_from_flange: ArrayLike, seed: ArrayLike) -> Floats:
-        """The solutions within limits nearest to the seed, turns included: (n, N), or (N,) for one pose.
+        """The solutions within limits near the seed, turns included: (n, N), or (N,) for one pose.
+
+        The nearest where the arm's solutions are known in closed form, exactly or nearly; of other arms the
+        one that a search from the seed arrives at.
 
         Args:
             base_from_flange: Poses (n, 4, 4) or (4, 4).

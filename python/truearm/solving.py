@@ -41,7 +41,7 @@ def calibrated_model(calibration: "Calibration") -> ArmModel:
     model, exact, bounds = calibration.model, None, None
     if model.field is None:
         spread = ConstantSpread.of(calibration)
-        exact = spread.columns, np.ascontiguousarray(spread.with_frame)
+        exact = spread.columns, np.ascontiguousarray(spread.with_setup)
     elif calibration.has_conservative:
         bounds = calibration.conservative
     return ArmModel(

@@ -35,11 +35,11 @@ AXES: Final = 3
 class Spread(Protocol):
     """Knows how uncertain the arm's parameters are."""
 
-    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I).
 
-        With `frame` (n, m, 6), derivatives by a motion of the base, it is that of what the device of the
-        set-up with most rows sees: what its frame can take over from parameters counts once.
+        With `moved` (n, m, 9), derivatives by motions of base and tool as in SetupPlace, it is that of what
+        the device of the set-up with most rows sees: what frame and target can take over counts no more.
         """
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
@@ -56,35 +56,33 @@ class Spread(Protocol):
         """Covariance (n, m, m) of what a measurement shows anew; `orientation` (m,) tells rows in rad."""
 
 
-@dataclass(frozen=True)
-class FramePlace:
-    """Where a set-up's frame stands among the unknowns of all set-ups.
+@dataclass(frozen=True, eq=False)
+class SetupPlace:
+    """What of the unknowns of all set-ups is the frame and the target of one.
 
     Attributes:
-        start: Its first unknown; None where no frame was fitted.
-        count: Unknowns of all set-ups, S.
+        motion: Motion (9, S) of the base (translation, rotation vector) and of the tool (translation in the
+            flange's frame, that of the targets' middle) with them; zero where nothing was fitted.
     """
 
-    start: int | None
-    count: int
+    motion: Floats
 
     @classmethod
-    def of(cls, task: Task, data: Measurements | None) -> "FramePlace":
-        """The frame of the set-up with most rows, or the first where rows were left out of the file."""
-        count = setup_unknowns(task)
-        if frame_unknowns(task) == 0:
-            return cls(None, count)
-        groups = list(task.groups)
+    def of(cls, task: Task, data: Measurements | None) -> "SetupPlace":
+        """Of the set-up with most rows, or the first where rows were left out of the file."""
+        groups, frame, count = list(task.groups), frame_unknowns(task), setup_unknowns(task)
         often = groups[0] if data is None else max(groups, key=lambda name: (data.group == name).sum())
-        return cls(groups.index(often) * (count // len(groups)), count)
+        start = groups.index(often) * (count // len(groups))
+        motion = np.zeros((FRAME_UNKNOWNS + AXES, count))
+        motion[:frame, start : start + frame] = np.eye(frame)
+        for k in range(len(task.selection.targets)):
+            target = start + frame + AXES * k
+            motion[FRAME_UNKNOWNS:, target : target + AXES] = np.eye(AXES) / len(task.selection.targets)
+        return cls(motion)
 
-    def among_all(self, frame: Floats | None) -> Floats | None:
-        """Derivatives (n, m, S) by all of them, of those (n, m, 6) by the frame."""
-        if frame is None or self.start is None:
-            return None
-        found = np.zeros((*frame.shape[:2], self.count))
-        found[:, :, self.start : self.start + frame.shape[2]] = frame
-        return found
+    def among_all(self, moved: Floats | None) -> Floats | None:
+        """Derivatives (n, m, S) by all of them, of those (n, m, 9) by the motions."""
+        return None if moved is None else np.ascontiguousarray(moved @ self.motion)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +93,7 @@ class ConstantSpread:
     of_all: Floats
     before: Floats
     noises: tuple[float, float]
-    place: "FramePlace"
+    place: "SetupPlace"
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "ConstantSpread":
@@ -106,22 +104,22 @@ class ConstantSpread:
         before = scale * np.where(np.isin(np.array(columns) % 5, LENGTHS), length, angle)
         details = calibration.constant
         data = None if calibration.rows is None else calibration.rows.data
-        place = FramePlace.of(task_of(calibration), data)
+        place = SetupPlace.of(task_of(calibration), data)
         noises = details.noise_m, details.noise_rad
         return cls(columns, details.covariance, before**2, noises, place)
 
     @property
-    def with_frame(self) -> Floats:
-        """Covariance of the constants, and behind them of the frame where one was fitted."""
-        own = list(range(len(self.columns)))
-        if self.place.start is not None:
-            start = len(own) + self.place.start
-            own += range(start, start + FRAME_UNKNOWNS)
-        return self.of_all[np.ix_(own, own)]
+    def with_setup(self) -> Floats:
+        """Covariance (P + 9, P + 9) of the constants, and of the motions of base and tool behind them."""
+        count = len(self.columns)
+        known = np.zeros((count + len(self.place.motion), len(self.of_all)))
+        known[:count, :count] = np.eye(count)
+        known[count:, count : count + self.place.motion.shape[1]] = self.place.motion
+        return np.asarray(known @ self.of_all @ known.T)
 
-    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m), the same rule everywhere."""
-        rows, setup = jacobian[:, :, self.columns], self.place.among_all(frame)
+        rows, setup = jacobian[:, :, self.columns], self.place.among_all(moved)
         if setup is not None:
             rows = np.concatenate([rows, setup], axis=2)
         size = rows.shape[2]
@@ -153,7 +151,7 @@ class VariableSpread:
     posterior: Posterior
     inflation: float
     noises: tuple[float, float]
-    place: "FramePlace"
+    place: "SetupPlace"
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "VariableSpread":
@@ -179,13 +177,13 @@ class VariableSpread:
         columns = list(calibration.arm.candidates.columns)
         point = calibration.models[CONSTANT]
         posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
-        place = FramePlace.of(task, rows.data)
+        place = SetupPlace.of(task, rows.data)
         return cls(columns, posterior, details.inflation, noises_of(details.hyper), place)
 
-    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m) at inputs (n, I)."""
         chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
-        setup = self.place.among_all(frame)
+        setup = self.place.among_all(moved)
         return self.posterior.covariance(np.ascontiguousarray(inputs), chosen, setup) * self.inflation**2
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
@@ -232,15 +230,15 @@ class UpdatedSpread:
             raise WorkError("this calibration was not updated", rule="Only an updated one has this spread")
         return cls(before, revision.directions, revision.covariance)
 
-    def covariance(self, inputs: Floats, jacobian: Floats, frame: Floats | None = None) -> Floats:
+    def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m); both parts counted in full, though they have something in common.
 
-        The frame is that of the calibration that was updated: with it its parameters were found.
+        The set-up is that of the calibration that was updated: with it its parameters were found.
         """
         size = self.offsets.shape[1]
-        moved = jacobian @ self.offsets
-        own = moved @ self.of_all[:size, :size] @ moved.transpose(0, 2, 1)
-        return self.before.covariance(inputs, jacobian, frame) + np.asarray(own)
+        shifted = jacobian @ self.offsets
+        own = shifted @ self.of_all[:size, :size] @ shifted.transpose(0, 2, 1)
+        return self.before.covariance(inputs, jacobian, moved) + np.asarray(own)
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) before any measurement."""

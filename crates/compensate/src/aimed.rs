@@ -17,6 +17,8 @@ use crate::spread::Spread;
 pub(crate) struct Aimed {
     pub model: Arc<Model>,
     pub chain: Chain,
+    /// Rotation of flange_from_tool.
+    pub turned: [f64; 9],
     /// Distance of the tool from the point whose standard deviation is bounded, m.
     pub reach: f64,
 }
@@ -26,7 +28,7 @@ impl Aimed {
         flange_from_tool.check("tool")?;
         let chain = model.chain.with_end(model.chain.end().compose(flange_from_tool))?;
         let reach = model.spread.as_ref().map_or(0.0, |spread| spread.reach(flange_from_tool.translation));
-        Ok(Self { model, chain, reach })
+        Ok(Self { model, chain, turned: flange_from_tool.rotation, reach })
     }
 
     pub fn scratch(&self) -> AimedScratch {

@@ -1,7 +1,7 @@
 //! How uncertain a model is of where it puts the tool.
 
 use truearm_field::{Conservative, FieldScratch};
-use truearm_kinematics::{Isa, LANES, Lane};
+use truearm_kinematics::{Isa, LANES, Lane, LaneFrame};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::error::{CompensateError, check_finite, check_length};
@@ -9,8 +9,8 @@ use crate::model::Model;
 
 /// What is left of a variance by less than this part is rounding.
 const ROUNDING: f64 = 1e-12;
-/// Unknowns of a frame.
-const FRAME: usize = 6;
+/// Unknowns of base and tool.
+const MOVED: usize = 9;
 
 /// Standard deviation of the tool's position: the root of the sum of the variances of x, y and z.
 #[derive(Debug, Clone)]
@@ -23,30 +23,30 @@ pub enum Spread {
 
 /// Covariance of some of the parameters, as a factor whose product with itself it is.
 ///
-/// Behind them may stand the frame that a device gave the base, a translation and a rotation vector of the base frame:
-/// what parameters and frame can take over from each other is then uncertain together only.
+/// Behind them may stand where a device saw base and tool: a translation and a rotation vector of the base, and a
+/// translation of the tool in the flange's frame. What they can take over from parameters is then uncertain together only.
 #[derive(Debug, Clone)]
 pub struct ConstantSpread {
     columns: Vec<usize>,
-    /// Unknowns of the frame, 6 or none.
-    frame: usize,
+    /// Unknowns of base and tool, 9 or none.
+    moved: usize,
     /// Lower triangle, row by row: the covariance is F F^T.
     factor: Vec<f64>,
 }
 
 impl ConstantSpread {
-    /// From the covariance (P, P) or (P + 6, P + 6), row-major, of the parameters `columns` (P ascending indices,
-    /// 5 link + k) and of the frame.
+    /// From the covariance (P, P) or (P + 9, P + 9), row-major, of the parameters `columns` (P ascending indices,
+    /// 5 link + k) and of base and tool.
     ///
     /// # Errors
     /// [`CompensateError::Length`] and [`CompensateError::NotFinite`].
     pub fn new(columns: Vec<usize>, covariance: &[f64]) -> Result<ConstantSpread, CompensateError> {
-        let with_frame = columns.len() + FRAME;
-        let frame = if covariance.len() == with_frame * with_frame { FRAME } else { 0 };
-        let count = columns.len() + frame;
+        let with_setup = columns.len() + MOVED;
+        let moved = if covariance.len() == with_setup * with_setup { MOVED } else { 0 };
+        let count = columns.len() + moved;
         check_length("the covariance", covariance.len(), count * count)?;
         check_finite("the covariance", covariance)?;
-        Ok(ConstantSpread { factor: semidefinite_factor(covariance, count), columns, frame })
+        Ok(ConstantSpread { factor: semidefinite_factor(covariance, count), columns, moved })
     }
 
     fn check(&self, model: &Model) -> Result<(), CompensateError> {
@@ -63,13 +63,12 @@ impl ConstantSpread {
 
     /// Variance of the end's position: |J F|^2.
     #[inline(always)]
-    fn variance<I: Isa>(&self, end: &[Lane; 3], scratch: &AimedScratch) -> Lane {
+    fn variance<I: Isa>(&self, moved: &[[Lane; 3]; MOVED], scratch: &AimedScratch) -> Lane {
         let count = self.columns.len();
-        let moved = moved_with_frame(end);
         let mut sum = Lane::ZERO;
-        for column in 0..count + self.frame {
+        for column in 0..count + self.moved {
             let mut motion = [Lane::ZERO; 3];
-            for row in column..count + self.frame {
+            for row in column..count + self.moved {
                 let linear = if row < count { &scratch.screws[row].linear } else { &moved[row - count] };
                 let factor = Lane::splat(self.factor[row * (row + 1) / 2 + column]);
                 for i in 0..3 {
@@ -84,11 +83,32 @@ impl ConstantSpread {
     }
 }
 
-/// How a point moves with translations and rotations of the frame it is in.
+/// How the end moves with translations and rotations of the base, and with translations of the tool in the flange's frame,
+/// from which the tool is turned.
 #[inline(always)]
-fn moved_with_frame(point: &[Lane; 3]) -> [[Lane; 3]; FRAME] {
-    let (zero, one, [x, y, z]) = (Lane::ZERO, Lane::splat(1.0), *point);
-    [[one, zero, zero], [zero, one, zero], [zero, zero, one], [zero, -z, y], [z, zero, -x], [-y, x, zero]]
+fn moved_with_setup<I: Isa>(end: &LaneFrame, flange_from_tool: &[f64; 9]) -> [[Lane; 3]; MOVED] {
+    let (zero, one, [x, y, z]) = (Lane::ZERO, Lane::splat(1.0), end.position);
+    let along = |axis: usize| {
+        let mut column = [zero; 3];
+        for (i, value) in column.iter_mut().enumerate() {
+            for k in 0..3 {
+                let turned = Lane::splat(flange_from_tool[3 * axis + k]);
+                *value = I::mul_add(end.rotation[3 * i + k], turned, *value);
+            }
+        }
+        column
+    };
+    [
+        [one, zero, zero],
+        [zero, one, zero],
+        [zero, zero, one],
+        [zero, -z, y],
+        [z, zero, -x],
+        [-y, x, zero],
+        along(0),
+        along(1),
+        along(2),
+    ]
 }
 
 impl Spread {
@@ -138,7 +158,7 @@ impl Spread {
         match self {
             Self::Constant(spread) => {
                 let end = aimed.sweep_columns::<I>(readings, alone, &spread.columns, scratch);
-                spread.variance::<I>(&end.position, scratch).sqrt()
+                spread.variance::<I>(&moved_with_setup::<I>(&end, &aimed.turned), scratch).sqrt()
             }
             Self::Field(bounds) => {
                 let poses = if alone { 1 } else { LANES };

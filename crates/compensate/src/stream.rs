@@ -32,7 +32,8 @@ pub struct StreamOptions {
 
 impl Default for StreamOptions {
     fn default() -> Self {
-        Self { rate: [0.1, 0.02], acceleration: [2.0, 0.5], ramp: 1.0, hold: 0.1, deadline: 0.05 }
+        let (rate, acceleration) = (6.0_f64.to_radians(), 120.0_f64.to_radians());
+        Self { rate: [rate, 0.02], acceleration: [acceleration, 0.5], ramp: 1.0, hold: 0.1, deadline: 0.05 }
     }
 }
 

@@ -105,7 +105,8 @@ fn what_the_frame_takes_over_does_not_count() {
     let Transform { rotation, translation: [x, y, z] } = *scene.chain.base();
     let [u, v, w] = [rotation[2], rotation[5], rotation[8]];
     let back = [v * z - w * y, w * x - u * z, u * y - v * x, -u, -v, -w];
-    let direction: Vec<f64> = std::iter::once(1.0).chain(back).map(|share| share * by).collect();
+    let still = [0.0; 3];
+    let direction: Vec<f64> = std::iter::once(1.0).chain(back).chain(still).map(|share| share * by).collect();
     let together: Vec<f64> = direction.iter().flat_map(|a| direction.iter().map(move |b| a * b)).collect();
     let std = |covariance: &[f64]| {
         let model = Model::new(scene.chain.clone(), &scene.constants, &scene.coupling).unwrap();

@@ -108,7 +108,8 @@ impl Inverse {
         targets.par_iter().map(|target| self.solutions(target, false)).collect()
     }
 
-    /// For each target the solution within limits that is nearest to its seed of J readings, or none.
+    /// For each target the solution within limits that is nearest to its seed of J readings, or none; of arms without a
+    /// closed form near by, the one that a search from the seed arrives at.
     ///
     /// # Errors
     /// If there is not a seed for each target, or it is not finite.

@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 WORKSPACE: Final = 300
 """Poses at which the expected error counts."""
 MOST_CANDIDATES: Final = 600
+MOST_PROPOSED: Final = 200
+"""More add nothing to a plan, and memory grows with the square of the candidates."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,13 @@ def check_same_arm(calibration: Calibration, arm: Robot) -> None:
 
 
 def _candidates(calibration: Calibration, options: ProposalOptions, cell: Cell | None) -> Candidates:
-    size = min(max(LEAST_POOL, POOL_PER_POSE * options.count), max(MOST_CANDIDATES, 2 * options.count))
+    if options.count > MOST_PROPOSED:
+        raise UsageError(
+            f"{options.count} poses",
+            rule=f"At most {MOST_PROPOSED} are proposed at a time",
+            way_out="Measure some, calibrate and ask again, or plan afresh with truearm plan ROBOT -n N",
+        )
+    size = min(max(LEAST_POOL, POOL_PER_POSE * options.count), MOST_CANDIDATES)
     pool = measurable_pool(calibration.robot, cell, size, options.seed)
     return Candidates(calibration, pool, options.group)
 
