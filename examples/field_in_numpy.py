@@ -26,8 +26,8 @@ std = 1e3 * np.linalg.norm(calibration.position_std(flat), axis=1)
 print(f"the nominal arm misses by {shift.mean():.2f} mm; known to {std.min():.3f} ... {std.max():.3f} mm")
 
 # %% Trust it where the standard deviation is small: a map of what is good enough
-good = (2.0 * std < 0.45).reshape(61, 61)
-print(f"{100 * good.mean():.0f} % of these configurations are known to 0.45 mm at two sigma")
+good = (2.0 * std < 0.28).reshape(61, 61)
+print(f"{100 * good.mean():.0f} % of these configurations are known to 0.28 mm at two sigma")
 
 # %% The least certain of them are what to measure next
 print("measure next, deg:", np.degrees(flat[std.argmax()]).round(0))

@@ -58,7 +58,7 @@ def test_a_far_tool_whose_position_alone_was_measured_is_not_far_above():
     q = arm.poses(60)
     ratio = calibration.conservative_std(q, tool=far) / roots(calibration, q, far)
     assert (ratio[:, 0] >= 1.0).all()
-    assert np.median(ratio[:, 0]) < 2.5
+    assert np.median(ratio[:, 0]) < 3.5
 
 
 def test_it_is_the_same_when_read_even_without_the_measurements(calibration, readings, tmp_path):
@@ -100,7 +100,7 @@ def test_compensation_judges_by_it(calibration):
     assert good.sum() > 20
     exact = 1e3 * roots(calibration, found.q[good], None)[:, 0]
     assert (found.std_mm[good] >= 0.999999 * exact).all()
-    assert (found.std_mm[good] < 3.0 * exact).all()
+    assert (found.std_mm[good] < 4.0 * exact).all()
     strict = ta.Limits(largest_std_mm=float(0.9 * exact.min()))
     refused = ta.Compensator(calibration, task="position", limits=strict).joints(q[good][:1]).refusals
     assert refused[0].code == 8

@@ -252,7 +252,7 @@ class Calibration:
         """Standard deviation of each coordinate along the axes of the base frame, (n, 3), m.
 
         It holds for base and tool as the device saw them in the set-up with most rows. Where the arm's own
-        base and flange are, no measurement of a target tells; work objects and tools that are found through the
+        base and flange are, no measurement of a target tells; work objects and tools found through the
         calibrated arm take it over. Noise of a measurement is no part.
         """
         return self._std(q, tool, features, pose=False)
