@@ -191,3 +191,11 @@ def test_refusals_of_positions_alone_name_the_tool(arm, capsys):
     assert "3 of 3 targets cannot be corrected" in told
     assert "sure of tools near the points that were measured" in told
     assert not Path("out.csv").exists()
+
+
+@pytest.mark.parametrize("words", [["-o", "arm.calib"], ["-o", "new.mod", "--report", "demo.mod"]])
+def test_what_is_read_is_never_written_over(words, capsys):
+    before = [Path(name).read_bytes() for name in ("arm.calib", "demo.mod")]
+    assert run(*words) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert [Path(name).read_bytes() for name in ("arm.calib", "demo.mod")] == before

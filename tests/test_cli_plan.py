@@ -1,6 +1,7 @@
 """`truearm plan`: poses that can be measured, determine the arm, and come in a good order."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -122,6 +123,12 @@ def test_poses_of_a_cell_are_proposed_that_it_can_measure(calib, tmp_path, capsy
     assert "8 poses" in capsys.readouterr().out
     cell = Cell.load("cell.toml")
     assert rehearse(cell, Poses.read_csv("a.csv", cell.arm)).refused == []
+    assert main(["plan", "ur10", "--cell", "cell.toml", "-o", "b.csv"]) == 2
+    assert "the cell is of" in capsys.readouterr().err
+    before = Path("cell.toml").read_bytes()
+    assert main(["plan", "--next", "8", "--from", calib, "--cell", "cell.toml", "-o", "cell.toml"]) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert Path("cell.toml").read_bytes() == before
 
 
 @pytest.mark.parametrize(

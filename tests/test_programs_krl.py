@@ -314,6 +314,24 @@ def test_the_mark_stands_behind_the_line_that_begins_the_module():
         assert content.startswith(b"&ACCESS RVP\r\n")
 
 
+def test_a_tool_holds_from_its_assignment_on():
+    first, second = (pose_text([a, -90, 100, 0, 45, 0], decimals=5) for a in (-20, 20))
+    tool = "$TOOL={X 0,Y 0,Z 150,A 0,B 0,C 0}"
+    src = f"DEF a()\n$BASE=$NULLFRAME\nPTP {first}\n{tool}\nPTP {second}\nEND\n"
+    done = rewritten(read("a.src", src, KUKA), models(KUKA))
+    assert done.changed.tolist() == [False, True]
+    branch = f"DEF a()\n$BASE=$NULLFRAME\nIF x THEN\n{tool}\nENDIF\nPTP {first}\nEND\n"
+    assert not rewritten(read("a.src", branch, KUKA), models(KUKA)).changed.any()
+
+
+@pytest.mark.parametrize("word", ["SPLINE", "PTP_SPLINE"])
+def test_the_tool_of_a_spline_is_not_the_one_before_it(word):
+    first, second = (pose_text([a, -90, 100, 0, 45, 0], decimals=5) for a in (-20, 20))
+    src = f"{ALREADY}{word} WITH $TOOL=SOME_TOOL[1]\nSPTP {first}\nENDSPLINE\nPTP {second}\nEND\n"
+    done = rewritten(read("a.src", src, KUKA), models(KUKA))
+    assert done.changed.tolist() == [False, True]
+
+
 def test_a_target_that_shifts_another_one_is_left_alone():
     first, second = (pose_text([a, -90, 100, 0, 45, 0], decimals=5) for a in (-20, 20))
     src = ALREADY + f"DECL E6POS XP1={first}\nDECL FRAME XOFF={{X 1,Y 2,Z 3,A 0,B 0,C 0}}\n"

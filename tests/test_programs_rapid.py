@@ -247,3 +247,17 @@ def test_digits_are_what_the_text_says_again():
     q = np.deg2rad(np.random.default_rng(1).uniform(-170.0, 170.0, (50, 6)))
     text = configuration.text_of_digits(configuration.digits(q), np.zeros((50, 4)))
     np.testing.assert_array_equal(configuration.digits_of_text(text), configuration.digits(q))
+
+
+@pytest.mark.parametrize("scope", ["LOCAL CONST", "LOCAL PERS", "TASK PERS", "PERS"])
+def test_targets_of_every_scope_are_corrected(scope):
+    data = f"{scope} robtarget pA:={numbers(SEEN['pA'])};"
+    done = rewritten(read("a.mod", module(f"MoveJ pA,{GO}", data), ABB), models(ABB))
+    assert done.changed[done.program.moves.target].all()
+
+
+def test_a_routine_may_displace_what_comes_after_its_call():
+    data = "\n".join(f"CONST robtarget {name}:={numbers(SEEN[name])};" for name in ("pA", "pB"))
+    body = f"PDispOff;\nMoveJ pA,{GO}\nshift;\nMoveL pB,{GO}\nENDPROC\nPROC shift()\nPDispSet pd;"
+    done = rewritten(read("a.mod", module(body, data), ABB), models(ABB))
+    assert done.changed[done.program.moves.target].tolist() == [True, False]

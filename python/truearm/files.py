@@ -4,7 +4,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 
 _SIGNATURES = (
     (b"PK\x03\x04", "a ZIP archive, such as an Excel workbook"),
@@ -93,3 +93,18 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def refuse_own_input(output: Path, *inputs: Path | None) -> None:
+    """Refuse to write over a file that the same work reads.
+
+    Raises:
+        UsageError: If the output is one of the inputs, under whatever name.
+    """
+    for given in inputs:
+        if given is not None and output.exists() and given.exists() and output.samefile(given):
+            raise UsageError(
+                f"{output} is what is read",
+                rule="An input is never written over",
+                way_out="Name another file",
+            )

@@ -77,6 +77,8 @@ class Options:
 
         if self.repeatability_mm is not None and not self.repeatability_mm > 0.0:
             raise UsageError(f"{self.repeatability_mm}", where="repeatability_mm", rule="It must be positive")
+        if len(set(self.features)) < len(self.features):
+            raise UsageError("a feature is named twice", where="features", rule="Each is named once")
         if self.features and self.model != "variable":
             raise UsageError(
                 "features belong to what varies",

@@ -128,8 +128,9 @@ def expected_mm(
     prior = np.concatenate([np.full(jacobian.shape[2] - links, FREE), np.full(links, PRIOR_M)])
     scaled = jacobian * prior
     rows = scaled[chosen].reshape(-1, scaled.shape[2]) / (1e-3 * sigma_mm)
-    information = rows.T @ rows + np.eye(scaled.shape[2])
-    spread = np.linalg.solve(np.linalg.cholesky(information), scaled.reshape(-1, scaled.shape[2]).T)
+    # Of what the poses do not tell normal equations lose the prior in rounding; this root keeps it.
+    root = np.linalg.qr(np.vstack([rows, np.eye(scaled.shape[2])])).R
+    spread = np.linalg.solve(root.T, scaled.reshape(-1, scaled.shape[2]).T)
     return float(1e3 * np.sqrt(np.square(spread).sum() / len(pool)))
 
 

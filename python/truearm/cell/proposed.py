@@ -105,12 +105,16 @@ def propose_acceptance(
 
 def check_same_arm(calibration: Calibration, arm: Robot) -> None:
     """Raise UsageError where a calibration is of another arm."""
-    known = calibration.robot
+    check_same_tables(arm, calibration.robot, f"the calibration is of {calibration.robot.name}")
+
+
+def check_same_tables(arm: Robot, known: Robot, whose: str) -> None:
+    """Raise UsageError, which says whose the known one is, where two arms have different tables."""
     if known.table.shape != arm.table.shape or not np.allclose(known.table, arm.table):
         raise UsageError(
-            f"the calibration is of {known.name}",
+            whose,
             rule=f"The poses are for {arm.name}, whose Denavit-Hartenberg table is another",
-            way_out="Name the robot that was calibrated, or leave it out",
+            way_out=f"Name {known.name}, or the robot's own file",
         )
 
 

@@ -14,7 +14,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
 from truearm.errors import UsageError
-from truearm.files import write_whole
+from truearm.files import refuse_own_input, write_whole
 
 OnRefusal = Literal["stop", "keep-nominal"]
 
@@ -93,6 +93,10 @@ def command(
     from truearm.programs.densify import Spacing
     from truearm.programs.report import report_of
 
+    if report is not None:
+        refuse_own_input(report, calibration, program, frames)
+    if output is not None:
+        refuse_own_input(Path(output), calibration, frames)
     if output is None and not dry_run:
         raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
     limits = ta.Limits(

@@ -7,6 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, CalibFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest
+from truearm.files import refuse_own_input
 
 READ_AS_ROBOT: Final = ("dh-toml", "urdf")
 
@@ -63,6 +64,7 @@ def command(
     from truearm.exporting import Options, export
     from truearm.exporting.field_grid import features_of
 
+    refuse_own_input(output, calibration, None if urdf is None else Path(str(urdf).partition("#")[0]))
     options = Options(
         urdf=urdf,
         kinematics_hash=kinematics_hash,

@@ -8,7 +8,7 @@ import typer
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest
 from truearm.errors import UsageError
-from truearm.files import write_whole
+from truearm.files import refuse_own_input, write_whole
 
 DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
@@ -56,8 +56,7 @@ def command(
     from truearm.rotation_columns import RotationColumns
 
     _check_choices(joint_unit, length_unit, decimal)
-    if output.exists() and raw.exists() and output.samefile(raw):
-        raise UsageError("the output is the table itself", where=str(output), way_out="Name another file")
+    refuse_own_input(output, raw)
     plan = ImportPlan(
         columns=_pairs(columns or [], "--map"),
         keep=_pairs(keep or [], "--keep"),

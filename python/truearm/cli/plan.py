@@ -11,10 +11,13 @@ from truearm.cli.console import print_json, print_table, say, say_wrapped, sugge
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.errors import UsageError
+from truearm.files import refuse_own_input
 
 if TYPE_CHECKING:
+    from truearm.cell.cell_file import Cell
     from truearm.cell.plan import Plan
     from truearm.cell.proposed import Proposed
+    from truearm.robot import Robot
 
 NUMBERS: Final = (20, 40, 60, 100, 200)
 ORDERS: Final = ("short", "paper")
@@ -82,7 +85,6 @@ def command(
     from truearm.cell.plan import PlanOptions, plan_poses
     from truearm.cell.plan_files import draw, write
     from truearm.planning.choosing import CRITERIA
-    from truearm.robot import Robot
 
     if criterion not in CRITERIA or order not in ORDERS:
         wrong, allowed = (criterion, CRITERIA) if criterion not in CRITERIA else (order, ORDERS)
@@ -91,6 +93,7 @@ def command(
     for name, number in asked.items():
         if number is not None and number < 1:
             raise UsageError(f"{number} poses", where=name, rule="At least one")
+    refuse_own_input(output, known, cell)
     if known is not None or next_count is not None or acceptance is not None:
         _propose(
             _Asked(robot, known, next_count, acceptance, group, cell, seed, order), output, picture, as_json
@@ -99,7 +102,7 @@ def command(
     if robot is None:
         raise UsageError("no robot is named", rule="truearm plan ROBOT, or with --from CALIB")
     known_cell = None if cell is None else Cell.load(cell)
-    arm = Robot.load(robot) if known_cell is None else known_cell.arm
+    arm = _arm_of(robot, known_cell)
     options = PlanOptions(count, criterion, seed, order, sigma_mm)  # type: ignore[arg-type]
     with ends_promptly(), told_stages()("choosing poses"):
         plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
@@ -111,6 +114,18 @@ def command(
         suggest(f"truearm measure {cell} {output} --dry-run")
     elif not as_json:
         suggest(f"truearm calibrate {robot} MEASUREMENTS.csv -o result", when="Measure them; then:")
+
+
+def _arm_of(robot: str, cell: "Cell | None") -> "Robot":
+    """The arm that is named, which is the cell's if there is one."""
+    from truearm.cell.proposed import check_same_tables
+    from truearm.robot import Robot
+
+    arm = Robot.load(robot)
+    if cell is None:
+        return arm
+    check_same_tables(arm, cell.arm, f"the cell is of {cell.arm.name}")
+    return cell.arm
 
 
 @dataclass(frozen=True)

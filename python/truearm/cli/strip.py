@@ -9,7 +9,7 @@ from truearm.cli.arguments import AsJson, CalibFile
 from truearm.cli.console import print_json, say, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import UsageError
+from truearm.files import refuse_own_input
 
 
 def command(
@@ -26,10 +26,7 @@ def command(
     """
     from truearm.calibration import Calibration
 
-    if output.exists() and output.samefile(calibration):
-        raise UsageError(
-            f"{output} is the calibration itself", where="-o", rule="The measurements would be lost"
-        )
+    refuse_own_input(output, calibration)
     known = Calibration.load(calibration)
     with ends_promptly(), told_stages()("bounding the standard deviation"):
         known.save(output, with_rows=False)

@@ -52,6 +52,7 @@ OPENING: Final = {"if": False, "switch": False, "for": True, "while": True, "loo
 CLOSING: Final = frozenset({"endif", "endswitch", "endfor", "endwhile", "endloop", "until"})
 OTHERWISE: Final = frozenset({"else", "case", "default"})
 JUMPS: Final = frozenset({"goto", "return", "exit"})
+SPLINES: Final = frozenset({"spline", "ptp_spline"})
 TAUGHT_ACCURATE: Final = "bit 3 of S says that points were taught with an absolutely accurate robot"
 RUN_TIME: Final = "its target is computed at run time"
 READ: Final = "the program computes with it"
@@ -80,6 +81,7 @@ class KrlReading:
             self._storage.gather(number, sources[number])
         self._frames = KrlFrames(self._storage, frames, sources)
         self._flow = Flow(self._frames.start(), Modal.joined, Modal.same)
+        self._around = self._flow.state
 
     def program(self) -> Program:
         """The program."""
@@ -146,8 +148,11 @@ class KrlReading:
             flow.otherwise(last=word != "case")
         elif word in JUMPS or reader.peek(1) == ":":
             flow.jump()
-        elif word in {"spline", "endspline"}:
-            self._in_spline = word == "spline"
+        elif word in SPLINES:
+            self._in_spline, self._around = True, flow.state
+            flow.state = self._with([token.text.lower() for token in reader.rest()])
+        elif word == "endspline":
+            self._in_spline, flow.state = False, self._around
         elif reader.kind() == "name" and reader.peek(1) == "(":
             flow.state = flow.state.lost(CALLED)
             flow.jump()

@@ -71,8 +71,12 @@ class KrlFrames:
         self._world = world if world is not None else Frame.of(np.eye(4), "$WORLD")
 
     def start(self) -> Modal:
-        """The state at the start: what the frames file calls $TOOL and $BASE."""
-        return Modal(self.named("tool", "$TOOL"), self.named("base", "$BASE"))
+        """The state at the start: what the frames file calls $TOOL and $BASE.
+
+        What the program assigns to them holds from there on only.
+        """
+        base = self._placed("base", self._frames.work_object("$BASE"))
+        return Modal(self._frames.tool("$TOOL"), base)
 
     def payload_kg(self, state: Modal) -> float | None:
         """The mass that the program, or the frames file, states."""

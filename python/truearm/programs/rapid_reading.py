@@ -128,8 +128,8 @@ class RapidReading:
         self._listed: list[Listed] = []
         self._fixed: dict[int, str] = {}
         self._read: dict[str, str] = {}
-        displaces = DISPLACEMENT.search(self._source.text) is not None
-        start = _Modal(np.eye(4), DISPLACED if displaces else "")
+        self._displaces = DISPLACEMENT.search(self._source.text) is not None
+        start = _Modal(np.eye(4), DISPLACED if self._displaces else "")
         self._flow = Flow(start, _joined, _same)
         self._used: list[int] = []
 
@@ -249,8 +249,10 @@ class RapidReading:
             self._displace(word, found)
         elif word == "gripload":
             self._flow.state = replace(self._flow.state, load_kg=self._frames.load_kg(found[1:]))
-        elif any(token.text.lower() in {"const", "pers", "var"} for token in found[:3]):
-            self._mention(found[3:], READ)
+        elif kinds := [
+            k for k, token in enumerate(found[:3]) if token.text.lower() in {"const", "pers", "var"}
+        ]:
+            self._mention(found[kinds[0] + 3 :], READ)
         elif reader.peek(1) in {":=", ".", "{"}:
             self._mention(found, READ)
         else:
@@ -264,6 +266,8 @@ class RapidReading:
             if word.startswith(("move", "search", "trigg", "arc", "spot", "disp", "paint")):
                 self._list(at, "an instruction that is not known here")
             self._flow.jump()
+            if self._displaces:
+                self._flow.state = replace(self._flow.state, problem=DISPLACED)
 
     def _mention(self, found: Sequence[Token], reason: str) -> None:
         for token in found:
