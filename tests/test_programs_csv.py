@@ -117,3 +117,23 @@ def test_mutilated_paths_end_in_a_listing_or_an_error(robot, data):
     end = data.draw(st.integers(start, min(len(sample), start + 60)))
     put = data.draw(st.text(st.sampled_from(',"\n #0.5-eq1x'), max_size=12))
     assert survives(CSV, sample[:start] + put + sample[end:], robot)
+
+
+def test_a_byte_order_mark_stays_in_front(robot):
+    text = joints(Q).encode("utf-8-sig")
+    result = rewritten(CSV, text, robot, by=SHIFT)
+    assert result.changed.all()
+    assert result.contents[0].startswith(text[:5])
+
+
+@pytest.mark.parametrize(
+    ("head", "words"),
+    [
+        ("q1_mm,q2,q3,q4,q5,q6", "q1_mm: joint 1 is revolute"),
+        ("q1,q2,q3,q4,q5,q6,q1_deg", "joint 1 has more than one column"),
+    ],
+)
+def test_columns_that_cannot_be_are_refused(robot, head, words):
+    row = ",".join("0.1" for _ in head.split(","))
+    with pytest.raises(InputError, match=words):
+        read(CSV, f"{head}\n{row}\n", robot)

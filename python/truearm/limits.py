@@ -42,7 +42,7 @@ class Limits:
     change_mm_per_mm: float | None = 0.05
     change_mrad_per_rad: float | None = 50.0
     residual_mm: float = 1e-6
-    residual_mrad: float = 1e-6
+    residual_mrad: float = 1e-5
     joint_limits: bool = True
 
     def __post_init__(self) -> None:

@@ -7,7 +7,7 @@ looked for next to. Other columns are kept as they are.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -78,7 +78,7 @@ class CsvPath:
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """A remark before the header."""
-        return 0, f"# {text}{source.newline}"
+        return source.first, f"# {text}{source.newline}"
 
     def linear_step(self, program: Program, step: LinearStep) -> str | None:
         """None: a path says itself how densely it is sampled."""
@@ -100,7 +100,9 @@ class _Reader:
         self._starts, self._skeleton, self._examples, self._first_number = found[:4]
         self._numbers = found[4:]
         self._header = self._find_header()
-        self._names = [name.strip().strip('"') for name in self._fields(self._header)]
+        fields = self._fields(self._header)
+        fields[0] = fields[0][source.first if self._header == 0 else 0 :]
+        self._names = [name.strip().strip('"') for name in fields]
         self._joints = robot.joints
         quaternion = all(name in self._names for name in QUATERNION)
         self.layouts = (
@@ -225,6 +227,7 @@ class _Reader:
         points = {m[1]: (c, m[3] or "m") for c, n in names.items() if (m := TARGET.fullmatch(n)) and not m[2]}
         turns = {m[1]: (c, m[2] or "rad") for c, n in names.items() if (m := ROTATION.fullmatch(n))}
         wanted = range(1, len(self._joints) + 1)
+        self._check_joints(joints)
         has_pose = set(points) == set("xyz") and (quaternion or set(turns) == set("xyz"))
         has_joints = set(joints) == set(wanted)
         if joints and not has_joints:
@@ -239,6 +242,17 @@ class _Reader:
         if has_pose:
             parts.append(self._pose_part(points, turns, quaternion=quaternion))
         return parts
+
+    def _check_joints(self, joints: Mapping[int, tuple[int, str]]) -> None:
+        """Each joint has one column, in a unit of its kind."""
+        named = [m[1] for name in self._names if (m := JOINT.fullmatch(name))]
+        twice = [joint for joint in joints if named.count(str(joint)) > 1]
+        if twice:
+            self._fail_header(f"joint {twice[0]} has more than one column")
+        for joint, (column, unit) in joints.items():
+            kind = self._joints[joint - 1] if joint <= len(self._joints) else ""
+            if kind and unit and (unit in ("m", "mm")) != (kind == "prismatic"):
+                self._fail_header(f"{self._names[column]}: joint {joint} is {kind}")
 
     def _pose_part(
         self, points: dict[str, tuple[int, str]], turns: dict[str, tuple[int, str]], *, quaternion: bool

@@ -15,6 +15,8 @@ from truearm.files import read_bytes
 LONGEST: Final = 2**31 - 1
 GIBIBYTE: Final = 2**30
 
+BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -27,6 +29,11 @@ class Source:
 
     path: Path
     content: bytes
+
+    @property
+    def first(self) -> int:
+        """Where the text begins: behind a byte order mark."""
+        return len(BYTE_ORDER_MARK) if self.content.startswith(BYTE_ORDER_MARK) else 0
 
     @classmethod
     def of(cls, path: Path, text: str) -> "Source":

@@ -7,7 +7,6 @@ where the arm stands, or to `qnear`.
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -21,8 +20,6 @@ from truearm.programs.urscript_places import argument
 from truearm.programs.urscript_reader import Reader
 from truearm.programs.urscript_syntax import NotReadable, expression, statements
 from truearm.robot import Robot
-
-BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
 
 class UrScript:
@@ -61,8 +58,7 @@ class UrScript:
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """A comment before the first line."""
-        start = len(BYTE_ORDER_MARK) if source.content.startswith(BYTE_ORDER_MARK) else 0
-        return start, f"# {text}{source.newline}"
+        return source.first, f"# {text}{source.newline}"
 
     def linear_step(self, program: Program, step: LinearStep) -> str | None:
         """The motion's own line with the step in place of its target; None if it states a time."""
