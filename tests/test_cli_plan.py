@@ -142,6 +142,8 @@ def test_poses_of_a_cell_are_proposed_that_it_can_measure(calib, tmp_path, capsy
         (["ur10", "--next", "5", "--from", "CALIB"], "the calibration is of RV-M2"),
         (["--next", "5", "--from", "CALIB", "--group", "x"], 'no set-up "x"'),
         ([], "no robot is named"),
+        (["rv-m2", "--picture", "poses.bmp"], 'ends in ".png", ".svg" or ".pdf"'),
+        (["rv-m2", "--seed", "-1"], "greater than or equal to 0"),
     ],
 )
 def test_wrong_proposals_are_told(words, message, calib, capsys):

@@ -210,7 +210,7 @@ def test_standard_deviations_of_constants_are_the_calibrations(constant):
         (lambda c: ta.Compensator(c, features={"t": 1.0}), "The calibration needs none"),
         (lambda c: ta.Compensator(c).joints(np.zeros((2, 5))), "must be \\(n, 6\\)"),
         (lambda c: ta.Compensator(c).joints([[np.nan] * 6]), "NaN or infinite"),
-        (lambda c: ta.Compensator(c).joints(PATH, tool=2 * np.eye(4)), "last row of tool"),
+        (lambda c: ta.Compensator(c).joints(PATH, tool=2 * np.eye(4)), "its last row 0 0 0 1"),
         (lambda c: ta.Compensator(c).joints(PATH, tool=np.diag([2.0, 1, 1, 1])), "the tool"),
         (lambda c: ta.Compensator(c).correct([0.0] * 5), "5 readings"),
         (lambda c: ta.Compensator(c).correct("home"), "could not convert"),

@@ -114,3 +114,11 @@ def test_orientations_in_an_unknown_convention_are_doubted():
     random /= np.linalg.norm(random, axis=1, keepdims=True)
     found = ta.calibrate(robot, with_quaternions(table, random), model="constant")
     assert "convention of Euler angles" in notice_of(found, "orientation_misfit")
+
+
+def test_a_tool_that_is_no_rigid_motion_is_refused():
+    arm = VirtualArm.paper(seed=4)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant")
+    for tool in (np.zeros((4, 4)), np.diag([1.0, 1.0, -1.0, 1.0]), np.diag([2.0, 1.0, 1.0, 1.0])):
+        with pytest.raises(ta.InputError, match="no rigid motion"):
+            calibration.position(arm.poses(2), tool=tool)

@@ -1,7 +1,7 @@
 """The point or frame that a prediction is of: the robot's tool, another tool, or a measured target."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
+
+RIGID: Final = 1e-8
+"""How far a rotation may be from orthonormal, as in the core."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +38,7 @@ def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
     """flange_from_tool (4, 4) of the robot's own tool, or of `tool`: a transform (4, 4) or a point (3,).
 
     Raises:
-        InputError: If it is neither.
+        InputError: If it is neither, or no rigid motion.
     """
     if tool is None:
         return robot.tool
@@ -49,6 +52,13 @@ def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
         raise InputError(
             f"the tool has shape {given.shape}",
             rule="A transform (4, 4) from flange to tool, or a point (3,) in the flange frame, m",
+        )
+    turn = given[:3, :3]
+    off = float(np.abs(turn.T @ turn - np.eye(3)).max())
+    if off > RIGID or np.linalg.det(turn) < 0.0 or np.abs(given[3] - [0.0, 0.0, 0.0, 1.0]).max() > RIGID:
+        raise InputError(
+            "the tool is no rigid motion",
+            rule=f"Its rotation is orthonormal and right-handed within {RIGID:g}, its last row 0 0 0 1",
         )
     return given
 

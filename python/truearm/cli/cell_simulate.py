@@ -25,7 +25,9 @@ def command(
     speed: Annotated[
         float | None, typer.Option(metavar="X", help="Run the virtual clock X times as fast.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the virtual arm, its noise and faults.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the virtual arm, its noise and faults.")
+    ] = None,
     fault: Annotated[
         list[str] | None,
         typer.Option(

@@ -10,7 +10,7 @@ from truearm.cli.arguments import ROBOT_HELP, AsJson, robots_like
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import UsageError
+from truearm.errors import UsageError, list_names
 from truearm.files import refuse_own_input
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 NUMBERS: Final = (20, 40, 60, 100, 200)
 ORDERS: Final = ("short", "paper")
+PICTURES: Final = (".png", ".svg", ".pdf")
 
 
 def command(
@@ -60,7 +61,7 @@ def command(
         str, typer.Option(metavar="short|paper", help="In which order they are measured.")
     ] = "short",
     sigma_mm: Annotated[float, typer.Option(metavar="MM", help="Noise of a measured coordinate.")] = 0.1,
-    seed: Annotated[int, typer.Option(help="Seed of the candidates.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the candidates.")] = 0,
     picture: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the poses, as PNG or SVG.")
     ] = None,
@@ -93,7 +94,7 @@ def command(
     for name, number in asked.items():
         if number is not None and number < 1:
             raise UsageError(f"{number} poses", where=name, rule="At least one")
-    refuse_own_input(output, known, cell)
+    _check_outputs(output, picture, known, cell)
     if known is not None or next_count is not None or acceptance is not None:
         _propose(
             _Asked(robot, known, next_count, acceptance, group, cell, seed, order), output, picture, as_json
@@ -114,6 +115,14 @@ def command(
         suggest(f"truearm measure {cell} {output} --dry-run")
     elif not as_json:
         suggest(f"truearm calibrate {robot} MEASUREMENTS.csv -o result", when="Measure them; then:")
+
+
+def _check_outputs(output: Path, picture: Path | None, *inputs: Path | None) -> None:
+    """Raise UsageError where what is read would be written over, or a picture has no known format."""
+    refuse_own_input(output, *inputs)
+    if picture is not None and picture.suffix.lower() not in PICTURES:
+        rule = f"Its name ends in {list_names(PICTURES, 'or')}"
+        raise UsageError(str(picture), where="--picture", rule=rule)
 
 
 def _arm_of(robot: str, cell: "Cell | None") -> "Robot":

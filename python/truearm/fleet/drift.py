@@ -12,25 +12,34 @@ from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT
 from truearm.parameters import KIND_COUNT, A, D
+from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 
 SURE: Final = 2.0
 """A change of a position beyond so many standard deviations of both calibrations together is seen."""
+FAR: Final = 0.1
+"""Tables of one arm, rad and m, do not differ by so much, whoever wrote them down."""
 MOVED: Final = 4.0
 """A parameter that changed by more standard errors moved; one unmoved arm in a thousand is suspected."""
 
 
-def check_comparable(previous: Calibration, new_joints: tuple[str, ...], where: str) -> None:
-    """Raise InputError if a calibration is not of an arm with these joints."""
-    if previous.robot.joints != new_joints:
-        raise InputError(
-            f"this is a calibration of {previous.robot.name}, with {len(previous.robot.joints)} joints",
-            where=where,
-            rule=f"The arm has {len(new_joints)}",
-            way_out="Correct previous of this arm",
-        )
+def check_comparable(previous: Calibration, robot: Robot, where: str) -> None:
+    """Raise InputError if a calibration is of an arm with other joints, or a table far from this."""
+    known = previous.robot
+    if known.joints != robot.joints:
+        what, rule = f"with {known.joint_count} joints", f"The arm has {robot.joint_count}"
+    elif (np.abs(known.table - robot.table) > FAR).any():
+        what, rule = "whose Denavit-Hartenberg table is another", f"The arm is {robot.name}"
+    else:
+        return
+    raise InputError(
+        f"this is a calibration of {known.name}, {what}",
+        where=where,
+        rule=rule,
+        way_out="Correct previous of this arm",
+    )
 
 
 def drift_of(previous: Calibration, now: Calibration, data: Measurements) -> dict[str, Any]:

@@ -65,7 +65,7 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
     previous = None
     if task.previous is not None:
         previous = Calibration.from_bytes(task.previous, where=task.previous_name)
-        check_comparable(previous, robot.joints, task.previous_name)
+        check_comparable(previous, robot, task.previous_name)
     made = calibrate(robot, task.data, task.options)
     return ArmMade(
         calibration=made.to_bytes(with_rows=not task.strip),
