@@ -69,8 +69,6 @@ def calibrate(
     notices = check_against(given, robot)
     given = given.deduplicated()
     task = _task(robot, given, chosen, threads, stages)
-    if task.selection.orientation:
-        check_turns(given, robot)
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))
     with stages("judging on held-out rows"):
@@ -130,6 +128,8 @@ def _options(options: Options | None, more: Mapping[str, Any]) -> Options:
 def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:
     selection = select(data, options.use, options.judge_target)
     where = ", ".join(data.files)
+    if selection.orientation:
+        check_turns(data, robot)
     if selection.distances and options.model == "variable":
         raise UsageError(
             "distances alone cannot tell what varies over the workspace",

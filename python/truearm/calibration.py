@@ -379,8 +379,9 @@ class Calibration:
     ) -> Floats:
         """Covariance (n, m, m) of a tool's position, or pose, as the device saw base and target."""
         flange = self.pose(rows, tool=np.eye(4), features=features)
-        points = self.position(rows, tool=tool, features=features)
-        moved = np.concatenate([rigid_motion(points), flange[:, :3, :3]], axis=2)
+        turned = flange[:, :3, :3]
+        points = flange[:, :3, 3] + turned @ at_tool(self.robot, tool)[:3, 3]
+        moved = np.concatenate([rigid_motion(points), turned], axis=2)
         if jacobian.shape[1] > moved.shape[1]:
             turns = np.broadcast_to(np.eye(3, moved.shape[2], 3), moved.shape)
             moved = np.concatenate([moved, turns], axis=1)

@@ -93,7 +93,7 @@ class ConstantSpread:
     of_all: Floats
     before: Floats
     noises: tuple[float, float]
-    place: "SetupPlace"
+    place: SetupPlace
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "ConstantSpread":
@@ -151,7 +151,7 @@ class VariableSpread:
     posterior: Posterior
     inflation: float
     noises: tuple[float, float]
-    place: "SetupPlace"
+    place: SetupPlace
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "VariableSpread":

@@ -179,7 +179,9 @@ def _direction(joint: Any) -> Floats:  # noqa: ANN401
 
 def _limits(joint: Any) -> tuple[float, float]:  # noqa: ANN401
     limit = joint.limit
-    if joint.type == "continuous" or limit is None or limit.lower is limit.upper is None:
+    if joint.type == "continuous" or limit is None:
+        return -np.inf, np.inf
+    if limit.lower is None and limit.upper is None:
         return -np.inf, np.inf
     lower, upper = limit.lower or 0.0, limit.upper or 0.0
     if lower >= upper:
