@@ -88,16 +88,16 @@ impl ConstantSpread {
 #[inline(always)]
 fn moved_with_setup<I: Isa>(end: &LaneFrame, flange_from_tool: &[f64; 9]) -> [[Lane; 3]; MOVED] {
     let (zero, one, [x, y, z]) = (Lane::ZERO, Lane::splat(1.0), end.position);
-    let along = |axis: usize| {
-        let mut column = [zero; 3];
-        for (i, value) in column.iter_mut().enumerate() {
+    // A closure would be compiled without the instruction set of this function.
+    let mut along = [[zero; 3]; 3];
+    for axis in 0..3 {
+        for i in 0..3 {
             for k in 0..3 {
                 let turned = Lane::splat(flange_from_tool[3 * axis + k]);
-                *value = I::mul_add(end.rotation[3 * i + k], turned, *value);
+                along[axis][i] = I::mul_add(end.rotation[3 * i + k], turned, along[axis][i]);
             }
         }
-        column
-    };
+    }
     [
         [one, zero, zero],
         [zero, one, zero],
@@ -105,9 +105,9 @@ fn moved_with_setup<I: Isa>(end: &LaneFrame, flange_from_tool: &[f64; 9]) -> [[L
         [zero, -z, y],
         [z, zero, -x],
         [-y, x, zero],
-        along(0),
-        along(1),
-        along(2),
+        along[0],
+        along[1],
+        along[2],
     ]
 }
 
