@@ -170,6 +170,20 @@ def test_standard_deviations_grow_away_from_the_data():
     assert np.median(std[beyond]) > 1.25 * np.median(std[far[:, 1] < np.radians(20.0)])
 
 
+def test_constants_alone_know_how_far_they_are_off_on_an_arm_that_varies():
+    arm = VirtualArm.paper(seed=3, imperfections=Imperfections(share=0.4))
+    data = arm.measure(arm.poses(150))
+    calibration = ta.calibrate(arm.robot, data, model="constant")
+    q = arm.poses(300, seed=9)
+    target = calibration.model.setup.targets[0, 0]
+    off = calibration.position(q, group=calibration.groups[0], target=1) - arm.measure(q).targets[:, 0]
+    std = calibration.position_std(q, tool=target)
+    assert 0.9 <= (np.abs(off) <= 1.96 * std).mean() <= 0.99
+    judged = ta.Compensator(calibration, task="position").joints(q, tool=target)
+    at_corrected = calibration.position_std(judged.q, tool=target)
+    np.testing.assert_allclose(judged.std_mm, 1e3 * np.linalg.norm(at_corrected, axis=1), rtol=1e-6)
+
+
 def test_standard_deviation_carries_to_another_tool(variable):
     _, data, calibration = variable
     q = data.readings[:20]

@@ -253,7 +253,8 @@ class Calibration:
 
         It holds for base and tool as the device saw them in the set-up with most rows. Where the arm's own
         base and flange are, no measurement of a target tells; work objects and tools found through the
-        calibrated arm take it over. Noise of a measurement is no part.
+        calibrated arm take it over. Noise of a measurement is no part, but of a model with constants alone
+        all is that they leave beside the rows' own sigma: noise that is not stated, they cannot tell apart.
         """
         return self._std(q, tool, features, pose=False)
 

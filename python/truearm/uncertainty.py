@@ -87,7 +87,11 @@ class SetupPlace:
 
 @dataclass(frozen=True, eq=False)
 class ConstantSpread:
-    """Constants: one covariance for the whole arm, and behind it of the set-ups."""
+    """Constants: one covariance for the whole arm, and behind it of the set-ups.
+
+    What constants leave of the measurements, beside the rows' own sigma, is the arm's as far as anybody can
+    tell: it counts wherever the device's frame and target are taken over.
+    """
 
     columns: list[int]
     of_all: Floats
@@ -110,18 +114,28 @@ class ConstantSpread:
 
     @property
     def with_setup(self) -> Floats:
-        """Covariance (P + 9, P + 9) of the constants, and of the motions of base and tool behind them."""
+        """Covariance (P + 9, P + 9) of the constants, and of the motions of base and tool behind them.
+
+        What the constants leave of positions is an uncertain place of the base, the same in all directions.
+        """
         count = len(self.columns)
         known = np.zeros((count + len(self.place.motion), len(self.of_all)))
         known[:count, :count] = np.eye(count)
         known[count:, count : count + self.place.motion.shape[1]] = self.place.motion
-        return np.asarray(known @ self.of_all @ known.T)
+        found = known @ self.of_all @ known.T
+        found[count : count + AXES, count : count + AXES] += self.noises[0] ** 2 * np.eye(AXES)
+        return np.asarray(found)
 
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
-        """Covariance (n, m, m), the same rule everywhere."""
+        """Covariance (n, m, m), the same rule everywhere; with `moved` what the constants leave is added."""
         rows, setup = jacobian[:, :, self.columns], self.place.among_all(moved)
-        if setup is not None:
-            rows = np.concatenate([rows, setup], axis=2)
+        if setup is None:
+            return self._carried(rows)
+        left = np.repeat(np.square(self.noises), AXES)[: jacobian.shape[1]]
+        return self._carried(np.concatenate([rows, setup], axis=2)) + np.diag(left)
+
+    def _carried(self, rows: Floats) -> Floats:
+        """Covariance (n, m, m) of rows (n, m, u) times the first u of all unknowns."""
         size = rows.shape[2]
         return np.asarray(rows @ self.of_all[:size, :size] @ rows.transpose(0, 2, 1))
 

@@ -86,5 +86,6 @@ def _expected_mm(calibration: Calibration, session: Session) -> float:
     readings = np.array([step.readings for step in session.steps("pose")])
     chosen = readings[np.linspace(0, len(readings) - 1, min(len(readings), SHOWN_POSES)).astype(np.int64)]
     variances = np.square(calibration.position_std(chosen)).sum(axis=1)
-    left = calibration.summary["noise_mm"] / MM_PER_METRE
+    # Standard deviations of constants hold all that they leave unexplained.
+    left = 0.0 if calibration.variable is None else calibration.variable.unexplained_m
     return float(MM_PER_METRE * np.sqrt(variances.mean() + 3.0 * left**2))
