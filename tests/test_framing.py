@@ -224,3 +224,82 @@ def test_too_little_is_refused(exact, tmp_path):
         find_object(model, line, TOOL)
     with pytest.raises(WorkError, match="2 points"):
         find_object(model, line.select(range(2)), TOOL)
+
+
+def placed(robot, tmp_path, places, stated, seed=5):
+    """Touches of `places` on the object, with `stated` as what the file says of them, m."""
+    points = places @ OBJECT[:3, :3].T + OBJECT[:3, 3]
+    q = readings_at(robot, points, tilted(np.random.default_rng(seed), len(places), 15.0))
+    return as_data(readings(q, **dict(zip(["x_m", "y_m", "z_m"], stated.T, strict=True))), tmp_path / "o.csv")
+
+
+def test_one_row_far_off_among_few_is_the_one_that_is_named(exact, tmp_path):
+    model, robot = exact
+    rng = np.random.default_rng(6)
+    points = np.tile([0.6, 0.1, 0.2], (5, 1)) + rng.normal(scale=2e-5, size=(5, 3))
+    points[3] += [0.0, 4e-3, -3e-3]
+    data = as_data(readings(readings_at(robot, points, tilted(rng, 5))), tmp_path / "few.csv")
+    (notice,) = find_tool(model, data, orientation=np.eye(3)).notices
+    assert notice.rows == (4,)
+    assert "row 4 lies far off, 4.97 mm from where the other rows say" in notice.message
+    stated = PLACES.copy()
+    stated[1] += [5e-3, 0.0, 0.0]
+    found = find_object(model, placed(robot, tmp_path, PLACES, stated), TOOL)
+    assert [notice.rows for notice in found.notices] == [(2,)]
+
+
+def test_of_two_rows_far_off_neither_hides_the_other(exact, tmp_path):
+    model, robot = exact
+    rng = np.random.default_rng(3)
+    points = np.tile([0.6, 0.1, 0.2], (12, 1)) + rng.normal(scale=1e-5, size=(12, 3))
+    points[[2, 6]] += [[6e-3, 0.0, 0.0], [0.0, 2e-3, 0.0]]
+    data = as_data(readings(readings_at(robot, points, tilted(rng, 12))), tmp_path / "two_off.csv")
+    found = find_tool(model, data, orientation=np.eye(3))
+    assert [notice.rows for notice in found.notices] == [(3, 7)]
+
+
+def test_rows_that_are_all_as_good_are_seldom_named(exact, tmp_path):
+    model, robot = exact
+    found = [find_tool(model, touched(robot, seed, tmp_path), orientation=np.eye(3)) for seed in range(40)]
+    assert sum(bool(one.notices) for one in found) <= 1
+
+
+def test_touches_that_contradict_each_other_give_nothing(exact, tmp_path):
+    model, robot = exact
+    data = touched(robot, 0, tmp_path)
+    mixed = as_data(readings(data.readings[:, [1, 0, 2, 3, 4, 5]]), tmp_path / "mixed.csv")
+    with pytest.raises(WorkError, match=r"disagree by \d+\.?\d* mm.*Check the units"):
+        find_tool(model, mixed, orientation=np.eye(3))
+    stated = PLACES.copy()
+    stated[2] += [0.0, 0.1, 0.0]
+    with pytest.raises(WorkError, match="Row 3 lies far off, 101 mm from where the other rows say"):
+        find_object(model, placed(robot, tmp_path, PLACES, stated), TOOL)
+
+
+def test_readings_in_degrees_are_not_taken_for_radians(exact, tmp_path):
+    model, robot = exact
+    data = touched(robot, 0, tmp_path)
+    table = pd.DataFrame(np.degrees(data.readings), columns=[f"q{j}" for j in range(1, 7)])
+    wrong = as_data(table, tmp_path / "degrees.csv")
+    with pytest.raises(InputError, match="give --angle-unit deg"):
+        find_tool(model, wrong, orientation=np.eye(3))
+
+
+def test_places_in_another_unit_and_mirrored_ones_are_refused(exact, tmp_path):
+    model, robot = exact
+    for factor, option in ((1e3, "--length-unit mm"), (1e-3, "--length-unit m,")):
+        with pytest.raises(InputError, match=option):
+            find_object(model, placed(robot, tmp_path, PLACES, factor * PLACES), TOOL)
+    with pytest.raises(InputError, match="that each row's place belongs"):
+        find_object(model, placed(robot, tmp_path, PLACES, PLACES / 25.4), TOOL)
+    with pytest.raises(WorkError, match="their mirror image to .*right-handed"):
+        find_object(model, placed(robot, tmp_path, PLACES, PLACES * [1.0, -1.0, 1.0]), TOOL)
+    flat = PLACES * [1.0, 1.0, 0.0]
+    assert find_object(model, placed(robot, tmp_path, flat, flat), TOOL).distances_mm.max() < 1e-6
+
+
+def test_points_that_were_touched_once_are_told_of_the_column(exact, tmp_path):
+    model, robot = exact
+    data = touched(robot, 0, tmp_path, count=6)
+    with pytest.raises(WorkError, match='in a column "group"'):
+        find_tool(model, data, orientation=np.eye(3), points=["a"] * 5 + ["b"])

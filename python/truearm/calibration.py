@@ -41,7 +41,7 @@ Floats = NDArray[np.float64]
 Features = Mapping[str, ArrayLike]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """Identified parameters of an arm. SI units; parameters in the order links, theta, d, a, alpha, beta.
 
@@ -49,7 +49,7 @@ class Calibration:
     calibration was fitted with features, predictions need `features`: a number, or one for each pose, by
     name. Without `group`, positions and poses are those of the robot file's tool, or of `tool`, in the
     robot's base frame. With `group` they are those of the measured `target`, or of `tool`, in that set-up's
-    world.
+    world. Copying and pickling go by the content of a calibration file.
 
     Attributes:
         robot: The nominal arm.
@@ -111,6 +111,17 @@ class Calibration:
         """The calibration of a file's content; `where` is named in errors, which are those of `load`."""
         arrays, content = parse_calibration(data, where)
         return cls(**calibration_content.unpack(arrays, content, where=where), file=data)
+
+    def __repr__(self) -> str:
+        joints, rows = self.robot.joint_count, self.validation.n_train + self.validation.n_holdout
+        held = self.validation.holdout.get(self.model_name)
+        error = f", {held.position.mean:.3g} mm mean on held-out rows" if held else ""
+        return f"<Calibration of {self.robot.name}: {self.model_name}, {joints} joints, {rows} rows{error}>"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        content = self.to_bytes()
+        file = content if self.file == content else self.file
+        return _restored, (content, self.notices, dict(self.seconds), file)
 
     def without_rows(self) -> "Calibration":
         """The same as a file without the measurements holds it, with the bounds of the standard deviation."""
@@ -436,3 +447,11 @@ class Calibration:
 
     def _chain(self, flange_from_end: Floats) -> Chain:
         return self.arm.chain(self.robot.flange @ flange_from_end)
+
+
+def _restored(
+    content: bytes, notices: tuple[Notice, ...], seconds: Mapping[str, float], file: bytes | None
+) -> Calibration:
+    """A calibration that was pickled: what its file holds, and what was said when it was made."""
+    found = Calibration.from_bytes(content, where="a pickled calibration")
+    return replace(found, notices=notices, seconds=seconds, file=file)

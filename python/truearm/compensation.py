@@ -1,8 +1,10 @@
 """Compensation: readings to command so that the real tool goes where the program means it."""
 
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +21,8 @@ from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
-TO_SHOWN = np.array([MM_PER_METRE, 1e3, MM_PER_METRE, 1e3, MM_PER_METRE])
+TO_SHOWN: Final = np.array([MM_PER_METRE, 1e3, MM_PER_METRE, 1e3, MM_PER_METRE])
+TOOLS_KEPT: Final = 16
 
 
 @dataclass(frozen=True)
@@ -119,11 +122,18 @@ class Compensator:
                 f"the programming model {self.programming.name} has joints {self.programming.joints}",
                 rule=f"{calibration.robot.name} was calibrated with {calibration.robot.joints}",
             )
+        self._moving = moving
         self._options = core_options(calibration.robot, task, moving, self.limits)
         self._features = feature_values(calibration, features)
         self._programming = plain_model(self.programming)
         self._calibrated = calibrated_model(calibration)
-        self._correctors: dict[bytes, Corrector] = {}
+        self._correctors: OrderedDict[bytes, Corrector] = OrderedDict()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        names = self.calibration.options.features[: len(self._features)]
+        features = dict(zip(names, self._features, strict=True))
+        kept = (self.calibration, self.programming, self.task, self._moving, self.limits, features)
+        return _compensator, kept
 
     def joints(self, q: ArrayLike, *, tool: ArrayLike | None = None) -> Compensated:
         """Correct the joint targets of a path.
@@ -194,11 +204,17 @@ class Compensator:
         return self._corrector(self._tool(tool))
 
     def _corrector(self, flange_from_tool: Floats) -> Corrector:
+        """The corrector of a tool; those of the last TOOLS_KEPT tools are kept."""
         key = flange_from_tool.tobytes()
-        if key not in self._correctors:
-            tool = np.ascontiguousarray(flange_from_tool)
-            self._correctors[key] = Corrector(self._calibrated, self._programming, tool, self._options)
-        return self._correctors[key]
+        if key in self._correctors:
+            self._correctors.move_to_end(key)
+            return self._correctors[key]
+        tool = np.ascontiguousarray(flange_from_tool)
+        made = Corrector(self._calibrated, self._programming, tool, self._options)
+        self._correctors[key] = made
+        if len(self._correctors) > TOOLS_KEPT:
+            self._correctors.popitem(last=False)
+        return made
 
     def _corrected(
         self, rows: Floats, flange_from_tool: Floats, unsolved: Mapping[int, Refusal]
@@ -213,3 +229,17 @@ class Compensator:
             unsolved.get(place) or Refusal(place + 1, reason, code) for place, code, reason in refused
         )
         return Compensated(q, rows, residual, turned, shift, turn, std, tuple(refusals))
+
+
+def _compensator(
+    calibration: Calibration,
+    programming: Robot,
+    task: Task,
+    moving: Sequence[int] | None,
+    limits: Limits,
+    features: Mapping[str, float],
+) -> Compensator:
+    """A compensator that was pickled."""
+    return Compensator(
+        calibration, programming=programming, task=task, moving=moving, limits=limits, features=features
+    )

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.columns import StatedUnits
-from truearm.errors import InputError, Notice, UsageError, list_rows
+from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
 from truearm.measured_fields import read_fields
 from truearm.reading import read_csv_table, table_from_frame
 
@@ -31,9 +31,10 @@ PER_ROW: Final = (
     "rows",
 )
 CONTENT: Final = PER_ROW[:-2]
+GROUPS_SHOWN: Final = 3
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Measurements:
     """n poses of an N-joint arm and what was measured there. SI units; world is the device's frame.
 
@@ -82,6 +83,14 @@ class Measurements:
 
     def __len__(self) -> int:
         return len(self.readings)
+
+    def __repr__(self) -> str:
+        counts = [(len(self), "row"), (self.joint_count, "joint"), (self.target_count, "target")]
+        size = ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
+        return f"<Measurements: {size}; {list_names(self.groups[:GROUPS_SHOWN])}>"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Measurements, tuple(getattr(self, field.name) for field in fields(self))
 
     @property
     def joint_count(self) -> int:

@@ -32,13 +32,31 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
         InputError: If the number or kind of joints differs, degrees were read as radians or the other
             way round, millimetres as metres or the other way round, or all poses are alike.
     """
+    outside = check_readings(measurements, robot)
+    _check_alike(measurements)
+    check_points(measurements, robot)
+    return [*measurements.notices, *outside, *_repetitions(measurements)]
+
+
+def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
+    """Check that readings can be of `robot`.
+
+    Returns:
+        What the user should know: joints outside their limits.
+
+    Raises:
+        InputError: If the number or kind of joints differs, or degrees were read as radians.
+    """
     measurements.require_joint_count(robot.joint_count)
     _check_kinds(measurements, robot)
     _check_degrees(measurements, robot)
-    _check_alike(measurements)
+    return _limit_notices(measurements, robot)
+
+
+def check_points(measurements: Measurements, robot: Robot) -> None:
+    """Raise InputError where measured points lie too far apart, or too close together, for their readings."""
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
-    return [*measurements.notices, *_limit_notices(measurements, robot), *_repetitions(measurements)]
 
 
 def _check_kinds(measurements: Measurements, robot: Robot) -> None:

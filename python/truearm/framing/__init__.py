@@ -1,19 +1,21 @@
 """Tools and work objects taught again, through the calibrated arm instead of the controller's model of it."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.calibration import Calibration
-from truearm.errors import InputError, UsageError
-from truearm.fitting import feature_values
+from truearm.errors import InputError, Notice, UsageError
+from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.frames_toml import former_entry, tip_covariance, write_frame
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.framing.measuring import tool_from_measurements
 from truearm.framing.placing import object_from_points
 from truearm.framing.touching import tool_from_touches
 from truearm.measurements import Measurements
+from truearm.plausibility import check_points, check_readings
 
 Floats = NDArray[np.float64]
 
@@ -41,18 +43,19 @@ def find_tool(
         InputError: If the data is of another arm.
         WorkError: If the data determines too little.
     """
-    data.require_joint_count(calibration.robot.joint_count)
+    notices = check_readings(data, calibration.robot)
     turned = None if orientation is None else _rotation(orientation)
     if data.target_count and np.isfinite(data.targets).any():
         if data.orientations is not None and turned is not None:
             raise UsageError("the orientation of the tool was measured", way_out="Leave it out")
-        return tool_from_measurements(calibration, data, turned)
+        check_points(data, calibration.robot)
+        return _with(notices, tool_from_measurements(calibration, data, turned))
     if turned is None:
         raise UsageError(
             "touches of a point do not tell how the tool is turned", way_out="Give its orientation"
         )
-    poses = _poses(calibration, data, np.eye(4))
-    return tool_from_touches(poses, points or ["point"] * len(data), turned, data.rows)
+    poses = calibrated_poses(calibration, data, np.eye(4))
+    return _with(notices, tool_from_touches(poses, points or ["point"] * len(data), turned, data.rows))
 
 
 def find_object(
@@ -73,7 +76,7 @@ def find_object(
         InputError: If the data is of another arm, or has no positions.
         WorkError: If the points do not tell where the object is.
     """
-    data.require_joint_count(calibration.robot.joint_count)
+    notices = check_readings(data, calibration.robot)
     if not data.target_count or not np.isfinite(data.targets[:, 0]).all():
         raise InputError(
             "there is no place x, y, z of every touched point",
@@ -87,14 +90,12 @@ def find_object(
     else:
         tool = given
     in_tool = None if covariance is None else tool[:3, :3].T @ np.asarray(covariance) @ tool[:3, :3]
-    return object_from_points(_poses(calibration, data, tool), data.targets[:, 0], data.rows, in_tool)
+    poses = calibrated_poses(calibration, data, tool)
+    return _with(notices, object_from_points(poses, data.targets[:, 0], data.rows, in_tool))
 
 
-def _poses(calibration: Calibration, data: Measurements, tool: Floats) -> Floats:
-    """base_from_tool (n, 4, 4) of the calibrated arm."""
-    names = calibration.options.features
-    features = dict(zip(names, feature_values(data, names).T, strict=True))
-    return calibration.pose(data.readings, tool=tool, features=features or None)
+def _with(notices: Sequence[Notice], found: IdentifiedFrame) -> IdentifiedFrame:
+    return replace(found, notices=(*notices, *found.notices))
 
 
 def _rotation(orientation: ArrayLike) -> Floats:

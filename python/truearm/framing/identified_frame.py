@@ -1,22 +1,17 @@
 """A tool or a work object as it was found, and how well."""
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import Notice, list_rows
+from truearm.errors import Notice
 from truearm.rotations import quaternion_from_matrix
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 Kind = Literal["tool", "object"]
-
-FAR: Final = 2.0
-"""Root mean squares of a residual beyond which a row is named."""
-FEW: Final = 3
-"""With no more coordinates to spare, every residual is small and none says anything."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +72,3 @@ class IdentifiedFrame:
             "residuals_mm": self.distances_mm.tolist(),
             "rows": self.rows.tolist(),
         }
-
-
-def far_rows(residuals: Floats, rows: NDArray[np.int64], noise_m: float, freedom: int) -> list[Notice]:
-    """A notice of rows that lie farther off than twice the root mean square, if any do."""
-    distance = np.linalg.norm(residuals, axis=1)
-    far = rows[distance > FAR * np.sqrt(3.0) * noise_m] if freedom > FEW else rows[:0]
-    if not len(far):
-        return []
-    words = list_rows(far.tolist())
-    return [Notice("far_rows", f"{words} lie far off: look at them, or leave them out", tuple(far.tolist()))]

@@ -5,12 +5,16 @@ from numpy.typing import NDArray
 
 from truearm._core import fit_constant
 from truearm.calibration import Calibration
-from truearm.core_set import core_set, select
+from truearm.core_set import Selection, core_set, select
 from truearm.errors import WorkError
 from truearm.fitting import Task, core_errors, fit_options
-from truearm.framing.identified_frame import IdentifiedFrame, far_rows
+from truearm.framing.agreement import check_agreement, far_rows
+from truearm.framing.calibrated import calibrated_poses
+from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
+from truearm.rotations import rigid_motion
+from truearm.turning_sense import check_turns
 
 Floats = NDArray[np.float64]
 
@@ -29,11 +33,7 @@ def tool_from_measurements(
         WorkError: If there are several set-ups, the rows determine too little, or only points were measured
             and no orientation is given.
     """
-    selection = select(data, "pose" if data.orientations is not None else "position")
-    if len(data.groups) != 1:
-        raise WorkError(f"{len(data.groups)} set-ups", rule="A tool is found from one set-up")
-    if not selection.orientation and orientation is None:
-        raise WorkError("only points of the tool were measured", rule="They do not tell how it is turned")
+    selection = _selection(calibration, data, stated=orientation is not None)
     task = Task(calibration.arm, selection, data.groups, calibration.options)
     model = calibration.model
     parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
@@ -55,7 +55,27 @@ def tool_from_measurements(
     freedom = residuals.size - first - width
     noise, rows = fit.noise[0], data.rows
     what = f"{len(data)} measured {'poses' if selection.orientation else 'points'} of it"
-    notices = tuple(far_rows(residuals[:, :3], rows, noise, freedom))
+    notices = far_rows(residuals[:, :3], _by_frame_and_tip(calibration, data, transform), rows)
+    check_agreement(noise, notices)
     return IdentifiedFrame(
-        "tool", transform, covariance, residuals[:, :3], rows, noise, freedom, what, notices
+        "tool", transform, covariance, residuals[:, :3], rows, noise, freedom, what, tuple(notices)
     )
+
+
+def _selection(calibration: Calibration, data: Measurements, *, stated: bool) -> Selection:
+    """What of the rows is used: they have to tell how the tool is turned, unless that is stated."""
+    selection = select(data, "pose" if data.orientations is not None else "position")
+    if len(data.groups) != 1:
+        raise WorkError(f"{len(data.groups)} set-ups", rule="A tool is found from one set-up")
+    if not selection.orientation and not stated:
+        raise WorkError("only points of the tool were measured", rule="They do not tell how it is turned")
+    if selection.orientation:
+        check_turns(data, calibration.robot)
+    return selection
+
+
+def _by_frame_and_tip(calibration: Calibration, data: Measurements, flange_from_tool: Floats) -> Floats:
+    """Derivatives (n, 3, 9) of what each row leaves by the frame of the device and by the tip."""
+    turns = calibrated_poses(calibration, data, np.eye(4))[:, :3, :3]
+    points = calibrated_poses(calibration, data, flange_from_tool)[:, :3, 3]
+    return np.concatenate([rigid_motion(points), turns], axis=2)

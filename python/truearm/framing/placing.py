@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import WorkError
-from truearm.framing.identified_frame import IdentifiedFrame, far_rows
+from truearm.framing.agreement import check_agreement, check_places, far_rows
+from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.registration import register
 from truearm.rotations import rigid_motion
 
@@ -14,6 +15,7 @@ Floats = NDArray[np.float64]
 
 FEWEST: Final = 3
 LEAST_SPREAD_M: Final = 1e-3
+LEAST_SHARE: Final = 1e-3
 
 
 def object_from_points(
@@ -34,30 +36,44 @@ def object_from_points(
     Raises:
         WorkError: If there are fewer than three points, or they lie on a line.
     """
-    _check_spread(point_in_object)
     touched = base_from_tool[:, :3, 3]
+    _check_count(point_in_object)
+    _check_spread(point_in_object, LEAST_SHARE * float(np.ptp(point_in_object, axis=0).max()))
+    check_places(touched, point_in_object)
+    _check_spread(point_in_object, LEAST_SPREAD_M)
     none = np.empty((0, 3, 3))
     transform = register(point_in_object, touched, none, none, 0.0)
     residuals = touched - point_in_object @ transform[:3, :3].T - transform[:3, 3]
     freedom = residuals.size - 6
     noise = float(np.sqrt(np.square(residuals).sum() / freedom))
-    jacobian = rigid_motion(point_in_object @ transform[:3, :3].T).reshape(-1, 6)
-    pseudo_inverse = np.linalg.pinv(jacobian)
+    jacobian = rigid_motion(point_in_object @ transform[:3, :3].T)
+    notices = far_rows(residuals, jacobian, rows)
+    check_agreement(noise, notices)
+    pseudo_inverse = np.linalg.pinv(jacobian.reshape(-1, 6))
     covariance = noise**2 * pseudo_inverse @ pseudo_inverse.T
     if tip_covariance is not None:
         gain = pseudo_inverse @ base_from_tool[:, :3, :3].reshape(-1, 3)
         covariance = covariance + gain @ tip_covariance @ gain.T
     what = f"{len(touched)} points of it"
-    notices = tuple(far_rows(residuals, rows, noise, freedom))
-    return IdentifiedFrame("object", transform, covariance, residuals, rows, noise, freedom, what, notices)
+    return IdentifiedFrame(
+        "object", transform, covariance, residuals, rows, noise, freedom, what, tuple(notices)
+    )
 
 
-def _check_spread(points: Floats) -> None:
+def _check_count(points: Floats) -> None:
+    if len(points) < FEWEST:
+        raise _too_little(f"{len(points)} points")
+
+
+def _check_spread(points: Floats, least_m: float) -> None:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) / np.sqrt(len(points))
-    if len(points) < FEWEST or spread[1] < LEAST_SPREAD_M:
-        what = f"{len(points)} points" if len(points) < FEWEST else f"the {len(points)} points lie on a line"
-        raise WorkError(
-            what,
-            rule="Three points that span a plane tell where an object is",
-            way_out="Touch points far from each other, some more than three",
-        )
+    if spread[1] <= least_m:
+        raise _too_little(f"the {len(points)} points lie on a line")
+
+
+def _too_little(what: str) -> WorkError:
+    return WorkError(
+        what,
+        rule="Three points that span a plane tell where an object is",
+        way_out="Touch points far from each other, some more than three",
+    )

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import WorkError
-from truearm.framing.identified_frame import IdentifiedFrame, far_rows
+from truearm.framing.agreement import check_agreement, far_rows
+from truearm.framing.identified_frame import IdentifiedFrame
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def tool_from_touches(
         raise WorkError(
             f"{len(point)} touches at {len(names)} points",
             rule=f"One point is touched at least {FEWEST} times, and no point once",
-            way_out='Name the point of each touch in a column "point" where several were touched',
+            way_out='Name the point of each touch in a column "group" where several were touched',
         )
     turns, origins = base_from_flange[:, :3, :3], base_from_flange[:, :3, 3]
     apart, shifts = _without_points(turns, number), _without_points(origins, number)
@@ -54,13 +55,23 @@ def tool_from_touches(
     residuals = np.einsum("nij,j->ni", apart, tip) + shifts
     freedom = residuals.size - 3 - 3 * len(names)
     noise = float(np.sqrt(np.square(residuals).sum() / freedom))
+    notices = far_rows(residuals, _by_tip_and_points(turns, number), rows)
+    check_agreement(noise, notices)
     covariance = np.zeros((6, 6))
     covariance[:3, :3] = noise**2 * np.linalg.inv(stacked.T @ stacked)
     transform = np.eye(4)
     transform[:3, :3], transform[:3, 3] = orientation, tip
     what = f"{len(point)} touches of {'one point' if len(names) == 1 else f'{len(names)} points'}"
-    notices = tuple(far_rows(residuals, rows, noise, freedom))
-    return IdentifiedFrame("tool", transform, covariance, residuals, rows, noise, freedom, what, notices)
+    return IdentifiedFrame(
+        "tool", transform, covariance, residuals, rows, noise, freedom, what, tuple(notices)
+    )
+
+
+def _by_tip_and_points(turns: Floats, number: NDArray[np.int64]) -> Floats:
+    """Derivatives (n, 3, 3 + 3 P) of what each touch leaves by the tip and by the points."""
+    of_points = np.eye(int(number.max()) + 1)[number]
+    by_points = np.einsum("np,ij->nipj", of_points, -np.eye(3)).reshape(len(turns), 3, -1)
+    return np.concatenate([turns, by_points], axis=2)
 
 
 def _without_points(values: Floats, number: NDArray[np.int64]) -> Floats:

@@ -1,0 +1,17 @@
+"""Where the calibrated arm puts a tool in measured rows."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.fitting import feature_values
+from truearm.measurements import Measurements
+
+Floats = NDArray[np.float64]
+
+
+def calibrated_poses(calibration: Calibration, data: Measurements, flange_from_tool: Floats) -> Floats:
+    """base_from_tool (n, 4, 4) of the calibrated arm."""
+    names = calibration.options.features
+    features = dict(zip(names, feature_values(data, names).T, strict=True))
+    return calibration.pose(data.readings, tool=flange_from_tool, features=features or None)
