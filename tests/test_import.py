@@ -62,7 +62,8 @@ def test_units_and_columns(tmp_path: Path) -> None:
 def test_units_behind_columns_come_first(tmp_path: Path) -> None:
     path = write(tmp_path, PLAIN)
     table = import_table(path, plan(columns={**COLUMNS, "q2": "J2:mm"}))
-    np.testing.assert_array_equal(table["q2"], [0.045, 0.0])
+    assert list(table.columns) == ["q1", "q2_m", "x", "y", "z"]
+    np.testing.assert_array_equal(table["q2_m"], [0.045, 0.0])
 
 
 def test_columns_with_our_names_need_no_mapping(tmp_path: Path) -> None:
@@ -92,7 +93,7 @@ def test_other_encodings(tmp_path: Path) -> None:
     path = write(tmp_path, PLAIN.replace("J1", "J1 [°]"), "latin-1")
     columns = {**COLUMNS, "q1": "J1 [°]"}
     assert len(import_table(path, plan(columns=columns, encoding="latin-1"))) == 2
-    with pytest.raises(InputError, match="not UTF-8"):
+    with pytest.raises(InputError, match="line 1 holds bytes that are not UTF-8. .*--encoding cp1252"):
         import_table(path, plan(columns=columns))
     with pytest.raises(UsageError, match='"klingon" is no known encoding'):
         import_table(path, plan(columns=columns, encoding="klingon"))
@@ -201,6 +202,25 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "page": ("<html></html>", {}, "an HTML page"),
     "empty": ("", {}, "the file is empty"),
     "NaN": (PLAIN.replace("1500", "nan"), {}, '"px" holds NaN or infinite values in row 2'),
+    "angle as a length": (
+        PLAIN,
+        {"columns": {**COLUMNS, "x": "px:deg"}},
+        'column "x" is said to be in deg: "px:deg". "x" is in m or mm. Write --map x=COLUMN:mm',
+    ),
+    "angle in a header": ("q1_deg,x_deg,y_mm,z_mm\n1,2,3,4\n", {"columns": {}}, '"x" is said to be in deg'),
+    "unit of a word": (PLAIN, {"keep": {}, "columns": {**COLUMNS, "group": "J1:mm"}}, '"group" has no unit'),
+    "points and commas": (
+        PLAIN.replace(",", ";").replace("1000", "1,234.5"),
+        {"delimiter": ";"},
+        'holds "1,234.5". A number has one mark.*without marks between thousands',
+    ),
+    "points with decimal commas": (
+        PLAIN.replace(",", ";").replace("1000", "1,234.5"),
+        {"delimiter": ";", "decimal": ","},
+        "no points. Write the numbers without marks between thousands.$",
+    ),
+    "joint unit": (PLAIN, {"joint_unit": "grad"}, '--joint-unit: "grad" is not known. Either rad or deg'),
+    "decimal mark": (PLAIN, {"decimal": ";"}, '--decimal: ";" is not known'),
     "no position": (PLAIN, {"columns": {"q1": "J1"}}, "No position x, y, z"),
 }
 
@@ -208,8 +228,9 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
 @pytest.mark.parametrize("case", BAD)
 def test_wrong_plans_are_explained(tmp_path: Path, case: str) -> None:
     text, changes, message = BAD[case]
+    path = write(tmp_path, text)
     with pytest.raises(InputError, match=message):
-        import_table(write(tmp_path, text), plan(**changes))
+        import_table(path, plan(**changes))
 
 
 @pytest.mark.parametrize(

@@ -155,6 +155,15 @@ def test_it_is_switched_off(client):
     assert answer["q"] == HOME
 
 
+def test_an_order_alone_is_no_set_point(client):
+    nothing = {"id": 1, "phase": "off", "gain": 0.0, "lag": 0.0, "fault": "there was no set-point yet"}
+    assert client.ask({"switch": "on", "id": 1}) == nothing
+    before = settle(client, {"q": HOME})
+    answer = client.ask({"switch": "on"})
+    assert answer == {key: value for key, value in before.items() if key != "q"}
+    assert client.ask({"q": HOME})["q"] == before["q"]
+
+
 @pytest.mark.parametrize(
     ("line", "words"),
     [
@@ -170,6 +179,8 @@ def test_it_is_switched_off(client):
         (b'{"q": [1, 2, 3, 4, 5, 1' + b"0" * 5000 + b"]}\n", "no JSON"),
         (b'{"q": null, "q_deg": null}\n', "not both"),
         (b'{"switch": "maybe"}\n', "on"),
+        (b'{"switch": null}\n', 'switch is "on" or "off"'),
+        (b'{"q": null, "switch": null}\n', 'switch is "on" or "off"'),
         (b'{"q": null, "id": {"a": 1}}\n', "id is a number"),
         (b'{"other": 1}\n', "not known"),
         (b'{"q": "' + b"x" * 20000 + b'"}\n', "longer than"),

@@ -42,8 +42,8 @@ def read_text(path: Path) -> str:
     return decode_text(read_bytes(path), where=str(path))
 
 
-def decode_text(content: bytes, *, where: str) -> str:
-    """`content` as UTF-8 text.
+def decode_text(content: bytes, *, where: str, way_out: str = "Save it as UTF-8") -> str:
+    """`content` as UTF-8 text; `way_out` is said of text in another encoding.
 
     Raises:
         InputError: If it is not text; says what it is where that can be told from its first bytes.
@@ -52,7 +52,7 @@ def decode_text(content: bytes, *, where: str) -> str:
         if content.startswith(signature):
             raise InputError(f"this is {kind}, not text", where=where, way_out="Export it as text")
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InputError("this is UTF-16 text", where=where, way_out="Save it as UTF-8")
+        raise InputError("this is UTF-16 text", where=where, way_out=way_out)
     if b"\x00" in content:
         raise InputError("this is binary data, not text", where=where)
     try:
@@ -60,7 +60,7 @@ def decode_text(content: bytes, *, where: str) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError(
-            f"line {line} holds bytes that are not UTF-8", where=where, way_out="Save it as UTF-8"
+            f"line {line} holds bytes that are not UTF-8", where=where, way_out=way_out
         ) from None
 
 

@@ -21,6 +21,11 @@ Floats = NDArray[np.float64]
 
 UNITS: Final = LENGTH_UNITS + ANGLE_UNITS
 DECIMAL_MARKS: Final = (".", ",")
+STATE_ENCODING: Final = (
+    "State what it is: --encoding cp1252 for most files of Windows in western Europe, --encoding utf-16 for "
+    '"Unicode text" of a spreadsheet'
+)
+NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
 
 
 @dataclass(frozen=True)
@@ -50,12 +55,25 @@ class ImportPlan:
     skip_lines: int = 0
     encoding: str = "utf-8"
 
+    def __post_init__(self) -> None:
+        choices = (
+            ("--joint-unit", self.joint_unit, ANGLE_UNITS),
+            ("--length-unit", self.length_unit, LENGTH_UNITS),
+            ("--decimal", self.decimal, DECIMAL_MARKS),
+        )
+        for option, value, known in choices:
+            if value is not None and value not in known:
+                raise UsageError(
+                    f'"{value}" is not known', where=option, rule=f"Either {known[0]} or {known[1]}"
+                )
+
 
 def import_table(path: Path, plan: ImportPlan) -> pd.DataFrame:
     """Read a table as `plan` says it is, as a table that Measurements.from_dataframe takes.
 
     Returns:
-        Joints, positions, orientation and what was kept, in rad and m, all rows.
+        Joints, positions, orientation and what was kept, in rad and m, all rows. The column of a joint that
+        is given as a length says so: q3_m.
 
     Raises:
         InputError: If the file is not what the plan says, or the measurements break a rule.
@@ -64,7 +82,8 @@ def import_table(path: Path, plan: ImportPlan) -> pd.DataFrame:
     table = _read(path, plan)
     columns: dict[str, Floats | NDArray[np.str_]] = {}
     for ours, theirs in _all_columns(table, plan).items():
-        columns[ours] = _converted(table, ours, theirs, plan)
+        unit = _unit(table, ours, theirs, plan)
+        columns[_written(ours, unit)] = _converted(table, ours, theirs, plan, unit)
     if plan.rotation is not None:
         columns |= _orientation(table, plan.rotation, plan)
     for ours, theirs in plan.keep.items():
@@ -89,7 +108,7 @@ def _read(path: Path, plan: ImportPlan) -> Table:
     where = str(path)
     content = read_bytes(path)
     if plan.encoding.casefold() in ("utf-8", "utf8"):
-        text = decode_text(content, where=where)
+        text = decode_text(content, where=where, way_out=STATE_ENCODING)
     else:
         text = _decode(content, plan.encoding, where)
     lines = text.splitlines(keepends=True)
@@ -109,7 +128,9 @@ def _decode(content: bytes, encoding: str, where: str) -> str:
     except LookupError:
         raise UsageError(f'"{encoding}" is no known encoding', where="--encoding") from None
     except UnicodeDecodeError as error:
-        raise InputError(f"the text is not {encoding}: {error.reason}", where=where) from None
+        raise InputError(
+            f"the text is not {encoding}: {error.reason}", where=where, way_out=STATE_ENCODING
+        ) from None
 
 
 def _plain_delimiter(text: str, where: str) -> str:
@@ -146,14 +167,40 @@ def _all_columns(table: Table, plan: ImportPlan) -> dict[str, str]:
     return dict(sorted(named.items(), key=lambda item: _order(item[0])))
 
 
-def _converted(table: Table, ours: str, theirs: str, plan: ImportPlan) -> Floats | NDArray[np.str_]:
-    name, unit = _split_unit(table, theirs)
+def _converted(
+    table: Table, ours: str, theirs: str, plan: ImportPlan, unit: str
+) -> Floats | NDArray[np.str_]:
+    name, _ = _split_unit(table, theirs)
     if ours in WORDS:
         return table.texts(name)
     values = _numbers(table, name, plan)
-    if ours in QUATERNION:
-        return values
-    return to_si(values, unit or _stated_unit(ours, plan))
+    return to_si(values, unit) if unit else values
+
+
+def _unit(table: Table, ours: str, theirs: str, plan: ImportPlan) -> str:
+    """Unit of a column; "" where it has none.
+
+    Raises:
+        UsageError: If it is not stated, or is one that no such column has.
+    """
+    _, unit = _split_unit(table, theirs)
+    known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else LENGTH_UNITS
+    if ours in WORDS + QUATERNION:
+        known = ()
+    if unit and unit not in known:
+        kind = f"is in {' or '.join(known)}" if known else "has no unit"
+        raise UsageError(
+            f'column "{ours}" is said to be in {unit}: "{theirs}"',
+            where=table.where,
+            rule=f'"{ours}" {kind}',
+            way_out=f"Write --map {ours}=COLUMN{':' + known[-1] if known else ''}",
+        )
+    return unit or (_stated_unit(ours, plan) if known else "")
+
+
+def _written(ours: str, unit: str) -> str:
+    """Name of a column that is written in SI: joints are angles unless their names say otherwise."""
+    return f"{ours}_m" if unit in LENGTH_UNITS and JOINT.fullmatch(ours) else ours
 
 
 def _stated_unit(ours: str, plan: ImportPlan) -> str:
@@ -192,11 +239,12 @@ def _numbers(table: Table, name: str, plan: ImportPlan) -> Floats:
     cells = table.texts(name)
     pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
     if pointed:
+        cell = cells[pointed[0] - 1]
         raise InputError(
-            f'column "{name}" holds "{cells[pointed[0] - 1]}" in row {pointed[0]}',
+            f'column "{name}" holds "{cell}" in row {pointed[0]}',
             where=table.where,
             rule="With a decimal comma there must be no points",
-            way_out="Write numbers without marks between thousands, or leave out --decimal",
+            way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out --decimal",
         )
     return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count).numbers(name)
 
@@ -208,10 +256,12 @@ def _numbers_or_hint(table: Table, name: str) -> Floats:
         commas = [cell for cell in table.texts(name) if "," in cell]
         if not commas:
             raise
+        both = "." in commas[0] or commas[0].count(",") > 1
         raise UsageError(
             f'column "{name}" holds "{commas[0]}"',
             where=table.where,
-            way_out='If this is a decimal comma, give --decimal ","',
+            rule="A number has one mark, the decimal one" if both else "",
+            way_out=NO_THOUSANDS if both else 'If this is a decimal comma, give --decimal ","',
         ) from error
 
 

@@ -95,7 +95,7 @@ class Table:
 
     def _no_number(self, name: str, row: int, cell: str) -> InputError:
         way_out = "Correct the cell"
-        if "," in cell:
+        if "," in cell and "." not in cell:
             way_out = 'If this is a decimal comma, convert the file with: truearm import --decimal ","'
         return InputError(
             f'column "{name}" holds "{cell}" in row {row + 1}',

@@ -72,6 +72,9 @@ class CorrectionStream:
 
     Where a set-point is missing, not finite, late or refused, the last correction is held for a moment and
     then ramped down, until good set-points come again.
+
+    Attributes:
+        last: What became of the latest set-point.
     """
 
     def __init__(
@@ -91,6 +94,7 @@ class CorrectionStream:
             self._core = Stream(compensator.corrector(tool), (options or StreamOptions()).core())
         except CoreError as error:
             raise UsageError(str(error)) from None
+        self.last = self.step(None, 0.0)
 
     def switch(self, on: bool) -> None:
         """Ramp the correction up or down from now on."""
@@ -104,4 +108,5 @@ class CorrectionStream:
             elapsed_s: Time since the step before.
         """
         readings = None if q is None else np.ascontiguousarray(q, dtype=np.float64)
-        return Streamed(*self._core.step(readings, self._features, elapsed_s))
+        self.last = Streamed(*self._core.step(readings, self._features, elapsed_s))
+        return self.last

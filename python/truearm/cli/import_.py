@@ -55,7 +55,6 @@ def command(
     from truearm.importing import ImportPlan, import_table, unused_columns
     from truearm.rotation_columns import RotationColumns
 
-    _check_choices(joint_unit, length_unit, decimal)
     refuse_own_input(output, raw)
     plan = ImportPlan(
         columns=_pairs(columns or [], "--map"),
@@ -112,14 +111,3 @@ def _delimiter(text: str | None) -> str | None:
             rule=f"One mark, such as {quoted_delimiter(';')} or tab",
         )
     return mark
-
-
-def _check_choices(joint_unit: str | None, length_unit: str | None, decimal: str | None) -> None:
-    choices = (
-        ("--joint-unit", joint_unit, ("deg", "rad")),
-        ("--length-unit", length_unit, ("mm", "m")),
-        ("--decimal", decimal, (".", ",")),
-    )
-    for option, value, known in choices:
-        if value is not None and value not in known:
-            raise UsageError(f'"{value}" is not known', where=option, rule=f"Either {known[0]} or {known[1]}")

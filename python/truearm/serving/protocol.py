@@ -131,10 +131,11 @@ def _number(entry: Any) -> float:  # noqa: ANN401
 
 
 def _switch(content: dict[str, Any]) -> bool | None:
-    value = content.get("switch")
-    if value not in (None, "on", "off"):
+    if "switch" not in content:
+        return None
+    if content["switch"] not in ("on", "off"):
         raise MalformedError('switch is "on" or "off"')
-    return None if value is None else value == "on"
+    return bool(content["switch"] == "on")
 
 
 def _identity(value: Any) -> str | int | float | None:  # noqa: ANN401

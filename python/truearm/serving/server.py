@@ -132,9 +132,10 @@ class Server:
             request = read_request(line, self._units)
             if request.switch is not None:
                 stream.switch(request.switch)
-            streamed = stream.step(request.q, 0.0 if before is None else now - before)
-            before = now
-            await self._send(writer, answer(request, streamed, self._units))
+            if request.is_set_point:
+                stream.step(request.q, 0.0 if before is None else now - before)
+                before = now
+            await self._send(writer, answer(request, stream.last, self._units))
             # A client with many lines in its buffer must not keep the others waiting.
             await asyncio.sleep(0)
 
