@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -16,6 +17,7 @@ from yourdfpy import URDF
 
 import truearm as ta
 from truearm import Robot
+from truearm.cli import main
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.exporting import FORMATS, Options, constant_robot, export
@@ -196,6 +198,16 @@ def test_a_tool_of_the_robot_file_follows_the_flange(tmp_path):
     assert np.abs(Robot.load(f"{path}#tool0").pose(q) - constant_robot(calibration).pose(q)).max() < 1e-9
 
 
+def test_the_command_that_is_named_after_correcting_a_urdf_works(hand_made, tmp_path, monkeypatch, capsys):
+    path, calibration = hand_made
+    monkeypatch.chdir(tmp_path)
+    calibration.save("arm.calib")
+    assert main(["export", "arm.calib", "--to", "urdf", "--urdf", f"{path}#mount", "-o", "new.urdf"]) == 0
+    (named,) = re.findall(r"truearm (robots .*)", capsys.readouterr().out)
+    assert named == "robots new.urdf#world,mount"
+    assert main(named.split()) == 0
+
+
 def test_a_corrected_urdf_keeps_all_but_the_chain(hand_made):
     path, calibration = hand_made
     made = export(calibration, "urdf", options=Options(urdf=f"{path}#mount"))
@@ -345,6 +357,31 @@ def test_samples_are_the_calibration_at_their_readings(variable, tmp_path):
     assert np.allclose(table["a2_mm"], 1e3 * added[:, 1, 2], atol=1e-6)
     assert np.allclose(table["std_mm"], 1e3 * variable.position_std(q, tool=np.eye(4)).max(axis=1), atol=1e-6)
     assert table["theta3_deg"].std() > 0.0
+
+
+def test_samples_say_where_they_were_taken_and_what_their_columns_are(variable):
+    made = export(variable, "field-csv", options=Options(grid="q2=-90:0:4,q5=30", with_std=True))
+    comments = " ".join(line[2:] for line in made.text.splitlines() if line.startswith("#"))
+    assert "q2 from -90 to 0 deg, 4 readings; q3 = " in comments
+    assert "q5 = 30 deg" in comments
+    header = made.text.splitlines()[comments_of(made.text)].split(",")
+    for name in header[6:14]:
+        assert name in comments
+    assert "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)" in comments
+    assert "std_mm" not in export(variable, "field-csv", options=Options(grid="q1=3")).text
+
+
+def comments_of(text):
+    return sum(line.startswith("#") for line in text.splitlines())
+
+
+def test_samples_say_at_which_features(tmp_path):
+    robot = ta.Robot.load("ur10")
+    arm = VirtualArm(robot, seed=3)
+    table = arm.measure_table(arm.poses(60)).assign(warmth=np.linspace(20.0, 30.0, 60))
+    calibration = ta.calibrate(robot, ta.Measurements.from_dataframe(table), features=("warmth",))
+    made = export(calibration, "field-csv", options=Options(grid="q1=3", features={"warmth": 21.5}))
+    assert "# Features: warmth 21.5." in made.text
 
 
 def test_without_a_grid_samples_cover_the_measured_readings(variable):

@@ -125,7 +125,8 @@ def command(
             tell=told_progress(),
         )
     warn(done.notices)
-    paths = [] if dry_run or output is None else done.save(_place(output))
+    writes = output is not None and not dry_run and bool(done.changed.any())
+    paths = done.save(_place(str(output))) if writes else []
     if report is not None:
         content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
         write_whole(report, f"{content}\n")
@@ -135,8 +136,11 @@ def command(
         print_rewritten(done, dry_run=dry_run)
         for path in paths:
             say(f"Written: {path}")
-        options = given_options(context, "dry_run", "output", "report", "as_json")
-        _suggest(f"{calibration} {program}{options}", calibration, dry_run=dry_run)
+        if done.changed.any():
+            options = given_options(context, "dry_run", "output", "report", "as_json")
+            _suggest(f"{calibration} {program}{options}", calibration, dry_run=dry_run)
+    if not dry_run:
+        done.refuse_unchanged()
 
 
 def _place(output: str) -> Path:

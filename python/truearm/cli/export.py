@@ -86,4 +86,4 @@ def command(
         say(f"{made.rows} samples.")
     say(f"Written: {output}")
     if to in READ_AS_ROBOT:
-        suggest(f"truearm robots {output}")
+        suggest(f"truearm robots {output}{f'#{made.chain}' if made.chain else ''}")

@@ -57,6 +57,7 @@ class Exported:
         difference_m: Largest difference between its forward kinematics, read again, and the calibration's
             constant part, m or rad; None for samples.
         rows: Number of samples; None for constants.
+        chain: "BASE,TIP", the links between which the arm is, of a URDF that was corrected; else "".
     """
 
     format: Format
@@ -64,6 +65,7 @@ class Exported:
     notes: tuple[str, ...]
     difference_m: float | None
     rows: int | None = None
+    chain: str = ""
 
 
 def export(
@@ -119,15 +121,17 @@ def _samples(calibration: Calibration, options: Options) -> Exported:
     axes = grid_axes(calibration, options.grid)
     table = grid_table(calibration, axes, features=options.features, with_std=options.with_std)
     note = "Samples of a field are not the field: between them it is not linear"
-    return Exported("field-csv", grid_text(table, calibration), (note,), None, len(table))
+    text = grid_text(table, calibration, axes, options.features)
+    return Exported("field-csv", text, (note,), None, len(table))
 
 
 def _constants(calibration: Calibration, chosen: Format, options: Options) -> Exported:
     robot, nominal = constant_robot(calibration), calibration.robot
-    notes = field_is_lost(calibration, chosen)
+    notes, chain = field_is_lost(calibration, chosen), ""
     if chosen == "urdf":
         notes += coupling_is_lost(robot)
-        text, difference = urdf_text(robot, nominal, options.urdf, notes)
+        text, difference, names = urdf_text(robot, nominal, options.urdf, notes)
+        chain = f"{names.base_link},{names.tip_link}" if options.urdf else ""
     elif chosen == "ur-yaml":
         notes = [ONLY_ROS, *notes]
         stated = options.kinematics_hash or _own_hash(calibration)
@@ -138,7 +142,7 @@ def _constants(calibration: Calibration, chosen: Format, options: Options) -> Ex
         makers = {"dh-json": json_text, "dh-csv": csv_text}
         maker = makers.get(chosen)
         text, difference = toml_text(robot, notes) if maker is None else maker(robot, nominal, notes)
-    return Exported(chosen, text, tuple(notes), difference)
+    return Exported(chosen, text, tuple(notes), difference, chain=chain)
 
 
 def _own_hash(calibration: Calibration) -> str:

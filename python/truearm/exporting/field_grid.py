@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from truearm.calibration import Calibration
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.exporting.losses import as_comments
+from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import UNLIMITED, flange_poses
 from truearm.parameters import KINDS
 from truearm.units import MM_PER_METRE, to_si
@@ -26,6 +26,7 @@ AXIS: Final = re.compile(r"q(\d+)=([^:,]+)(?::([^:,]+):(\d+))?")
 SHIFTS: Final = ("dx_mm", "dy_mm", "dz_mm", "rx_mrad", "ry_mrad", "rz_mrad")
 DISPLAYED: Final = {"revolute": "deg", "prismatic": "mm"}
 DIGITS: Final = "%.9g"
+SHOWN: Final = ".6g"
 
 
 @dataclass(frozen=True)
@@ -107,16 +108,55 @@ def grid_table(
     return pd.DataFrame(table | _corrections(added))
 
 
-def grid_text(table: pd.DataFrame, calibration: Calibration) -> str:
-    """The table as CSV with comments on what it is."""
+def grid_text(
+    table: pd.DataFrame,
+    calibration: Calibration,
+    axes: Sequence[Axis],
+    features: Mapping[str, ArrayLike] | None = None,
+) -> str:
+    """The table as CSV with comments on what it is, where it was sampled, and what each column is."""
+    stated = [f"{name} {np.asarray(value):{SHOWN}}" for name, value in (features or {}).items()]
     notes = [
         f"{calibration.robot.name}, calibrated by truearm {calibration.version}: samples of what varies",
-        "dx to rz lead from the nominal flange to the calibrated one, in the base frame: mm, and "
-        "the rotation vector in mrad. The other columns are added to the nominal D-H parameters, and "
-        "hold the constant part too",
+        f"Sampled at {'; '.join(_in_words(calibration, axes))}, the last one running fastest",
+        *([f"Features: {', '.join(stated)}"] if stated else []),
+        *_columns_in_words(list(table.columns), calibration),
         "Between samples the field is not linear; beyond the readings it was learnt at it is a guess",
     ]
     return as_comments(notes) + table.to_csv(index=False, float_format=DIGITS, lineterminator="\n")
+
+
+def _in_words(calibration: Calibration, axes: Sequence[Axis]) -> list[str]:
+    """The readings of each joint: "q2 -90 to 0 deg in 4 steps"."""
+    units = [DISPLAYED[kind] for kind in calibration.robot.joints]
+    return [
+        f"q{number} = {axis.low:{SHOWN}} {unit}"
+        if axis.count == 1
+        else f"q{number} from {axis.low:{SHOWN}} to {axis.high:{SHOWN}} {unit}, {axis.count} readings"
+        for number, (axis, unit) in enumerate(zip(axes, units, strict=True), start=1)
+    ]
+
+
+def _columns_in_words(columns: Sequence[str], calibration: Calibration) -> list[str]:
+    """What each kind of column is; the unit of each stands in its name."""
+    count = calibration.robot.joint_count
+    said = [
+        f"q1 to q{count}: joint readings, as the controller shows them",
+        "dx_mm, dy_mm, dz_mm: from the nominal flange to the calibrated one, along the axes of the base",
+        "rx_mrad, ry_mrad, rz_mrad: rotation vector from the nominal flange to the calibrated one, along the "
+        "axes of the base",
+    ]
+    if "std_mm" in columns:
+        said.append("std_mm: the largest standard deviation of the three coordinates of the flange")
+    first = next((name for name in columns[count + len(SHIFTS) :] if name != "std_mm"), None)
+    if first is not None:
+        order = LINK_ORDER[calibration.robot.convention]
+        said.append(
+            f"{first} and so on: what is added to that parameter of the nominal D-H table there, the constant "
+            f"part with what varies; the number is the link's, and a link is {order}. A parameter without a "
+            "column is the nominal one everywhere"
+        )
+    return said
 
 
 def _axis(text: str) -> tuple[int, Axis]:

@@ -25,6 +25,11 @@ FORMAT_WORDS: Final = {
     "dh-csv": "a D-H table",
 }
 
+LINK_ORDER: Final = {
+    "standard": "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)",
+    "modified": "Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d)",
+}
+
 
 def field_is_lost(calibration: Calibration, export_format: str) -> list[str]:
     """That the field is not in a file of constants, with the held-out errors that this makes."""

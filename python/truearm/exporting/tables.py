@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.exporting.losses import as_comments
+from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import checked, flange_poses
 from truearm.parameters import KINDS
 from truearm.robot import Robot
@@ -70,10 +70,7 @@ def _read_table(text: str) -> list[list[float]]:
 
 
 def _frame_notes(robot: Robot) -> list[str]:
-    order = {
-        "standard": "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)",
-        "modified": "Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d)",
-    }[robot.convention]
+    order = LINK_ORDER[robot.convention]
     notes = [f"{robot.name}, {robot.source}", f"Each row is A = {order}, {robot.convention} convention"]
     for name in ("base", "flange", "tool"):
         transform = getattr(robot, name)

@@ -18,8 +18,10 @@ from truearm.urdf_names import UrdfNames
 NOMINAL_WITHIN_M: Final = 1e-4
 
 
-def urdf_text(robot: Robot, nominal: Robot, original: str | None, notes: list[str]) -> tuple[str, float]:
-    """Text of a URDF, and how far its forward kinematics are from the robot's, m.
+def urdf_text(
+    robot: Robot, nominal: Robot, original: str | None, notes: list[str]
+) -> tuple[str, float, UrdfNames]:
+    """Text of a URDF, how far its forward kinematics are from the robot's, m, and the arm's names in it.
 
     Args:
         robot: The calibrated arm.
@@ -47,7 +49,7 @@ def urdf_text(robot: Robot, nominal: Robot, original: str | None, notes: list[st
     difference = checked(
         robot, lambda q: again.flange_chain.pose(np.ascontiguousarray(q @ to_urdf.T)), "the URDF"
     )
-    return text, difference
+    return text, difference, names
 
 
 def _names(robot: Robot) -> UrdfNames:

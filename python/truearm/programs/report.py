@@ -9,6 +9,8 @@ import numpy as np
 
 from truearm.programs.program import Listed, Program
 from truearm.programs.rewriting import Rewritten, listed_target
+from truearm.programs.tables import Motion
+from truearm.programs.uses import target_count
 
 FORMAT = 1
 
@@ -36,8 +38,8 @@ def report_of(done: Rewritten, outputs: Sequence[Path] = ()) -> dict[str, Any]:
 def counts(done: Rewritten) -> dict[str, int]:
     """How many targets were changed, kept and listed."""
     return {
-        "targets": len(done.program.targets),
-        "moves": len(done.program.moves),
+        "targets": target_count(done.program),
+        "moves": int((done.program.moves.motion != Motion.NONE).sum()),
         "changed": int(done.changed.sum()),
         "kept": len(done.kept),
         "listed": len(done.listed),

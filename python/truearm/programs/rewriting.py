@@ -21,7 +21,7 @@ from truearm.programs.program import Language, Listed, Program
 from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, run_of
-from truearm.programs.uses import Uses
+from truearm.programs.uses import Uses, target_count
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -148,6 +148,19 @@ class Rewritten:
         """The same with facts for the report, and more notices."""
         return replace(self, facts=facts, notices=(*notices, *self.notices))
 
+    def refuse_unchanged(self) -> None:
+        """Raise WorkError where no target was changed: a copy would pass for a compensated program."""
+        if self.changed.any():
+            return
+        count = target_count(self.program)
+        raise WorkError(
+            f"nothing was changed: {f'none of {count} targets can be' if count else 'it has no targets'}"
+            f"{' corrected with certainty' if count else ''}",
+            where=str(self.program.sources[0].path),
+            rule="A program is written only where something in it is corrected",
+            way_out="--dry-run lists each target with the reason" if count else "",
+        )
+
     def save(self, output: str | Path) -> list[Path]:
         """Write the program's files, each beside its place and then moved there; their paths.
 
@@ -158,7 +171,9 @@ class Rewritten:
         Raises:
             UsageError: If it is the program itself.
             InputError: If a directory does not exist or may not be written to.
+            WorkError: If no target was changed.
         """
+        self.refuse_unchanged()
         paths = output_paths(self.program, Path(output))
         write_outputs(paths, self.contents)
         return paths
@@ -271,7 +286,7 @@ class _State:
         listed = [self._listed(target, reason) for target, reason in sorted(self.refused.items())]
         if choices.on_refusal == "stop":
             raise WorkError(
-                f"{len(listed)} of {len(self.program.targets)} targets cannot be corrected:\n"
+                f"{len(listed)} of {target_count(self.program)} targets cannot be corrected:\n"
                 + describe(self.program, listed),
                 way_out="Change them or the limits; --on-refusal keep-nominal leaves such targets as "
                 f"they are where that makes no step{self._why_unsure()}",
@@ -307,7 +322,7 @@ class _State:
         words: dict[int, list[Words]] = {}
         for file, offset, line in steps.lines:
             words.setdefault(file, []).append((offset, offset, line.encode("latin-1")))
-        if mark:
+        if mark and changed.any():
             for number, source in enumerate(self.program.sources):
                 at, line = self.program.language.mark(source, mark)
                 words.setdefault(number, []).append((at, at, line.encode("latin-1", "replace")))

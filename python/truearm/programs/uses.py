@@ -71,6 +71,13 @@ class Uses:
         )
 
 
+def target_count(program: Program) -> int:
+    """How many targets a program has; readings that a pose is only looked for next to are none."""
+    real = program.moves.motion != Motion.NONE
+    seeds = np.setdiff1d(program.moves.target[~real], program.moves.target[real])
+    return len(program.targets) - len(seeds)
+
+
 def _all_or(chosen: Bools) -> slice | Bools:
     """Chosen rows; all of them as a slice, which copies nothing."""
     return slice(None) if chosen.all() else chosen
