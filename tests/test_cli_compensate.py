@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from tests.programs_rig import ABB, obeyed, read
@@ -169,10 +170,52 @@ def test_a_broken_program_names_line_and_column(capsys):
 def test_keep_nominal_where_that_makes_no_step(capsys):
     Path("far.mod").write_bytes(module(FAR, points()).encode("latin-1"))
     words = ["compensate", "arm.calib", "far.mod", "-o", "kept.mod", "--controller", "nominal"]
-    assert main([*words, "--largest-mm", "0.001", "--on-refusal", "keep-nominal"]) == 0
+    assert main([*words, "--largest-mm", "1.35", "--on-refusal", "keep-nominal"]) == 0
     assert "Kept after a refusal:" in capsys.readouterr().out
-    changed = Path("kept.mod").read_bytes().decode("latin-1").splitlines()
-    assert len(changed) == len(module(FAR, points()).splitlines()) + 1, "only the mark is new"
+    before = module(FAR, points()).splitlines()
+    after = Path("kept.mod").read_bytes().decode("latin-1").splitlines()
+    assert len(after) == len(before) + 1
+    assert len(set(after) - set(before)) == 2, "the mark and jHome"
+
+
+def test_where_nothing_is_changed_nothing_is_written_that_says_it_was(capsys):
+    Path("still.mod").write_bytes(module(FAR, points()).encode("latin-1"))
+    words = ["compensate", "arm.calib", "still.mod", "--controller", "nominal", "--largest-mm", "0.001"]
+    words += ["--on-refusal", "keep-nominal", "--report", "still.json"]
+    assert main([*words, "-o", "new/"]) == 1
+    printed = capsys.readouterr()
+    assert "nothing was changed: none of 6 targets" in printed.err
+    assert "RAPID: 0 of 6 targets changed, 2 kept" in printed.out
+    assert "Run it slowly" not in printed.out
+    assert not Path("new").exists()
+    assert json.loads(Path("still.json").read_text())["outputs"] == []
+    assert main([*words, "--dry-run"]) == 0
+    assert "RAPID: 0 of 6 targets would be changed" in capsys.readouterr().out
+    done = ta.compensate_program(
+        "still.mod",
+        ta.Compensator(ta.Calibration.load("arm.calib"), limits=ta.Limits(largest_mm=0.001)),
+        controller="nominal",
+        choices=ta.Choices(on_refusal="keep-nominal"),
+    )
+    assert done.contents == (Path("still.mod").read_bytes(),)
+    with pytest.raises(ta.WorkError, match="only where something in it is corrected"):
+        done.save("still2.mod")
+
+
+def test_seeds_of_a_path_are_no_targets(arm, capsys):
+    q = arm.poses(3, seed=5)
+    poses = ABB.pose(q)
+    xyz = 1e3 * poses[:, :3, 3]
+    table = np.hstack([xyz, Rotation.from_matrix(poses[:, :3, :3]).as_rotvec(), q])
+    names = "x_mm,y_mm,z_mm,rx,ry,rz,q1,q2,q3,q4,q5,q6"
+    np.savetxt("seeds.csv", table, delimiter=",", header=names, comments="", fmt="%.9f")
+    words = ["compensate", "arm.calib", "seeds.csv", "--controller", "nominal", "-o", "seeds_out.csv"]
+    assert main([*words, "--report", "seeds.json"]) == 0
+    assert "CSV path: 3 of 3 targets changed, 0 kept" in capsys.readouterr().out
+    counts = json.loads(Path("seeds.json").read_text())["counts"]
+    assert (counts["targets"], counts["moves"], counts["changed"]) == (3, 3, 3)
+    assert main([*words[:-1], "x.csv", "--largest-mm", "0.001"]) == 1
+    assert "3 of 3 targets cannot be corrected" in capsys.readouterr().err
 
 
 def test_a_directory_takes_files_of_the_same_names():

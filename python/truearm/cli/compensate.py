@@ -125,11 +125,7 @@ def command(
             tell=told_progress(),
         )
     warn(done.notices)
-    writes = output is not None and not dry_run and bool(done.changed.any())
-    paths = done.save(_place(str(output))) if writes else []
-    if report is not None:
-        content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
-        write_whole(report, f"{content}\n")
+    paths = _written(done, None if dry_run else output, report)
     if as_json:
         print_json(report_of(done, paths))
     else:
@@ -141,6 +137,17 @@ def command(
             _suggest(f"{calibration} {program}{options}", calibration, dry_run=dry_run)
     if not dry_run:
         done.refuse_unchanged()
+
+
+def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> list[Path]:
+    """The program's files, where there is something to write, and the report."""
+    from truearm.programs.report import report_of
+
+    paths = [] if output is None or not done.changed.any() else done.save(_place(output))
+    if report is not None:
+        content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
+        write_whole(report, f"{content}\n")
+    return paths
 
 
 def _place(output: str) -> Path:

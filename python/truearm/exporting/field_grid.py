@@ -152,9 +152,9 @@ def _columns_in_words(columns: Sequence[str], calibration: Calibration) -> list[
     if first is not None:
         order = LINK_ORDER[calibration.robot.convention]
         said.append(
-            f"{first} and so on: what is added to that parameter of the nominal D-H table there, the constant "
-            f"part with what varies; the number is the link's, and a link is {order}. A parameter without a "
-            "column is the nominal one everywhere"
+            f"{first} and so on: what is added to that parameter of the nominal D-H table there, "
+            "the constant part and what varies together; the number is the link's, and a link is "
+            f"{order}. A parameter without a column is the nominal one everywhere"
         )
     return said
 
