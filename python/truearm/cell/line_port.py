@@ -4,14 +4,39 @@ import re
 import threading
 import time
 from collections import deque
-from typing import Final
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Final, Literal, Self
 
 from truearm.cell.channels import Channel, ConnectionEndedError, open_channel
 from truearm.cell.device_errors import DeviceError, gone, silent, stopped
+from truearm.cell.schema import Frame, Positive, Section
 
 LONGEST_LINE: Final = 65536
 # Devices end lines as they like, and not always as they want them ended: an empty line means nothing.
-END_OF_LINE: Final = re.compile(rb"[\r\n]")
+ENDS: Final = re.compile(rb"[\r\n]")
+TERMINATORS: Final = {"lf": b"\n", "cr": b"\r", "crlf": b"\r\n"}
+
+
+class PortSection(Section):
+    """Keys of every driver whose device speaks in lines."""
+
+    driver: str
+    port: str
+    baud: int = 9600
+    frame: Frame = "8N1"
+    timeout_s: Positive = 2.0
+
+
+class LineSection(PortSection):
+    """Keys of the drivers whose lines stand in the cell file."""
+
+    end_of_line: Literal["lf", "cr", "crlf"] = "lf"
+
+    @property
+    def terminator(self) -> bytes:
+        """What ends a line that is sent."""
+        return TERMINATORS[self.end_of_line]
 
 
 class LinePort:
@@ -43,6 +68,17 @@ class LinePort:
         self._interrupted = threading.Event()
         self._writing = threading.Lock()
 
+    @classmethod
+    def of(cls, device: str, keys: PortSection, *, terminator: bytes = b"\n") -> Self:
+        """The port of a device by the keys of its section; not yet open.
+
+        Args:
+            device: What people call the device.
+            keys: The section.
+            terminator: Of lines that are sent.
+        """
+        return cls(device, keys.port, keys.timeout_s, terminator=terminator, baud=keys.baud, frame=keys.frame)
+
     @property
     def is_open(self) -> bool:
         """Whether there is a connection."""
@@ -64,6 +100,21 @@ class LinePort:
         self._rest = b""
         self._lines.clear()
 
+    @contextmanager
+    def opened(self) -> Iterator[None]:
+        """Open the port for good; closed again only where the work within the block fails.
+
+        Raises:
+            PortUnavailableError: If it cannot be opened.
+            DeviceError: If it is open already.
+        """
+        self.open()
+        try:
+            yield
+        except BaseException:
+            self.close()
+            raise
+
     @property
     def where(self) -> str:
         """Device and port, for messages."""
@@ -82,6 +133,12 @@ class LinePort:
     def resume(self) -> None:
         """Let waits be waits again."""
         self._interrupted.clear()
+
+    def end_waits(self, busy: AbstractContextManager[object]) -> None:
+        """End the wait of the thread that holds the lock `busy`; once it let go, waits are waits again."""
+        self.interrupt()
+        with busy:
+            self.resume()
 
     def send(self, text: str) -> None:
         """Send a line.
@@ -152,7 +209,7 @@ class LinePort:
             raise gone(self.device, self.address, str(error)) from None
         if not data:
             return False
-        *lines, rest = END_OF_LINE.split(self._rest + data)
+        *lines, rest = ENDS.split(self._rest + data)
         self._rest = rest[-LONGEST_LINE:] if rest else rest
         for line in lines:
             if line:

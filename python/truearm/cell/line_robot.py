@@ -2,16 +2,16 @@
 
 import threading
 import time
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import field_validator
 
 from truearm.cell.device_errors import DeviceError, DeviceSilentError
-from truearm.cell.line_port import LinePort
+from truearm.cell.line_port import LinePort, LineSection
 from truearm.cell.patterns import filled, numbers_in, pattern_of
-from truearm.cell.schema import Positive, Section
+from truearm.cell.schema import Positive
 from truearm.errors import InputError
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
@@ -21,8 +21,6 @@ Floats = NDArray[np.float64]
 
 SENDINGS: Final = 4
 THERE_RAD: Final = 2e-3
-END_OF_LINE: Final = {"lf": b"\n", "cr": b"\r", "crlf": b"\r\n"}
-EndOfLine = Literal["lf", "cr", "crlf"]
 
 
 class LineRobot:
@@ -31,15 +29,10 @@ class LineRobot:
     The command is sent, then the robot is asked where it is until it is there; nothing else is believed.
     """
 
-    class Settings(Section):
+    class Settings(LineSection):
         """Keys of [robot] with driver "line"."""
 
         driver: str = "line"
-        port: str
-        baud: int = 9600
-        frame: str = Field(default="8N1", pattern="[78][NEO][12]")
-        end_of_line: EndOfLine = "lf"
-        timeout_s: Positive = 2.0
         motion_timeout_s: Positive = 60.0
         angle_unit: AngleUnit = "deg"
         length_unit: LengthUnit = "mm"
@@ -66,14 +59,7 @@ class LineRobot:
             raise InputError(str(error), where="robot, joints") from None
         units = {"revolute": settings.angle_unit, "prismatic": settings.length_unit}
         self._si = np.array([to_si(1.0, units[kind]) for kind in arm.joints])
-        self._port = LinePort(
-            self.name,
-            settings.port,
-            settings.timeout_s,
-            terminator=END_OF_LINE[settings.end_of_line],
-            baud=settings.baud,
-            frame=settings.frame,
-        )
+        self._port = LinePort.of(self.name, settings, terminator=settings.terminator)
         self._busy = threading.RLock()
 
     @property
@@ -88,13 +74,8 @@ class LineRobot:
 
     def connect(self) -> None:
         """Open the port and ask where the robot is."""
-        with self._busy:
-            self._port.open()
-            try:
-                self._where()
-            except BaseException:
-                self._port.close()
-                raise
+        with self._busy, self._port.opened():
+            self._where()
 
     def move_joints(self, readings: Floats) -> None:
         """See Robot."""

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from truearm.cell.device_errors import DeviceSilentError, silent
-from truearm.cell.line_port import LinePort
-from truearm.cell.line_robot import END_OF_LINE, EndOfLine
+from truearm.cell.line_port import LinePort, LineSection
 from truearm.cell.patterns import numbers_in, pattern_of
 from truearm.cell.reading import Expected, Reading
-from truearm.cell.schema import Positive, Section
+from truearm.cell.schema import Positive
 from truearm.robot import Robot
 from truearm.units import LengthUnit, to_si
 
@@ -29,15 +28,10 @@ class LineSensor:
     settled are averaged. A group `ok` must be 1 for the point to count. All other groups become features.
     """
 
-    class Settings(Section):
+    class Settings(LineSection):
         """Keys of [sensor] with driver "line"."""
 
         driver: str = "line"
-        port: str
-        baud: int = 9600
-        frame: str = Field(default="8N1", pattern="[78][NEO][12]")
-        end_of_line: EndOfLine = "lf"
-        timeout_s: Positive = 2.0
         length_unit: LengthUnit = "mm"
         answer: str
         trigger: str | None = None
@@ -57,14 +51,7 @@ class LineSensor:
         del arm
         self._settings = settings
         self._answer = pattern_of(settings.answer, XYZ)
-        self._port = LinePort(
-            self.name,
-            settings.port,
-            settings.timeout_s,
-            terminator=END_OF_LINE[settings.end_of_line],
-            baud=settings.baud,
-            frame=settings.frame,
-        )
+        self._port = LinePort.of(self.name, settings, terminator=settings.terminator)
         self._busy = threading.RLock()
 
     @property
@@ -79,8 +66,7 @@ class LineSensor:
 
     def connect(self) -> None:
         """Open the port and send the lines of `setup`."""
-        with self._busy:
-            self._port.open()
+        with self._busy, self._port.opened():
             for line in self._settings.setup:
                 self._port.send(line)
 
@@ -108,9 +94,7 @@ class LineSensor:
 
     def stop(self) -> None:
         """See Device."""
-        self._port.interrupt()
-        with self._busy:
-            self._port.resume()
+        self._port.end_waits(self._busy)
 
     def close(self) -> None:
         """See Device."""

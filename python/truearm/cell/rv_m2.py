@@ -27,9 +27,9 @@ from truearm.cell.device_errors import (
     EmergencyStopError,
     RefusedError,
 )
-from truearm.cell.line_port import LinePort
+from truearm.cell.line_port import LinePort, PortSection
 from truearm.cell.movemaster import readings_of, tenths
-from truearm.cell.schema import Positive, Section
+from truearm.cell.schema import Frame, Positive
 from truearm.inverse import Inverse
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -49,13 +49,11 @@ FRESH_S: Final = 0.05
 class RvM2:
     """A Movemaster robot; see the module."""
 
-    class Settings(Section):
+    class Settings(PortSection):
         """Keys of [robot] with driver "rv-m2"."""
 
         driver: str = "rv-m2"
-        port: str
-        baud: int = 9600
-        frame: str = Field(default="7E2", pattern="[78][NEO][12]")
+        frame: Frame = "7E2"
         timeout_s: Positive = 3.0
         speed: int = Field(default=5, ge=0, le=9)
         leg_s: Positive = 0.5
@@ -65,14 +63,7 @@ class RvM2:
     def __init__(self, settings: Settings, arm: Robot) -> None:
         movemaster.check_arm(arm)
         self._settings, self._arm = settings, arm
-        self._port = LinePort(
-            self.name,
-            settings.port,
-            settings.timeout_s,
-            terminator=movemaster.TERMINATOR,
-            baud=settings.baud,
-            frame=settings.frame,
-        )
+        self._port = LinePort.of(self.name, settings, terminator=movemaster.TERMINATOR)
         self._count: Tenths | None = None
         self._guesses: list[Tenths] = []
         self._low, self._high = np.rint(arm.limits.T / (0.1 * RADIANS_PER_DEGREE)).tolist()
@@ -94,14 +85,9 @@ class RvM2:
 
     def connect(self) -> None:
         """Open the port, clear a command error, and go to the mechanical origin."""
-        with self._busy:
-            self._port.open()
+        with self._busy, self._port.opened():
             self._silences = 0
-            try:
-                self._go_to_origin()
-            except BaseException:
-                self._port.close()
-                raise
+            self._go_to_origin()
 
     def move_joints(self, readings: Floats) -> None:
         """See Robot. The arm ends at whole tenths of a degree."""
@@ -135,9 +121,7 @@ class RvM2:
 
     def stop(self) -> None:
         """See Device. No further increment is sent; the one under way ends by itself, and is waited for."""
-        self._port.interrupt()
-        with self._busy:
-            self._port.resume()
+        self._port.end_waits(self._busy)
         time.sleep(max(0.0, self._still_at - time.monotonic()))
 
     def close(self) -> None:

@@ -26,7 +26,7 @@ from truearm.cell.device_errors import (
     silent,
 )
 from truearm.cell.framing import framed, unframed
-from truearm.cell.line_port import LinePort
+from truearm.cell.line_port import LinePort, PortSection
 from truearm.cell.panel import Panel
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive, Section, Vector2, Vector3
@@ -73,14 +73,11 @@ class PanelSection(Section):
 class TablePanel:
     """The table and its panel as a sensor; see the module."""
 
-    class Settings(Section):
+    class Settings(PortSection):
         """Keys of [sensor] with driver "table-panel"."""
 
         driver: str = "table-panel"
-        port: str
         baud: int = 19200
-        frame: str = Field(default="8N1", pattern="[78][NEO][12]")
-        timeout_s: Positive = 2.0
         ranges_mm: Vector3 = (800.0, 560.0, 580.0)
         speed_mm_s: Positive = 100.0
         touch_speed_mm_s: Positive = 20.0
@@ -91,9 +88,7 @@ class TablePanel:
         del arm
         self._settings, self.panel = settings, settings.panel.geometry()
         self.ranges_m = to_si(np.array(settings.ranges_mm), "mm")
-        self._port = LinePort(
-            self.name, settings.port, settings.timeout_s, baud=settings.baud, frame=settings.frame
-        )
+        self._port = LinePort.of(self.name, settings)
         self._number = 0
         self._travel_m = 0.0
         self._carriage: Floats | None = None
@@ -112,15 +107,10 @@ class TablePanel:
 
     def connect(self) -> None:
         """Open the port, greet the table, and learn where its carriage is."""
-        with self._busy:
-            self._port.open()
-            try:
-                self._number = 0
-                self._ask("HELLO", self._port.limit_s)
-                self._carriage = _point(self._ask("WHERE", self._port.limit_s), self._port.where)
-            except BaseException:
-                self._port.close()
-                raise
+        with self._busy, self._port.opened():
+            self._number = 0
+            self._ask("HELLO", self._port.limit_s)
+            self._carriage = self._seen_carriage()
 
     def carriage_for(self, expected: Expected) -> Floats:
         """Where the carriage (3,) stands before it touches near an expected point, m.
@@ -211,7 +201,7 @@ class TablePanel:
             self._port.resume()
             if self._port.is_open:
                 self._ask("STOP", self._port.limit_s)
-                self._carriage = _point(self._ask("WHERE", self._port.limit_s), self._port.where)
+                self._carriage = self._seen_carriage()
 
     def close(self) -> None:
         """See Device."""
@@ -225,6 +215,9 @@ class TablePanel:
         x, y, z = (MM_PER_METRE * carriage).tolist()
         self._ask(f"MOVE {x:.3f} {y:.3f} {z:.3f}", self._limit(way_mm / self._settings.speed_mm_s))
         self._carriage = carriage
+
+    def _seen_carriage(self) -> Floats:
+        return _point(self._ask("WHERE", self._port.limit_s), self._port.where)
 
     def _limit(self, seconds: float) -> float:
         return self._port.limit_s + MOTION_MARGIN * seconds

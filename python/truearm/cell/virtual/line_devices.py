@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.line_robot import END_OF_LINE, LineRobot
+from truearm.cell.line_robot import LineRobot
 from truearm.cell.line_sensor import LineSensor
 from truearm.cell.patterns import expression_for
 from truearm.cell.virtual.state import STOPPED
@@ -28,7 +28,7 @@ class VirtualLineRobot:
     def __init__(self, world: World, settings: LineRobot.Settings) -> None:
         self._world, self._settings = world, settings
         self._move = expression_for(settings.move)
-        self.terminator = END_OF_LINE[settings.end_of_line]
+        self.terminator = settings.terminator
         units = {"revolute": settings.angle_unit, "prismatic": settings.length_unit}
         self._si = np.array([to_si(1.0, units[kind]) for kind in world.cell.arm.joints])
 
@@ -76,7 +76,7 @@ class VirtualTracker:
 
     def __init__(self, world: World, settings: LineSensor.Settings) -> None:
         self._world, self._settings = world, settings
-        self.terminator = END_OF_LINE[settings.end_of_line]
+        self.terminator = settings.terminator
         self._next = 0.0
 
     def restart(self) -> None:
