@@ -3,10 +3,9 @@
 import json
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
+from truearm.cli import calibrate_options as option
 from truearm.cli.arguments import (
     AngleUnit,
     AsJson,
@@ -27,6 +26,9 @@ from truearm.scheme_options import SchemeOptions
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
+    from truearm.measurements import Measurements
+    from truearm.options import Options
+    from truearm.robot import Robot
 
 SCHEME = SchemeOptions()
 CALIBRATION_NAME = "calibration.calib"
@@ -38,80 +40,33 @@ def command(
     robot: RobotName,
     measurements: MeasurementFiles,
     output: OutputDirectory,
-    holdout: Annotated[
-        float | None, typer.Option(help=f"Share of the rows that is held out.  [default: {HOLDOUT}]")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the split.")] = SEED,
-    train_size: Annotated[
-        int | None, typer.Option(metavar="N", help="Training rows of each file.  [default: all others]")
-    ] = None,
-    split_by: Annotated[
-        str | None, typer.Option(metavar="COL,COL", help="Hold out whole groups equal in these columns.")
-    ] = None,
-    holdout_range: Annotated[
-        str | None,
-        typer.Option(
-            metavar="qJ:low|high:SHARE", help="Hold out the rows with the lowest or highest readings."
-        ),
-    ] = None,
+    holdout: option.Holdout = None,
+    seed: option.Seed = SEED,
+    train_size: option.TrainSize = None,
+    split_by: option.SplitBy = None,
+    holdout_range: option.HoldoutRange = None,
     use: Use = None,
-    judge_target: Annotated[
-        int, typer.Option(metavar="K", help="Judge at this target; another than 1 takes no part in the fit.")
-    ] = 1,
-    model: Annotated[
-        str,
-        typer.Option(
-            metavar="variable|constant|regions|cmac|fcmac",
-            help="The variable model, the constant one alone, or a scheme of the paper.",
-        ),
-    ] = "variable",
-    robust: Annotated[
-        str, typer.Option(metavar="none|huber|cauchy", help="Loss of the constant fit.")
-    ] = "none",
-    features: Annotated[
-        str | None, typer.Option(metavar="COL,COL", help="Columns that parameters may vary with.")
-    ] = None,
-    frame: Annotated[
-        str, typer.Option(metavar="free|world", help="world: the base is corrected, not fitted.")
-    ] = "free",
-    no_refit: Annotated[bool, typer.Option("--no-refit", help="Keep the fit to the training rows.")] = False,
-    strip: Annotated[
-        bool, typer.Option("--strip", help="Leave the measurements out of the file, for controllers.")
-    ] = False,
+    judge_target: option.JudgeTarget = 1,
+    model: option.Model = "variable",
+    robust: option.Robust = "none",
+    features: option.Features = None,
+    frame: option.Frame = "free",
+    no_refit: option.NoRefit = False,
+    strip: option.Strip = False,
     length_unit: LengthUnit = None,
     angle_unit: AngleUnit = None,
-    scheme_joints: Annotated[
-        str | None,
-        typer.Option(metavar="J,J", help="Schemes: joints that are divided.  [default: 1,2,3]"),
-    ] = None,
-    demanded_mm: Annotated[
-        float, typer.Option(metavar="MM", help="Schemes: a region this accurate is not divided.")
-    ] = SCHEME.demanded_mm,
-    regions: Annotated[
-        int, typer.Option(metavar="N", help="Schemes: regions at the most.")
-    ] = SCHEME.most_regions,
-    region_rows: Annotated[
-        int, typer.Option(metavar="N", help="Schemes: rows that a region needs.")
-    ] = SCHEME.region_rows,
-    region_ceps: Annotated[
-        str,
-        typer.Option(metavar="shrunk|least_squares", help="Schemes: shrunk to the parent, or as the paper."),
-    ] = SCHEME.region_ceps,
-    train_on: Annotated[
-        str, typer.Option(metavar="ceps|measurements", help="Networks: what they learn from.")
-    ] = SCHEME.train_on,
-    membership: Annotated[
-        str, typer.Option(metavar="gaussian|bspline", help="FCMAC: its fuzzy sensors.")
-    ] = SCHEME.membership,
-    composition: Annotated[
-        str, typer.Option(metavar="min|product", help="Networks: how sensors combine.")
-    ] = SCHEME.composition,
-    repeatability_mm: Annotated[
-        float | None, typer.Option(metavar="MM", help="Of the arm; errors are told in parts of it too.")
-    ] = None,
+    scheme_joints: option.SchemeJoints = None,
+    demanded_mm: option.DemandedMm = SCHEME.demanded_mm,
+    regions: option.Regions = SCHEME.most_regions,
+    region_rows: option.RegionRows = SCHEME.region_rows,
+    region_ceps: option.RegionCeps = SCHEME.region_ceps,
+    train_on: option.TrainOn = SCHEME.train_on,
+    membership: option.Membership = SCHEME.membership,
+    composition: option.Composition = SCHEME.composition,
+    repeatability_mm: option.RepeatabilityMm = None,
     as_json: AsJson = False,
-    degree: Annotated[int, typer.Option(hidden=True)] = 2,
-    threads: Annotated[int | None, typer.Option(hidden=True, min=1)] = None,
+    degree: option.Degree = 2,
+    threads: option.Threads = None,
 ) -> None:
     """Calibrate an arm and judge the calibration on poses that took no part in it.
 
@@ -123,7 +78,6 @@ def command(
       truearm calibrate arm.toml monday.csv tuesday.csv -o result
       truearm calibrate ur10 m.csv -o result --model constant --seed 3
     """
-    from truearm.calibrating import calibrate
     from truearm.measurements import Measurements
     from truearm.options import Options
     from truearm.robot import Robot
@@ -157,10 +111,8 @@ def command(
         measurements, length_unit=length_unit, angle_unit=angle_unit, joints=arm.joints
     )
     check_directory(output)
-    stages = told_stages(f"calibrate {arm.name} {model}", len(data))
     with ends_promptly():
-        calibration = calibrate(arm, data, options, threads=threads, stages=stages)
-        bound_std(calibration, stages)
+        calibration = _calibrated(arm, data, options, threads)
         summary = write_results(calibration, output, with_rows=not strip)
     warn(calibration.notices)
     if as_json:
@@ -169,6 +121,16 @@ def command(
     print_results(calibration)
     print_places(output)
     suggest_next(calibration, output / CALIBRATION_NAME)
+
+
+def _calibrated(arm: "Robot", data: "Measurements", options: "Options", threads: int | None) -> "Calibration":
+    """Calibrate, telling of the stages."""
+    from truearm.calibrating import calibrate
+
+    stages = told_stages(f"calibrate {arm.name} {options.model}", len(data))
+    calibration = calibrate(arm, data, options, threads=threads, stages=stages)
+    bound_std(calibration, stages)
+    return calibration
 
 
 def suggest_next(calibration: "Calibration", file: Path) -> None:

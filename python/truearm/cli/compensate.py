@@ -1,12 +1,14 @@
 """`truearm compensate`: rewrite a program so that the calibrated arm goes where its author meant."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import typer
 
 import truearm as ta
+from truearm.cli import compensate_options as option
 from truearm.cli.arguments import AsJson, CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm
 from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.given import given_options
@@ -22,61 +24,25 @@ OnRefusal = Literal["stop", "keep-nominal"]
 def command(
     context: typer.Context,
     calibration: CalibFile,
-    program: Annotated[Path, typer.Argument(metavar="PROGRAM", help="The program, or one of its files.")],
-    output: Annotated[
-        str | None, typer.Option("-o", "--output", metavar="OUT", help="A file, or a directory: DIR/.")
-    ] = None,
-    report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE", help="Write a report in JSON.")
-    ] = None,
-    controller: Annotated[
-        str | None,
-        typer.Option(
-            "--controller",
-            metavar="nominal|FILE",
-            help="The model that the controller computes with: a robot file, a URDF, UR's calibration.",
-        ),
-    ] = None,
-    frames: Annotated[
-        Path | None, typer.Option("--frames", metavar="FILE", help="Tools and work objects (TOML).")
-    ] = None,
-    programming: Annotated[
-        str | None,
-        typer.Option(metavar="ROBOT", help="The model of the author.  [default: the nominal arm]"),
-    ] = None,
-    language: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Language.  [default: by the ending]")
-    ] = None,
-    task: Annotated[
-        str, typer.Option(metavar="pose|axis|position", help="What of the tool is to be met.")
-    ] = "pose",
-    moving: Annotated[
-        str | None, typer.Option(metavar="1,2,3", help="Joints that may change.  [default: all]")
-    ] = None,
+    program: option.Program,
+    output: option.Output = None,
+    report: option.Report = None,
+    controller: option.Controller = None,
+    frames: option.Frames = None,
+    programming: option.Programming = None,
+    language: option.Language = None,
+    task: option.Task = "pose",
+    moving: option.Moving = None,
     feature: Feature = None,
-    on_refusal: Annotated[
-        str,
-        typer.Option(metavar="stop|keep-nominal", help="What becomes of targets that cannot be corrected."),
-    ] = "stop",
+    on_refusal: option.OnRefusal = "stop",
     largest_mm: LargestMm = LARGEST_MM,
     largest_deg: LargestDeg = LARGEST_DEG,
-    largest_joint_deg: Annotated[
-        float, typer.Option("--largest-joint-deg", help="Largest change of a joint.")
-    ] = LARGEST_JOINT_DEG,
+    largest_joint_deg: option.LargestJointDeg = LARGEST_JOINT_DEG,
     largest_std_mm: LargestStdMm = LARGEST_STD_MM,
-    densify_mm: Annotated[
-        float | None,
-        typer.Option("--densify-mm", metavar="MM", help="Insert waypoints on lines that deviate by more."),
-    ] = None,
-    least_spacing_mm: Annotated[
-        float, typer.Option("--least-spacing-mm", metavar="MM", help="Least way between inserted waypoints.")
-    ] = 10.0,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show a table and a unified diff; write nothing.")
-    ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Go on with a program that was compensated already.")
-    ] = False,
+    densify_mm: option.DensifyMm = None,
+    least_spacing_mm: option.LeastSpacingMm = 10.0,
+    dry_run: option.DryRun = False,
+    force: option.Force = False,
     as_json: AsJson = False,
 ) -> None:
     """Rewrite a robot program so that the calibrated arm's tool goes where the author meant it to go.
@@ -93,12 +59,7 @@ def command(
     from truearm.programs.densify import Spacing
     from truearm.programs.report import report_of
 
-    if report is not None:
-        refuse_own_input(report, calibration, program, frames)
-    if output is not None:
-        refuse_own_input(Path(output), calibration, frames)
-    if output is None and not dry_run:
-        raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
+    _check_outputs(output, report, (calibration, program, frames), dry_run=dry_run)
     limits = ta.Limits(
         largest_mm=largest_mm,
         largest_deg=largest_deg,
@@ -148,6 +109,19 @@ def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> l
         content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
         write_whole(report, f"{content}\n")
     return paths
+
+
+def _check_outputs(
+    output: str | None, report: Path | None, inputs: Sequence[Path | None], *, dry_run: bool
+) -> None:
+    """Raise UsageError where nothing is to be written, or what is read would be written over."""
+    calibration, program, frames = inputs
+    if report is not None:
+        refuse_own_input(report, calibration, program, frames)
+    if output is not None:
+        refuse_own_input(Path(output), calibration, frames)
+    if output is None and not dry_run:
+        raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
 
 
 def _place(output: str) -> Path:

@@ -1,12 +1,12 @@
 """`truearm plan`: choose measurement poses."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
-import typer
-
-from truearm.cli.arguments import ROBOT_HELP, AsJson, robots_like
+from truearm.cli import plan_options as option
+from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
@@ -25,46 +25,19 @@ PICTURES: Final = (".png", ".svg", ".pdf")
 
 
 def command(
-    robot: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="ROBOT",
-            help=f"{ROBOT_HELP} With --from it is known.",
-            autocompletion=robots_like,
-        ),
-    ] = None,
-    count: Annotated[int, typer.Option("-n", "--count", metavar="N", help="Poses to fit to.")] = 60,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="CSV", help="Where the poses go.")] = Path(
-        "poses.csv"
-    ),
-    cell: Annotated[
-        Path | None, typer.Option(metavar="CELL", help="A cell file whose sensor has to reach the poses.")
-    ] = None,
-    criterion: Annotated[
-        str, typer.Option(metavar="d|kappa|o1..o5", help="What is best: determinant, condition, an index.")
-    ] = "d",
-    next_count: Annotated[
-        int | None,
-        typer.Option("--next", metavar="N", help="The N poses that a calibration would learn most from."),
-    ] = None,
-    acceptance: Annotated[
-        int | None, typer.Option(metavar="N", help="The N poses that check a calibration best.")
-    ] = None,
-    known: Annotated[
-        Path | None, typer.Option("--from", metavar="CALIB", help="--next, --acceptance: the calibration.")
-    ] = None,
-    group: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="--next, --acceptance: set-up to measure in.  [default: the last]"),
-    ] = None,
-    order: Annotated[
-        str, typer.Option(metavar="short|paper", help="In which order they are measured.")
-    ] = "short",
-    sigma_mm: Annotated[float, typer.Option(metavar="MM", help="Noise of a measured coordinate.")] = 0.1,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the candidates.")] = 0,
-    picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the poses, as PNG or SVG.")
-    ] = None,
+    robot: option.RobotOrNone = None,
+    count: option.Count = 60,
+    output: option.Output = Path("poses.csv"),
+    cell: option.CellReaching = None,
+    criterion: option.Criterion = "d",
+    next_count: option.NextCount = None,
+    acceptance: option.Acceptance = None,
+    known: option.Known = None,
+    group: option.Group = None,
+    order: option.Order = "short",
+    sigma_mm: option.SigmaMm = 0.1,
+    seed: option.Seed = 0,
+    picture: option.Picture = None,
     as_json: AsJson = False,
 ) -> None:
     """Choose the poses that determine an arm's parameters best, from candidates that can be measured.
@@ -85,15 +58,9 @@ def command(
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import PlanOptions, plan_poses
     from truearm.cell.plan_files import draw, write
-    from truearm.planning.choosing import CRITERIA
 
-    if criterion not in CRITERIA or order not in ORDERS:
-        wrong, allowed = (criterion, CRITERIA) if criterion not in CRITERIA else (order, ORDERS)
-        raise UsageError(f'"{wrong}" is not known', rule=f"One of {', '.join(allowed)}")
-    asked = {"--next": next_count, "--acceptance": acceptance, "--count": count}
-    for name, number in asked.items():
-        if number is not None and number < 1:
-            raise UsageError(f"{number} poses", where=name, rule="At least one")
+    _check_words(criterion, order)
+    _check_counts({"--next": next_count, "--acceptance": acceptance, "--count": count})
     _check_outputs(output, picture, known, cell)
     if known is not None or next_count is not None or acceptance is not None:
         _propose(
@@ -115,6 +82,22 @@ def command(
         suggest(f"truearm measure {cell} {output} --dry-run")
     elif not as_json:
         suggest(f"truearm calibrate {robot} MEASUREMENTS.csv -o result", when="Measure them; then:")
+
+
+def _check_words(criterion: str, order: str) -> None:
+    """Raise UsageError where a criterion or an order is not known."""
+    from truearm.planning.choosing import CRITERIA
+
+    for word, allowed in ((criterion, CRITERIA), (order, ORDERS)):
+        if word not in allowed:
+            raise UsageError(f'"{word}" is not known', rule=f"One of {', '.join(allowed)}")
+
+
+def _check_counts(asked: Mapping[str, int | None]) -> None:
+    """Raise UsageError where fewer than one pose is asked for by an option."""
+    for name, number in asked.items():
+        if number is not None and number < 1:
+            raise UsageError(f"{number} poses", where=name, rule="At least one")
 
 
 def _check_outputs(output: Path, picture: Path | None, *inputs: Path | None) -> None:

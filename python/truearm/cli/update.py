@@ -2,10 +2,9 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Final
 
-import typer
-
+from truearm.cli import update_options as option
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, Use
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
@@ -13,7 +12,9 @@ from truearm.cli.progress import told_stages
 from truearm.errors import UsageError
 
 if TYPE_CHECKING:
-    from truearm.updating import Update
+    from truearm.calibration import Calibration
+    from truearm.measurements import Measurements
+    from truearm.updating import Update, UpdateOptions
 
 CALIBRATION_NAME: Final = "calibration.calib"
 REPORT_NAME: Final = "update.json"
@@ -30,34 +31,16 @@ VERDICTS: Final = {
 
 def command(
     calibration: CalibFile,
-    measurements: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="MEASUREMENTS...", help="CSV files of 10 to 20 poses, each a set-up."),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="NEW.calib|DIR", help="Where the updated calibration goes."),
-    ] = None,
-    keep_frame: Annotated[
-        bool, typer.Option("--keep-frame", help="The device stands where it stood: tells joint 1 too.")
-    ] = False,
-    keep_tool: Annotated[
-        bool, typer.Option("--keep-tool", help="The target sits where it sat: tells the last joint too.")
-    ] = False,
-    new_tool: Annotated[
-        bool, typer.Option("--new-tool", help="It is another target: it shows nothing of the arm.")
-    ] = False,
-    offset_deg: Annotated[
-        float, typer.Option(metavar="DEG", help="How far an offset may have changed (standard deviation).")
-    ] = 1.0,
-    tool_mm: Annotated[float, typer.Option(metavar="MM", help="The same of the target on the tool.")] = 5.0,
-    level: Annotated[
-        float, typer.Option(metavar="SHARE", help="Of unchanged arms that are not said to hold.")
-    ] = 0.01,
+    measurements: option.FilesOrNone = None,
+    output: option.Output = None,
+    keep_frame: option.KeepFrame = False,
+    keep_tool: option.KeepTool = False,
+    new_tool: option.NewTool = False,
+    offset_deg: option.OffsetDeg = 1.0,
+    tool_mm: option.ToolMm = 5.0,
+    level: option.Level = 0.01,
     use: Use = None,
-    roll_back: Annotated[
-        bool, typer.Option("--roll-back", help="Write the calibration as it was before, bit for bit.")
-    ] = False,
+    roll_back: option.RollBack = False,
     length_unit: LengthUnit = None,
     angle_unit: AngleUnit = None,
     as_json: AsJson = False,
@@ -83,7 +66,7 @@ def command(
 
     from truearm.calibration import Calibration
     from truearm.measurements import Measurements
-    from truearm.updating import UpdateOptions, update
+    from truearm.updating import UpdateOptions
 
     options = UpdateOptions(
         offset_deg=offset_deg,
@@ -99,9 +82,7 @@ def command(
         files, length_unit=length_unit, angle_unit=angle_unit, joints=known.robot.joints
     )
     with ends_promptly():
-        found = update(known, data, options, stages=told_stages())
-        if place is not None:
-            _write(found, place)
+        found = _updated(known, data, options, place)
     warn(found.notices)
     if as_json:
         print_json({"calibration": None if place is None else str(place), **found.to_dict()})
@@ -110,6 +91,18 @@ def command(
     if place is not None:
         say(f"Updated calibration: {place}")
     _suggest(found, calibration, place)
+
+
+def _updated(
+    known: "Calibration", data: "Measurements", options: "UpdateOptions", place: Path | None
+) -> "Update":
+    """Update a calibration, and write it to a place where one is named."""
+    from truearm.updating import update
+
+    found = update(known, data, options, stages=told_stages())
+    if place is not None:
+        _write(found, place)
+    return found
 
 
 def _roll_back(updated: Path, files: list[Path], output: Path | None, *, as_json: bool) -> None:

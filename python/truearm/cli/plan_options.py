@@ -1,0 +1,47 @@
+"""Arguments and options of `truearm plan`."""
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+from truearm.cli.arguments import ROBOT_HELP, robots_like
+
+RobotOrNone: TypeAlias = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="ROBOT",
+        help=f"{ROBOT_HELP} With --from it is known.",
+        autocompletion=robots_like,
+    ),
+]
+Count: TypeAlias = Annotated[int, typer.Option("-n", "--count", metavar="N", help="Poses to fit to.")]
+Output: TypeAlias = Annotated[Path, typer.Option("-o", "--output", metavar="CSV", help="Where the poses go.")]
+CellReaching: TypeAlias = Annotated[
+    Path | None, typer.Option(metavar="CELL", help="A cell file whose sensor has to reach the poses.")
+]
+Criterion: TypeAlias = Annotated[
+    str, typer.Option(metavar="d|kappa|o1..o5", help="What is best: determinant, condition, an index.")
+]
+NextCount: TypeAlias = Annotated[
+    int | None,
+    typer.Option("--next", metavar="N", help="The N poses that a calibration would learn most from."),
+]
+Acceptance: TypeAlias = Annotated[
+    int | None, typer.Option(metavar="N", help="The N poses that check a calibration best.")
+]
+Known: TypeAlias = Annotated[
+    Path | None, typer.Option("--from", metavar="CALIB", help="--next, --acceptance: the calibration.")
+]
+Group: TypeAlias = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="--next, --acceptance: set-up to measure in.  [default: the last]"),
+]
+Order: TypeAlias = Annotated[
+    str, typer.Option(metavar="short|paper", help="In which order they are measured.")
+]
+SigmaMm: TypeAlias = Annotated[float, typer.Option(metavar="MM", help="Noise of a measured coordinate.")]
+Seed: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of the candidates.")]
+Picture: TypeAlias = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Draw the poses, as PNG or SVG.")
+]
