@@ -31,8 +31,8 @@ def there(folder, monkeypatch):
 def test_an_update_is_told_written_and_rolled_back(folder, capsys):
     assert main(["update", "old.calib", "moved.csv", "-o", "new.calib"]) == 0
     told = capsys.readouterr().out
-    assert "Offsets or tool moved." in told
-    assert "not told from the frame" in told
+    assert "Offsets or tool changed." in told
+    assert "confounded with the frame" in told
     assert "truearm update --roll-back new.calib" in told
     assert max(map(len, told.splitlines())) <= 80
     assert main(["update", "--roll-back", "new.calib", "-o", "back.calib"]) == 0
@@ -50,8 +50,17 @@ def test_an_update_is_told_written_and_rolled_back(folder, capsys):
 def test_without_output_nothing_is_written(folder, capsys):
     before = sorted(folder.iterdir())
     assert main(["update", "old.calib", "same.csv"]) == 0
-    assert "The old calibration still holds." in capsys.readouterr().out
+    assert "The calibration still holds" in capsys.readouterr().out
     assert sorted(folder.iterdir()) == before
+
+
+def test_what_is_kept_is_not_said_to_be_found(capsys):
+    assert main(["update", "old.calib", "moved.csv", "--keep-frame", "--keep-tool"]) == 0
+    told = capsys.readouterr().out
+    assert "Frame of moved: kept as it was." in told
+    assert "Tool of moved: kept as it was." in told
+    assert "Offsets changed." in told
+    assert "anew" not in told
 
 
 def test_json_says_it_to_programs(folder, capsys):

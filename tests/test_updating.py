@@ -137,6 +137,56 @@ def test_heights_that_only_frame_and_tool_share_stay_together(model):
     assert kept.errors[model].position.mean < 2.0 * own
 
 
+def test_positions_are_compared_with_a_target_whose_orientation_was_measured_too():
+    # Found anew, the target of a SCARA goes metres off along axes that are hardly tilted.
+    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=2)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(80), orientation=True), model="constant")
+    shift = np.array([0.0, 0.5, 0.0, 0.0])
+    found = ta.update(calibration, remastered(arm, arm.poses(15, seed=9), shift, seed=9))
+    assert found.verdict == "moved"
+    check_offset(found.offsets[1], shift[1])
+    assert found.tools[0].largest_mm < 1.0
+    other = ta.update(calibration, arm.measure(arm.poses(15, seed=9), seed=9), new_tool=True)
+    assert other.verdict == "holds"
+
+
+def test_orientations_that_the_calibration_did_not_use_are_left_out(known):
+    arm, calibration = known
+    data = arm.measure(arm.poses(15, seed=9), seed=9, orientation=True)
+    found = ta.update(calibration, data)
+    assert found.verdict == "holds"
+    assert found.after.orientation is None
+    with pytest.raises(ta.UsageError, match="took no part in the calibration"):
+        ta.update(calibration, data, use="pose")
+
+
+def test_every_model_is_judged_at_poses_left_out_in_turn(known, moved):
+    arm, calibration = known
+    _, found = moved
+    new = found.calibration
+    assert new.validation.left_out
+    assert new.held is not None
+    for name, errors in new.held.errors.items():
+        assert errors.statistics() == new.validation.holdout[name]
+        assert new.validation.holdout[name].position.mean > new.validation.train[name].position.mean
+    assert new.validation.holdout["variable"] == found.after
+    assert new.summary["update"]["former"] == calibration.validation.to_dict()
+    fresh = remastered(arm, arm.poses(60, seed=77), SHIFT, seed=78, tool_mm=TOOL_MM)
+    outside = ta.evaluate(new, fresh, frame_rows=15).errors["nominal"].position.mean
+    assert new.validation.holdout["nominal"].position.mean == pytest.approx(outside, rel=0.5)
+
+
+def test_what_was_kept_is_told_apart_from_what_was_found(known, moved):
+    arm, calibration = known
+    data = arm.measure(arm.poses(15, seed=9), seed=9)
+    assert moved[1].estimated == ("offsets", "frame", "tool")
+    assert moved[1].tested == ("offsets", "tool")
+    kept = ta.update(calibration, data, keep_frame=True, keep_tool=True)
+    assert (kept.estimated, kept.tested) == (("offsets",), ("offsets",))
+    assert kept.to_dict()["frames"][0]["kept"]
+    assert ta.update(calibration, data, new_tool=True).tested == ("offsets",)
+
+
 def test_orientation_and_its_target_are_updated():
     arm = VirtualArm.paper(seed=2)
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(50), orientation=True), model="constant")
@@ -266,7 +316,7 @@ def test_set_up_derivatives_are_those_of_finite_differences(known):
     data = arm.measure(arm.poses(6, seed=3))
     task = Task(calibration.arm, select(data, None), data.groups, calibration.options)
     unknowns = Unknowns.of(calibration, task, UpdateOptions())
-    scene = Scene(task, data, calibration.model, unknowns)
+    scene = Scene(task, data, calibration, unknowns)
     state = scene.start()
     linear = scene.linear(state)
     size = 1e-6

@@ -33,6 +33,7 @@ def summarise(calibration: "Calibration") -> dict[str, Any]:
         "version": calibration.version,
         "seconds": dict(calibration.seconds),
         "notices": [str(notice) for notice in calibration.notices],
+        "update": None if calibration.revision is None else dict(calibration.revision.report),
     }
 
 

@@ -99,15 +99,17 @@ def _measured(errors: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Validation:
-    """Errors on rows that took no part in any fit, and on those that trained.
+    """Errors on rows that took no part in the fits they judge, and on those that trained.
 
     Attributes:
         n_train: Rows that trained.
-        n_holdout: Rows that were held out.
-        holdout: Errors of "nominal", "constant" and, if fitted, "variable" on held-out rows.
+        n_holdout: Rows that were held out, or left out in turn.
+        holdout: Errors of "nominal", "constant" and, if fitted, "variable" on these rows.
         train: The same on training rows.
         coverage_95: Share of the held-out coordinates that lie within the 95 % intervals of the variable
             model; None where there is none.
+        left_out: Whether each row was judged by what the other rows gave, as after an update; else the rows
+            were held out of one fit.
     """
 
     n_train: int
@@ -115,6 +117,12 @@ class Validation:
     holdout: Mapping[str, Errors]
     train: Mapping[str, Errors]
     coverage_95: float | None = None
+    left_out: bool = False
+
+    @property
+    def judged(self) -> str:
+        """What the rows that were judged are called: "held-out" or "left-out"."""
+        return "left-out" if self.left_out else "held-out"
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
@@ -124,6 +132,7 @@ class Validation:
             "holdout": {name: errors.to_dict() for name, errors in self.holdout.items()},
             "train": {name: errors.to_dict() for name, errors in self.train.items()},
             "coverage_95": self.coverage_95,
+            "left_out": self.left_out,
         }
 
     @classmethod
@@ -133,7 +142,13 @@ class Validation:
             side: {name: Errors.from_dict(errors) for name, errors in content[side].items()}
             for side in ("holdout", "train")
         }
-        return cls(content["n_train"], content["n_holdout"], **sides, coverage_95=content["coverage_95"])
+        return cls(
+            content["n_train"],
+            content["n_holdout"],
+            **sides,
+            coverage_95=content["coverage_95"],
+            left_out=content.get("left_out", False),
+        )
 
 
 def row_errors(

@@ -15,18 +15,13 @@ if TYPE_CHECKING:
     from truearm.calibration import Calibration
     from truearm.measurements import Measurements
     from truearm.updating import Update, UpdateOptions
+    from truearm.updating.moved import Motion, Offset
 
 CALIBRATION_NAME: Final = "calibration.calib"
 REPORT_NAME: Final = "update.json"
 SUFFIX: Final = ".calib"
 LEAST_TOLD: Final = 1e-6
 """Smaller probabilities say no more."""
-VERDICTS: Final = {
-    "holds": "The old calibration still holds.",
-    "moved": "Offsets or tool moved. The field still fits, so the updated calibration replaces the old one.",
-    "field": "The field itself no longer fits: offsets, frame and tool do not explain what was measured. "
-    "Measure again and calibrate.",
-}
 
 
 def command(
@@ -156,25 +151,33 @@ def _suggest(found: "Update", old: Path, place: Path | None) -> None:
         suggest(f"truearm update {old} MEASUREMENTS -o NEW.calib", when="Nothing was written. To do so:")
 
 
+def _verdict(found: "Update") -> str:
+    """What was found, in a sentence or two."""
+    from truearm.reporting.numbers import listed
+
+    if found.verdict == "holds":
+        return "The calibration still holds: no significant change was found."
+    if found.verdict == "moved":
+        return (
+            f"{' or '.join(found.tested).capitalize()} changed. All else still fits, so the updated "
+            "calibration replaces the old one."
+        )
+    return (
+        f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "
+        "Measure again and calibrate."
+    )
+
+
 def _print(found: "Update") -> None:
-    say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {VERDICTS[found.verdict]}")
-    rows = []
-    for entry in found.offsets:
-        name = str(entry.joint)
-        if entry.std is None or entry.p is None:
-            from_what = f" from the {entry.confounded}" if entry.confounded else ""
-            rows.append([name, "held", "", "", f"not told{from_what}"])
-            continue
-        change = f"{entry.change:+.4f} {entry.unit}"
-        rows.append([name, change, f"{entry.std:.4f}", _probability(entry.p), "moved" if entry.moved else ""])
-    print_table(("joint", "offset changed by", "std error", "p", ""), rows, left=(0, 4))
+    from truearm.reporting.numbers import listed
+
+    say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {_verdict(found)}")
+    print_table(
+        ("joint", "change of offset", "std error", "p", ""), [_offset(o) for o in found.offsets], left=(0, 4)
+    )
     for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
         for motion in motions:
-            turn = "" if motion.angle_deg is None else f" and {motion.angle_deg:.4f} deg"
-            judged = (
-                "found anew" if motion.p is None else f"p {_probability(motion.p)}{', moved' * motion.moved}"
-            )
-            say(f"{name} of {motion.group}: {motion.largest_mm:.3f} mm{turn} ({judged}).")
+            say(f"{name} of {motion.group}: {_motion(motion)}.")
     print_table(
         ("error at left-out poses, mm", "mean", "RMS", "largest"),
         [
@@ -183,9 +186,31 @@ def _print(found: "Update") -> None:
         ],
     )
     say_wrapped(
-        f"An unchanged arm shows such a change with p {_probability(found.changed.p)}, "
-        f"and such a rest with p {_probability(found.rest.p)}."
+        f"Test for a change of {listed(found.tested)}: p {_probability(found.changed.p)}. "
+        f"Test of the residuals that remain: p {_probability(found.rest.p)}. "
+        "A small p is unlikely for an arm that did not change."
     )
+
+
+def _offset(entry: "Offset") -> list[str]:
+    """Cells of a joint."""
+    name = str(entry.joint)
+    if entry.std is None or entry.p is None:
+        why = f"confounded with the {entry.confounded}" if entry.confounded else "not determined"
+        return [name, "kept", "", "", why]
+    change = f"{entry.change:+.4f} {entry.unit}"
+    return [name, change, f"{entry.std:.4f}", _probability(entry.p), "changed" if entry.moved else ""]
+
+
+def _motion(motion: "Motion") -> str:
+    """How far a frame or tool is from where it was."""
+    if motion.kept:
+        return "kept as it was"
+    turn = "" if motion.angle_deg is None else f" and {motion.angle_deg:.4f} deg"
+    away = f"{motion.largest_mm:.3f} mm{turn} from where it was"
+    if motion.p is None:
+        return f"found anew, {away}"
+    return f"{away} (p {_probability(motion.p)}{', changed' * motion.moved})"
 
 
 def _probability(p: float) -> str:

@@ -35,11 +35,12 @@ def field_is_lost(calibration: Calibration, export_format: str) -> list[str]:
     """That the field is not in a file of constants, with the held-out errors that this makes."""
     if calibration.model_name == CONSTANT:
         return []
-    errors = calibration.validation.holdout
+    validation = calibration.validation
+    errors = validation.holdout
     constant, variable = (errors[name].position.mean for name in (CONSTANT, calibration.model_name))
     return [
         f"The parameters of this calibration vary over the workspace; {FORMAT_WORDS[export_format]} holds "
-        f"the constant part alone. On {calibration.validation.n_holdout} held-out rows the constant part "
+        f"the constant part alone. On {validation.n_holdout} {validation.judged} rows the constant part "
         f"left {constant:.3f} mm in the mean, the whole calibration {variable:.3f} mm. Programs rewritten by "
         "truearm compensate have all of it"
     ]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
 from truearm.calibration import Calibration
-from truearm.core_set import select
+from truearm.core_set import Use, select
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names
 from truearm.fitted_rows import OVERWHELMING
 from truearm.fitting import Stages, Task, no_stages
@@ -22,9 +22,9 @@ from truearm.updating.scene import Scene
 from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
 from truearm.updating.unknowns import Unknowns
 from truearm.updating.updated import updated
-from truearm.validation import Errors, Statistics
+from truearm.updating.validating import errors_at_left_out, left_out_errors
+from truearm.validation import Errors
 
-Floats = NDArray[np.float64]
 Verdict = Literal["holds", "moved", "field"]
 
 MOST_OUTLIERS: Final = 0.2
@@ -67,6 +67,19 @@ class Update:
     outliers: tuple[int, ...]
     notices: tuple[Notice, ...] = ()
 
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """What was estimated: "offsets", then "frame" (or the known world's "base") and "tool" if not kept."""
+        frame = "base" if self.calibration.arm.world_is_known else "frame"
+        parts = ((frame, self.frames), ("tool", self.tools))
+        free = (name for name, found in parts if not (found and all(motion.kept for motion in found)))
+        return ("offsets", *free)
+
+    @property
+    def tested(self) -> tuple[str, ...]:
+        """What was tested for a change: "offsets", and "tool" unless it was kept or is another one."""
+        return ("offsets", "tool") if any(motion.p is not None for motion in self.tools) else ("offsets",)
+
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the calibration and the notices."""
         return {
@@ -74,6 +87,8 @@ class Update:
             "level": self.level,
             "n_poses": self.n_poses,
             "outliers": list(self.outliers),
+            "estimated": list(self.estimated),
+            "tested": list(self.tested),
             "offsets": [entry.to_dict() for entry in self.offsets],
             "frames": [entry.to_dict() for entry in self.frames],
             "tools": [entry.to_dict() for entry in self.tools],
@@ -121,10 +136,10 @@ def update(
     with stages("asking what the calibration expects"):
         _ = calibration.spread
     with stages("finding what moved"):
-        held = _held(calibration, Scene(task, data, calibration.model, unknowns))
+        held = _held(calibration, Scene(task, data, calibration, unknowns))
         unknowns = unknowns.holding(held)
         kept, outliers = _without_outliers(calibration, task, data, unknowns)
-        scene = Scene(task, data.select(kept), calibration.model, unknowns)
+        scene = Scene(task, data.select(kept), calibration, unknowns)
         found = _Found(calibration, scene, chosen, held)
         return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
 
@@ -150,6 +165,7 @@ class _Found:
         judge = Judge(level, scale_freedom(self.calibration))
         changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
         frames, tools = motions(scene, found, judge)
+        judged = left_out_errors(self.calibration, scene, found, spread)
         told = Update(
             calibration=self.calibration,
             verdict=_verdict(changed, rest, level),
@@ -159,13 +175,13 @@ class _Found:
             tools=tools,
             changed=changed,
             rest=rest,
-            before=_errors(scene, still, spread, anew),
-            after=_errors(scene, found, spread, unknowns.free),
+            before=errors_at_left_out(scene, still, spread, anew).statistics(),
+            after=judged[self.calibration.model_name].statistics(),
             n_poses=len(scene.data) + len(outliers),
             outliers=tuple(outliers),
             notices=notices,
         )
-        return replace(told, calibration=updated(self.calibration, scene, found, told.after, told.to_dict()))
+        return replace(told, calibration=updated(self.calibration, scene, found, judged, told.to_dict()))
 
 
 def _verdict(changed: SquaresTest, rest: SquaresTest, level: float) -> Verdict:
@@ -188,13 +204,26 @@ def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, 
             rule="An update needs standard deviations, and schemes do not tell them",
             way_out="Calibrate with --model variable or constant",
         )
-    selection = select(data, options.use)
     where = ", ".join(data.files)
+    selection = select(data, options.use or _use(calibration, data))
+    if selection.orientation and not calibration.selection.orientation:
+        raise UsageError(
+            "orientations took no part in the calibration",
+            where=where,
+            rule="It does not tell how far they may scatter",
+            way_out="Leave --use pose out, or calibrate with orientations",
+        )
     if selection.distances or calibration.selection.distances:
         raise InputError("distances were measured, not points", where=where, rule="An update needs points")
     if calibration.arm.world_is_known and len(data.groups) > 1:
         raise InputError(f"there are {len(data.groups)} set-ups", where=where, rule="The world is one")
     return Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
+
+
+def _use(calibration: Calibration, data: Measurements) -> Use | None:
+    """Positions where orientations were measured that the calibration did not use; else all that there is."""
+    unknown = not calibration.selection.orientation and data.orientations is not None
+    return "position" if unknown and data.target_count == 1 else None
 
 
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:
@@ -238,7 +267,7 @@ def _without_outliers(
     """
     kept, out = np.arange(len(data)), list[int]()
     while len(out) <= MOST_OUTLIERS * len(data):
-        scene = Scene(task, data.select(kept), calibration.model, unknowns)
+        scene = Scene(task, data.select(kept), calibration, unknowns)
         start = scene.start()
         spread = scene.covariance(calibration, start)
         found = estimate(scene, spread, start, unknowns.free)
@@ -273,15 +302,3 @@ def _check_plausible(scene: Scene, found: Estimate) -> None:
             way_out="Check that these are measurements of this arm; after a larger change give a larger "
             "--offset-deg",
         )
-
-
-def _errors(scene: Scene, found: Estimate, spread: Floats, free: NDArray[np.bool_]) -> Errors:
-    """Errors at left-out poses: of the first target, and of the orientation."""
-    left = np.full(scene.seen.shape, np.nan)
-    left[scene.seen] = left_out(found.linear, spread, scene.unknowns.std, free)
-    points = np.linalg.norm(left[:, :3], axis=1)
-    position = Statistics.of(points[np.isfinite(points)])
-    if not scene.task.selection.orientation:
-        return Errors(position)
-    turns = np.linalg.norm(left[:, -3:], axis=1)
-    return Errors(position, Statistics.of(turns[np.isfinite(turns)]))

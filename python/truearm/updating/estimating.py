@@ -1,5 +1,6 @@
 """Gaussian estimate of what moved: correlated noise, wide priors, linearised until it stands still."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -99,14 +100,23 @@ def solved(linear: Linear, factor: Floats, std: Floats, free: Mask) -> Floats:
 
 def left_out(linear: Linear, spread: Floats, std: Floats, free: Mask) -> Floats:
     """Residuals (R,) of each pose's values when the free unknowns are found from the others."""
-    poses = np.unique(linear.pose)
     found = np.empty_like(linear.residual)
-    for part in range(min(MOST_PARTS, len(poses))):
-        out = np.isin(linear.pose, poses[part::MOST_PARTS])
-        rest = Linear(linear.residual[~out], linear.jacobian[~out], linear.departure, linear.pose[~out])
-        step = solved(rest, factored(spread[np.ix_(~out, ~out)]), std, free)
+    for poses, step in folds(linear, spread, std, free):
+        out = np.isin(linear.pose, poses)
         found[out] = linear.residual[out] - linear.jacobian[out] @ step
     return found
+
+
+def folds(
+    linear: Linear, spread: Floats, std: Floats, free: Mask
+) -> Iterator[tuple[NDArray[np.int64], Floats]]:
+    """Poses that are left out together, and the step (u,) that the others make of the free unknowns."""
+    poses = np.unique(linear.pose)
+    for part in range(min(MOST_PARTS, len(poses))):
+        left = poses[part::MOST_PARTS]
+        out = np.isin(linear.pose, left)
+        rest = Linear(linear.residual[~out], linear.jacobian[~out], linear.departure, linear.pose[~out])
+        yield left, solved(rest, factored(spread[np.ix_(~out, ~out)]), std, free)
 
 
 def surprise(linear: Linear, spread: Floats, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:

@@ -101,7 +101,7 @@ class Motion:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
-        return asdict(self)
+        return {**asdict(self), "kept": self.kept}
 
 
 def untold(scene: Scene, spread: Floats, state: State) -> dict[int, str]:

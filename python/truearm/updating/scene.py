@@ -1,6 +1,7 @@
 """New measurements against a calibration: residuals, derivatives, and how they may scatter."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -10,13 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
-from truearm.core_set import core_set, rotations
+from truearm.core_set import Selection, core_set, rotations
 from truearm.fitting import Task, core_errors, fit_options
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
-from truearm.models import ArmModel
 from truearm.rotations import rigid_inverse
-from truearm.updating.unknowns import OPEN, Unknowns
+from truearm.updating.unknowns import FRAME_UNKNOWNS, OPEN, Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -40,7 +40,7 @@ class Linear:
     Attributes:
         residual: Measured minus predicted (R,), m and rad.
         jacobian: Derivatives (R, u) of the prediction by the unknowns.
-        departure: How far the unknowns are from what was known before (u,); zero where nothing was.
+        departure: How far the unknowns are from where their priors have them (u,).
         pose: Pose of each value (R,).
     """
 
@@ -53,9 +53,12 @@ class Linear:
 class Scene:
     """The rows of an update under one model of a calibration."""
 
-    def __init__(self, task: Task, data: Measurements, model: ArmModel, unknowns: Unknowns) -> None:
+    def __init__(
+        self, task: Task, data: Measurements, calibration: Calibration, unknowns: Unknowns
+    ) -> None:
+        model = calibration.model
         self.task, self.data, self.unknowns = task, data, unknowns
-        self._model = model
+        self._known = _part(model.setup, calibration.selection, task.selection)
         self.inputs = model_inputs(task.arm, data, task.options.features)
         self.parameters = model.parameters(self.inputs)
         self.measured = core_set(task.arm.robot, data, task.selection, task.groups)
@@ -66,11 +69,14 @@ class Scene:
 
     def start(self) -> State:
         """Nothing moved but set-ups; parts of them that are kept are as they were."""
+        return State(np.zeros(len(self.unknowns.arm_names)), self._with_known(self.anew, self.unknowns.free))
+
+    @cached_property
+    def anew(self) -> Setup:
+        """Set-ups that the unchanged arm finds in the rows: what is found anew starts from them."""
         with core_errors(self.data):
-            found = fit_constant(
-                self.task.problem(self.measured, []), fit_options(self.task, parameters=self.parameters)
-            ).setup
-        return State(np.zeros(len(self.unknowns.arm_names)), self._with_known(found, self.unknowns.free))
+            options = fit_options(self.task, parameters=self.parameters)
+            return fit_constant(self.task.problem(self.measured, []), options).setup
 
     def unchanged(self, state: State) -> State:
         """The state in which only what says nothing about a change may differ from what was known."""
@@ -99,13 +105,18 @@ class Scene:
         return Linear(residual[seen], jacobian[seen], self.departure(state), pose[seen])
 
     def departure(self, state: State) -> Floats:
-        """How far the unknowns (u,) of a state are from what was known; zero where nothing was."""
+        """How far the unknowns (u,) of a state are from where their priors have them.
+
+        Those found anew are held, ever so gently, where the unchanged arm finds them: rows of few directions
+        do not tell all of them, such as the height of a SCARA's device from that of its target.
+        """
         found = np.zeros(len(self.unknowns.std))
         found[: len(state.arm)] = state.arm
         for k, number in enumerate(self.unknowns.known):
-            if number is not None:
-                found[self.unknowns.group(k)] = self._departure_of(state.setup, k, number)
-        found[self.unknowns.std >= OPEN] = 0.0
+            place = self.unknowns.group(k)
+            gentle = self._between(self.anew, k, state.setup, k)
+            known = gentle if number is None else self._between(self._known, number, state.setup, k)
+            found[place] = np.where(self.unknowns.std[place] >= OPEN, gentle, known)
         return found
 
     def motion(self, state: State, number: int) -> tuple[Floats | None, Floats | None]:
@@ -113,7 +124,7 @@ class Scene:
         known = self.unknowns.known[number]
         if known is None:
             return None, None
-        moved = self._departure_of(state.setup, number, known)
+        moved = self._between(self._known, known, state.setup, number)
         frame = 0 if self.task.arm.world_is_known else 6
         return (moved[:frame] if frame else None), moved[frame:]
 
@@ -147,8 +158,10 @@ class Scene:
 
     def _with_known(self, setup: Setup, free: Mask) -> Setup:
         """A set-up with the known parts put in where they are not free."""
-        frames, targets, rotations = setup.frames, setup.targets, setup.rotations
-        known = self._model.setup
+        frames, targets, rotations = (
+            part.copy() for part in (setup.frames, setup.targets, setup.rotations)
+        )
+        known = self._known
         for k, number in enumerate(self.unknowns.known):
             place = self.unknowns.group(k)
             if number is None:
@@ -160,14 +173,15 @@ class Scene:
                 targets[k], rotations[k] = known.targets[number], known.rotations[number]
         return Setup(frames, targets, rotations, setup.anchors)
 
-    def _departure_of(self, setup: Setup, k: int, number: int) -> Floats:
-        known, parts = self._model.setup, []
+    def _between(self, before: Setup, number: int, now: Setup, k: int) -> Floats:
+        """How far set-up k is from set-up `number` of another state (W,)."""
+        parts = []
         if not self.task.arm.world_is_known:
-            between = rigid_inverse(known.frames[number]) @ setup.frames[k]
+            between = rigid_inverse(before.frames[number]) @ now.frames[k]
             parts += [between[:3, 3], Rotation.from_matrix(between[:3, :3]).as_rotvec()]
-        parts.append((setup.targets[k] - known.targets[number]).reshape(-1))
+        parts.append((now.targets[k] - before.targets[number]).reshape(-1))
         if self._turns:
-            turn = known.rotations[number].T @ setup.rotations[k]
+            turn = before.rotations[number].T @ now.rotations[k]
             parts.append(Rotation.from_matrix(turn).as_rotvec())
         return np.concatenate(parts)
 
@@ -176,14 +190,35 @@ class Scene:
         if all(number is None for number in self.unknowns.known):
             return None
         own = setup_jacobian(self.problem, self.parameters, state.setup)
-        width = own.shape[2]
+        places, width = self._places(calibration.selection)
         found = np.zeros((*own.shape[:2], len(calibration.groups) * width))
         for k, number in enumerate(self.unknowns.known):
             if number is not None:
-                rows = self.number == k
+                rows = np.flatnonzero(self.number == k)
                 tied = self.unknowns.std[self.unknowns.group(k)] < OPEN
-                found[rows, :, number * width : (number + 1) * width] = own[rows] * tied
+                found[np.ix_(rows, range(own.shape[1]), number * width + places)] = own[rows] * tied
         return found
+
+    def _places(self, selection: Selection) -> tuple[NDArray[np.int64], int]:
+        """Where the unknowns of a set-up of the update stand in one of the calibration, and how many it has."""
+        first = 0 if self.task.arm.world_is_known else FRAME_UNKNOWNS
+        points = [
+            first + 3 * selection.targets.index(target) + axis
+            for target in self.task.selection.targets
+            for axis in range(3)
+        ]
+        behind = first + 3 * len(selection.targets)
+        turns = range(behind, behind + self._turns)
+        return np.array([*range(first), *points, *turns]), behind + (3 if selection.orientation else 0)
+
+
+def _part(setup: Setup, fitted: Selection, used: Selection) -> Setup:
+    """A calibration's set-ups with the targets that are used; all of them where one took no part in it."""
+    if not is_part_of(used, fitted):
+        return setup
+    chosen = [fitted.targets.index(target) for target in used.targets]
+    targets = np.ascontiguousarray(setup.targets[:, chosen])
+    return Setup(setup.frames, targets, setup.rotations, setup.anchors)
 
 
 def _without(covariance: Floats, columns: Floats) -> Floats:

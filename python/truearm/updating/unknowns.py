@@ -49,7 +49,7 @@ class Unknowns:
         arm = task.arm
         directions, names = arm_directions(arm)
         known = tuple(counterpart(calibration, group) for group in task.groups)
-        comparable = calibration.selection == task.selection
+        comparable = is_part_of(task.selection, calibration.selection)
         groups = [
             setup_std(arm, task.selection, options, known=comparable and number is not None)
             for number in known
@@ -93,6 +93,11 @@ class Unknowns:
         width = (len(self.std) - len(self.arm_names)) // len(self.known)
         first = len(self.arm_names) + number * width
         return slice(first, first + width)
+
+
+def is_part_of(selection: Selection, known: Selection) -> bool:
+    """Whether all that is selected took part in what is known."""
+    return set(selection.targets) <= set(known.targets) and selection.orientation <= known.orientation
 
 
 def counterpart(calibration: Calibration, group: str) -> int | None:

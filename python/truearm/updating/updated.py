@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import fit_constant
 from truearm.calibration import Calibration
 from truearm.details import ConstantDetails
 from truearm.fitted_rows import TRAINED, FittedRows
-from truearm.fitting import core_errors, fit_options
-from truearm.judging import judge, model_inputs
+from truearm.held_rows import HeldRows
+from truearm.judging import judge
 from truearm.models import NOMINAL, ArmModel
 from truearm.revision import Revision
 from truearm.uncertainty import UpdatedSpread
 from truearm.updating.estimating import Estimate
 from truearm.updating.scene import Scene
-from truearm.validation import Errors, Validation
+from truearm.updating.validating import setup_of
+from truearm.validation import RowErrors, Validation
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def updated(
     calibration: Calibration,
     scene: Scene,
     found: Estimate,
-    held_out: Errors,
+    judged: Mapping[str, RowErrors],
     report: Mapping[str, Any],
 ) -> Calibration:
     """The calibration with what was found put in.
@@ -37,15 +37,15 @@ def updated(
         calibration: As it was.
         scene: The measurements, all of which were used.
         found: Values of the unknowns.
-        held_out: Errors of poses that were left out.
+        judged: Errors of each model at poses that were left out in turn.
         report: What the update said.
     """
     task, unknowns = scene.task, scene.unknowns
     change = (unknowns.directions @ found.state.arm).reshape(-1, 5)
     models = {name: _model(calibration, scene, found, name, change) for name in calibration.models}
-    judged = judge(task, models, scene.data, scene.data)
-    trained = {name: errors.statistics() for name, errors in judged.items()}
+    fitted = judge(task, models, scene.data, scene.data)
     file = calibration.to_bytes() if calibration.file is None else calibration.file
+    report = {**report, "former": calibration.validation.to_dict()}
     revision = Revision.of(report, unknowns.directions, found.covariance, file)
     new = replace(
         calibration,
@@ -54,10 +54,14 @@ def updated(
         models=models,
         constant=_constant(calibration, scene, found),
         validation=Validation(
-            len(scene.data), len(scene.data), {**trained, calibration.model_name: held_out}, trained
+            n_train=len(scene.data),
+            n_holdout=len(scene.data),
+            holdout={name: errors.statistics() for name, errors in judged.items()},
+            train={name: errors.statistics() for name, errors in fitted.items()},
+            left_out=True,
         ),
         rows=_rows(scene, found),
-        held=None,
+        held=HeldRows.of(scene.data, judged),
         data_hash=scene.data.hash(),
         version=version("truearm"),
         notices=(),
@@ -79,11 +83,7 @@ def _model(calibration: Calibration, scene: Scene, found: Estimate, name: str, c
     model = ArmModel(np.ascontiguousarray(constants), old.setup, old.field, old.scheme)
     if name == calibration.model_name:
         return replace(model, setup=found.state.setup)
-    task = scene.task
-    parameters = model.parameters(model_inputs(task.arm, scene.data, task.options.features))
-    with core_errors(scene.data):
-        setup = fit_constant(task.problem(scene.measured, []), fit_options(task, parameters=parameters)).setup
-    return replace(model, setup=setup)
+    return replace(model, setup=setup_of(model, scene, scene.data))
 
 
 def _constant(calibration: Calibration, scene: Scene, found: Estimate) -> ConstantDetails:

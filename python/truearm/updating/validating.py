@@ -1,0 +1,81 @@
+"""What each model misses at a pose when all that an update estimates is found from the other poses."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Setup, fit_constant
+from truearm.calibration import Calibration
+from truearm.core_set import core_set
+from truearm.fitting import core_errors, fit_options
+from truearm.judging import model_inputs
+from truearm.measurements import Measurements
+from truearm.models import NOMINAL, ArmModel
+from truearm.updating.estimating import Estimate, folds, left_out
+from truearm.updating.scene import Scene
+from truearm.validation import RowErrors, row_errors
+
+Floats = NDArray[np.float64]
+
+TURN: Final = 3
+
+
+def left_out_errors(
+    calibration: Calibration, scene: Scene, found: Estimate, spread: Floats
+) -> dict[str, RowErrors]:
+    """Errors of all models at each pose of an update, none of which had a part in what they were found from.
+
+    Args:
+        calibration: As it was.
+        scene: The measurements, n poses.
+        found: Values of the unknowns from all poses.
+        spread: Covariance (R, R) of the residuals of an unchanged arm.
+    """
+    own = errors_at_left_out(scene, found, spread, scene.unknowns.free)
+    return {
+        name: own if name == calibration.model_name else _others(name, model, scene, found, spread)
+        for name, model in calibration.models.items()
+    }
+
+
+def errors_at_left_out(
+    scene: Scene, found: Estimate, spread: Floats, free: NDArray[np.bool_]
+) -> RowErrors:
+    """Errors of the model that predicts: of the first target, and of the orientation."""
+    left = np.full(scene.seen.shape, np.nan)
+    left[scene.seen] = left_out(found.linear, spread, scene.unknowns.std, free)
+    turned = left[:, -TURN:] if scene.task.selection.orientation else None
+    return RowErrors(left[:, :TURN], turned)
+
+
+def _others(name: str, model: ArmModel, scene: Scene, found: Estimate, spread: Floats) -> RowErrors:
+    """Errors of a model that does not predict: its frame and tool, and its offsets but for the nominal
+    model's, are found from the other poses.
+    """
+    task, data, unknowns = scene.task, scene.data, scene.unknowns
+    position = np.full((len(data), TURN), np.nan)
+    turned = np.full((len(data), TURN), np.nan)
+    for out, step in folds(found.linear, spread, unknowns.std, unknowns.free):
+        change = np.zeros(len(unknowns.arm_names))
+        if name != NOMINAL:
+            change = found.state.arm + step[: len(change)]
+        constants = model.constants + (unknowns.directions @ change).reshape(-1, 5)
+        shifted = ArmModel(np.ascontiguousarray(constants), model.setup, model.field, model.scheme)
+        rest, judged = (data.select(rows) for rows in (np.setdiff1d(np.arange(len(data)), out), out))
+        setup = setup_of(shifted, scene, rest)
+        at = shifted.parameters(model_inputs(task.arm, judged, task.options.features))
+        missed = row_errors(task.arm, judged, task.selection, task.groups, at, setup)
+        position[out] = missed.position
+        if missed.orientation is not None:
+            turned[out] = missed.orientation
+    return RowErrors(position, turned if task.selection.orientation else None)
+
+
+def setup_of(model: ArmModel, scene: Scene, data: Measurements) -> Setup:
+    """Frames and tools of a model that rows of an update find."""
+    task = scene.task
+    at = model.parameters(model_inputs(task.arm, data, task.options.features))
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
+    with core_errors(data):
+        return fit_constant(task.problem(measured, []), fit_options(task, parameters=at)).setup
