@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 import pytest
 
 import truearm as ta
+from tests.remastered import remastered
 from tests.report_support import (
     errors_table,
     figures_of,
@@ -54,7 +55,7 @@ def test_the_verdict_is_that_of_the_summary(calibrations, reports, model):
     after, before = summary["holdout"][model], summary["holdout"]["nominal"]
     wanted = [after["mean_mm"], after["max_mm"], before["mean_mm"], before["max_mm"]]
     np.testing.assert_allclose(numbers[:4], wanted, atol=0.006)
-    assert f"On {summary['n_holdout']} poses it has never seen" in reports[model].verdict
+    assert f"On {summary['n_holdout']} held-out poses" in reports[model].verdict
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -208,6 +209,26 @@ def test_advice_follows_from_the_data(calibrations, reports):
     found = report(ta.calibrate(robot.robot, ta.Measurements.from_dataframe(data), model="constant"))
     assert found.advice[0].kind == "outliers"
     assert "row 5" in found.advice[0].words
+
+
+def test_the_report_of_an_update_says_what_was_judged_how():
+    arm = VirtualArm.paper(seed=2)
+    old = small_calibration("constant")
+    found = ta.update(old, remastered(arm, arm.poses(15, seed=9), [0.0, 0.6, 0.0, 0.0, 0.0], seed=9))
+    made = report(found.calibration)
+    text = words_of(made.html)
+    first = errors_table(made.html.partition("</table>")[0])
+    for name, errors in found.calibration.validation.holdout.items():
+        assert first[name][0] == f"{errors.position.mean:.3f}"
+    assert made.verdict.startswith("On 15 left-out poses, each predicted from the others,")
+    assert f"{found.before.position.max:.2f}" in made.verdict
+    assert "training pose" not in text
+    assert "held out" not in text.partition("The update")[0]
+    held = old.validation
+    assert f"on {held.n_holdout} held-out poses of its own data" in text
+    assert f"constant {held.holdout['constant'].position.mean:.3f}" in text
+    assert "joint 1 kept confounded with the frame" in text
+    assert "more_poses" not in [advice.kind for advice in made.advice]
 
 
 def test_a_wave_is_found_and_a_line_is_none():

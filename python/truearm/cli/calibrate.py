@@ -209,15 +209,17 @@ def print_results(calibration: "Calibration") -> None:
     trained = f"fitted to {validation.n_train} rows, judged on {validation.n_holdout} others"
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
     print_determined(calibration)
-    print_errors(validation.holdout, f"{validation.n_holdout} held-out rows")
-    say(f"Noise that no model explains: {summary['noise_mm']:.3f} mm in each coordinate.")
+    of = "distance" if calibration.selection.distances else "position"
+    print_errors(validation.holdout, f"{validation.n_holdout} held-out rows", of)
+    per = "distance" if calibration.selection.distances else "coordinate"
+    say(f"Standard deviation of what the model does not explain: {summary['noise_mm']:.3f} mm per {per}.")
     if validation.coverage_95 is not None:
         inside = f"{100 * validation.coverage_95:.1f} %"
         say(f"The variable model's 95 % intervals hold {inside} of the held-out coordinates.")
     _print_scheme(calibration, summary["error_to_repeatability"])
     _print_outliers(summary["outliers"], calibration)
     if calibration.options.refit and calibration.rows is not None:
-        say(f"After that fitted to all {len(calibration.rows.data)} rows.")
+        say(f"The calibration in the file is fitted to all {len(calibration.rows.data)} rows.")
 
 
 def print_determined(calibration: "Calibration") -> None:
@@ -228,8 +230,8 @@ def print_determined(calibration: "Calibration") -> None:
         say_wrapped(f"  {', '.join(names)} {words}")
     if len(calibration.selection.targets) in (1, 2) and not calibration.selection.orientation:
         say_wrapped(
-            "Orientation was not measured: how the tool is turned follows from positions alone, "
-            "and is judged by nothing below."
+            "Orientation was not measured: the tool's follows from positions alone, and nothing below "
+            "validates it."
         )
 
 
@@ -253,7 +255,7 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
         say_wrapped(f"Training, {details.epochs} epochs, {left}: {details.ended}.")
     if ratios is not None:
         words = ", ".join(f"{name} {ratio:.1f}" for name, ratio in ratios.items())
-        say(f"Mean error in parts of the repeatability: {words}.")
+        say(f"Mean error in multiples of the repeatability: {words}.")
 
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
@@ -273,4 +275,4 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
     means = {} if held is None else held.means_without_mm(outliers)
     if means:
         said = ", ".join(f"{name} {mean:.3f}" for name, mean in means.items())
-        say_wrapped(f"Mean error without those of them that were held out: {said} mm.")
+        say_wrapped(f"Mean error without the held-out ones among them: {said} mm.")

@@ -9,14 +9,15 @@ from truearm.validation import Errors, Statistics
 HEADINGS: Final = ("mean", "RMS", "95 %", "99 %", "max")
 
 
-def print_errors(errors: Mapping[str, Errors], judged: str) -> None:
+def print_errors(errors: Mapping[str, Errors], judged: str, of: str = "position") -> None:
     """Print the errors of each model: position in mm, and orientation in mrad where it was measured.
 
     Args:
         errors: Errors by name of the model.
         judged: What was judged, such as "832 held-out poses".
+        of: What was measured in mm: "position" or "distance".
     """
-    _print({name: found.position for name, found in errors.items()}, f"Position error, mm, {judged}")
+    _print({name: found.position for name, found in errors.items()}, f"{of.capitalize()} error, mm, {judged}")
     turned = {name: found.orientation for name, found in errors.items() if found.orientation is not None}
     if turned:
         _print(turned, f"Orientation error, mrad, {judged}")

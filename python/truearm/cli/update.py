@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 CALIBRATION_NAME: Final = "calibration.calib"
 REPORT_NAME: Final = "update.json"
 SUFFIX: Final = ".calib"
-LEAST_TOLD: Final = 1e-6
-"""Smaller probabilities say no more."""
 
 
 def command(
@@ -169,7 +167,7 @@ def _verdict(found: "Update") -> str:
 
 
 def _print(found: "Update") -> None:
-    from truearm.reporting.numbers import listed
+    from truearm.reporting.numbers import listed, probability
 
     say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {_verdict(found)}")
     print_table(
@@ -186,32 +184,32 @@ def _print(found: "Update") -> None:
         ],
     )
     say_wrapped(
-        f"Test for a change of {listed(found.tested)}: p {_probability(found.changed.p)}. "
-        f"Test of the residuals that remain: p {_probability(found.rest.p)}. "
+        f"Test for a change of {listed(found.tested)}: p {probability(found.changed.p)}. "
+        f"Test of the residuals that remain: p {probability(found.rest.p)}. "
         "A small p is unlikely for an arm that did not change."
     )
 
 
 def _offset(entry: "Offset") -> list[str]:
     """Cells of a joint."""
+    from truearm.reporting.numbers import probability
+
     name = str(entry.joint)
     if entry.std is None or entry.p is None:
         why = f"confounded with the {entry.confounded}" if entry.confounded else "not determined"
         return [name, "kept", "", "", why]
     change = f"{entry.change:+.4f} {entry.unit}"
-    return [name, change, f"{entry.std:.4f}", _probability(entry.p), "changed" if entry.moved else ""]
+    return [name, change, f"{entry.std:.4f}", probability(entry.p), "changed" if entry.moved else ""]
 
 
 def _motion(motion: "Motion") -> str:
     """How far a frame or tool is from where it was."""
+    from truearm.reporting.numbers import probability
+
     if motion.kept:
         return "kept as it was"
     turn = "" if motion.angle_deg is None else f" and {motion.angle_deg:.4f} deg"
     away = f"{motion.largest_mm:.3f} mm{turn} from where it was"
     if motion.p is None:
         return f"found anew, {away}"
-    return f"{away} (p {_probability(motion.p)}{', changed' * motion.moved})"
-
-
-def _probability(p: float) -> str:
-    return f"{p:.2g}" if p >= LEAST_TOLD else f"< {LEAST_TOLD:g}"
+    return f"{away} (p {probability(motion.p)}{', changed' * motion.moved})"

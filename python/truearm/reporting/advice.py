@@ -43,7 +43,7 @@ class Advice:
 
 def advise(facts: Facts, known: Known | None) -> list[Advice]:
     """What would help most, the most first, four at most."""
-    rules = (_outliers, _noise_or_poses, _tail, _unseen, _few_held, _intervals, _what_varies)
+    rules = RULES if facts.update is None else RULES_OF_UPDATES
     found = [advice for rule in rules for advice in rule(facts)]
     if known is not None:
         found += _where(facts, known)
@@ -60,11 +60,30 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     largest = short(outliers[0]["distance_mm"])[0]
     share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
     words = (
-        f"{count_of(len(outliers), 'measurement')} cannot be of this arm as the others show it: {rows} "
-        f"{named}{more}, up to {largest} mm off. Measure these poses again; a blocked beam, a loose "
-        "target or an unsettled arm shows at once."
+        f"{count_of(len(outliers), 'measurement')} cannot be of the arm that the others show: {rows} "
+        f"{named}{more}, up to {largest} mm off. Measure these poses again. Usual causes are an interrupted "
+        "beam, a loose target, or an arm that had not settled."
     )
-    yield Advice("outliers", "Look at the outliers.", words, facts.mean_mm() + share)
+    yield Advice("outliers", "Check the outliers.", words, facts.mean_mm() + share)
+
+
+def _no_longer_fits(facts: Facts) -> Iterator[Advice]:
+    if facts.update is not None and facts.update["verdict"] == "field":
+        words = (
+            f"{listed(facts.update['estimated']).capitalize()} do not explain what the update measured. "
+            "Measure more poses, truearm plan --next says which first, and calibrate."
+        )
+        yield Advice("calibrate_anew", "Calibrate anew.", words, 10.0 * facts.mean_mm())
+
+
+def _left_out(facts: Facts) -> Iterator[Advice]:
+    if facts.update is not None and facts.update["outliers"]:
+        rows = listed(list(map(str, facts.update["outliers"])))
+        words = (
+            f"The update left out row {rows}, which "
+            "no other pose supports; the errors above are without them. Measure these poses again."
+        )
+        yield Advice("outliers", "Check the outliers.", words, 2.0 * facts.mean_mm())
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
@@ -74,15 +93,15 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
         words = (
-            f"{left} mm are left where noise alone leaves {noise} mm. More poses will hardly help: what "
-            "is left is the instrument and what the arm does not repeat."
+            f"The mean error is {left} mm, and noise alone would leave {noise} mm. More poses will hardly "
+            "help: what is left is noise of the measuring device and what the arm does not repeat."
         )
         yield Advice("noise_floor", "The noise floor is reached.", words, floor)
         return
     trained = facts.calibration.validation.n_train
     words = (
-        f"{left} mm are left where noise alone leaves {noise} mm; the rest is what {trained} training "
-        "poses do not tell. Poses like those of the work help most."
+        f"The mean error is {left} mm, and noise alone would leave {noise} mm. The rest is what {trained} "
+        "training poses leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
@@ -94,9 +113,8 @@ def _tail(facts: Facts) -> Iterator[Advice]:
     if p99 > LONG_TAIL * mean:
         far, near = short(p99, mean)
         words = (
-            f"One pose in a hundred misses by more than {far} mm, the mean is {near} mm. Look where the "
-            "worst poses lie, in their table and along the joints: more poses there, or a second look at "
-            "them."
+            f"One pose in a hundred has an error above {far} mm; the mean is {near} mm. See where the worst "
+            "poses lie, in their table and along the joints: measure more poses there, or these again."
         )
         yield Advice("long_tail", "Look at the worst poses.", words, 0.5 * p99)
 
@@ -106,14 +124,20 @@ def _where(facts: Facts, known: Known) -> Iterator[Advice]:
     if weak is None:
         return
     std, median = short(weak.std_mm, weak.median_mm)
-    there = (
-        count_of(weak.rows, "measured pose") if facts.readings is not None else "an unknown number of poses"
-    )
     words = (
-        f"With {_range(facts, weak)} the standard deviation is {std} mm, against {median} mm in the "
-        f"median; {there} lie there. Measure there, or keep the work away."
+        f"With {_range(facts, weak)} the standard deviation is {std} mm; its median over all configurations "
+        f"is {median} mm. {_lying(facts, weak)} Measure there, or keep the task away."
     )
     yield Advice("more_poses_there", "Fill the gap.", words, 0.5 * (weak.std_mm - weak.median_mm))
+
+
+def _lying(facts: Facts, weak: Stretch) -> str:
+    """How many measured poses lie in a stretch."""
+    if facts.readings is None:
+        return "How many measured poses lie there is not known."
+    if weak.rows == 0:
+        return "No measured pose lies there."
+    return f"{count_of(weak.rows, 'measured pose')} {'lies' if weak.rows == 1 else 'lie'} there."
 
 
 def _range(facts: Facts, weak: Stretch) -> str:
@@ -129,23 +153,26 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
     hidden = [name for name, words in pairs if SETUP_WORDS not in words]
     if hidden:
         words = (
-            f"What the poses do not show stays nominal: {listed(hidden)}. Larger turns of the joints, and "
-            "a target mounted away from the last axis, would show it."
+            f"The poses do not determine {listed(hidden)}: the nominal values stay. Larger motions of the "
+            "joints, and a target mounted off the last axis, would determine more."
         )
-        yield Advice("unseen_parameters", "Show what cannot be seen.", words, 0.1 * facts.mean_mm())
+        yield Advice("unseen_parameters", "Determine all parameters.", words, 0.1 * facts.mean_mm())
     if selection.distances or selection.orientation or len(selection.targets) > 2:
         return
     words = (
-        "How the tool is turned follows from positions alone and is judged by nothing here. If the tool "
-        "is long or its direction matters, measure orientation or three targets on it."
+        "The orientation of the tool follows from positions alone, and nothing here validates it. If the "
+        "tool is long or its direction matters, measure its orientation, or three targets on it."
     )
     yield Advice("no_orientation", "Measure orientation.", words, 0.05 * facts.mean_mm())
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
     held = facts.calibration.validation.n_holdout
-    if held < FEW_HELD:
-        words = f"The errors above are those of {count_of(held, 'pose')}; another draw would give others."
+    if held < FEW_HELD and facts.update is not None:
+        words = f"The errors above come from {count_of(held, 'pose')}: truearm evaluate judges it on others."
+        yield Advice("few_held_out", "Judge it on more poses.", words, 0.5 * facts.mean_mm())
+    elif held < FEW_HELD:
+        words = f"The errors above come from {facts.poses_judged}: another split would give others."
         yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * facts.mean_mm())
 
 
@@ -154,7 +181,7 @@ def _intervals(facts: Facts) -> Iterator[Advice]:
     if covered is not None and covered < COVERED:
         words = (
             f"Only {percent(covered)} of the held-out coordinates lie within their 95 % intervals: the "
-            "held-out poses are not like those that trained, or something moved between them."
+            "held-out poses are unlike the training poses, or something moved between them."
         )
         yield Advice("narrow_intervals", "Do not trust the intervals.", words, facts.mean_mm())
 
@@ -162,18 +189,22 @@ def _intervals(facts: Facts) -> Iterator[Advice]:
 def _what_varies(facts: Facts) -> Iterator[Advice]:
     mean, constant = facts.mean_mm(), facts.mean_mm(CONSTANT)
     if facts.best == CONSTANT and not facts.calibration.selection.distances:
-        words = "Here parameters were held constant; --model variable shows what varies over the workspace."
+        words = "Here they are constant; --model variable shows how much they vary over the workspace."
         yield Advice("try_variable", "Let the parameters vary.", words, 0.5 * mean)
     elif facts.best not in (CONSTANT, VARIABLE):
         words = (
-            "This is a scheme of the paper; --model variable learns from fewer poses and tells its "
-            "uncertainty."
+            "This is one of the paper's schemes; --model variable needs fewer poses, and gives standard "
+            "deviations."
         )
         yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
     elif facts.best == VARIABLE and mean > SAME * constant:
         left, before = short(mean, constant)
         words = (
-            f"What varies gains little: {left} mm against {before} mm with constants. The arm has little "
-            "of it, or the poses are too few to show it."
+            f"The variable model gains little: a mean error of {left} mm against {before} mm with constant "
+            "parameters. They hardly vary, or the poses are too few to show it."
         )
-        yield Advice("constant_suffices", "Constants do as well.", words, 0.2 * mean)
+        yield Advice("constant_suffices", "Constant parameters do as well.", words, 0.2 * mean)
+
+
+RULES: Final = (_outliers, _noise_or_poses, _tail, _unseen, _few_held, _intervals, _what_varies)
+RULES_OF_UPDATES: Final = (_no_longer_fits, _left_out, _unseen, _few_held)

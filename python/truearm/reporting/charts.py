@@ -18,7 +18,7 @@ def axis(title: str, **more: object) -> dict[str, Any]:
     return {"title": {"text": title}, **more}
 
 
-def log_mm_axis(title: str, low: float, high: float) -> dict[str, Any]:
+def log_axis(title: str, low: float, high: float) -> dict[str, Any]:
     """A logarithmic axis with the round numbers 1, 2, 5 as its ticks."""
     first, last = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
     ticks = [round(m * 10.0**e, 9) for e in range(first, last + 1) for m in (1, 2, 5)]

@@ -28,7 +28,7 @@ def compensation(facts: Facts) -> Section:
     title = "Compensation"
     calibration, rows = facts.calibration, facts.calibration.rows
     if calibration.scheme is not None:
-        words = f"Compensation knows constant and variable models; this one is {facts.best}."
+        words = f"Compensation takes constant and variable models; this one is {facts.best}."
         return Section(title, [Text(words)])
     if rows is None:
         return Section(
@@ -40,21 +40,22 @@ def compensation(facts: Facts) -> Section:
     found = Compensator(calibration, task=task, limits=alone, features=facts.features or None).joints(
         data.readings
     )
-    parts: list[Part] = [Text(_overall(found, task)), *_sizes(facts, found)]
-    return Section(title, [*parts, largest(facts, data, found), *_refusals(data, found)])
+    parts: list[Part] = [Text(_overall(found, task, len(rows.data))), *_sizes(facts, found)]
+    return Section(title, [*parts, *largest(facts, data, found), *_refusals(data, found)])
 
 
 def _task(joints: int) -> Task:
     return "pose" if joints >= FULL_POSE else "axis" if joints == AXIS else "position"
 
 
-def _overall(found: Compensated, task: Task) -> str:
+def _overall(found: Compensated, task: Task, count: int) -> str:
     corrected = int((~found.refused).sum())
     met = {"pose": "position and orientation", "axis": "position and tool axis", "position": "position"}[task]
-    refused = count_of(len(found.refusals), "refusal") if found.refusals else "none refused"
+    refused = f"{int(found.refused.sum()) or 'none'} refused"
+    which = "first " if len(found.q) < count else ""
     return (
-        f"The {count_of(len(found.q), 'measured pose')}, corrected one by one as a program's waypoints "
-        f"({met}): {corrected} corrected, {refused}."
+        f"The {which}{count_of(len(found.q), 'measured pose')}, each corrected as a waypoint of a program "
+        f"({met} of the robot file's tool, not of the measured target): {corrected} corrected, {refused}."
     )
 
 
@@ -82,16 +83,16 @@ def _sizes(facts: Facts, found: Compensated) -> list[Figure]:
     units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
     figure = Figure(
         "Corrections of the joints",
-        f"Joint {widest + 1} changes most, by up to {np.abs(change[:, widest]).max():.3f} "
-        f"{facts.unit(widest)}. The tool moves by {middle} mm in the median and {most} mm at most.",
+        f"Joint {widest + 1} is corrected most, by up to {np.abs(change[:, widest]).max():.3f} "
+        f"{facts.unit(widest)}. The tool is moved by {middle} mm in the median and {most} mm at most.",
         traces,
         {"xaxis": axis("joint"), "yaxis": axis(f"correction, {units}")},
         height=300,
     )
     trace = {"type": "histogram", "x": lean(shift), "nbinsx": 40, "marker": {"color": "@variable"}}
     sizes = Figure(
-        "How far the tool is moved",
-        f"Half of the corrections move the tool by less than {middle} mm; the largest turns it by "
+        "Shift of the tool",
+        f"The median shift is {middle} mm, the largest {most} mm; the largest rotation is "
         f"{short(float(found.correction_mrad[good].max()))[0]} mrad.",
         [trace],
         {"xaxis": axis("shift of the tool, mm", rangemode="tozero"), "yaxis": axis("poses"), "bargap": 0.05},
@@ -100,11 +101,12 @@ def _sizes(facts: Facts, found: Compensated) -> list[Figure]:
     return [figure, sizes]
 
 
-def largest(facts: Facts, data: Measurements, found: Compensated) -> Table:
-    """The rows with the largest corrections."""
+def largest(facts: Facts, data: Measurements, found: Compensated) -> list[Table]:
+    """The rows with the largest corrections; none where all are refused."""
     shift = np.where(found.refused, -1.0, found.correction_mm)
     order = [k for k in np.argsort(-shift, kind="stable")[:LARGEST] if shift[k] >= 0.0]
     change = facts.shown(found.q - found.nominal)
+    units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
     rows = [
         [
             _row_name(data, k),
@@ -115,12 +117,21 @@ def largest(facts: Facts, data: Measurements, found: Compensated) -> Table:
         ]
         for k in order
     ]
-    return Table(
+    if not rows:
+        return []
+    table = Table(
         "Largest corrections",
-        ["row", "shift, mm", "turn, mrad", "standard deviation, mm", "joints, deg or mm"],
+        [
+            "row",
+            "shift, mm",
+            "rotation, mrad",
+            "standard deviation, mm",
+            f"corrections of the joints, {units}",
+        ],
         rows,
         left=(0, 4),
     )
+    return [table]
 
 
 def _row_name(data: Measurements, k: int) -> str:
@@ -140,9 +151,9 @@ def _refusals(data: Measurements, found: Compensated) -> list[Table]:
         rows.append([str(times), named + (" ..." if times > 5 else ""), mine[0].reason])
     table = Table(
         "Refused",
-        ["poses", "rows", "for the first the reason is"],
+        ["poses", "rows", "reason for the first"],
         rows,
-        says="Refused waypoints are left to a person: nothing is clipped.",
+        says="A refused waypoint needs a person's decision: no correction is clipped.",
         left=(1, 2),
     )
     return [table]

@@ -40,9 +40,9 @@ def influence(facts: Facts, effects: Floats) -> Figure:
         "colorbar": colour_bar("mm"),
     }
     return Figure(
-        "Which parameter varies along which joint, as it moves the measured point",
-        f"Most: {names[k]} along joint {joint + 1}, {fixed(shown[joint, k])} mm peak to peak. Over all "
-        f"parameters most varies along joint {int(np.argmax(along)) + 1}.",
+        "Which parameter varies along which joint: the effect on the measured point",
+        f"Largest: {names[k]} along joint {joint + 1}, {fixed(shown[joint, k])} mm peak to peak. Summed over "
+        f"the parameters, the effect is largest along joint {int(np.argmax(along)) + 1}.",
         [trace],
         {
             "xaxis": axis("parameter", tickangle=-60),
@@ -67,10 +67,9 @@ def along(facts: Facts, joint: int, effects: Floats) -> Figure:
         values = found.values[:, column] / per_unit(column)
         values = values - values.mean()
         if spread is not None:
-            x = np.linspace(q[0], q[-1], len(spread))
-            middle = np.interp(x, q, values)
-            half = SURE * spread[:, k] / per_unit(column)
-            traces.append(band(x, middle - half, middle + half, visible=k == 0))
+            known_at = np.linspace(q[0], q[-1], len(spread))
+            half = SURE * np.interp(q, known_at, spread[:, k]) / per_unit(column)
+            traces.append(band(q, values - half, values + half, visible=k == 0))
         traces.append(line(q, values, facts.best, name=name, visible=k == 0))
         shown = [j // each == k for j in range(each * len(names))]
         title = {"yaxis": axis(f"{name}, {unit_of(column)}")}
@@ -81,7 +80,7 @@ def along(facts: Facts, joint: int, effects: Floats) -> Figure:
             )
     first = candidates.column(names[0])
     return Figure(
-        f"Along joint {joint + 1}",
+        f"Variation along joint {joint + 1}",
         says,
         traces,
         {
@@ -119,9 +118,9 @@ def _says(name: str, unit: str, q: Floats, values: Floats, joint_unit: str, sure
     if sure is None:
         start = f"{name} varies by {_four(reach)} {unit} over the measured range."
         return start + _wave(q, values, joint_unit, unit)
-    start = f"{name} varies by {_four(reach)} {unit}; its 95 % band is {_four(2.0 * sure)} wide"
+    start = f"{name} varies by {_four(reach)} {unit}; its 95 % band is {_four(2.0 * sure)} {unit} wide"
     if reach < 2.0 * sure:
-        return f"{start}: the data cannot tell whether it varies."
+        return f"{start}: these data do not show whether it varies."
     return f"{start}.{_wave(q, values, joint_unit, unit)}"
 
 
@@ -131,7 +130,8 @@ def _wave(q: Floats, values: Floats, joint_unit: str, unit: str) -> str:
         return ""
     return (
         f" A wave with a period of {short(wave.period)[0]} {joint_unit} and an amplitude of "
-        f"{_four(wave.amplitude)} {unit} makes {100 * wave.share:.0f} % of what a parabola leaves of it."
+        f"{_four(wave.amplitude)} {unit} accounts for {100 * wave.share:.0f} % of the variance about a "
+        "parabola."
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from truearm.calibration import Calibration
 from truearm.evaluation import Evaluation
 from truearm.held_rows import HeldRows
-from truearm.reporting.numbers import shown_readings, unit_of
+from truearm.reporting.numbers import count_of, shown_readings, unit_of
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -45,6 +45,27 @@ class Facts:
     def held(self) -> HeldRows | None:
         """The held-out rows with their errors, of points; None without, and where distances were measured."""
         return None if self.calibration.selection.distances else self.calibration.held
+
+    @property
+    def update(self) -> Mapping[str, Any] | None:
+        """What the update said that this calibration comes from; None where there was none."""
+        revision = self.calibration.revision
+        return None if revision is None else revision.report
+
+    @property
+    def judged(self) -> str:
+        """What the poses that errors are of are called: "held-out", or "left-out" after an update."""
+        return self.calibration.validation.judged
+
+    @property
+    def poses_judged(self) -> str:
+        """How many they are: "832 held-out poses"."""
+        return count_of(self.calibration.validation.n_holdout, f"{self.judged} pose")
+
+    @property
+    def error(self) -> str:
+        """What errors are of: "distance error" or "position error"."""
+        return "distance error" if self.calibration.selection.distances else "position error"
 
     @property
     def models(self) -> list[str]:

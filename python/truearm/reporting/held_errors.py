@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.held_rows import HeldRows
-from truearm.reporting.charts import axis, legend, line, log_mm_axis, points, running_median
+from truearm.reporting.charts import axis, legend, line, log_axis, points, running_median
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
@@ -25,12 +25,13 @@ FEWEST_IN_BIN: Final = 8
 STANDS_OUT: Final = 1.35
 """A stretch of a joint whose median error is so many times that of all is named."""
 WORST: Final = 12
-SMALLEST_MM: Final = 1e-4
+SMALLEST: Final = 1e-4
+"""In mm or mrad: smaller errors are drawn there."""
 
 
 def held_errors(facts: Facts) -> Section:
     """Errors that were made on poses that took no part in fitting."""
-    title = "Errors on unseen poses"
+    title = f"Errors on {facts.judged} poses"
     if facts.held is None:
         return Section(title, [Text(_without_rows(facts))])
     errors = facts.errors_mm
@@ -42,22 +43,20 @@ def held_errors(facts: Facts) -> Section:
 
 def _without_rows(facts: Facts) -> str:
     if facts.calibration.selection.distances:
-        return (
-            "Distances were measured, not points: the table above has their errors, which have no direction."
-        )
+        return "Distances were measured, not points: their errors, which stand above, have no direction."
     if facts.calibration.rows is not None:
         return (
-            "This file does not hold errors pose by pose: it is an update of another calibration, or "
-            "older than the report. The table above has their statistics."
+            "This file does not hold the errors of single poses, only their statistics, which stand in the "
+            "table above."
         )
     return (
-        "The measurements were left out of this file, so that errors cannot be shown pose by pose; the "
-        "table above was kept. The calibration as it was written before stripping has them."
+        "The measurements were left out of this file, so the errors of single poses cannot be shown; their "
+        "statistics stand in the table above. The calibration before stripping has them."
     )
 
 
 def _known(errors: Floats) -> Floats:
-    return np.maximum(errors[np.isfinite(errors)], SMALLEST_MM)
+    return np.maximum(errors[np.isfinite(errors)], SMALLEST)
 
 
 def histogram(errors: Mapping[str, Floats]) -> Figure:
@@ -76,11 +75,11 @@ def histogram(errors: Mapping[str, Floats]) -> Figure:
     texts = short(*medians.values())
     halves = [f"{text} mm ({name})" for name, text in zip(medians, texts, strict=True)]
     return Figure(
-        "How large the errors are",
-        f"Half of the poses miss by less than {listed(halves)}.",
+        "Distribution of the errors",
+        f"The median is {listed(halves)}.",
         traces,
         legend(
-            xaxis=log_mm_axis("position error, mm (logarithmic)", low, high),
+            xaxis=log_axis("position error, mm (logarithmic)", low, high),
             yaxis=axis("share of the poses, %", rangemode="tozero"),
         ),
     )
@@ -99,12 +98,12 @@ def cumulative(errors: Mapping[str, Floats]) -> Figure:
     within = [f"{text} mm ({name})" for name, text in zip(bounds, short(*bounds.values()), strict=True)]
     mark = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": 95, "y1": 95}
     return Figure(
-        "How many poses are within",
-        f"95 of 100 poses are within {listed(within)}.",
+        "Cumulative distribution of the errors",
+        f"95 % of the poses have an error below {listed(within)}.",
         traces,
         legend(
-            xaxis=log_mm_axis("position error, mm (logarithmic)", low, high),
-            yaxis=axis("poses with less, %", range=[0, 101]),
+            xaxis=log_axis("position error, mm (logarithmic)", low, high),
+            yaxis=axis("poses with a smaller error, %", range=[0, 101]),
             shapes=[{**mark, "line": {"color": "@muted", "width": 1, "dash": "dot"}}],
         ),
     )
@@ -122,23 +121,25 @@ def along_joint(facts: Facts, joint: int) -> Figure:
         raise ValueError("there are no held-out rows")
     q = facts.shown(held.readings)[:, joint]
     unit, name = facts.unit(joint), facts.best
-    traces = []
-    for model in [model for model in facts.models if model != "nominal"]:
+    traces, shown = [], {}
+    for model in facts.models:
         errors = facts.errors_mm[model]
         known = np.isfinite(errors)
         _, middles, medians = running_median(q[known], errors[known], JOINT_BINS, FEWEST_IN_BIN)
         if model == name:
-            traces.append(points(q[known][:DRAWN], errors[known][:DRAWN], model, showlegend=False))
+            traces.append(points(q[known][:DRAWN], _known(errors)[:DRAWN], model, showlegend=False))
+            shown["points"] = _known(errors)[:DRAWN]
         traces.append(line(middles, medians, model, name=f"{model}, median"))
+        shown[model] = _known(medians)
     return Figure(
         f"Error along joint {joint + 1}",
         _where_along(q, facts.errors_mm[name], unit),
         traces,
         legend(
             xaxis=axis(f"joint {joint + 1}, {unit}"),
-            yaxis=axis("position error, mm", rangemode="tozero"),
+            yaxis=log_axis("position error, mm (logarithmic)", *_ends(shown)),
         ),
-        height=270,
+        height=290,
     )
 
 
@@ -149,11 +150,14 @@ def _where_along(q: Floats, errors: Floats, unit: str) -> str:
     worst_bin = int(np.argmax(medians))
     here, everywhere = short(float(medians[worst_bin]), overall)
     if len(medians) < 3:
-        return f"Too few poses to tell stretches of the joint apart; the median is {everywhere} mm."
+        return f"Too few poses to compare stretches of the joint; the median is {everywhere} mm."
     if medians[worst_bin] < STANDS_OUT * overall:
-        return f"Even along the joint: no stretch's median exceeds {here} mm, that of all is {everywhere} mm."
+        return (
+            f"No stretch of the joint stands out: the largest median of one is {here} mm, that of all poses "
+            f"{everywhere} mm."
+        )
     stretch = f"{edges[worst_bin]:.0f} and {edges[worst_bin + 1]:.0f} {unit}"
-    return f"Largest between {stretch}: {here} mm in the median, against {everywhere} mm over all."
+    return f"Largest between {stretch}: the median there is {here} mm, that of all poses {everywhere} mm."
 
 
 def orientation(facts: Facts) -> list[Figure]:
@@ -165,7 +169,7 @@ def orientation(facts: Facts) -> list[Figure]:
         for name, found in facts.held.errors.items()
         if found.orientation is not None
     }
-    known = {name: np.sort(values[np.isfinite(values)]) for name, values in turned.items()}
+    known = {name: np.sort(_known(values)) for name, values in turned.items()}
     if not known or min(map(len, known.values())) == 0:
         return []
     traces = [
@@ -175,12 +179,12 @@ def orientation(facts: Facts) -> list[Figure]:
     bounds = {name: float(np.quantile(values, 0.95)) for name, values in known.items()}
     within = [f"{text} mrad ({name})" for name, text in zip(bounds, short(*bounds.values()), strict=True)]
     figure = Figure(
-        "Orientation: how many poses are within",
-        f"95 of 100 poses are turned by less than {listed(within)}.",
+        "Cumulative distribution of the orientation errors",
+        f"95 % of the poses have an orientation error below {listed(within)}.",
         traces,
         legend(
-            xaxis=axis("orientation error, mrad", rangemode="tozero"),
-            yaxis=axis("poses with less, %", range=[0, 101]),
+            xaxis=log_axis("orientation error, mrad (logarithmic)", *_ends(known)),
+            yaxis=axis("poses with a smaller error, %", range=[0, 101]),
         ),
     )
     return [figure]
@@ -205,8 +209,8 @@ def worst(held: HeldRows, facts: Facts) -> Table:
         "Worst poses",
         [*columns, f"joints, {units}"],
         rows,
-        says=f"These {len(rows)} of {len(held)} held-out poses make {100 * share:.0f} % of the sum of all "
-        "errors. Rows are counted from 1 below the header of the file.",
+        says=f"These {len(rows)} of {facts.poses_judged} make up {100 * share:.0f} % of the sum of all "
+        "errors. Row 1 is the first below the header of the file.",
         left=(0, len(columns)) if not several else (0, 1, len(columns)),
     )
 

@@ -10,6 +10,7 @@ from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 
+LEAST_TOLD: Final = 1e-6
 DIGITS: Final = 4
 """Significant digits of what figures are drawn from: finer than a pixel."""
 
@@ -47,6 +48,11 @@ def short(*values: float) -> list[str]:
 def percent(share: float) -> str:
     """A share in percent: "64 %"; of one that is hardly any, "less than 1 %"."""
     return "less than 1 %" if share < 0.005 else f"{100.0 * share:.0f} %"
+
+
+def probability(p: float) -> str:
+    """A probability: "0.034"; of one that says no more by being smaller, "< 1e-06"."""
+    return f"{p:.2g}" if p >= LEAST_TOLD else f"< {LEAST_TOLD:g}"
 
 
 def count_of(count: int, noun: str) -> str:

@@ -1,11 +1,21 @@
 """Chapter: the same models judged on other measurements."""
 
+from truearm.doubts import helps
+from truearm.evaluation import Evaluation
+from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
 from truearm.reporting.held_errors import cumulative, histogram
 from truearm.reporting.numbers import count_of, fixed, short
 from truearm.reporting.parts import Part, Section, Table
 from truearm.reporting.verdict import HEADINGS, STATISTICS
 from truearm.units import MM_PER_METRE
+
+
+def _no_help(found: Evaluation, best: str) -> str:
+    """A warning where the nominal model does as well."""
+    if helps(found.errors[NOMINAL].position.mean, found.errors[best].position.mean):
+        return ""
+    return " On these measurements the calibration does not help."
 
 
 def other_data(facts: Facts) -> Section:
@@ -20,16 +30,16 @@ def other_data(facts: Facts) -> Section:
     held = facts.calibration.validation.holdout[facts.best].position.mean
     here, there = short(now, held)
     how = (
-        f"{count_of(found.n_frame, 'row')} found frame and tool"
+        f"Frame and tool were found from {count_of(found.n_frame, 'other row')}"
         if found.n_frame
-        else "frame and tool were kept"
+        else "Frame and tool were kept"
     )
     table = Table(
         f"{', '.join(facts.other_names)}: {count_of(found.n_judged, 'row')} judged, mm",
         ["model", *HEADINGS],
         rows,
-        says=f"{how}. The {facts.best} model misses by {here} mm on average, {there} mm on the poses held "
-        "out of its own data.",
+        says=f"{how}. The mean error of the {facts.best} model is {here} mm here, and {there} mm on the "
+        f"{facts.judged} poses of its own data.{_no_help(found, facts.best)}",
         strong=[list(errors).index(facts.best)],
     )
     parts: list[Part] = [table]

@@ -1,4 +1,4 @@
-"""Chapter: the constants: nominal, correction, standard error, and what cannot be told from what."""
+"""The constant model: nominal, correction, standard error, and which parameters are confounded."""
 
 from typing import Final
 
@@ -10,7 +10,7 @@ from truearm.parameters import KIND_COUNT, KINDS
 from truearm.reporting.charts import colour_bar
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import count_of, lean
-from truearm.reporting.parts import Cell, Figure, Part, Section, Table, Text
+from truearm.reporting.parts import Cell, Figure, Table
 from truearm.reporting.style import DIVERGING
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
@@ -35,19 +35,6 @@ def unit_of(column: int) -> str:
 def per_unit(column: int) -> float:
     """What its SI value is divided by to be shown."""
     return 1.0 / MM_PER_METRE if kind_of(column) in LENGTHS else RADIANS_PER_DEGREE
-
-
-def parameters(facts: Facts) -> Section:
-    """The constant model's parameters and what the poses determine."""
-    found = facts.calibration.identifiability
-    words = (
-        f"The poses determine {found.rank} of {found.parameters} parameters of the arm, and with frames "
-        f"and targets {found.total_rank} unknowns; condition number {found.condition:.0f}. The others "
-        "stay nominal."
-    )
-    parts: list[Part] = [Text(words), table(facts)]
-    figure = confounding(facts)
-    return Section("Parameters", [*parts, *([figure] if figure is not None else [])])
 
 
 def table(facts: Facts) -> Table:
@@ -80,17 +67,22 @@ def table(facts: Facts) -> Table:
             ]
         )
     return Table(
-        "Constant corrections",
-        ["", "unit", "nominal", "correction", "standard error", "at the point, mm", "the data says"],
+        f"Parameters of the constant model{_purpose(facts)}",
+        ["", "unit", "nominal", "correction", "standard error", "at the point, mm", "determined?"],
         rows,
-        says=f"{largest[0]} matters most: its correction moves the measured point by {largest[1]:.3f} mm "
-        "(root mean square over the poses). Standard errors hold for the constant model alone.",
+        says=f"{largest[0]} has the largest effect: its correction moves the measured point by "
+        f"{largest[1]:.3f} mm (root mean square over the poses).",
         left=(0, 1, 6),
     )
 
 
+def _purpose(facts: Facts) -> str:
+    """What the constant model is for where another one predicts."""
+    return "" if facts.best == CONSTANT else ", which exports of constants hold"
+
+
 def _remark(name: str, words: str) -> str:
-    return words.removeprefix(name).strip().rstrip(".") or "not asked for"
+    return words.removeprefix(name).strip().rstrip(".") or "not estimated"
 
 
 def standard_errors(facts: Facts) -> dict[str, float]:
@@ -123,16 +115,17 @@ def confounding(facts: Facts) -> Figure | None:
     covariance = details.covariance[:size, :size]
     deviation = np.sqrt(np.diagonal(covariance))
     scale = np.outer(deviation, deviation)
-    # An update holds constants that its poses do not tell: they go with nothing.
+    # An update keeps constants that its poses do not tell: they correlate with nothing.
     correlation = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
     off = np.where(np.eye(size, dtype=bool), 0.0, correlation)
     row, column = np.unravel_index(int(np.argmax(np.abs(off))), off.shape)
     strong = int((np.abs(np.triu(off)) > CONFOUNDED).sum())
-    pair = f"{names[row]} and {names[column]} go together most: correlation {off[row, column]:+.2f}"
+    pair = f"The largest correlation is {off[row, column]:+.2f}, of {names[row]} and {names[column]}"
+    pairs = f"{count_of(strong, 'pair')} {'exceeds' if strong == 1 else 'exceed'}"
     others = (
-        f"No pair is beyond {CONFOUNDED}."
+        f"No pair exceeds {CONFOUNDED} either way."
         if strong == 0
-        else f"{count_of(strong, 'pair')} beyond {CONFOUNDED}: their sum or difference is known far better."
+        else f"{pairs} {CONFOUNDED} either way: a combination of the two is known far better than each."
     )
     trace = {
         "type": "heatmap",
@@ -145,7 +138,7 @@ def confounding(facts: Facts) -> Figure | None:
         "colorbar": colour_bar("correlation"),
     }
     return Figure(
-        "What is confounded with what",
+        "Correlations of the constant model's parameters",
         f"{pair}. {others}",
         [trace],
         {

@@ -3,11 +3,11 @@
 import os
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from truearm.options import Options
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import fixed
+from truearm.reporting.numbers import count_of, fixed
+from truearm.reporting.option_words import in_words, shown_options
 from truearm.reporting.parts import Part, Section, Table, Text
 
 
@@ -21,25 +21,30 @@ def provenance(facts: Facts) -> Section:
 
 def _origin(facts: Facts) -> Table:
     calibration, summary = facts.calibration, facts.summary
-    robot, validation = calibration.robot, calibration.validation
+    robot = calibration.robot
     files = [] if calibration.rows is None else [Path(file).name for file in calibration.rows.data.files]
     fitted = summary["n_fitted"]
     rows = [
-        ["arm", f"{robot.name}; {robot.source}"],
+        ["arm", robot.name],
+        *([["source of the nominal parameters", robot.source]] if robot.source else []),
         ["measurements", ", ".join(files) or "left out of the file"],
-        ["their SHA-256", summary["data_sha256"]],
-        ["rows", f"{validation.n_train} trained, {validation.n_holdout} held out" + _fitted(fitted)],
-        ["seed of the split", str(summary["options"]["seed"])],
+        ["SHA-256 of the measurements", summary["data_sha256"]],
+        ["rows", _rows(facts, fitted)],
         ["truearm", summary["version"]],
     ]
     if summary["seconds"]:
         times = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in summary["seconds"].items())
-        rows.append(["time of the fits", times])
-    return Table("Origin", ["", "this report"], [*rows, ["page made", _now()]], left=(0, 1))
+        rows.append(["duration of the fits", times])
+    return Table("Origin", ["", "value"], [*rows, ["report written", _now()]], left=(0, 1))
 
 
-def _fitted(fitted: int | None) -> str:
-    return "" if fitted is None else f"; the calibration in the file is fitted to {fitted}"
+def _rows(facts: Facts, fitted: int | None) -> str:
+    """How many rows had which part."""
+    validation = facts.calibration.validation
+    if facts.update is not None:
+        return f"updated with {validation.n_train}; learned from those of the calibration before the update"
+    said = f"{count_of(validation.n_train, 'training row')}, {validation.n_holdout} held out"
+    return said if fitted is None else f"{said}; the calibration in the file is fitted to {fitted}"
 
 
 def _now() -> str:
@@ -50,26 +55,22 @@ def _now() -> str:
 
 
 def _options(options: Options) -> Table:
-    """All options, those that are not the defaults first."""
+    """The options that bear on the model, those that are not the defaults first."""
     used, usual = options.to_dict(), Options().to_dict()
-    changed = [name for name in used if used[name] != usual[name]]
-    names = [*changed, *(name for name in used if name not in changed)]
+    words = shown_options(options.model)
+    changed = [name for name in words if used[name] != usual[name]]
+    names = [*changed, *(name for name in words if name not in changed)]
+    says = (
+        "Options that differ from the defaults come first, in bold." if changed else "All are the defaults."
+    )
     return Table(
         "Options",
         ["option", "value"],
-        [[name, _words(used[name])] for name in names],
-        says=f"Those that differ from the defaults come first: {', '.join(changed) or 'none does'}.",
+        [[words[name], in_words(name, used[name])] for name in names],
+        says=says,
         left=(0, 1),
         strong=range(len(changed)),
     )
-
-
-def _words(value: Any) -> str:  # noqa: ANN401
-    if value is None:
-        return "none"
-    if isinstance(value, list):
-        return ", ".join(map(str, value)) or "none"
-    return str(value)
 
 
 def _outliers(facts: Facts) -> list[Table]:
@@ -86,8 +87,8 @@ def _outliers(facts: Facts) -> list[Table]:
         "Outliers",
         ["row", "file", "distance, mm", "score"],
         rows,
-        says=f"They were {fate} the fit, never out of the held-out errors. A score above one is beyond "
-        "belief.",
+        says=f"They were {fate} the fit; the held-out errors include them. Scores are squared standardised "
+        "residuals over the limit: above one is an outlier.",
         left=(0, 1),
     )
     return [table]

@@ -21,6 +21,8 @@ MOST_ARROWS: Final = 400
 SHARE_OF_REACH: Final = 0.12
 """Length of a large nominal error in parts of the workspace."""
 LONGER: Final = 10
+SHARED: Final = 0.3
+"""Errors whose mean vector is longer than this part of their mean length share a direction."""
 ROUND: Final = (1, 2, 5)
 CAMERA: Final = {"eye": {"x": 1.2, "y": -1.4, "z": 0.6}, "center": {"x": 0.0, "y": 0.0, "z": -0.06}}
 
@@ -44,7 +46,7 @@ def quiver(facts: Facts) -> Figure | None:
     fixed_traces = len(traces) - len(states)
     shown = [[True] * fixed_traces + [j == k for j in range(len(states))] for k in range(len(states))]
     return Figure(
-        f"Errors in space, {scale} times longer than they are",
+        f"Errors in space, enlarged {scale} times",
         _says(facts, held),
         traces,
         {
@@ -61,11 +63,11 @@ def quiver(facts: Facts) -> Figure | None:
 
 
 def _states(facts: Facts) -> list[tuple[str, str, int]]:
-    """Label, model and magnification of each state; before and after come first."""
+    """Label, model and magnification of each state; nominal and best come first."""
     best = facts.best
-    states = [("before: nominal", NOMINAL, 1), (f"after: {best}", best, 1)]
+    states = [(NOMINAL, NOMINAL, 1), (best, best, 1)]
     states += [("constant", CONSTANT, 1)] if best != CONSTANT else []
-    return [*states, (f"after: {best}", best, LONGER)]
+    return [*states, (best, best, LONGER)]
 
 
 def _scale(places: Floats, vectors: Floats) -> int:
@@ -109,10 +111,9 @@ def _says(facts: Facts, held: HeldRows) -> str:
         common.append((mean, float(np.linalg.norm(vectors, axis=1).mean())))
     (_, before), (mean, after) = common
     texts = short(before, after, mean)
-    parts = (
-        f"Arrows are {texts[0]} mm long on average before and {texts[1]} mm after; averaged as vectors "
-        f"the latter leave {texts[2]} mm"
+    shared = "share no direction" if mean < SHARED * after else "share a direction"
+    return (
+        f"The mean error is {texts[0]} mm with the nominal model and {texts[1]} mm with the {facts.best} "
+        f"one; the mean of its error vectors is {texts[2]} mm long: they {shared}. The arm is drawn in a "
+        "pose near the middle of the measured ones."
     )
-    if mean < 0.3 * after:
-        return f"{parts}, so they point in all directions. The arm is drawn in a pose near the middle of all."
-    return f"{parts}, so they share a direction. The arm is drawn in a pose near the middle of all."

@@ -91,12 +91,13 @@ class Repeats:
 def repeats(facts: Facts) -> Section:
     """What repeated poses say."""
     title = "Repeatability and noise"
+    per = "per distance" if facts.calibration.selection.distances else "per coordinate"
     floor, noise = short(distance_at_floor_mm(facts), facts.summary["noise_mm"])
     parts: list[Part] = [
         Text(
-            f"What no model explains deviates by {noise} mm in each coordinate; alone it would make a "
-            f"mean error of {floor} mm. That is the instrument, what the arm does not repeat, and what "
-            "the model cannot follow."
+            f"The residual that the {facts.best} model does not explain has a standard deviation of {noise} "
+            f"mm {per}; alone it would make a mean error of {floor} mm. It comprises noise of the measuring "
+            "device, what the arm does not repeat, and what the model cannot represent."
         )
     ]
     found = Repeats.of(facts)
@@ -109,12 +110,12 @@ def repeats(facts: Facts) -> Section:
 
 def _nothing(facts: Facts) -> str:
     if facts.calibration.rows is None:
-        return "The measurements were left out of this file, so that repeated poses cannot be looked at."
+        return "The measurements were left out of this file, so repeated poses cannot be examined."
     if facts.calibration.selection.distances:
-        return "Distances were measured, not points: how poses repeat cannot be told from them."
+        return "Distances were measured, not points: they do not show how poses repeat."
     return (
-        "No pose was measured twice, so repeatability and hysteresis cannot be told from this data. Some "
-        "poses measured several times, and from both sides, would tell them."
+        "No pose was measured twice, so these data do not show repeatability and hysteresis. Some poses "
+        "measured several times, approached from both sides, would."
     )
 
 
@@ -124,7 +125,11 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     mean, spread = float(distances.mean()), float(distances.std(ddof=1)) if len(distances) > 1 else 0.0
     error = facts.calibration.validation.holdout[facts.best].position.mean
     texts = short(mean, mean + 3.0 * spread)
-    times = f" The mean error of unseen poses is {error / mean:.1f} times that scatter." if mean > 0.0 else ""
+    times = (
+        f" The mean error on {facts.judged} poses is {error / mean:.1f} times that scatter."
+        if mean > 0.0
+        else ""
+    )
     poses = len(np.unique(found.place))
     trace = {
         "type": "histogram",
@@ -134,11 +139,11 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     }
     return Figure(
         "How well poses repeat",
-        f"{len(distances)} measurements of {count_of(poses, 'pose')} lie {texts[0]} mm from their centres "
-        f"on average; mean and three standard deviations make {texts[1]} mm.{times}",
+        f"{len(distances)} measurements of {count_of(poses, 'pose')} lie {texts[0]} mm from the mean of "
+        f"their pose on average; mean plus three standard deviations is {texts[1]} mm.{times}",
         [trace],
         {
-            "xaxis": axis("distance from the centre of the pose, mm", rangemode="tozero"),
+            "xaxis": axis("distance from the mean of the pose, mm", rangemode="tozero"),
             "yaxis": axis("measurements"),
             "bargap": 0.05,
         },
@@ -162,10 +167,10 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
         return []
     largest = max(rows, key=lambda row: float(row[2]))
     table = Table(
-        "Reached from both sides",
-        ["", "poses", "sides apart, mm", "scatter alone, mm"],
+        "Poses approached from both sides",
+        ["", "poses", "difference of the sides, mm", "expected from scatter, mm"],
         rows,
-        says=f"{largest[0].capitalize()} shows most: {largest[2]} mm (root mean square). Rows are taken in "
-        "the order of the file as the order of measuring.",
+        says=f"{largest[0].capitalize()} shows the largest difference: {largest[2]} mm (root mean square). "
+        "The order of the rows is taken for the order of measuring.",
     )
     return [table]

@@ -14,11 +14,12 @@ from truearm.reporting.held_errors import held_errors
 from truearm.reporting.known import Known, known
 from truearm.reporting.other_data import other_data
 from truearm.reporting.page import page
-from truearm.reporting.parameters import parameters
+from truearm.reporting.parameters_chapter import parameters
 from truearm.reporting.parts import Figure, Section
 from truearm.reporting.provenance import provenance
 from truearm.reporting.quiver import quiver
 from truearm.reporting.repeats import repeats
+from truearm.reporting.since_update import since_update
 from truearm.reporting.trust import trust
 from truearm.reporting.varying import varying
 from truearm.reporting.verdict import head, verdict
@@ -86,6 +87,7 @@ def report(
 def _chapters(certain: Known | None) -> list[Chapter]:
     """What each chapter is about and what makes it, in their order."""
     return [
+        ("the update", since_update),
         ("errors", _errors),
         ("other measurements", other_data),
         ("parameters", parameters),

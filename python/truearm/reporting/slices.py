@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from truearm._core import Field
 from truearm.reporting.charts import axis, heatmap
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import fixed
+from truearm.reporting.numbers import fixed, listed
 from truearm.reporting.parameters import effect_mm
 from truearm.reporting.parts import Choice, Figure
 from truearm.reporting.style import DIVERGING
@@ -35,7 +35,7 @@ def slices(facts: Facts) -> list[Figure]:
 
 
 class Cut:
-    """A block on a grid over its first two inputs, at three places of its third."""
+    """A block on a grid over its first two inputs, at three places of its third, less its means there."""
 
     def __init__(self, facts: Facts, alone: Field, block: dict[str, Any]) -> None:
         """Ask the block alone."""
@@ -43,7 +43,8 @@ class Cut:
         first, second = self.inputs[:2]
         self.axes = [facts.places(joint, GRID) for joint in (first, second)]
         self.places = self._places()
-        self.values = np.stack([self._ask(alone, place) for place in self.places])
+        values = np.stack([self._ask(alone, place) for place in self.places])
+        self.values = values - values.mean(axis=(0, 1, 2))
         self.effects = np.abs(self.values).max(axis=(1, 2)) * effect_mm(facts)
 
     def _places(self) -> list[float | None]:
@@ -66,14 +67,14 @@ class Cut:
     def moved(self) -> Figure:
         """Root of the sum of squares of what all parameters do to the judged point."""
         z = np.sqrt(np.square(self.values * effect_mm(self.facts)).sum(axis=-1))
-        names = ", ".join(f"{joint + 1}" for joint in self.inputs)
+        names = listed([f"{joint + 1}" for joint in self.inputs])
         return self._figure(
-            f"What varies with joints {names} together, all parameters",
+            f"Variation over joints {names} together, all parameters",
             z,
             "mm",
-            f"It moves the measured point by up to {fixed(float(z.max()))} mm, "
-            f"{fixed(float(np.median(z)))} mm in the median of these slices (root of the sum of squares "
-            "over the parameters).",
+            "Deviation of the parameters from their means over these slices, as it moves the measured point "
+            f"(root sum of squares over the parameters): up to {fixed(float(z.max()))} mm, with a median of "
+            f"{fixed(float(np.median(z)))} mm. The means are no part of it: the constants could take them.",
             {"zmin": 0, "zmax": float(f"{z.max():.4g}")},
         )
 
@@ -87,8 +88,8 @@ class Cut:
             f"{name} over the same slices",
             z,
             "mm",
-            f"As it moves the measured point: between {fixed(float(z.min()))} and {fixed(float(z.max()))} "
-            "mm.",
+            f"Deviation from the mean over the slices, as it moves the measured point: "
+            f"{fixed(float(z.min()))} to {fixed(float(z.max()))} mm.",
             {"zmin": -top, "zmax": top, "colorscale": DIVERGING},
         )
 

@@ -24,7 +24,7 @@ def trust(facts: Facts, found: Known | None) -> Section:
     """Maps over the workspace and over pairs of joints."""
     title = "Where to trust it"
     if found is None:
-        words = f"The model {facts.best} does not tell how uncertain it is; one with --model variable does."
+        words = f"The model {facts.best} gives no standard deviations; --model variable does."
         return Section(title, [Text(words)])
     joints = _most_telling(facts, found)
     pairs = [(joints[i], joints[j]) for i in range(len(joints)) for j in range(i + 1, len(joints))]
@@ -35,12 +35,13 @@ def trust(facts: Facts, found: Known | None) -> Section:
 def _overall(facts: Facts, found: Known) -> str:
     values = [float(np.quantile(found.std_mm, share)) for share in (0.5, 0.9)]
     median, tenth, near = short(*values, float(np.median(found.at_rows_mm)))
-    kind = "exact" if found.is_exact else "the bounds that compensation judges by, never below the exact ones"
-    where = "the measured poses" if facts.readings is not None else "poses within the joints' limits"
+    kind = "exact" if found.is_exact else "upper bounds, which compensation judges by"
+    where = "the measured poses" if facts.readings is not None else "poses in the usual ranges of the joints"
     return (
-        f"Standard deviation of the measured point, the arm's part without noise: {near} mm in the median "
-        f"of {where}; over all that the joints reach {median} mm in the median, and less than {tenth} mm "
-        f"in nine of ten configurations. Values are {kind}, at {len(found.std_mm)} configurations."
+        "Standard deviation of the measured point as the arm's model gives it, without noise of the "
+        f"measurement (root of the summed variances of x, y and z): the median over {where} is {near} mm, "
+        f"over all configurations in the joints' whole ranges {median} mm, and 90 % of these are below "
+        f"{tenth} mm. The values are {kind}, at {len(found.std_mm)} configurations."
     )
 
 
@@ -65,7 +66,7 @@ def pair_map(facts: Facts, found: Known, pair: tuple[int, int]) -> Figure:
         for k, joint in enumerate(pair)
     )
     traces = [_map(means, middles, found)]
-    says = f"From {small} mm where it is best known to {large} mm with {where}."
+    says = f"Means over the other joints: from {small} mm to {large} mm, the largest with {where}."
     if facts.readings is not None:
         q = facts.shown(facts.readings[:DRAWN])
         traces.append(data_points(q[:, pair[0]], q[:, pair[1]]))
@@ -99,13 +100,13 @@ def workspace(facts: Facts, found: Known) -> Figure:
     traces = [_map(means, middles, found)]
     k = np.unravel_index(int(np.nanargmax(means)), means.shape)
     where = f"{middles[0][k[0]]:.0f} mm from the axis of the base at height {middles[1][k[1]]:.0f} mm"
-    says = f"Largest {where}: {short(float(means[k]))[0]} mm."
+    says = f"Largest: {short(float(means[k]))[0]} mm, {where}."
     if facts.readings is not None:
         seen = _radius_height(facts, facts.readings)
         traces.append(data_points(seen[:DRAWN, 0], seen[:DRAWN, 1]))
         measured, _, _ = np.histogram2d(seen[:, 0], seen[:, 1], edges)
         share = float((measured[np.isfinite(means)] > 0).mean())
-        says += f" The measured poses, dots, lie in {percent(share)} of the cells that the arm reaches."
+        says += f" Dots are measured poses; they lie in {percent(share)} of the cells that are filled."
     return Figure(
         "Standard deviation over the workspace",
         says,

@@ -1,5 +1,7 @@
 """Chapter: how the parameters vary."""
 
+from typing import Final
+
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.curves import along, influence
 from truearm.reporting.facts import Facts
@@ -12,14 +14,17 @@ from truearm.reporting.sweeps import influence_mm
 
 
 def varying(facts: Facts) -> Section:
-    """Curves, slices, regions, and what varies with weight."""
+    """Curves, slices, regions, and what varies with the levers of the links."""
     title = "How the parameters vary"
     if facts.best == CONSTANT:
-        return Section(title, [Text("This calibration holds all parameters constant.")])
+        return Section(title, [Text("The parameters of this calibration are constant.")])
     effects = influence_mm(facts)
-    words = "Curves show how a parameter differs from its mean along the joint, other joints in a usual pose."
+    words = (
+        "Curves show the deviation of a parameter from its mean along the joint; the other joints stay in a "
+        "typical pose."
+    )
     if facts.best == VARIABLE and facts.readings is not None:
-        words += " Bands are two standard deviations of that difference on either side."
+        words += " Bands are two standard deviations of that deviation to either side."
     parts: list[Part] = [Text(words, is_note=True), influence(facts, effects)]
     tree = region_tree(facts)
     parts += [tree] if tree is not None else []
@@ -34,8 +39,9 @@ def varying(facts: Facts) -> Section:
 
 def _blocks(facts: Facts) -> Table:
     """The blocks of the field as summary.json has them."""
-    rows = []
-    for block in facts.summary["blocks"]:
+    rows, blocks = [], facts.summary["blocks"]
+    shown = [key for key in _AMPLITUDES if any(key in block["amplitudes"] for block in blocks)]
+    for block in blocks:
         amplitudes = block["amplitudes"]
         inputs = [f"joint {joint}" for joint in block["joints"]] + list(block["features"])
         rows.append(
@@ -44,17 +50,23 @@ def _blocks(facts: Facts) -> Table:
                 ", ".join(inputs),
                 str(block["parameters"]),
                 str(block["cells"]),
-                *(fixed(amplitudes[key]) if key in amplitudes else "" for key in _AMPLITUDES),
+                *(fixed(amplitudes[key]) if key in amplitudes else "" for key in shown),
             ]
         )
     return Table(
         "Blocks of the field",
-        ["block", "over", "parameters", "cells", "theta, mrad", "other angles, mrad", "lengths, mm"],
+        [*_COLUMNS, *(_AMPLITUDES[key] for key in shown)],
         rows,
-        says="Amplitudes are standard deviations of the prior that the evidence chose: how much each block "
-        "is allowed.",
+        says="The last columns are the standard deviations of the prior, chosen by the evidence: how far "
+        "each block may take its parameters.",
         left=(0, 1),
     )
 
 
-_AMPLITUDES = ("theta_mrad", "other_angles_mrad", "lengths_mm")
+_COLUMNS: Final = ("block", "over", "parameters", "cells")
+_AMPLITUDES: Final = {
+    "theta_mrad": "theta, mrad",
+    "theta_mrad_per_m": "theta, mrad for a lever of 1 m",
+    "other_angles_mrad": "other angles, mrad",
+    "lengths_mm": "lengths, mm",
+}

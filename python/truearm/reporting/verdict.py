@@ -40,26 +40,39 @@ def about(facts: Facts) -> str:
     elif used.orientation:
         what = "position and orientation"
     else:
-        what = count_of(len(used.targets), "measured point") + " a pose"
+        what = count_of(len(used.targets), "measured point") + " per pose"
     joints = count_of(len(facts.joints), "joint")
-    rows = f"{validation.n_train} poses trained, {validation.n_holdout} were held out"
+    if facts.update is not None:
+        rows = f"updated with {count_of(validation.n_train, 'pose')}"
+    else:
+        rows = f"{count_of(validation.n_train, 'training pose')}, {facts.poses_judged}"
     setups = f"{count_of(len(calibration.groups), 'set-up')} ({', '.join(calibration.groups)})"
-    return f"{calibration.robot.name}, {joints}; {setups}, {what}; {rows}; model: {facts.best}"
+    return f"{calibration.robot.name}, {joints}; {setups}, {what}; {rows}; {facts.best} model"
 
 
 def verdict(facts: Facts) -> str:
-    """What the calibration gained, on poses it has never seen."""
+    """What the calibration gained, on poses that took no part in what is judged there."""
     validation = facts.calibration.validation
-    before, after = (validation.holdout[name].position for name in (NOMINAL, facts.best))
-    numbers = short(after.mean, after.max, before.mean, before.max)
-    poses = count_of(validation.n_holdout, "pose")
-    start = (
-        f"On {poses} it has never seen, the arm now misses by {numbers[0]} mm on average and {numbers[1]} mm"
+    nominal, after = (validation.holdout[name].position for name in (NOMINAL, facts.best))
+    before = nominal.mean, nominal.max
+    if facts.update is not None:
+        before = facts.update["before"]["mean_mm"], facts.update["before"]["max_mm"]
+    numbers = short(after.mean, after.max, *before)
+    poses = facts.poses_judged + (", each predicted from the others," if validation.left_out else "")
+    said = (
+        f"On {poses} the mean {facts.error} is {numbers[0]} mm and the largest {numbers[1]} mm; "
+        f"{_former(facts)} they are {numbers[2]} mm and {numbers[3]} mm."
     )
-    said = f"{start} at most; before {numbers[2]} and {numbers[3]}."
-    if not helps(before.mean, after.mean):
-        return f"{said} The calibration does not help: do not use it before the reason is found."
+    if not helps(nominal.mean, after.mean):
+        return f"{said} The calibration does not help: do not use it until the reason is found."
+    if facts.update is not None and facts.update["verdict"] == "field":
+        return f"{said} The calibration no longer fits the arm: measure again and calibrate."
     return said
+
+
+def _former(facts: Facts) -> str:
+    """What the errors are compared with."""
+    return "with the nominal model" if facts.update is None else "with the calibration before the update"
 
 
 def tone(facts: Facts) -> Tone:
@@ -68,6 +81,8 @@ def tone(facts: Facts) -> Tone:
     before, after = (validation.holdout[name].position.mean for name in (NOMINAL, facts.best))
     if not helps(before, after):
         return "bad"
+    if facts.update is not None and facts.update["verdict"] == "field":
+        return "bad"
     return "good" if after < GOOD * before else "fair"
 
 
@@ -75,18 +90,19 @@ def cards(facts: Facts) -> list[Card]:
     """The numbers that matter most."""
     validation, summary = facts.calibration.validation, facts.summary
     before, after = (validation.holdout[name].position for name in (NOMINAL, facts.best))
-    mean, p95, was = short(after.mean, after.p95, before.mean)
+    was = before.mean if facts.update is None else facts.update["before"]["mean_mm"]
+    mean, p95, former = short(after.mean, after.p95, was)
     found = [
-        Card(mean, "mm", f"mean error on unseen poses; before {was}", tone(facts)),
-        Card(p95, "mm", "95 of 100 unseen poses are within"),
+        Card(mean, "mm", f"mean error on {facts.judged} poses; {_former(facts)} {former}", tone(facts)),
+        Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"),
         Card(*_short_mm(distance_at_floor_mm(facts)), "mean error that noise alone would leave"),
     ]
     ratios = summary["error_to_repeatability"]
     if ratios is not None:
-        found.append(Card(f"{ratios[facts.best]:.1f}", "times", "mean error over the stated repeatability"))
+        found.append(Card(f"{ratios[facts.best]:.1f}", "times", "the stated repeatability: the mean error"))
     if validation.coverage_95 is not None:
         share = f"{100 * validation.coverage_95:.1f}"
-        found.append(Card(share, "%", "of held-out coordinates lie within their 95 % intervals"))
+        found.append(Card(share, "%", "of the held-out coordinates lie within their 95 % intervals"))
     return found
 
 
@@ -104,14 +120,24 @@ def table(facts: Facts) -> Table:
         if found is not None:
             rows.append([f"{name}, orientation in mrad", *_cells(found)])
             units = ["mm", "orientation in mrad"]
-    judged = count_of(facts.calibration.validation.n_holdout, "held-out pose")
+    of = "Distance errors" if facts.calibration.selection.distances else "Errors"
     return Table(
-        f"Errors on {judged}, {listed(units)}",
+        f"{of} on {facts.poses_judged}, {listed(units)}",
         ["model", *HEADINGS],
         rows,
-        says="Each model found frame and target on the same training poses.",
+        says=_found_from(facts),
         strong=[list(errors).index(facts.best)],
     )
+
+
+def _found_from(facts: Facts) -> str:
+    """What each model had fitted, and to which poses."""
+    if facts.calibration.validation.left_out:
+        return (
+            "Each pose is predicted from the others: with every model they give frame and target, and the "
+            "joint offsets of all but the nominal one."
+        )
+    return "Frame and target of each model were fitted to the same training poses."
 
 
 def _cells(found: Statistics) -> list[str]:

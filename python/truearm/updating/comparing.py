@@ -15,7 +15,7 @@ from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.turning_sense import check_turns
-from truearm.updating.estimating import Estimate, estimate, left_out, surprise
+from truearm.updating.estimating import Estimate, estimate, surprise
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
 from truearm.updating.scene import Scene
@@ -69,7 +69,7 @@ class Update:
 
     @property
     def estimated(self) -> tuple[str, ...]:
-        """What was estimated: "offsets", then "frame" (or the known world's "base") and "tool" if not kept."""
+        """What was estimated: "offsets", and unless kept "frame" (in a known world "base") and "tool"."""
         frame = "base" if self.calibration.arm.world_is_known else "frame"
         parts = ((frame, self.frames), ("tool", self.tools))
         free = (name for name, found in parts if not (found and all(motion.kept for motion in found)))

@@ -53,9 +53,7 @@ class Linear:
 class Scene:
     """The rows of an update under one model of a calibration."""
 
-    def __init__(
-        self, task: Task, data: Measurements, calibration: Calibration, unknowns: Unknowns
-    ) -> None:
+    def __init__(self, task: Task, data: Measurements, calibration: Calibration, unknowns: Unknowns) -> None:
         model = calibration.model
         self.task, self.data, self.unknowns = task, data, unknowns
         self._known = _part(model.setup, calibration.selection, task.selection)
@@ -158,9 +156,7 @@ class Scene:
 
     def _with_known(self, setup: Setup, free: Mask) -> Setup:
         """A set-up with the known parts put in where they are not free."""
-        frames, targets, rotations = (
-            part.copy() for part in (setup.frames, setup.targets, setup.rotations)
-        )
+        frames, targets, rotations = (part.copy() for part in (setup.frames, setup.targets, setup.rotations))
         known = self._known
         for k, number in enumerate(self.unknowns.known):
             place = self.unknowns.group(k)
@@ -196,11 +192,11 @@ class Scene:
             if number is not None:
                 rows = np.flatnonzero(self.number == k)
                 tied = self.unknowns.std[self.unknowns.group(k)] < OPEN
-                found[np.ix_(rows, range(own.shape[1]), number * width + places)] = own[rows] * tied
+                found[np.ix_(rows, np.arange(own.shape[1]), number * width + places)] = own[rows] * tied
         return found
 
     def _places(self, selection: Selection) -> tuple[NDArray[np.int64], int]:
-        """Where the unknowns of a set-up of the update stand in one of the calibration, and how many it has."""
+        """Where the unknowns of an update's set-up stand in one of the calibration, and how many that has."""
         first = 0 if self.task.arm.world_is_known else FRAME_UNKNOWNS
         points = [
             first + 3 * selection.targets.index(target) + axis

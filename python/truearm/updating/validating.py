@@ -39,9 +39,7 @@ def left_out_errors(
     }
 
 
-def errors_at_left_out(
-    scene: Scene, found: Estimate, spread: Floats, free: NDArray[np.bool_]
-) -> RowErrors:
+def errors_at_left_out(scene: Scene, found: Estimate, spread: Floats, free: NDArray[np.bool_]) -> RowErrors:
     """Errors of the model that predicts: of the first target, and of the orientation."""
     left = np.full(scene.seen.shape, np.nan)
     left[scene.seen] = left_out(found.linear, spread, scene.unknowns.std, free)

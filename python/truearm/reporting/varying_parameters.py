@@ -1,0 +1,78 @@
+"""Table: parameters of a model that varies: its constants, and their range with what varies."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import WorkError
+from truearm.reporting.facts import Facts
+from truearm.reporting.parameters import POSES, effect_mm, per_unit, unit_of
+from truearm.reporting.parts import Table
+from truearm.reporting.sweeps import corrections
+
+Floats = NDArray[np.float64]
+
+TOGETHER: Final = 3
+"""Rows of a Jacobian that a covariance is asked for at once."""
+
+
+def varying_parameters(facts: Facts) -> Table:
+    """Corrections of the model that predicts: of its constants alone, and of the whole at some poses."""
+    calibration, poses = facts.calibration, facts.drawn(POSES)
+    candidates, nominal = calibration.arm.candidates, calibration.arm.table.ravel()
+    constants = calibration.model.constants.ravel() - nominal
+    whole = corrections(facts, poses)
+    effects = effect_mm(facts) * np.sqrt(np.square(whole).mean(axis=0))
+    spread = standard_deviations(facts, list(candidates.columns))
+    rows = []
+    for name, column in zip(candidates.names, candidates.columns, strict=True):
+        unit, values = per_unit(column), whole[:, column]
+        ends = (constants[column], values.mean(), values.min(), values.max())
+        rows.append(
+            [
+                name,
+                unit_of(column),
+                f"{nominal[column] / unit:.3f}",
+                *(f"{value / unit:+.4f}" for value in ends),
+                *([] if spread is None else [f"{spread[column] / unit:.4f}"]),
+                f"{effects[column]:.3f}",
+            ]
+        )
+    of = "measured poses" if facts.readings is not None else "poses in the usual ranges of the joints"
+    says = (
+        "Corrections to the nominal values: the constant part, then constant part and what varies together "
+        f"at {len(poses)} {of}. Compensation uses the latter."
+    )
+    if spread is not None:
+        says += (
+            " Standard deviations are of the whole in a typical pose; parameters are correlated, so that "
+            "together they are known far better than each."
+        )
+    deviation = [] if spread is None else ["standard deviation"]
+    return Table(
+        f"Parameters of the {facts.best} model",
+        [*COLUMNS, *deviation, "at the point, mm"],
+        rows,
+        says=says,
+        left=(0, 1),
+    )
+
+
+COLUMNS: Final = ("", "unit", "nominal", "constant part", "mean", "smallest", "largest")
+
+
+def standard_deviations(facts: Facts, columns: list[int]) -> dict[int, float] | None:
+    """Standard deviation of parameters in a typical pose, SI; None where the model does not tell them."""
+    calibration = facts.calibration
+    count = -(-len(columns) // TOGETHER)
+    jacobian = np.zeros((count, TOGETHER, calibration.arm.table.size))
+    for k, column in enumerate(columns):
+        jacobian[k // TOGETHER, k % TOGETHER, column] = 1.0
+    inputs = facts.inputs(np.repeat(facts.typical[None], count, axis=0))
+    try:
+        found = calibration.spread.covariance(inputs, jacobian)
+    except WorkError:
+        return None
+    variances = np.einsum("kii->ki", found).reshape(-1)
+    return dict(zip(columns, np.sqrt(np.maximum(variances, 0.0)).tolist(), strict=False))
