@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.wall import on_a_wall
 from truearm.simulation import Imperfections, VirtualArm
 
 OK, REFUSED = 0, 2
@@ -138,6 +139,14 @@ def test_it_computes_what_python_computes(model, data, library, tmp_path):
             bound = calibration.conservative_std(theirs.q[0], tool=tool)[0]
             assert found.std_m == pytest.approx(bound, rel=1e-9)
     assert corrected > 5
+
+
+def test_it_knows_which_way_is_up(library, tmp_path):
+    calibration, measured = on_a_wall()
+    calibration.save(tmp_path / "arm.calib")
+    known = Library(library, tmp_path / "arm.calib", calibration.robot.tool)
+    for q in measured.readings[:5]:
+        assert known.pose(q) == pytest.approx(calibration.pose(q), abs=1e-12)
 
 
 def test_a_base_that_is_corrected_is_read(library, tmp_path):

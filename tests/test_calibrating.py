@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.wall import on_a_wall
 from truearm.rotations import matrix_from_quaternion, quaternion_from_rotation_vector
 from truearm.simulation import Imperfections, VirtualArm
 
@@ -190,6 +191,16 @@ def test_standard_deviation_carries_to_another_tool(variable):
     near = calibration.position_std(q, tool=calibration.model.setup.targets[0, 0])
     long = calibration.position_std(q, tool=[0.0, 0.0, 1.0])
     assert (np.linalg.norm(long, axis=1) > np.linalg.norm(near, axis=1)).mean() > 0.9
+
+
+def test_an_arm_on_a_wall_is_recognised_by_how_it_gives_way():
+    calibration, data = on_a_wall()
+    assert calibration.variable.hyper["up"] == [1.0, 0.0, 0.0]
+    assert [notice.kind for notice in calibration.notices] == ["mounting"]
+    again = ta.Calibration.from_bytes(calibration.to_bytes(), where="kept")
+    q = data.readings[:5]
+    np.testing.assert_array_equal(again.position(q), calibration.position(q))
+    np.testing.assert_allclose(again.position_std(q), calibration.position_std(q), rtol=1e-6)
 
 
 def test_same_bits_whatever_the_number_of_threads():

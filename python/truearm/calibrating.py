@@ -10,7 +10,7 @@ import numpy as np
 from truearm.calibration import Calibration
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.doubts import doubts
+from truearm.doubts import doubts, mounting
 from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
@@ -94,7 +94,7 @@ def calibrate(
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(*notices, *_open_setup(task, final.identifiability)),
+        notices=(*notices, *_open_setup(task, final.identifiability), *_mounting(variable)),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
@@ -173,6 +173,10 @@ def _open_setup(task: Task, found: Identifiability) -> list[Notice]:
         "target are not harmed, but where the base stands in the world is not known."
     )
     return [Notice("open_setup", text)]
+
+
+def _mounting(details: VariableDetails | None) -> list[Notice]:
+    return [] if details is None else mounting(details.hyper)
 
 
 def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> VariableSpread | None:

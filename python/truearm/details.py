@@ -46,7 +46,8 @@ class VariableDetails:
     """About the variable model.
 
     Attributes:
-        hyper: Hyper-parameters by name; amplitudes in rad and m, length scales in rad or parts of the range.
+        hyper: Hyper-parameters by name; amplitudes in rad and m, length scales in rad or parts of the range;
+            "up" is the direction in the base frame that the sag block takes for up.
         evidence: Logarithm of the evidence at its maximum, on the rows that found it.
         evaluations: How often it was evaluated there.
         inflation: Factor on standard deviations that makes them agree with left-out residuals.

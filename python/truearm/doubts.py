@@ -1,6 +1,6 @@
 """Whether what a calibration found can be true: signs of wrong data or of another robot."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -23,6 +23,7 @@ LARGE_MM: Final = 10.0
 LARGE_MRAD: Final = 50.0
 """Nor turns its tool by so much more or less."""
 MOST_NAMED: Final = 4
+UPRIGHT: Final = (0.0, 0.0, 1.0)
 NO_HELP: Final = "no_help"
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
@@ -39,6 +40,20 @@ def doubts(
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, models[CONSTANT]),
     ]
+
+
+def mounting(hyper: Mapping[str, Sequence[float]]) -> list[Notice]:
+    """A notice where the field takes another direction than the base's z axis for up."""
+    up = hyper["up"]
+    if tuple(up) == UPRIGHT:
+        return []
+    shown = ", ".join(f"{part:.2g}" for part in up)
+    text = (
+        f"The errors grow with the levers of the links as if the direction ({shown}) of the base were "
+        "vertical, not its z axis: the arm seems to be mounted on a wall or a slope, and is calibrated so. "
+        "If it is, turn [base] in the robot file so that z points up; fewer poses then do."
+    )
+    return [Notice("mounting", text)]
 
 
 def helps(before_mm: float, after_mm: float) -> bool:

@@ -55,6 +55,8 @@ pub struct BlockContent {
     pub inputs: Vec<usize>,
     pub axes: Vec<AxisContent>,
     pub outputs: Vec<usize>,
+    /// Which way is up in the base frame; the `sag` block says it where it is not the z axis.
+    pub up: Option<[f64; 3]>,
 }
 
 /// Is an angle, scale, origin, spacing, count, closed, degree.

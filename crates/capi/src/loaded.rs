@@ -5,6 +5,7 @@ use std::sync::Arc;
 use truearm_compensate::{Limits, Model, Spread};
 use truearm_field::{
     Axis, Bank, Block, Conservative, ConservativeParts, Grid, Input, InputKind, Levers, SAG_NAME, Sag,
+    UPRIGHT,
 };
 use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
 
@@ -85,7 +86,8 @@ fn calibrated(container: &Container, content: &Content, coupling: &[f64]) -> Res
     if let Some(stored) = &content.models[name].blocks {
         let mut blocks = blocks(container, stored, name)?;
         let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
-        let levers = Levers::new(model.chain());
+        let up = stored.iter().find_map(|block| block.up).unwrap_or(UPRIGHT);
+        let levers = Levers::new(model.chain()).along(up)?;
         let sag = sag.map(|block| Sag { levers, outputs: block.outputs, weights: block.weights });
         let bank = Bank { input_count: inputs, parameter_count: width, blocks, sag };
         bank.check()?;

@@ -15,6 +15,7 @@ use crate::posterior::{Posterior, Solution};
 use crate::refine::relinearised;
 use crate::select::{Found, contest_major, prune_major, refine_with, select_major};
 use crate::training::Training;
+use crate::upright::contest_up;
 use crate::widening::with_widenings;
 
 /// How the field is fitted.
@@ -165,6 +166,7 @@ impl Search<'_> {
         let mut hyper = self.searched(training, noise)?;
         if self.options.hyper.is_none() {
             let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION, 0));
+            let large = large.lifted(hyper.up)?;
             hyper.extrapolation =
                 extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         }
@@ -178,7 +180,9 @@ impl Search<'_> {
         let joints = self.problem.measurements.joint_count;
         let small = training.select(&spread_poses(training, ROWS_FOR_SELECTION, POSES_FOR_SELECTION));
         let chosen = select_major(&small, joints, noise, &self.options.cancel)?;
+        let chosen = contest_up(&small, chosen, &self.options.cancel)?;
         let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
+        let middle = middle.lifted(chosen.hyper.up)?;
         let evidence = Evidence::new(&middle, &self.options.cancel);
         let mut found = refine_with(&evidence, chosen.hyper, chosen.curvature, SEARCH)?;
         found.evaluations += chosen.evaluations;
@@ -198,7 +202,7 @@ impl Search<'_> {
         if self.options.hyper.is_some() {
             return Ok(hyper);
         }
-        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0));
+        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
         let evidence = Evidence::new(&large, &self.options.cancel);
         let found = refine_with(&evidence, hyper, self.curvature.take(), POLISH)?;
         self.note(&found);

@@ -3,6 +3,8 @@
 //! Amplitudes and lengths are shared by the joints: one more per joint costs at thirty poses and gains nothing
 //! measurable at four hundred (docs/decisions/0003). Each has a wide log-normal prior centred on its start.
 
+use crate::sag::UPRIGHT;
+
 /// A block that varies with several joints together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Product {
@@ -35,6 +37,8 @@ pub struct Hyper {
     pub repeatability: f64,
     /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`OWN_LEVER`] m).
     pub sag: f64,
+    /// The direction, in the base frame, against which `sag` takes links to weigh.
+    pub up: [f64; 3],
     /// Blocks over several joints together.
     pub products: Vec<Product>,
     /// Noise of positions (m) and of orientations (rad).
@@ -141,6 +145,7 @@ impl Hyper {
             smooth_length: SMOOTH_LENGTH.start,
             repeatability: REPEATABILITY.start,
             sag: SAG.start,
+            up: UPRIGHT,
             products,
             noise,
             own_widening: 1.0,

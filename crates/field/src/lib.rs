@@ -47,6 +47,7 @@ mod select;
 mod tests;
 mod training;
 mod unknowns;
+mod upright;
 mod weight_space;
 mod widening;
 
@@ -63,5 +64,5 @@ pub use kernel::{Input, InputKind};
 pub use outliers::Judgement;
 pub use posterior::Posterior;
 pub use predict::measurement_covariance;
-pub use sag::{Levers, SAG_NAME, Sag, SagScratch};
+pub use sag::{Levers, SAG_NAME, Sag, SagScratch, UPRIGHT};
 pub use training::{Class, Column, Training};

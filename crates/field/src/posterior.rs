@@ -107,10 +107,10 @@ impl Posterior {
     /// afforded, from poses that fill the space.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], and [`FieldError::Kinematics`] if `up` is no direction.
     pub fn new(training: Training, hyper: Hyper, degree: usize, cancel: &Cancel) -> Result<Self, FieldError> {
         let rows = training.row_count();
-        let model = Model::new(training, hyper, degree);
+        let model = Model::new(training.lifted(hyper.up)?, hyper, degree);
         if rows <= FEW_ROWS {
             return Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)));
         }

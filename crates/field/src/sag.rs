@@ -3,20 +3,27 @@
 //! A joint with stiffness s under the weights w_k of the links behind it turns by `sum_k w_k g_jk / s`, where g_jk is the
 //! derivative by joint j of the height at which link k ends: the lever of that weight. Weights and stiffness are not
 //! known apart: the block has one number for each pair of joints, rad for each metre of lever. Levers are those of the
-//! nominal arm, and up is the z axis of the base.
+//! nominal arm, and up is the z axis of the base unless another direction is given.
 
 use truearm_kinematics::{
-    Chain, Isa, Kernel, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters, dispatch, lever_count,
+    Chain, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters,
+    dispatch, lever_count,
 };
 
 /// Name of the block.
 pub const SAG_NAME: &str = "sag";
 
+/// Up, in the base frame of an arm that stands.
+pub const UPRIGHT: [f64; 3] = [0.0, 0.0, 1.0];
+
 /// The levers of an arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Levers {
+    arm: Chain,
+    /// The arm in a base frame whose z axis is up.
     chain: Chain,
     nominal: SharedParameters,
+    up: [f64; 3],
 }
 
 /// Weights of the block.
@@ -50,9 +57,23 @@ pub struct Loads {
 }
 
 impl Levers {
-    /// Of an arm as it was meant to be.
+    /// Of an arm as it was meant to be, standing upright.
     pub fn new(chain: &Chain) -> Self {
-        Self { nominal: SharedParameters::new(&chain.nominal()), chain: chain.clone() }
+        let nominal = SharedParameters::new(&chain.nominal());
+        Self { nominal, arm: chain.clone(), chain: chain.clone(), up: UPRIGHT }
+    }
+
+    /// Of the same arm, where `up` is a direction in its base frame.
+    ///
+    /// # Errors
+    /// [`KinematicsError::NoDirection`].
+    pub fn along(self, up: [f64; 3]) -> Result<Self, KinematicsError> {
+        Ok(Self { chain: self.arm.with_up(up)?, up, ..self })
+    }
+
+    /// The direction, in the base frame, that heights are measured along.
+    pub fn up(&self) -> [f64; 3] {
+        self.up
     }
 
     /// Number of joints, N.
@@ -110,7 +131,7 @@ impl Kernel for At<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        let Levers { chain, nominal } = self.levers;
+        let Levers { chain, nominal, .. } = self.levers;
         let SagScratch { joints, frames, .. } = self.scratch;
         chain.levers::<I>(joints, LaneParameters::Shared(nominal), frames, self.out);
     }
@@ -156,7 +177,7 @@ impl Loads {
         for (k, lane) in joints.iter_mut().enumerate() {
             *lane = input(k);
         }
-        let Levers { chain, nominal } = &self.levers;
+        let Levers { chain, nominal, .. } = &self.levers;
         let parameters = if alone {
             one.move_to::<I>(chain, joints);
             LaneParameters::One(one)

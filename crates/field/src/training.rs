@@ -120,6 +120,19 @@ impl Training {
         (noise * noise + self.variance[row]) / self.weight[row]
     }
 
+    /// The same with levers of heights along `up`, a direction in the base frame.
+    ///
+    /// # Errors
+    /// [`FieldError::Kinematics`] if it is no direction.
+    pub fn lifted(mut self, up: [f64; 3]) -> Result<Training, FieldError> {
+        if up != self.geometry.up() {
+            self.geometry = self.geometry.along(up)?;
+            let poses = 0..self.pose_count();
+            self.levers = poses.flat_map(|pose| self.geometry.at(self.values_of(pose))).collect();
+        }
+        Ok(self)
+    }
+
     /// All poses, with the rows of some of them (ascending) alone.
     pub fn only(&self, kept: &[usize]) -> Training {
         let mut thinned = self.select(kept);

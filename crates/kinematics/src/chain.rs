@@ -155,6 +155,22 @@ impl Chain {
         base.check("base")?;
         Ok(Chain { base, ..self.clone() })
     }
+
+    /// The same chain as a base frame sees it whose z axis is `up`, a direction in the present one of any length.
+    ///
+    /// # Errors
+    /// [`KinematicsError::NoDirection`].
+    pub fn with_up(&self, up: [f64; 3]) -> Result<Chain, KinematicsError> {
+        let [x, y, z] = up;
+        if !up.iter().all(|value| value.is_finite()) || up == [0.0; 3] {
+            return Err(KinematicsError::NoDirection { name: "up", value: up });
+        }
+        let across = x.hypot(y);
+        let angle = across.atan2(z);
+        let shortest = if across > 0.0 { [y / across, -x / across, 0.0] } else { [1.0, 0.0, 0.0] };
+        let turned = Transform::from_rotation_vector(shortest.map(|part| angle * part), [0.0; 3]);
+        self.with_base(turned.compose(&self.base))
+    }
 }
 
 fn turns(transform: &Transform) -> bool {

@@ -34,6 +34,14 @@ pub enum KinematicsError {
         /// Largest deviation of R^T R from the identity.
         deviation: f64,
     },
+    /// A direction that is none.
+    #[error("the direction {name} is {value:?}: it must be three finite numbers, not all of them zero")]
+    NoDirection {
+        /// Which direction.
+        name: &'static str,
+        /// What was given.
+        value: [f64; 3],
+    },
     /// An array whose length does not fit.
     #[error("{name} has {got} numbers, {rule}")]
     Length {

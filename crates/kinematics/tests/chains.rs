@@ -62,3 +62,21 @@ fn a_lower_instruction_set_is_a_lower_one() {
     assert!(baseline < avx2 && avx2 < avx512);
     assert!(InstructionSet::ALL.contains(&InstructionSet::detected()));
 }
+
+#[test]
+fn with_up_heights_are_along_up() {
+    for chain in [six_axis(), mixed(Convention::Modified)] {
+        let q = common::spread(chain.joint_count(), 3);
+        let before = common::reference(&chain, &q, &chain.nominal()).translation;
+        for up in [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -3.0, 0.0], [0.4, -0.2, -0.7]] {
+            let turned = chain.with_up(up).unwrap();
+            let after = common::reference(&turned, &q, &chain.nominal()).translation;
+            let length = up.iter().map(|part| part * part).sum::<f64>().sqrt();
+            let height: f64 = up.iter().zip(before).map(|(a, b)| a * b / length).sum();
+            assert!((after[2] - height).abs() < 1e-12, "{up:?}: {} is not {height}", after[2]);
+        }
+    }
+    for none in [[0.0; 3], [0.0, f64::NAN, 1.0]] {
+        assert!(matches!(six_axis().with_up(none), Err(KinematicsError::NoDirection { .. })));
+    }
+}

@@ -8,6 +8,9 @@ use truearm_field::{Axis, Block, Grid, Input, InputKind, SAG_NAME, Sag};
 
 use crate::measured::matrix;
 
+/// Key of the direction that a `sag` block takes for up, in the base frame.
+const UP: &str = "up";
+
 /// One axis as stored: is an angle, scale, origin, spacing, count, closed, degree.
 type StoredAxis = (bool, f64, f64, f64, usize, bool, usize);
 
@@ -30,14 +33,22 @@ pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<
     Ok(stored)
 }
 
-/// The sag as a block over all joints without cells.
-pub(crate) fn sag_block(sag: &Sag) -> Block {
-    Block {
+/// The sag as a block over all joints without cells, and which way is up in it.
+pub(crate) fn sag_into<'py>(py: Python<'py>, sag: &Sag) -> PyResult<Bound<'py, PyDict>> {
+    let block = Block {
         name: SAG_NAME.to_owned(),
         grid: Grid { inputs: (0..sag.levers.joint_count()).collect(), axes: Vec::new() },
         outputs: sag.outputs.clone(),
         weights: sag.weights.clone(),
-    }
+    };
+    let stored = block_into(py, &block)?;
+    stored.set_item(UP, sag.levers.up().to_vec())?;
+    Ok(stored)
+}
+
+/// Which way a stored block says is up; None where it does not.
+pub(crate) fn up_of(stored: &Bound<'_, PyDict>) -> PyResult<Option<[f64; 3]>> {
+    stored.get_item(UP)?.map(|up| up.extract()).transpose()
 }
 
 pub(crate) fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {

@@ -15,11 +15,11 @@ use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
     Bank, Block, Compiled, FieldFit as CoreFit, FieldOptions, Hyper, Input, Levers, MAJOR_NAME,
-    Posterior as CorePosterior, Product, SAG_NAME, Sag, WRIST_NAME, fit_field as fit, measurement_covariance,
-    restore,
+    Posterior as CorePosterior, Product, SAG_NAME, Sag, UPRIGHT, WRIST_NAME, fit_field as fit,
+    measurement_covariance, restore,
 };
 
-use crate::blocks::{block_from, block_into, sag_block};
+use crate::blocks::{block_from, block_into, sag_into, up_of};
 use crate::chain::{Chain, contiguous};
 use crate::door::{CoreError, Failure, long, quick, with_threads};
 use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
@@ -98,6 +98,7 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         own_widening: one("own_widening")?,
         smooth_widening: three("smooth_widening")?,
         sag: values.get("sag").map_or(Ok(0.0), |_| one("sag"))?,
+        up: values.get("up").map_or(Ok(UPRIGHT), |_| three("up"))?,
         sag_widening: values.get("sag_widening").map_or(Ok(1.0), |_| one("sag_widening"))?,
         extrapolation: one("extrapolation")?,
     })
@@ -117,6 +118,7 @@ fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         ("smooth_widening".to_owned(), hyper.smooth_widening.to_vec()),
         ("sag".to_owned(), vec![hyper.sag]),
         ("sag_widening".to_owned(), vec![hyper.sag_widening]),
+        ("up".to_owned(), hyper.up.to_vec()),
         ("extrapolation".to_owned(), vec![hyper.extrapolation]),
     ]);
     for product in &hyper.products {
@@ -260,10 +262,11 @@ impl Field {
         blocks: Vec<Bound<'_, PyDict>>,
         nominal: &Chain,
     ) -> PyResult<Self> {
+        let up = blocks.iter().find_map(|block| up_of(block).transpose()).unwrap_or(Ok(UPRIGHT))?;
         let mut blocks: Vec<Block> = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
         let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
-        let levers = || Levers::new(nominal.core());
-        let sag = sag.map(|block| Sag { levers: levers(), outputs: block.outputs, weights: block.weights });
+        let levers = Levers::new(nominal.core()).along(up).map_err(Failure::into_exception)?;
+        let sag = sag.map(|block| Sag { levers, outputs: block.outputs, weights: block.weights });
         let core = Bank { input_count, parameter_count, blocks, sag };
         core.check().map_err(|error| CoreError::new_err(error.to_string()))?;
         Ok(Self::wrap(core))
@@ -286,8 +289,14 @@ impl Field {
 
     /// The blocks as dictionaries.
     fn blocks<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let sag = self.core.sag.as_ref().map(sag_block);
-        self.core.blocks.iter().chain(&sag).map(|block| block_into(py, block)).collect()
+        let mut stored = Vec::with_capacity(self.core.blocks.len() + 1);
+        for block in &self.core.blocks {
+            stored.push(block_into(py, block)?);
+        }
+        if let Some(sag) = &self.core.sag {
+            stored.push(sag_into(py, sag)?);
+        }
+        Ok(stored)
     }
 
     /// Absolute parameters (n, L, 5): `constants` (L, 5) plus the CEPs of the inputs (n, I).
