@@ -32,7 +32,7 @@ def test_an_evaluation_as_people_run_it():
     command = [PROGRAM, "evaluate", "arm.calib", "other.csv"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "20 rows found the frame, 40 rows judged" in done.stdout
+    assert "20 rows found frame and tool, 40 rows judged" in done.stdout
     for word in ("nominal", "constant", "variable", "mean", "max"):
         assert word in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 80
@@ -46,6 +46,22 @@ def test_json_is_all_that_is_printed(capsys):
     assert (found["n_frame"], found["n_judged"]) == (10, 50)
     assert list(found["errors"]) == ["nominal", "constant", "variable"]
     assert list(found["errors"]["variable"]) == ["mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm"]
+
+
+def test_a_calibration_that_does_not_help_is_not_suggested_for_programs(folder, capsys):
+    other = VirtualArm.paper(seed=7)
+    table = other.measure_table(other.poses(40, seed=1), seed=1)
+    spoilt = table.copy()
+    spoilt[["x", "y", "z"]] = table[["x", "y", "z"]].to_numpy()[::-1]
+    spoilt.to_csv(folder / "spoilt.csv", index=False)
+    assert main(["evaluate", "arm.calib", "spoilt.csv"]) == 0
+    printed = capsys.readouterr()
+    assert "The calibration does not help" in printed.err
+    assert "truearm compensate" not in printed.out + printed.err
+    assert main(["evaluate", "arm.calib", "other.csv"]) == 0
+    printed = capsys.readouterr()
+    assert "does not help" not in printed.err
+    assert "truearm compensate" in printed.out + printed.err
 
 
 def test_kept_frames_judge_all_rows(capsys):

@@ -11,7 +11,7 @@ from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, A, D
 from truearm.units import to_si
-from truearm.validation import Validation
+from truearm.validation import Errors, Validation
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def doubts(
 ) -> list[Notice]:
     """What speaks against a calibration whose model `best` is used."""
     return [
-        *_no_help(validation, best),
+        *no_help(validation.holdout, best, f"{validation.judged} rows"),
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, models[CONSTANT]),
     ]
@@ -61,13 +61,14 @@ def helps(before_mm: float, after_mm: float) -> bool:
     return after_mm < min(before_mm, LARGE_MM)
 
 
-def _no_help(validation: Validation, best: str) -> list[Notice]:
-    before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
+def no_help(errors: Mapping[str, Errors], best: str, rows: str) -> list[Notice]:
+    """A warning where a calibration whose model `best` is used is of no use on the rows it was judged on."""
+    before, after = (errors[name].position.mean for name in (NOMINAL, best))
     if helps(before, after):
         return []
     text = (
-        f"The calibration does not help: on held-out rows {after:.4g} mm are left on average, without it "
-        f"{before:.4g} mm. Do not use it before the reason is found. {CHECKS}."
+        f"The calibration does not help: on {rows} its mean error is {after:.4g} mm, that of the nominal "
+        f"model {before:.4g} mm. Do not use it until the reason is found. {CHECKS}."
     )
     return [Notice(NO_HELP, text)]
 
@@ -77,7 +78,8 @@ def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:
     if turned is None or turned.mean < LARGE_MRAD:
         return []
     text = (
-        f"Orientations do not fit the arm: on held-out rows {turned.mean:.4g} mrad are left on average. "
+        f"Orientations do not fit the arm: their mean error on {validation.judged} rows is "
+        f"{turned.mean:.4g} mrad. "
         "Check how they were noted (order of the quaternion, convention of Euler angles, into which frame "
         "they turn), or calibrate with positions alone: --use position."
     )

@@ -12,6 +12,7 @@ from truearm._core import Setup, fit_constant
 from truearm.calibration import Calibration
 from truearm.core_set import Use, core_set, rotations, select
 from truearm.defaults import SEED
+from truearm.doubts import no_help
 from truearm.errors import InputError, Notice, UsageError, list_names
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.held_rows import HeldRows
@@ -140,6 +141,7 @@ def evaluate(
     if not (chosen.keep_frames or chosen.keep_tool):
         notices = [*notices, *_spoiled(task, calibration, data.select(frame))]
     statistics = {name: found.statistics() for name, found in errors.items()}
+    notices = [*notices, *no_help(statistics, calibration.model_name, "the rows that were judged")]
     return Evaluation(len(frame), len(judged), statistics, tuple(notices), HeldRows.of(chosen_rows, errors))
 
 

@@ -42,6 +42,7 @@ def command(
     """
     from truearm.calibration import Calibration
     from truearm.cli.error_tables import print_errors
+    from truearm.doubts import NO_HELP
     from truearm.evaluation import EvaluationOptions, evaluate
     from truearm.measurements import Measurements
 
@@ -63,8 +64,13 @@ def command(
     if as_json:
         print_json(found.to_dict())
         return
-    how = "frame and tool kept" if keep_frames else f"{found.n_frame} rows found the frame"
+    if keep_frames:
+        how = "frame and tool kept"
+    else:
+        how = f"{found.n_frame} rows found {'the frame' if keep_tool else 'frame and tool'}"
     say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
     print_errors(found.errors, f"{found.n_judged} rows")
     others = " ".join(map(str, measurements))
-    suggest(f"truearm report {calibration} {others} -o other.html", compensate_command(known, calibration))
+    useful = all(notice.kind != NO_HELP for notice in found.notices)
+    next_one = [compensate_command(known, calibration)] if useful else []
+    suggest(f"truearm report {calibration} {others} -o other.html", *next_one)
