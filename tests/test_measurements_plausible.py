@@ -178,7 +178,7 @@ def test_wrong_units_of_one_group_are_found() -> None:
         check_against(Measurements.concatenate([good, bad]), robot)
 
 
-def test_distances_alone_are_looked_at_for_joints_only() -> None:
+def test_distances_alone_may_be_of_any_plausible_size() -> None:
     robot = Robot.load("ur5")
     q = readings(robot)
     data = table(robot, q).drop(columns=["x", "y", "z"]).assign(distance=1.0, anchor="bar")
@@ -210,3 +210,27 @@ def test_public_data_is_plausible_and_is_not_in_other_units(shared_data: Path, f
         check_against(Measurements.read_csv(path, length_unit="mm"), arm)
     with pytest.raises(InputError, match="look like radians"):
         check_against(Measurements.read_csv(path, angle_unit="deg"), arm)
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "words"),
+    [
+        (1.0, "m", None),
+        (1000.0, "mm", None),
+        (1000.0, "m", "name the column distance_mm"),
+        (1.0, "mm", "short"),
+    ],
+)
+def test_distances_are_compared_with_the_arm(size: float, unit: str, words: str | None) -> None:
+    robot = Robot.load("ur10")
+    q = readings(robot)
+    near = np.linalg.norm(robot.position(q) + WORLD / 4.0, axis=1)
+    named = {"distance": size * near, "anchor": "bar"}
+    data = Measurements.from_dataframe(
+        table(robot, q).drop(columns=["x", "y", "z"]).assign(**named), length_unit=unit
+    )
+    if words is None:
+        assert check_against(data, robot) == []
+        return
+    with pytest.raises(InputError, match=words):
+        check_against(data, robot)

@@ -17,10 +17,15 @@ from tests.report_support import (
     words_of,
 )
 from truearm.calibration_file import read_calibration_file, write_calibration_file
+from truearm.options import Options
+from truearm.reporting.facts import Facts
+from truearm.reporting.gravity import sag
+from truearm.reporting.option_words import GENERAL, SCHEMES, VARIABLE, shown_options
 from truearm.reporting.report import report
 from truearm.reporting.script import licence_notice
 from truearm.reporting.waves import strongest_wave
-from truearm.simulation import VirtualArm
+from truearm.simulation import Imperfections, VirtualArm
+from truearm.simulation.imperfections import Deflection, Mass
 
 STATISTICS = ("mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm")
 MODELS = ("variable", "constant", "regions", "fcmac", "cmac")
@@ -231,6 +236,19 @@ def test_the_report_of_an_update_says_what_was_judged_how():
     assert "more_poses" not in [advice.kind for advice in made.advice]
 
 
+@pytest.mark.parametrize(
+    ("compliance", "words"), [(2e-6, "Vertical levers stand out."), (0.0, "smaller than the noise")]
+)
+def test_levers_stand_out_where_links_give_way(compliance, words):
+    deflection = Deflection((compliance,) * 6, (Mass(2, 8.0), Mass(3, 5.0), Mass(5, 2.0)))
+    errors = Imperfections(share=0.0, noise_mm=0.02, deflection=deflection)
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=errors)
+    made = sag(Facts(ta.calibrate(arm.robot, arm.measure(arm.poses(90)))))
+    assert made is not None
+    assert words in made.says
+    assert "weight" not in made.says
+
+
 def test_a_wave_is_found_and_a_line_is_none():
     x = np.linspace(-150.0, 150.0, 121)
     wave = strongest_wave(x, 0.01 * x + 2.0 * np.sin(2.0 * np.pi * x / 40.0 + 0.3))
@@ -240,6 +258,41 @@ def test_a_wave_is_found_and_a_line_is_none():
     assert wave.share > 0.99
     assert strongest_wave(x, 0.01 * x) is None
     assert strongest_wave(x, np.exp(-x / 100.0)) is None
+
+
+def test_slices_are_deviations_from_their_means(reports):
+    figures = figures_of(reports["variable"].html)["figures"]
+    titles = [title for title, _ in reports["variable"].figures]
+    for figure, title in zip(figures, titles, strict=True):
+        if title.endswith("over the same slices"):
+            values = np.concatenate([np.ravel(trace["z"]) for trace in figure["traces"]])
+            assert abs(values.mean()) < 1e-3 * np.abs(values).max()
+            assert figure["traces"][0]["zmin"] == -figure["traces"][0]["zmax"]
+    assert any(title.endswith("over the same slices") for title in titles)
+
+
+def test_a_variable_calibration_shows_its_own_constants(calibrations, reports):
+    calibration = calibrations["variable"]
+    shown = reports["variable"].html.partition("Parameters of the variable model")[2].partition("</table>")[0]
+    cells = {
+        row[0]: row[1:]
+        for row in (
+            re.findall(r"<td[^>]*>(.*?)</td>", part) for part in re.findall(r"<tr.*?</tr>", shown, re.DOTALL)
+        )
+        if row
+    }
+    place = dict(zip(calibration.arm.candidates.names, calibration.arm.candidates.columns, strict=True))
+    for name in ("a2", "a3"):
+        change = (calibration.model.constants - calibration.arm.table).ravel()[place[name]]
+        assert cells[name][2] == f"{1e3 * change:+.4f}"
+    assert "Parameters of the constant model" in reports["variable"].html
+    assert "Parameters of the variable model" not in reports["constant"].html
+
+
+def test_every_option_has_words():
+    assert set(Options().to_dict()) == {*GENERAL, *VARIABLE, *SCHEMES}
+    for model in MODELS:
+        assert not [words for words in shown_options(model).values() if "_" in words]
 
 
 def test_how_parameters_vary_is_known_better_than_their_level(calibrations):

@@ -20,6 +20,8 @@ LIMIT_TOLERANCE: Final = 1e-6
 SPREAD_FACTOR: Final = 30.0
 """Between the factor that a long tool may stretch the poses by and the 1000 of a wrong unit."""
 TOOL_ALLOWANCE_M: Final = 0.1
+SHORTEST_M: Final = 0.005
+"""No bar or wire that tells distances is as short as this; a metre read as a millimetre is shorter."""
 
 
 def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
@@ -57,6 +59,7 @@ def check_points(measurements: Measurements, robot: Robot) -> None:
     """Raise InputError where measured points lie too far apart, or too close together, for their readings."""
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
+    _check_distances(measurements, robot)
 
 
 def _check_kinds(measurements: Measurements, robot: Robot) -> None:
@@ -145,9 +148,37 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
         )
 
 
-def _way_out_of_large(measured: float, nominal: float) -> str:
+def _check_distances(measurements: Measurements, robot: Robot) -> None:
+    """Compare the measured distances with how far the nominal arm takes its flange."""
+    given = measurements.distance_m
+    if given is None or not np.isfinite(given).any():
+        return
+    measured = float(np.nanmedian(given))
+    nominal = _spread(robot.position(measurements.readings))
+    found = (
+        f"half of the measured distances are longer than {measured:.4g} m, and {robot.name} takes its tool"
+    )
+    where = ", ".join(measurements.files)
+    if measured > SPREAD_FACTOR * (nominal + TOOL_ALLOWANCE_M):
+        raise InputError(
+            found,
+            where=where,
+            rule="Distances are in metres unless their column says so (distance_mm)",
+            way_out=_way_out_of_large(measured, nominal, "distance_mm"),
+        )
+    if nominal > TOOL_ALLOWANCE_M and measured < SHORTEST_M:
+        raise InputError(
+            found,
+            where=where,
+            rule="The distances are far too short for these poses",
+            way_out="If they are in metres, give --length-unit m, or name the column distance",
+        )
+
+
+def _way_out_of_large(measured: float, nominal: float, columns: str = "x_mm, y_mm, z_mm") -> str:
     if measured / MM_PER_METRE < SPREAD_FACTOR * (nominal + TOOL_ALLOWANCE_M):
-        return "If these are millimetres, give --length-unit mm, or name the columns x_mm, y_mm, z_mm"
+        column = "columns" if "," in columns else "column"
+        return f"If these are millimetres, give --length-unit mm, or name the {column} {columns}"
     return "Check the columns and their unit"
 
 

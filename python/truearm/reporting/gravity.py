@@ -1,15 +1,18 @@
-"""Figure: what varies, as far as it follows weight on the joints, without saying that weight causes it."""
+"""Figure: what varies vertically, and how far it follows the levers of the links, without naming a cause."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm._core import Chain
 from truearm.models import CONSTANT
 from truearm.reporting.charts import axis, line, points, running_median
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import percent, short
 from truearm.reporting.parts import Figure
+from truearm.rotations import rigid_motion
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -17,44 +20,72 @@ Floats = NDArray[np.float64]
 POSES: Final = 800
 BINS: Final = 10
 FEWEST: Final = 15
-UP: Final = np.array([0.0, 0.0, 1.0])
+UPRIGHT: Final = (0.0, 0.0, 1.0)
+STANDS_OUT: Final = 2.0
+LEAST: Final = 0.1
+"""Vertical levers stand out that explain so many times what horizontal ones do, and this share at least."""
+RANK: Final = 1e-9
+"""Directions of the constants that reach no farther than this share of the farthest are none."""
 
 
 def sag(facts: Facts) -> Figure | None:
-    """How much of what varies gives way downwards with the lever of each joint; None without a varying model.
+    """How far what varies follows the levers of the links about the joints; None without a varying model.
 
-    Each joint is asked for one stiffness: it turns by that times the moment of a unit weight at the measured
-    point. The base is taken to stand upright.
+    Each joint is asked for one compliance a link behind it: it turns by that times the lever of a weight at
+    the link's end. What the constants, frame and target can take over is no part of either side. The same
+    levers for horizontal directions tell what so many curves explain by themselves.
     """
     if facts.best == CONSTANT or "prismatic" in facts.joints:
         return None
-    poses = facts.drawn(POSES)
-    moved = _moved_mm(facts, poses)
-    basis, reach = _giving_way(facts, poses)
-    share = _explained(basis.reshape(-1, len(facts.joints)), moved.reshape(-1))
-    _, middles, medians = running_median(reach, moved[:, 2], BINS, FEWEST)
-    drop = float(medians[-1] - medians[0])
-    far, near = short(float(medians[-1]), float(medians[0]))
-    direction = "lower" if drop < 0.0 else "higher"
+    poses, up = facts.drawn(POSES), _up(facts)
+    taken = _taken_over(facts, poses)
+    moved = _without(taken, _moved_mm(facts, poses).reshape(-1))
+    share, other = (
+        max(_explained(_without(taken, _giving_way(facts, poses, way)), moved) for way in ways)
+        for ways in ([up], _across(up))
+    )
+    reach, height = _reach_mm(facts, poses), moved.reshape(-1, 3) @ up
+    _, middles, medians = running_median(reach, height, BINS, FEWEST)
+    near, far = short(float(medians[0]), float(medians[-1]))
     return Figure(
-        "Vertical part of what varies",
-        f"Far out the point lies {short(abs(drop))[0]} mm {direction} than close by, against the constant "
-        f"model ({far} and {near} mm in the median). Joints that give way in proportion to the moment of "
-        f"a weight at the point would explain {percent(share)} of what varies; other causes may look the "
-        "same.",
+        "Vertical deviation, beyond what constants can take over",
+        f"Its median is {near} mm close to the base's axis and {far} mm far out. Vertical levers of the "
+        f"links about the joints would explain {percent(share)} of the variance of all three coordinates, "
+        f"horizontal ones up to {percent(other)}. {_verdict(facts, moved, share, other)}.",
         [
-            points(reach, moved[:, 2], facts.best),
+            points(reach, height, facts.best),
             line(middles, medians, facts.best, line={"color": "@ink", "width": 2}),
         ],
         {
             "xaxis": axis("distance from the base's z axis, mm"),
-            "yaxis": axis("variable minus constant model, vertical, mm"),
+            "yaxis": axis("vertical deviation, mm"),
         },
     )
 
 
+def _verdict(facts: Facts, moved: Floats, share: float, other: float) -> str:
+    """Whether vertical levers stand out, and whether there is enough to tell."""
+    if np.sqrt(np.square(moved).mean()) < facts.summary["noise_mm"]:
+        return "What varies is smaller than the noise, so this says little"
+    if share > STANDS_OUT * other and share > LEAST:
+        return "Vertical levers stand out"
+    return "These data do not set vertical levers apart"
+
+
+def _up(facts: Facts) -> Floats:
+    """The vertical in the base frame: as the calibration found it, else the base's z axis."""
+    details = facts.calibration.variable
+    return np.array(UPRIGHT if details is None else details.hyper.get("up", UPRIGHT), dtype=np.float64)
+
+
+def _across(up: Floats) -> list[Floats]:
+    """Four horizontal directions."""
+    first, second = np.linalg.svd(up[None])[2][1:]
+    return [first, -first, second, -second]
+
+
 def _moved_mm(facts: Facts, poses: Floats) -> Floats:
-    """Where the varying model puts the measured point, less where the constant one does (n, 3), mm, centred.
+    """Where the varying model puts the measured point, less where the constant one does (n, 3), mm.
 
     Both have their own frame and target; the difference is that of the points in the world of the first
     set-up, along the axes of the constant model's base.
@@ -68,26 +99,59 @@ def _moved_mm(facts: Facts, poses: Floats) -> Floats:
         pose = model.setup.frames[0] @ chain.pose(values, model.parameters(inputs))
         places.append(pose[:, :3, :3] @ model.setup.targets[0, 0] + pose[:, :3, 3])
     axes = calibration.models[CONSTANT].setup.frames[0][:3, :3]
-    difference = MM_PER_METRE * (places[0] - places[1]) @ axes
-    return np.asarray(difference - difference.mean(axis=0))
+    return np.asarray(MM_PER_METRE * (places[0] - places[1]) @ axes)
 
 
-def _giving_way(facts: Facts, poses: Floats) -> tuple[Floats, Floats]:
-    """Displacement (n, 3, N) for each joint's unit stiffness, without mean; distance from the axis, mm."""
-    robot = facts.calibration.robot
+def _chain(facts: Facts) -> Chain:
+    """The chain to the measured point."""
     end = np.eye(4)
     end[:3, 3] = facts.point
-    chain = facts.calibration.arm.chain(robot.flange @ end)
-    values = robot.joints_from_readings(poses)
-    jacobian = chain.joint_jacobian(values)
-    moments = jacobian.transpose(0, 2, 1) @ UP
-    basis = jacobian * -moments[:, None, :]
-    place = chain.position(values)
-    return basis - basis.mean(axis=0), MM_PER_METRE * np.linalg.norm(place[:, :2], axis=1)
+    return facts.calibration.arm.chain(facts.calibration.robot.flange @ end)
+
+
+def _taken_over(facts: Facts, poses: Floats) -> Floats:
+    """Orthonormal directions (3 n, k) of what constants, frame and target do to the measured point."""
+    arm, robot = facts.calibration.arm, facts.calibration.robot
+    values, chain = robot.joints_from_readings(poses), _chain(facts)
+    pose = chain.pose(values)
+    constants = chain.parameter_jacobian(values)[:, :, list(arm.candidates.columns)]
+    columns = np.concatenate([constants, rigid_motion(pose[:, :3, 3]), pose[:, :3, :3]], axis=2)
+    directions, sizes, _ = np.linalg.svd(columns.reshape(-1, columns.shape[2]), full_matrices=False)
+    return np.asarray(directions[:, sizes > RANK * sizes[0]])
+
+
+def _without(directions: Floats, values: Floats) -> Floats:
+    return np.asarray(values - directions @ (directions.T @ values))
+
+
+def _giving_way(facts: Facts, poses: Floats, up: Floats) -> Floats:
+    """Displacement (3 n, c) of the measured point: joints comply with the levers of links behind them."""
+    values = facts.calibration.robot.joints_from_readings(poses)
+    moved = _chain(facts).joint_jacobian(values)
+    found = []
+    for link in _links(facts):
+        behind = link.joint_count
+        levers = up @ link.joint_jacobian(np.ascontiguousarray(values[:, :behind]))
+        found.append(-moved[:, :, :behind] * levers[:, None, :])
+    return np.concatenate(found, axis=2).reshape(-1, sum(part.shape[2] for part in found))
+
+
+def _links(facts: Facts) -> Iterator[Chain]:
+    """The chain to the end of each link."""
+    robot = facts.calibration.robot
+    for count in range(1, robot.joint_count + 1):
+        table = robot.table[:count].copy()
+        yield Chain(robot.convention, list(robot.joints[:count]), table, robot.base, np.eye(4))
+
+
+def _reach_mm(facts: Facts, poses: Floats) -> Floats:
+    """Distance of the measured point from the base's z axis (n,)."""
+    place = _chain(facts).position(facts.calibration.robot.joints_from_readings(poses))
+    return np.asarray(MM_PER_METRE * np.linalg.norm(place[:, :2], axis=1))
 
 
 def _explained(basis: Floats, moved: Floats) -> float:
-    """Share of the variance that the best positive stiffnesses explain."""
+    """Share of the variance that the best compliances, none of them negative, explain."""
     from scipy.optimize import nnls  # noqa: PLC0415
 
     found, _ = nnls(basis, moved)
