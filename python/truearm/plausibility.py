@@ -156,7 +156,8 @@ def _check_distances(measurements: Measurements, robot: Robot) -> None:
     measured = float(np.nanmedian(given))
     nominal = _spread(robot.position(measurements.readings))
     found = (
-        f"half of the measured distances are longer than {measured:.4g} m, and {robot.name} takes its tool"
+        f"the median of the measured distances is {measured:.4g} m, and half of the poses take the tool of "
+        f"{robot.name} more than {nominal:.3g} m from their middle"
     )
     where = ", ".join(measurements.files)
     if measured > SPREAD_FACTOR * (nominal + TOOL_ALLOWANCE_M):
