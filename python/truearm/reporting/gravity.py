@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Chain
+from truearm.doubts import UPRIGHT
 from truearm.models import CONSTANT
 from truearm.reporting.charts import axis, line, points, running_median
 from truearm.reporting.facts import Facts
@@ -20,7 +21,6 @@ Floats = NDArray[np.float64]
 POSES: Final = 800
 BINS: Final = 10
 FEWEST: Final = 15
-UPRIGHT: Final = (0.0, 0.0, 1.0)
 STANDS_OUT: Final = 2.0
 LEAST: Final = 0.1
 """Vertical levers stand out that explain so many times what horizontal ones do, and this share at least."""
