@@ -50,8 +50,9 @@ def mounting(hyper: Mapping[str, Sequence[float]]) -> list[Notice]:
     shown = ", ".join(f"{part:.2g}" for part in up)
     text = (
         f"The errors grow with the levers of the links as if the direction ({shown}) of the base were "
-        "vertical, not its z axis: the arm seems to be mounted on a wall or a slope, and is calibrated so. "
-        "If it is, turn [base] in the robot file so that z points up; fewer poses then do."
+        "vertical, not its z axis, and are calibrated so. If the arm is mounted on a wall or a slope, turn "
+        "[base] in its file so that z points up: fewer poses then do. If it stands level, other errors "
+        "look like that, and nothing needs to be done."
     )
     return [Notice("mounting", text)]
 
