@@ -25,6 +25,8 @@ from truearm.cell.schema import checked
 from truearm.cli import COMMANDS
 from truearm.fleet import Fleet
 from truearm.programs.frames import FramesFile
+from truearm.reporting import advice, gravity
+from truearm.reporting import known as certainty
 from truearm.robot import Robot
 from truearm.robot_file import RobotFile
 from truearm.simulation import VirtualArm
@@ -198,6 +200,37 @@ def test_every_key_of_a_summary_is_explained(tables):
     evaluation = ta.evaluate(calibration, data[1])
     for key in [*calibration.summary, *evaluation.to_dict()]:
         assert f"`{key}`" in first_column, key
+
+
+def test_the_report_page_has_the_rules_of_the_report():
+    text = (ROOT / "docs" / "how-to" / "read-a-report.md").read_text()
+    named = set(re.findall(r'Advice\(\s*"\w+",\s*"([^"]+)"', Path(advice.__file__).read_text()))
+    assert set(re.findall(r"^\| ([A-Z][^|]*\.) \|", text, re.MULTILINE)) == named
+    for rule in (
+        f"at most {advice.AT_THE_FLOOR:g} times what noise alone would leave",
+        f"more than {advice.LONG_TAIL:g} times the mean",
+        f"more than {certainty.STANDS_OUT:g} times its median",
+        f"fewer than {advice.FEW_HELD} were",
+        f"fewer than {advice.FEW_HELD} |",
+        f"less than {advice.COVERED:.0%}".replace("%", " %"),
+        f"by less than {1.0 - advice.SAME:.0%}".replace("%", " %"),
+        f"more than {gravity.STANDS_OUT:g} times what horizontal ones do",
+        f"at least {gravity.LEAST:.0%}".replace("%", " %"),
+    ):
+        assert rule in text, rule
+
+
+def test_a_leaner_picture_is_the_same_picture():
+    maker = load_script("make_methods")
+    marker = '<use xlink:href="#m" x="{x}" y="2.50" style="fill: red"/>'
+    svg = (
+        '<svg><g id="a"><text x="1.23456">0.00512</text></g><g clip-path="url(#p)">\n'
+        f"  {marker.format(x='1.23456')}\n  {marker.format(x='-7.0001')}\n</g></svg>"
+    )
+    assert maker.leaner(svg) == (
+        '<svg><g><text x="1.23">0.00512</text></g><g clip-path="url(#p)" style="fill: red">\n'
+        '<use xlink:href="#m" x="1.23" y="2.5"/>\n<use xlink:href="#m" x="-7" y="2.5"/>\n</g></svg>'
+    )
 
 
 def test_every_public_name_is_in_the_python_reference():
