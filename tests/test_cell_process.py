@@ -11,6 +11,7 @@ from tests.cell_support import cell_text, measured, poses_of, virtual, write_pos
 from tests.trials import measuring, simulated
 from truearm.cell import Cell
 from truearm.cell.accepted import accepted_table, measurements_of, points_of_last_check
+from truearm.cell.examples import EXAMPLES, SIMULATED
 from truearm.cell.measuring import ACCURATE, DONE, Progress
 from truearm.cell.poses_file import Poses
 from truearm.cell.reading import Reading
@@ -191,6 +192,16 @@ def test_wrong_commands_are_told(words, status, message, tmp_path, monkeypatch, 
         main(["cell", "example", name, "-o", "cell.toml" if name == "rv-m2" else "playback.toml"])
     assert main(words) == status
     assert message in capsys.readouterr().err
+
+
+def test_what_is_named_after_an_example_can_be_done(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in EXAMPLES:
+        assert main(["cell", "example", name, "-o", f"{name}.toml"]) == 0
+        named = capsys.readouterr().out
+        assert f"truearm cell check {name}.toml" in named
+        assert (f"truearm cell simulate {name}.toml" in named) == (name in SIMULATED)
+    assert set(EXAMPLES) - set(SIMULATED) == {"playback"}
 
 
 def test_a_check_is_held_against_the_same_pose_where_the_first_contact_was_given_up(tmp_path):

@@ -203,6 +203,21 @@ def test_frames_that_nobody_knows(robot):
     assert rewritten(TP, known, robot, by=SHIFT, frames=FRAMES).changed.all()
 
 
+def test_the_current_frame_is_certain_only_where_every_motion_has_it(robot):
+    position = pose(robot, 1, Q[0], ("1", "2")).replace("UF : 1, UT : 2", "UF : F, UT : F")
+    move, frame, tool = "L P[1] 10mm/sec FINE", "  UFRAME_NUM=1", "  UTOOL_NUM=2"
+
+    def why(*lines):
+        result = rewritten(TP, program(lines, [position]), robot, by=SHIFT, frames=FRAMES)
+        return "" if result.changed.all() else reasons(result)[0][2]
+
+    assert not why(frame, tool, move)
+    assert "UFRAME_NUM is set in line 9, behind motions or branches" in why(tool, move, frame, move)
+    assert "behind motions" in why(frame, "  IF R[1]=1,JMP LBL[1]", tool, "  LBL[1]", move)
+    assert "program called in line 9 may set" in why(frame, tool, "  CALL GRIP", move)
+    assert "not one number" in why(frame, tool, "  IF (DI[1]=ON),UFRAME_NUM=(3)", move)
+
+
 def test_a_position_that_is_computed_with_is_listed(robot):
     text = program(["  PR[1]=P[1]", "J P[1] 10% FINE"], [joints(1, Q[0])])
     result = rewritten(TP, text, robot, by=SHIFT)

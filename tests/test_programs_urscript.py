@@ -263,6 +263,21 @@ def test_without_set_tcp_the_frames_file_has_it(robot):
     assert np.abs(result.nominal - Q1).max() < 1e-7
 
 
+def test_before_its_first_set_tcp_a_program_has_the_tcp_of_the_installation(robot):
+    text = f"movel(p[{pose_text(robot, Q1)}], qnear=[{', '.join(map(str, Q1))}])\n"
+    text = f"movej([0.3, -1.3, 1.4, -1.7, -1.5, 0.4])\n{text}set_tcp(p[0, 0, 0.1, 0, 0, 0])\n{text}"
+    own = "[tool.tcp]\nxyz = [0, 0, 100.3]\n"
+    program = read(UR, text, robot, own)
+    tools = [program.environments[int(n)].tool for n in program.moves.environment]
+    assert [tool.unknown or tool.true[2, 3] for tool in tools] == [
+        *['tool "installation" is not in the program; give it in a file of --frames'] * 2,
+        0.1003,
+    ]
+    program = read(UR, text, robot, own + "[tool.installation]\nxyz = [0, 0, 50]\n")
+    tools = [program.environments[int(n)].tool for n in program.moves.environment]
+    assert [tool.true[2, 3] for tool in tools] == [0.05, 0.05, 0.1003]
+
+
 def test_an_array_indexed_at_run_time_is_corrected_throughout(robot):
     poses = ", ".join(f"[{', '.join(f'{q:.6f}' for q in row)}]" for row in PATH)
     text = (

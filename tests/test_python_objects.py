@@ -3,8 +3,10 @@
 import copy
 import pickle
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -75,3 +77,58 @@ def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
         compensator.corrector([0.0, 0.001 * k, 0.2])
         assert compensator.corrector([0.0, 0.0, 0.1]) is first
     assert len(compensator._correctors) == TOOLS_KEPT
+
+
+api: Any = ta
+WRONG = {
+    "a robot for a calibration": (
+        lambda r, d, c: api.evaluate(r, d),
+        "a calibration of type Robot was given",
+    ),
+    "measurements first": (lambda r, d, c: api.evaluate(d, c), "A truearm.Calibration is needed. Load it"),
+    "a path": (lambda r, d, c: api.evaluate(c, "m.csv"), "measurements of type str were given. .*read_csv"),
+    "a list of tables": (lambda r, d, c: api.update(c, [pd.DataFrame()]), "measurements of type DataFrame"),
+    "no such option": (
+        lambda r, d, c: api.evaluate(c, d, frame_row=9),
+        'no option "frame_row".*"frame_rows"',
+    ),
+    "other options": (
+        lambda r, d, c: api.evaluate(c, d, ta.Options()),
+        "truearm.EvaluationOptions is needed",
+    ),
+    "options in two ways": (
+        lambda r, d, c: api.evaluate(c, d, ta.EvaluationOptions(), seed=1),
+        "given both ways",
+    ),
+    "no such option of update": (lambda r, d, c: api.update(c, d, keep_tol=True), 'you mean "keep_tool"'),
+    "calibrating with a dict": (
+        lambda r, d, c: api.calibrate(r, d, {"seed": 1}),
+        "truearm.Options is needed",
+    ),
+    "a compensator of a file": (lambda r, d, c: api.Compensator("arm.calib"), "Calibration.load"),
+    "a programming model by name": (lambda r, d, c: api.Compensator(c, programming="ur10"), "Robot.load"),
+    "one moving joint": (lambda r, d, c: api.Compensator(c, moving=3), "A list of joints"),
+    "a program without compensator": (
+        lambda r, d, c: api.compensate_program("a.src", c),
+        "Compensator is",
+    ),
+    "a tool in words": (lambda r, d, c: c.position(d.readings, tool="gripper"), "the tool is not numbers"),
+    "a table for a path": (lambda r, d, c: api.Measurements.from_dataframe("m.csv"), "a table of type str"),
+    "a convention": (
+        lambda r, d, c: api.Robot.from_dict({**r.to_dict(), "convention": "craig"}),
+        'convention: "craig" is not known. Either standard or modified',
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_arguments_are_told_what_is_needed(case, robot, data, calibration):
+    call, words = WRONG[case]
+    with pytest.raises(ta.InputError, match=words):
+        call(robot, data, calibration)
+
+
+def test_lists_of_measurements_are_put_together(data, calibration):
+    parts = [data.select(np.arange(30)), data.select(np.arange(30, 60))]
+    whole, parted = ta.evaluate(calibration, data), ta.evaluate(calibration, parts)
+    assert parted.to_dict() == whole.to_dict()

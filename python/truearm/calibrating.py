@@ -1,12 +1,13 @@
 """From measurements to a calibration: split, fit, validate, and fit to all rows."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
@@ -64,8 +65,8 @@ def calibrate(
         InputError: If the data cannot be of this arm, or cannot be split as asked for.
         WorkError: If the rows determine too little.
     """
-    chosen = _options(options, more)
-    given = _measured(robot, data)
+    chosen = kinds.chosen(Options, options, more, Options.of)
+    robot, given = kinds.required(robot, Robot, "a robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given = given.deduplicated()
     task = _task(robot, given, chosen, threads, stages)
@@ -100,29 +101,6 @@ def calibrate(
     )
     doubted = doubts(task.arm, found.models, validation, found.model_name)
     return replace(found, notices=(*found.notices, *doubted))
-
-
-def _measured(robot: object, data: object) -> Measurements:
-    if not isinstance(robot, Robot):
-        raise UsageError(
-            f"the robot is of type {type(robot).__name__}",
-            rule="A truearm.Robot is needed",
-            way_out='Load it: Robot.load("ur10"), or from a TOML or URDF file',
-        )
-    parts = [data] if isinstance(data, Measurements) else data
-    if not isinstance(parts, Sequence) or not all(isinstance(part, Measurements) for part in parts):
-        raise UsageError(
-            f"the measurements are of type {type(data).__name__}",
-            rule="truearm.Measurements, or a list of them, are needed",
-            way_out="Read them: Measurements.read_csv(path), Measurements.from_dataframe(table)",
-        )
-    return parts[0] if len(parts) == 1 else Measurements.concatenate(parts)
-
-
-def _options(options: Options | None, more: Mapping[str, Any]) -> Options:
-    if options is not None and more:
-        raise UsageError("options were given both ways", rule="Give an Options object or keywords")
-    return options if options is not None else Options.of(**more)
 
 
 def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:

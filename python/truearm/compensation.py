@@ -14,6 +14,7 @@ from truearm.arrays import as_rows
 from truearm.calibration import Calibration
 from truearm.endpoints import at_tool
 from truearm.errors import InputError, WorkError
+from truearm.kinds import required
 from truearm.limits import Limits, Task
 from truearm.robot import Robot
 from truearm.solving import as_poses, as_seed, calibrated_model, core_options, feature_values, plain_model
@@ -113,10 +114,10 @@ class Compensator:
             UsageError: If the task, a joint or the features are not those of the arm and the calibration.
             InputError: If the programming model is of another arm.
         """
-        self.calibration = calibration
-        self.programming = programming or calibration.robot
+        self.calibration = required(calibration, Calibration, "a calibration")
+        self.programming = required(programming or calibration.robot, Robot, "a programming model")
         self.task: Task = task
-        self.limits = limits or Limits()
+        self.limits = required(limits or Limits(), Limits, "limits")
         if self.programming.joints != calibration.robot.joints:
             raise InputError(
                 f"the programming model {self.programming.name} has joints {self.programming.joints}",

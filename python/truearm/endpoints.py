@@ -42,7 +42,10 @@ def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
     """
     if tool is None:
         return robot.tool
-    given = np.asarray(tool, dtype=np.float64)
+    try:
+        given = np.asarray(tool, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"the tool is not numbers: {error}") from None
     check_finite(given.reshape(1, -1), what="the tool's numbers")
     if given.shape == (3,):
         transform = np.eye(4)

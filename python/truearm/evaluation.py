@@ -1,6 +1,6 @@
 """Errors of a calibration on measurements that it has not seen, mostly in a new set-up."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm import kinds
 from truearm._core import Setup, fit_constant
 from truearm.calibration import Calibration
 from truearm.core_set import Use, core_set, rotations, select
@@ -89,7 +90,7 @@ class Evaluation:
 
 def evaluate(
     calibration: Calibration,
-    data: Measurements,
+    data: Measurements | Sequence[Measurements],
     options: EvaluationOptions | None = None,
     *,
     stages: Stages = no_stages,
@@ -111,7 +112,8 @@ def evaluate(
         InputError: If the data cannot be of this arm, or has too few rows.
         WorkError: If the frame rows determine too little.
     """
-    chosen = options if options is not None else EvaluationOptions(**more)
+    chosen = kinds.chosen(EvaluationOptions, options, more)
+    calibration, data = kinds.required(calibration, Calibration, "a calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
     selection = select(data, chosen.use, chosen.judge_target)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm.columns import StatedUnits
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
+from truearm.kinds import required
 from truearm.measured_fields import read_fields
 from truearm.reading import read_csv_table, table_from_frame
 
@@ -219,6 +220,7 @@ class Measurements:
         Raises:
             InputError: If columns are missing or values break a rule.
         """
+        required(frame, pd.DataFrame, "a table")
         if len(frame) == 0:
             raise InputError("there are no data rows", where=name)
         stated = StatedUnits(length_unit, angle_unit)
@@ -234,7 +236,18 @@ class Measurements:
         Raises:
             InputError: If there are no parts or the numbers of joints differ.
         """
-        return _concatenate(parts)
+        return _concatenate([required(part, Measurements, "measurements") for part in parts])
+
+    @staticmethod
+    def of(given: object) -> "Measurements":
+        """`given`, which has to be measurements, or a list of them that are put together.
+
+        Raises:
+            UsageError: If it is anything else.
+        """
+        parts = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+        found = [required(part, Measurements, "measurements") for part in parts]
+        return found[0] if len(found) == 1 else _concatenate(found)
 
     def select(self, index: ArrayLike) -> "Measurements":
         """The rows of a boolean mask (n,) or of row indices (m,), counted from 0."""

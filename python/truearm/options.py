@@ -6,8 +6,9 @@ from numbers import Integral, Real
 from typing import Any, Final, Literal
 
 from truearm.core_set import FIRST_TARGET, USES, Use
-from truearm.errors import UsageError, did_you_mean, list_names
+from truearm.errors import UsageError
 from truearm.identified import Frame
+from truearm.kinds import check_name
 from truearm.parameters import PARALLEL_WITHIN_DEG
 from truearm.scheme_options import SchemeOptions
 from truearm.schemes import SCHEMES
@@ -99,14 +100,10 @@ class Options:
             UsageError: If there is no such option or a value breaks a rule.
         """
         parts = {"split": SplitRule.__dataclass_fields__, "scheme": SchemeOptions.__dataclass_fields__}
-        known = (*cls.__dataclass_fields__, *parts["split"], *parts["scheme"])
+        known = {*cls.__dataclass_fields__, *parts["split"], *parts["scheme"]}
         for name in given:
-            if name not in known:
-                raise UsageError(
-                    f'there is no option "{name}"',
-                    rule=f"There are {list_names(sorted(set(known) - set(parts)))}",
-                    way_out=did_you_mean(name, known),
-                )
+            if name not in parts:
+                check_name(name, list(known - set(parts)))
         _check_numbers(given)
         splitting = {name: given.pop(name) for name in SplitRule.__dataclass_fields__ if name in given}
         if isinstance(splitting.get("holdout_range"), str):

@@ -1,7 +1,8 @@
 """The fields of a robot: nominal table, fixed transforms, coupling and limits, checked on the way in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,6 +70,8 @@ class RobotData:
 
     def __post_init__(self) -> None:
         n = len(self.joints)
+        _check_known("convention", (self.convention,), get_args(Convention))
+        _check_known("joints", self.joints, get_args(Joint))
         shapes = {"table": (n, 5), "base": (4, 4), "flange": (4, 4), "tool": (4, 4)}
         shapes |= {"coupling": (n, n), "limits": (n, 2)}
         for field, shape in shapes.items():
@@ -86,6 +89,12 @@ class RobotData:
     def joint_count(self) -> int:
         """Number of joints, N."""
         return len(self.joints)
+
+
+def _check_known(field: str, values: Sequence[str], known: tuple[str, ...]) -> None:
+    for value in values:
+        if value not in known:
+            raise InputError(f'"{value}" is not known', where=field, rule=f"Either {' or '.join(known)}")
 
 
 def _checked(field: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:

@@ -63,7 +63,9 @@ def core_options(robot: Robot, task: Task, moving: Sequence[int] | None, limits:
     """
     if task not in TASKS:
         raise UsageError(f'"{task}" is not known', where="task", rule=f"One of {', '.join(TASKS)}")
-    if moving is not None and (not moving or not set(moving) <= set(range(1, robot.joint_count + 1))):
+    if moving is not None and not isinstance(moving, Sequence | np.ndarray):
+        raise UsageError(f"{moving!r}", where="moving", rule="A list of joints, counted from 1")
+    if moving is not None and (len(moving) == 0 or not set(moving) <= set(range(1, robot.joint_count + 1))):
         raise UsageError(
             f"joints {list(moving)}",
             where="moving",

@@ -22,7 +22,7 @@ def command(
     Examples:
       truearm cell example rv-m2 -o cell.toml
     """
-    from truearm.cell.examples import EXAMPLES, example
+    from truearm.cell.examples import EXAMPLES, SIMULATED, example
     from truearm.files import write_whole
 
     if name not in EXAMPLES:
@@ -37,4 +37,7 @@ def command(
         print_json({"cell": str(output)})
         return
     say(f"Cell file: {output}")
-    suggest(f"truearm cell simulate {output}", f"truearm cell check {output}")
+    if name in SIMULATED:
+        suggest(f"truearm cell simulate {output}", f"truearm cell check {output}")
+    else:
+        suggest(f"truearm cell check {output}", when="Name the recorded file in it, then:")

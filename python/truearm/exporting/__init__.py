@@ -20,6 +20,7 @@ from truearm.exporting.tables import csv_text, json_text, toml_text
 from truearm.exporting.ur_yaml import yaml_text
 from truearm.exporting.urdf_file import urdf_text
 from truearm.files import write_whole
+from truearm.kinds import required
 
 Format = Literal["urdf", "ur-yaml", "dh-toml", "dh-json", "dh-csv", "field-csv"]
 FORMATS: Final = get_args(Format)
@@ -85,6 +86,7 @@ def export(
         WorkError: If the text, read again, is not the calibration; nothing is written then.
     """
     chosen = _format(to)
+    calibration = required(calibration, Calibration, "a calibration")
     given = options or Options()
     _check_options(chosen, given)
     made = _samples(calibration, given) if chosen == "field-csv" else _constants(calibration, chosen, given)

@@ -14,6 +14,7 @@ from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.framing.measuring import tool_from_measurements
 from truearm.framing.placing import object_from_points
 from truearm.framing.touching import tool_from_touches
+from truearm.kinds import required
 from truearm.measurements import Measurements
 from truearm.plausibility import check_points, check_readings
 
@@ -43,7 +44,8 @@ def find_tool(
         InputError: If the data is of another arm.
         WorkError: If the data determines too little.
     """
-    notices = check_readings(data, calibration.robot)
+    calibration = required(calibration, Calibration, "a calibration")
+    notices = check_readings(Measurements.of(data), calibration.robot)
     turned = None if orientation is None else _rotation(orientation)
     if data.target_count and np.isfinite(data.targets).any():
         if data.orientations is not None and turned is not None:
@@ -76,7 +78,8 @@ def find_object(
         InputError: If the data is of another arm, or has no positions.
         WorkError: If the points do not tell where the object is.
     """
-    notices = check_readings(data, calibration.robot)
+    calibration = required(calibration, Calibration, "a calibration")
+    notices = check_readings(Measurements.of(data), calibration.robot)
     if not data.target_count or not np.isfinite(data.targets[:, 0]).all():
         raise InputError(
             "there is no place x, y, z of every touched point",

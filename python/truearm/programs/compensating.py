@@ -7,6 +7,7 @@ from truearm.compensation import Compensator
 from truearm.controller import Controller
 from truearm.errors import UsageError
 from truearm.inverse import Inverse
+from truearm.kinds import required
 from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
@@ -43,7 +44,8 @@ def compensate_program(
         InputError: If a file cannot be read, or is no program.
         WorkError: If targets were refused, or the program was compensated already.
     """
-    chosen = choices or Choices()
+    chosen = required(choices or Choices(), Choices, "choices")
+    compensator = required(compensator, Compensator, "a compensator")
     calibration, author = compensator.calibration, compensator.programming
     written_in = language_of(Path(path), chosen.language)
     declared = (

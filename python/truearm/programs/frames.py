@@ -94,13 +94,13 @@ class Frames:
     where: str = ""
 
     @classmethod
-    def load(cls, path: Path) -> "Frames":
+    def load(cls, path: str | Path) -> "Frames":
         """The frames of a file.
 
         Raises:
             InputError: If it cannot be read or breaks a rule; names the key.
         """
-        return cls.parse(read_text(path), where=str(path))
+        return cls.parse(read_text(Path(path)), where=str(path))
 
     @classmethod
     def parse(cls, text: str, *, where: str = "frames") -> "Frames":

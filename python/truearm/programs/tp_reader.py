@@ -27,6 +27,8 @@ _LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
 _TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
 _SET: Final = re.compile(r"\s*(UFRAME_NUM|UTOOL_NUM)\s*=\s*(\S+)\s*$")
+_SET_INSIDE: Final = re.compile(r"\b(UFRAME_NUM|UTOOL_NUM)\s*=")
+_CALLED: Final = re.compile(r"\b(CALL|RUN)\b")
 _REDEFINED: Final = re.compile(r"\s*(UFRAME|UTOOL)\[([^\]]+)\]\s*=")
 _STRING: Final = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"")
 _BLEND: Final = re.compile(r"\b(FINE|CNT\s*(\d+|R\[)|CR\s*\d+|CD\s*\d+)", re.IGNORECASE)
@@ -55,11 +57,23 @@ class _Current:
 
     numbers: dict[str, set[str]] = field(default_factory=lambda: {"UFRAME_NUM": set(), "UTOOL_NUM": set()})
     redefined: dict[tuple[str, str], int] = field(default_factory=dict)
+    late: dict[str, int] = field(default_factory=dict)
+    called: int = 0
 
     def of(self, name: str) -> str | None:
         """The one number; None if there are several, or one known at run time, or none."""
         found = self.numbers[name]
         return next(iter(found)) if len(found) == 1 and next(iter(found)).isdigit() else None
+
+    def doubt(self, name: str) -> str:
+        """Why the number is not certain wherever a motion is; empty if it is."""
+        if self.of(name) is None:
+            return f"{name} is not one number throughout the program"
+        if name in self.late:
+            return (
+                f"{name} is set in line {self.late[name]}, behind motions or branches that do not have it yet"
+            )
+        return f"the program called in line {self.called} may set {name}" if self.called else ""
 
 
 class Reader:
@@ -130,13 +144,22 @@ class Reader:
                 pieces = []
 
     def _settings(self) -> None:
+        current, straight = self._current, True
         for at, text in self._statements():
             chosen, redefined = _SET.match(text), _REDEFINED.match(text)
+            line = self._source.place(at)[0]
             if chosen is not None:
-                self._current.numbers[chosen.group(1)].add(chosen.group(2))
+                if not straight and not current.numbers[chosen.group(1)]:
+                    current.late[chosen.group(1)] = line
+                current.numbers[chosen.group(1)].add(chosen.group(2))
+            for inside in _SET_INSIDE.finditer(text) if chosen is None else ():
+                current.numbers[inside.group(1)].add(inside.group())
+            if _CALLED.search(text):
+                current.called = current.called or line
+            straight = straight and _MOTION.match(text) is None and _JUMPS.match(text) is None
             if redefined is not None:
                 key = (redefined.group(1), redefined.group(2).partition(":")[0].strip())
-                self._current.redefined.setdefault(key, self._source.place(at)[0])
+                current.redefined.setdefault(key, line)
 
     def _motions(self) -> None:
         follows = False
@@ -208,10 +231,10 @@ class Reader:
     def _frame(self, kind: str, number: str) -> Frame:
         """The frame that a position is in, or its tool; number 0 is the robot's own."""
         if number == CURRENT:
-            current = self._current.of(f"{kind}_NUM")
-            if current is None:
-                return Frame.missing(f"{kind}_NUM is not one number throughout the program", number)
-            number = current
+            doubt = self._current.doubt(f"{kind}_NUM")
+            if doubt:
+                return Frame.missing(doubt, number)
+            number = str(self._current.of(f"{kind}_NUM"))
         line = self._current.redefined.get((kind, number))
         if line is not None:
             return Frame.missing(f"{kind}[{number}] is set in line {line} when the program runs", number)

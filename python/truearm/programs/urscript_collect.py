@@ -37,6 +37,8 @@ HARMLESS: Final = frozenset({"textmsg", "popup", "pose_dist", "point_dist", "get
 PAYLOADS: Final = frozenset({"set_payload", "set_target_payload", "set_payload_mass"})
 FUNCTIONS: Final = frozenset({"def", "thread", "sec"})
 LONGEST_NAME: Final = 48
+TCP: Final = "tcp"
+INSTALLATION: Final = "installation"
 
 
 class MotionCall(NamedTuple):
@@ -97,6 +99,10 @@ class Collected:
             else:
                 yield step
 
+    def installed(self, frames: Frames) -> Frame:
+        """The TCP of the installation, which the arm has until the program sets one."""
+        return frames.tool(INSTALLATION if self._tcps or INSTALLATION in frames.tools else TCP)
+
     def _tool(self, at: int, name: str, frames: Frames) -> Frame:
         node = self._tcps.get(at)
         try:
@@ -113,7 +119,7 @@ class Collected:
         texts = {at: self._source.part(node.start, node.end) for at, node in written.items()}
         different = list(dict.fromkeys(texts.values()))
         several = len(different) > 1
-        found = {at: f"tcp {different.index(text) + 1}" if several else "tcp" for at, text in texts.items()}
+        found = {at: f"{TCP} {different.index(text) + 1}" if several else TCP for at, text in texts.items()}
         return found | {at: node.text for at, node in self._tcps.items() if node and node.kind == "name"}
 
     def _mass(self, node: Node | None) -> float | None:

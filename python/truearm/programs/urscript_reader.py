@@ -79,7 +79,7 @@ class Reader:
         self._source = source
         steps = list(self._found.steps(frames))
         unknown = {step.at: State(UNSURE) for step in steps}
-        flow = unknown | states(steps, State(frames.tool("tcp")))
+        flow = unknown | states(steps, State(self._found.installed(frames)))
         self._offsets = np.array(sorted(flow), dtype=np.int64)
         self._states = [flow[int(at)] for at in self._offsets]
         self._leaves = _Leaves()

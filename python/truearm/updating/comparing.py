@@ -1,5 +1,6 @@
 """Update a calibration with 10 to 20 new poses: what moved, and whether the old one still holds."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
+from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import Use, select
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names
@@ -101,7 +103,7 @@ class Update:
 
 def update(
     calibration: Calibration,
-    data: Measurements,
+    data: Measurements | Sequence[Measurements],
     options: UpdateOptions | None = None,
     *,
     stages: Stages = no_stages,
@@ -124,7 +126,8 @@ def update(
         InputError: If the data cannot be of this arm, or has too few rows.
         WorkError: If the calibration is stripped or of a scheme, or what it finds is not plausible.
     """
-    chosen = options if options is not None else UpdateOptions(**more)
+    chosen = kinds.chosen(UpdateOptions, options, more)
+    calibration, data = kinds.required(calibration, Calibration, "a calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
     task = _task(calibration, data, chosen, stages)

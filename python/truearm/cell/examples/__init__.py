@@ -3,7 +3,9 @@
 from importlib import resources
 from typing import Final
 
-EXAMPLES: Final = ("rv-m2", "ur", "tracker", "playback")
+SIMULATED: Final = ("rv-m2", "ur", "tracker")
+"""Those whose devices have virtual counterparts."""
+EXAMPLES: Final = (*SIMULATED, "playback")
 
 
 def example(name: str) -> str:
