@@ -51,7 +51,7 @@ def test_what_is_no_robot_and_no_measurements_is_said(tmp_path):
         ("ur10", data, "robot is of type str.*Robot.load"),
         (arm.robot, "data.csv", "measurements are of type str.*read_csv"),
         (arm.robot, arm.measure_table(arm.poses(5)), "of type DataFrame.*from_dataframe"),
-        (arm.robot, [data, 3], "of type list"),
+        (arm.robot, [data, 3], "of type int"),
     ]
     for robot, given, words in cases:
         with pytest.raises(ta.UsageError, match=words):

@@ -83,11 +83,14 @@ api: Any = ta
 WRONG = {
     "a robot for a calibration": (
         lambda r, d, c: api.evaluate(r, d),
-        "a calibration of type Robot was given",
+        "the calibration is of type Robot",
     ),
     "measurements first": (lambda r, d, c: api.evaluate(d, c), "A truearm.Calibration is needed. Load it"),
-    "a path": (lambda r, d, c: api.evaluate(c, "m.csv"), "measurements of type str were given. .*read_csv"),
-    "a list of tables": (lambda r, d, c: api.update(c, [pd.DataFrame()]), "measurements of type DataFrame"),
+    "a path": (lambda r, d, c: api.evaluate(c, "m.csv"), "measurements are of type str.*read_csv"),
+    "a list of tables": (
+        lambda r, d, c: api.update(c, [pd.DataFrame()]),
+        "are of type DataFrame",
+    ),
     "no such option": (
         lambda r, d, c: api.evaluate(c, d, frame_row=9),
         'no option "frame_row".*"frame_rows"',
@@ -113,7 +116,10 @@ WRONG = {
         "Compensator is",
     ),
     "a tool in words": (lambda r, d, c: c.position(d.readings, tool="gripper"), "the tool is not numbers"),
-    "a table for a path": (lambda r, d, c: api.Measurements.from_dataframe("m.csv"), "a table of type str"),
+    "a table for a path": (
+        lambda r, d, c: api.Measurements.from_dataframe("m.csv"),
+        "table is of type str",
+    ),
     "a convention": (
         lambda r, d, c: api.Robot.from_dict({**r.to_dict(), "convention": "craig"}),
         'convention: "craig" is not known. Either standard or modified',

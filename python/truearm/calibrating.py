@@ -66,7 +66,7 @@ def calibrate(
         WorkError: If the rows determine too little.
     """
     chosen = kinds.chosen(Options, options, more, Options.of)
-    robot, given = kinds.required(robot, Robot, "a robot"), Measurements.of(data)
+    robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given = given.deduplicated()
     task = _task(robot, given, chosen, threads, stages)

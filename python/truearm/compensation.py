@@ -114,10 +114,10 @@ class Compensator:
             UsageError: If the task, a joint or the features are not those of the arm and the calibration.
             InputError: If the programming model is of another arm.
         """
-        self.calibration = required(calibration, Calibration, "a calibration")
-        self.programming = required(programming or calibration.robot, Robot, "a programming model")
+        self.calibration = required(calibration, Calibration, "the calibration")
+        self.programming = required(programming or calibration.robot, Robot, "the programming model")
         self.task: Task = task
-        self.limits = required(limits or Limits(), Limits, "limits")
+        self.limits = required(limits or Limits(), Limits, "the limits")
         if self.programming.joints != calibration.robot.joints:
             raise InputError(
                 f"the programming model {self.programming.name} has joints {self.programming.joints}",

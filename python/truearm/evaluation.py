@@ -113,7 +113,7 @@ def evaluate(
         WorkError: If the frame rows determine too little.
     """
     chosen = kinds.chosen(EvaluationOptions, options, more)
-    calibration, data = kinds.required(calibration, Calibration, "a calibration"), Measurements.of(data)
+    calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
     selection = select(data, chosen.use, chosen.judge_target)

@@ -25,7 +25,7 @@ def required(value: object, kind: type[T], noun: str) -> T:
     if isinstance(value, kind):
         return value
     raise UsageError(
-        f"{noun} of type {type(value).__name__} {'were' if noun.endswith('s') else 'was'} given",
+        f"{noun} {'are' if noun.endswith('s') else 'is'} of type {type(value).__name__}",
         rule=f"A truearm.{kind.__name__} is needed",
         way_out=WAYS.get(kind.__name__, ""),
     )
@@ -50,7 +50,7 @@ def chosen(
             raise UsageError(
                 "options were given both ways", rule=f"Give an object of {kind.__name__}, or keywords"
             )
-        return required(given, kind, "options")
+        return required(given, kind, "the options")
     if make is not None:
         return make(**more)
     known = [field.name for field in fields(kind)]  # type: ignore[arg-type]

@@ -220,7 +220,7 @@ class Measurements:
         Raises:
             InputError: If columns are missing or values break a rule.
         """
-        required(frame, pd.DataFrame, "a table")
+        required(frame, pd.DataFrame, "the table")
         if len(frame) == 0:
             raise InputError("there are no data rows", where=name)
         stated = StatedUnits(length_unit, angle_unit)
@@ -236,7 +236,7 @@ class Measurements:
         Raises:
             InputError: If there are no parts or the numbers of joints differ.
         """
-        return _concatenate([required(part, Measurements, "measurements") for part in parts])
+        return _concatenate([required(part, Measurements, "the measurements") for part in parts])
 
     @staticmethod
     def of(given: object) -> "Measurements":
@@ -246,7 +246,7 @@ class Measurements:
             UsageError: If it is anything else.
         """
         parts = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
-        found = [required(part, Measurements, "measurements") for part in parts]
+        found = [required(part, Measurements, "the measurements") for part in parts]
         return found[0] if len(found) == 1 else _concatenate(found)
 
     def select(self, index: ArrayLike) -> "Measurements":

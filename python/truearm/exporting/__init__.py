@@ -86,7 +86,7 @@ def export(
         WorkError: If the text, read again, is not the calibration; nothing is written then.
     """
     chosen = _format(to)
-    calibration = required(calibration, Calibration, "a calibration")
+    calibration = required(calibration, Calibration, "the calibration")
     given = options or Options()
     _check_options(chosen, given)
     made = _samples(calibration, given) if chosen == "field-csv" else _constants(calibration, chosen, given)

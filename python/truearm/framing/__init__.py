@@ -44,7 +44,7 @@ def find_tool(
         InputError: If the data is of another arm.
         WorkError: If the data determines too little.
     """
-    calibration = required(calibration, Calibration, "a calibration")
+    calibration = required(calibration, Calibration, "the calibration")
     notices = check_readings(Measurements.of(data), calibration.robot)
     turned = None if orientation is None else _rotation(orientation)
     if data.target_count and np.isfinite(data.targets).any():
@@ -78,7 +78,7 @@ def find_object(
         InputError: If the data is of another arm, or has no positions.
         WorkError: If the points do not tell where the object is.
     """
-    calibration = required(calibration, Calibration, "a calibration")
+    calibration = required(calibration, Calibration, "the calibration")
     notices = check_readings(Measurements.of(data), calibration.robot)
     if not data.target_count or not np.isfinite(data.targets[:, 0]).all():
         raise InputError(

@@ -44,8 +44,8 @@ def compensate_program(
         InputError: If a file cannot be read, or is no program.
         WorkError: If targets were refused, or the program was compensated already.
     """
-    chosen = required(choices or Choices(), Choices, "choices")
-    compensator = required(compensator, Compensator, "a compensator")
+    chosen = required(choices or Choices(), Choices, "the choices")
+    compensator = required(compensator, Compensator, "the compensator")
     calibration, author = compensator.calibration, compensator.programming
     written_in = language_of(Path(path), chosen.language)
     declared = (

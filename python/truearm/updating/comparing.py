@@ -127,7 +127,7 @@ def update(
         WorkError: If the calibration is stripped or of a scheme, or what it finds is not plausible.
     """
     chosen = kinds.chosen(UpdateOptions, options, more)
-    calibration, data = kinds.required(calibration, Calibration, "a calibration"), Measurements.of(data)
+    calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
     task = _task(calibration, data, chosen, stages)
