@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -17,7 +18,8 @@ from truearm.simulation import VirtualArm
 
 PROGRAM = str(Path(sys.executable).parent / "truearm")
 STATISTICS = ["mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm"]
-SUMMARY = ["robot", "n_train", "n_holdout", "holdout", "train", "coverage_95", "identifiability", "noise_mm"]
+SUMMARY = ["robot", "n_train", "n_holdout", "holdout", "train", "coverage_95", "left_out", "n_planned"]
+SUMMARY += ["identifiability", "noise_mm"]
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +56,20 @@ def test_a_calibration_as_people_run_it(folder):
     calibration = ta.Calibration.load("result/calibration.calib")
     assert calibration.validation.n_train == 50
     assert calibration.summary["n_fitted"] == 80
+
+
+def test_planned_poses_are_held_out_and_a_stated_share_comes_first(folder, capsys):
+    table = pd.read_csv("arm.csv")
+    table["purpose"] = ["validate" if row % 8 == 0 else "train" for row in range(len(table))]
+    table.to_csv("planned.csv", index=False)
+    words = ["calibrate", "rv-m2", "planned.csv", "-o", "planned", "--model", "constant"]
+    assert main(words) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "judged on 10 others, planned to validate (--holdout draws others)" in printed
+    assert json.loads(Path("planned/summary.json").read_text())["n_planned"] == 10
+    assert ta.Calibration.load("planned/calibration.calib").validation.n_planned == 10
+    assert main([*words, "--holdout", "0.3"]) == 0
+    assert "judged on 24 others." in capsys.readouterr().out
 
 
 def test_the_summary_on_disk_and_on_stdout_is_one(folder):

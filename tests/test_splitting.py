@@ -6,6 +6,7 @@ import pytest
 
 from truearm.errors import InputError, UsageError
 from truearm.measurements import Measurements
+from truearm.options import Options
 from truearm.splitting import HoldoutRange, SplitRule, split_rows
 
 
@@ -178,3 +179,54 @@ def test_a_set_up_without_training_rows_is_refused():
     group = ["morning"] * 190 + ["evening"] * 10
     with pytest.raises(InputError, match=r'no row of the set-up "evening" trains'):
         split_rows(measured(200, group=group), SplitRule(train_size=5))
+
+
+def planned(count, every=5, **more):
+    return measured(count, purpose=["validate" if k % every == 0 else "train" for k in range(count)], **more)
+
+
+def test_poses_that_were_planned_to_validate_are_held_out():
+    data = planned(50)
+    assert data.notices == ()
+    split = split_rows(data, SplitRule())
+    assert sorted(split.holdout) == list(range(0, 50, 5))
+    assert sorted(split.train) == [k for k in range(50) if k % 5]
+    assert split.planned == 10
+    again = split_rows(data, SplitRule(train_size=20, seed=1))
+    assert len(again.train) == 20
+    assert sorted(again.holdout) == sorted(split.holdout)
+    np.testing.assert_array_equal(again.train, split_rows(data, SplitRule(seed=1)).train[:20])
+
+
+def test_a_stated_rule_comes_before_what_was_planned():
+    data, plain = planned(50, layer=np.arange(50) % 10 * 1.0), measured(50, layer=np.arange(50) % 10 * 1.0)
+    tail = HoldoutRange.parse("q1:high:0.3")
+    for rule in (
+        SplitRule(by_purpose=False),
+        SplitRule(holdout=0.4),
+        SplitRule(split_by=("layer",)),
+        SplitRule(holdout_range=tail),
+        Options.of(holdout=0.3).split,
+    ):
+        split, same = split_rows(data, rule), split_rows(plain, rule)
+        np.testing.assert_array_equal(split.train, same.train)
+        np.testing.assert_array_equal(split.holdout, same.holdout)
+        assert split.planned == 0
+    assert Options.of(seed=3).split.by_purpose
+
+
+def test_files_without_poses_to_validate_keep_the_plain_split():
+    for purpose in (["train"] * 40, [""] * 40, np.arange(40.0)):
+        split = split_rows(measured(40, purpose=purpose), SplitRule())
+        np.testing.assert_array_equal(split.holdout, np.random.default_rng(7).permutation(40)[28:])
+    assert list(measured(40, purpose=np.arange(40.0)).features) == ["purpose"]
+    both = Measurements.concatenate([planned(30, name="a"), measured(40, "b", seed=1)])
+    split = split_rows(both, SplitRule())
+    assert sorted(split.holdout[:6]) == list(range(0, 30, 5))
+    np.testing.assert_array_equal(split.holdout[6:], 30 + np.random.default_rng(7).permutation(40)[28:])
+    assert split.planned == 6
+
+
+def test_purposes_are_no_part_of_what_was_measured():
+    assert planned(50).hash() == measured(50).hash()
+    assert planned(50).select([5, 6]).purpose.tolist() == ["validate", "train"]

@@ -134,6 +134,7 @@ def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> tu
     validation = Validation(
         n_train=len(trained.data),
         n_holdout=len(held),
+        n_planned=split.planned,
         holdout={name: found.statistics() for name, found in errors.items()},
         train={name: found.statistics() for name, found in on_training.items()},
         coverage_95=interval_coverage(task, trained, held),

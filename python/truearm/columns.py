@@ -15,6 +15,9 @@ DISTANCE: Final = re.compile(r"distance(?:_(m|mm))?")
 QUATERNION: Final = ("qw", "qx", "qy", "qz")
 WORDS: Final = ("group", "anchor", "pair")
 AXES: Final = "xyz"
+PURPOSE: Final = "purpose"
+VALIDATE: Final = "validate"
+"""In the column "purpose": a pose that was planned to judge by, not to fit to."""
 K = TypeVar("K")
 
 

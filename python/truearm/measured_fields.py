@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.columns import (
+    PURPOSE,
     QUATERNION,
     Column,
     Layout,
@@ -38,7 +39,8 @@ def read_fields(
     distance = _distances(table, layout)
     if measured or layout.targets:
         _check_measured(table, targets, distance)
-    features, notices = _features(table, layout)
+    purpose = _purpose(table, layout)
+    features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
         "readings": readings,
         "targets": targets,
@@ -51,6 +53,7 @@ def read_fields(
         "joint_units": tuple(column.unit for column in layout.joints),
         "distance_m": distance,
         **_ends(table, layout, distance),
+        "purpose": purpose,
         "notices": tuple(notices),
     }
 
@@ -187,10 +190,18 @@ def _check_pairs(table: Table, pair: Texts, distance: Floats) -> None:
         )
 
 
-def _features(table: Table, layout: Layout) -> tuple[pd.DataFrame, list[Notice]]:
+def _purpose(table: Table, layout: Layout) -> Texts | None:
+    """What each pose was planned for, in words; None where there is no such column."""
+    if PURPOSE not in layout.others or table.is_numeric(PURPOSE):
+        return None
+    return table.texts(PURPOSE)
+
+
+def _features(table: Table, layout: Layout, known: tuple[str, ...]) -> tuple[pd.DataFrame, list[Notice]]:
+    """Columns of numbers, and notices of the columns that are left out; `known` mean something else."""
     numeric = [name for name in layout.others if table.is_numeric(name)]
     notices = []
-    texts = [name for name in layout.others if name not in numeric]
+    texts = [name for name in layout.others if name not in (*numeric, *known)]
     if texts:
         notices.append(
             Notice("text_columns", f"{table.where}: left out, as not numeric: {list_names(texts)}.")

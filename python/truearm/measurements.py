@@ -19,7 +19,7 @@ from truearm.reading import read_csv_table, table_from_frame
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]
 
-PER_ROW: Final = (
+CONTENT: Final = (
     "readings",
     "targets",
     "orientations",
@@ -28,10 +28,8 @@ PER_ROW: Final = (
     "distance_m",
     "anchor",
     "pair",
-    "sources",
-    "rows",
 )
-CONTENT: Final = PER_ROW[:-2]
+PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows")
 GROUPS_SHOWN: Final = 3
 
 
@@ -55,6 +53,7 @@ class Measurements:
             to the fixed point `anchor`, or to target 1 of the other row of the same `pair`.
         anchor: Name of the fixed point (n,), "" where there is none.
         pair: Name of the pair of rows (n,), "" where there is none.
+        purpose: What each pose was planned for (n,), such as "train" or "validate"; None where nothing says.
         notices: What was noticed on reading.
     """
 
@@ -70,6 +69,7 @@ class Measurements:
     distance_m: Floats | None = None
     anchor: Texts | None = None
     pair: Texts | None = None
+    purpose: Texts | None = None
     notices: tuple[Notice, ...] = ()
 
     def __post_init__(self) -> None:
@@ -265,7 +265,7 @@ class Measurements:
         return self.select(~repeated) if repeated.any() else self
 
     def hash(self) -> str:
-        """SHA-256 (hexadecimal) of all that was measured; file names and row numbers do not count."""
+        """SHA-256 (hexadecimal) of what was measured; file names, row numbers and purposes do not count."""
         digest = hashlib.sha256()
         for name in CONTENT:
             value = getattr(self, name)
@@ -329,6 +329,7 @@ def _concatenate(parts: Sequence[Measurements]) -> Measurements:
         joint_units=_common_units(parts),
         distance_m=_joined([(part.distance_m, (len(part),)) for part in parts]),
         anchor=_joined_words([(part.anchor, len(part)) for part in parts]),
+        purpose=_joined_words([(part.purpose, len(part)) for part in parts]),
         pair=_joined_words([(_own_pairs(part, k), len(part)) for k, part in enumerate(parts)]),
         notices=tuple(notice for part in parts for notice in part.notices),
     )

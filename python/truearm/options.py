@@ -110,6 +110,8 @@ class Options:
             splitting["holdout_range"] = HoldoutRange.parse(splitting["holdout_range"])
         for part, names in ((splitting, ("split_by",)), (given, ("features",))):
             part |= {name: _words(part[name]) for name in names if name in part}
+        if "holdout" in splitting:
+            splitting.setdefault("by_purpose", False)
         if splitting:
             given["split"] = SplitRule(**splitting)
         scheme = {name: given.pop(name) for name in parts["scheme"] if name in given}

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from truearm.columns import VALIDATE
 from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.measurements import Measurements
@@ -64,6 +65,10 @@ class SplitRule:
     share of them is held out with all their rows, and the training rows are a permutation of the other
     rows. With `holdout_range` the tail is held out instead, and the training rows follow in the same way.
 
+    Where a file says what its poses were planned for, in a column "purpose", those planned to "validate" are
+    held out instead, all of them, and the training rows follow in the same way. A stated share, `split_by`
+    and `holdout_range` come first.
+
     Rows with the same joint vector, and the two rows of a pair, stay together, on the side of the first.
 
     Attributes:
@@ -72,6 +77,8 @@ class SplitRule:
         train_size: Training rows of each file; all that are not held out by default.
         split_by: Columns.
         holdout_range: Tail of one joint.
+        by_purpose: Whether rows that were planned to validate are held out, where there are some; only with
+            the default share.
     """
 
     holdout: float = HOLDOUT
@@ -79,6 +86,7 @@ class SplitRule:
     train_size: int | None = None
     split_by: tuple[str, ...] = ()
     holdout_range: HoldoutRange | None = None
+    by_purpose: bool = True
 
     def __post_init__(self) -> None:
         _check_share(self.holdout, "the share to hold out")
@@ -100,10 +108,12 @@ class Split:
     Attributes:
         train: Training rows (t,), in the permutations' order.
         holdout: Held-out rows (h,), in the permutations' order.
+        planned: How many of them are held out because they were planned to validate.
     """
 
     train: Rows
     holdout: Rows
+    planned: int = 0
 
 
 def split_rows(data: Measurements, rule: SplitRule) -> Split:
@@ -118,6 +128,7 @@ def split_rows(data: Measurements, rule: SplitRule) -> Split:
     split = Split(
         train=np.concatenate([part.train for part in parts]),
         holdout=np.concatenate([part.holdout for part in parts]),
+        planned=sum(part.planned for part in parts),
     )
     _check_groups(data, split)
     return split
@@ -126,7 +137,10 @@ def split_rows(data: Measurements, rule: SplitRule) -> Split:
 def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule) -> Split:
     """Split the rows (r,) of one file; `first_of` (n,) names each row's first kin."""
     rng = np.random.default_rng(rule.seed)
-    if rule.holdout_range is not None:
+    planned = _planned(data, rows, rule)
+    if planned.any():
+        held = planned
+    elif rule.holdout_range is not None:
         held = _tail(data, rows, rule.holdout_range)
     elif rule.split_by:
         held = _drawn_keys(data, rows, rule, rng)
@@ -135,12 +149,21 @@ def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule)
         held = np.zeros(len(rows), dtype=np.bool_)
         held[order[int((1.0 - rule.holdout) * len(rows)) :]] = True
     held = _together(held, rows, first_of)
-    if rule.split_by or rule.holdout_range is not None:
+    if rule.split_by or rule.holdout_range is not None or planned.any():
         order = np.concatenate([rng.permutation(np.flatnonzero(~held)), np.flatnonzero(held)])
     train, holdout = order[~held[order]], order[held[order]]
     where = str(data.sources[rows[0]])
     _check_sizes(len(train), len(holdout), rule, where)
-    return Split(train=rows[train[: rule.train_size]], holdout=rows[holdout])
+    count = len(holdout) if planned.any() else 0
+    return Split(train=rows[train[: rule.train_size]], holdout=rows[holdout], planned=count)
+
+
+def _planned(data: Measurements, rows: Rows, rule: SplitRule) -> Mask:
+    """Mask (r,) of the rows that were planned to validate; none where another rule is stated."""
+    stated = bool(rule.split_by) or rule.holdout_range is not None or rule.holdout != HOLDOUT
+    if data.purpose is None or stated or not rule.by_purpose:
+        return np.zeros(len(rows), dtype=np.bool_)
+    return np.asarray(data.purpose[rows] == VALIDATE)
 
 
 def _tail(data: Measurements, rows: Rows, tail: HoldoutRange) -> Mask:

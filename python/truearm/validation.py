@@ -110,6 +110,7 @@ class Validation:
             model; None where there is none.
         left_out: Whether each row was judged by what the other rows gave, as after an update; else the rows
             were held out of one fit.
+        n_planned: How many rows were held out because they were planned to validate.
     """
 
     n_train: int
@@ -118,6 +119,7 @@ class Validation:
     train: Mapping[str, Errors]
     coverage_95: float | None = None
     left_out: bool = False
+    n_planned: int = 0
 
     @property
     def judged(self) -> str:
@@ -133,6 +135,7 @@ class Validation:
             "train": {name: errors.to_dict() for name, errors in self.train.items()},
             "coverage_95": self.coverage_95,
             "left_out": self.left_out,
+            "n_planned": self.n_planned,
         }
 
     @classmethod
@@ -143,11 +146,13 @@ class Validation:
             for side in ("holdout", "train")
         }
         return cls(
-            content["n_train"],
-            content["n_holdout"],
-            **sides,
+            n_train=content["n_train"],
+            n_holdout=content["n_holdout"],
+            holdout=sides["holdout"],
+            train=sides["train"],
             coverage_95=content["coverage_95"],
             left_out=content.get("left_out", False),
+            n_planned=content.get("n_planned", 0),
         )
 
 

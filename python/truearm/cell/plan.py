@@ -13,6 +13,7 @@ from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
 from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
+from truearm.columns import VALIDATE
 from truearm.errors import WorkError
 from truearm.identified import IdentifiedArm
 from truearm.planning.choosing import Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
@@ -163,7 +164,7 @@ def _with_others(pool: Floats, chosen: NDArray[np.int64]) -> tuple[NDArray[np.in
     """Rows of the pool: chosen ones, and others spread over the space."""
     free = np.setdiff1d(np.arange(len(pool)), chosen)
     judged = free[fill(pool[free], max(LEAST_JUDGED, round(JUDGED_SHARE * len(chosen))))]
-    return np.concatenate([chosen, judged]), ["train"] * len(chosen) + ["validate"] * len(judged)
+    return np.concatenate([chosen, judged]), ["train"] * len(chosen) + [VALIDATE] * len(judged)
 
 
 def in_order(

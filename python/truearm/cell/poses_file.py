@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.columns import StatedUnits
+from truearm.columns import PURPOSE, StatedUnits
 from truearm.errors import InputError, list_rows
 from truearm.measured_fields import read_joint_columns
 from truearm.reading import read_csv_table
@@ -16,7 +16,6 @@ from truearm.robot import Robot
 Floats = NDArray[np.float64]
 
 APPROACH: Final = "approach"
-PURPOSE: Final = "purpose"
 DIRECTIONS: Final = (-1.0, 0.0, 1.0)
 
 

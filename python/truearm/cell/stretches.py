@@ -63,7 +63,9 @@ def calibrate_so_far(
     """Calibrate with the first `measured` poses; None if that cannot be done yet, which is noted."""
     model = cell.file.process.model if measured >= LEAST_FOR_VARIABLE else "constant"
     try:
-        calibration = calibrate(cell.arm, measurements_of(session, most=measured), model=model)
+        calibration = calibrate(
+            cell.arm, measurements_of(session, most=measured), model=model, by_purpose=False
+        )
         expected_mm = _expected_mm(calibration, session)
     except TruearmError as error:
         note("calibration", f"not yet: {error}")

@@ -88,6 +88,7 @@ def command(
         train_size=train_size,
         split_by=split_by or (),
         holdout_range=holdout_range,
+        by_purpose=holdout is None,
         use=use,
         judge_target=judge_target,
         model=model,
@@ -207,6 +208,10 @@ def print_results(calibration: "Calibration") -> None:
 
     validation, summary = calibration.validation, calibration.summary
     trained = f"fitted to {validation.n_train} rows, judged on {validation.n_holdout} others"
+    if validation.n_planned:
+        whole = validation.n_planned == validation.n_holdout
+        trained += f", {'' if whole else f'{validation.n_planned} of them '}planned to validate"
+        trained += " (--holdout draws others)"
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
     print_determined(calibration)
     of = "distance" if calibration.selection.distances else "position"

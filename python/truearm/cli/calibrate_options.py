@@ -7,7 +7,10 @@ import typer
 from truearm.defaults import HOLDOUT
 
 Holdout: TypeAlias = Annotated[
-    float | None, typer.Option(help=f"Share of the rows that is held out.  [default: {HOLDOUT}]")
+    float | None,
+    typer.Option(
+        help=f"Share of the rows that is held out.  [default: those planned to validate, else {HOLDOUT}]"
+    ),
 ]
 Seed: TypeAlias = Annotated[int, typer.Option(help="Seed of the split.")]
 TrainSize: TypeAlias = Annotated[

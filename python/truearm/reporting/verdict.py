@@ -46,6 +46,7 @@ def about(facts: Facts) -> str:
         rows = f"updated with {count_of(validation.n_train, 'pose')}"
     else:
         rows = f"{count_of(validation.n_train, 'training pose')}, {facts.poses_judged}"
+        rows += f" ({validation.n_planned} as planned)" if validation.n_planned else ""
     setups = f"{count_of(len(calibration.groups), 'set-up')} ({', '.join(calibration.groups)})"
     return f"{calibration.robot.name}, {joints}; {setups}, {what}; {rows}; {facts.best} model"
 

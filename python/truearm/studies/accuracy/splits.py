@@ -111,7 +111,7 @@ def divide(data_set: DataSet, cut: Cut, seed: int) -> Split:
         data = replace(data, features=data.features.assign(**{CLUSTER_COLUMN: _clusters(data, seed)}))
         rule = SplitRule(seed=seed, split_by=(CLUSTER_COLUMN,))
     else:
-        rule = SplitRule(seed=seed)
+        rule = SplitRule(seed=seed, by_purpose=False)
     split = split_rows(data, rule)
     count = min(len(split.holdout), MOST_JUDGED)
     spread = np.arange(count) * len(split.holdout) // count

@@ -12,6 +12,7 @@ from truearm.cell.movemaster import readings_of, tenths
 from truearm.cell.ordering import paper_order
 from truearm.cell.poses_file import Poses
 from truearm.cell.virtual.world import true_arm
+from truearm.columns import VALIDATE
 from truearm.identified import IdentifiedArm
 from truearm.planning.dividing import DividedSpace, DivisionOptions, divide_space
 from truearm.planning.workspace import Workspace
@@ -26,7 +27,7 @@ FREE_TO_STOP: Final = 1024
 PLANNED: Final = 0
 """Seed of the draw of poses: the same for all arms."""
 TRAIN: Final = "train"
-TEST: Final = "validate"
+TEST: Final = VALIDATE
 
 
 @dataclass(frozen=True, eq=False)
