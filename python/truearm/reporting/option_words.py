@@ -7,6 +7,7 @@ GENERAL: Final[Mapping[str, str]] = {
     "model": "model",
     "holdout": "share of the rows held out",
     "holdout_range": "joint range held out",
+    "by_purpose": "poses planned to validate are held out",
     "split_by": "groups kept together in the split",
     "seed": "seed of the split",
     "train_size": "training rows of each file",
