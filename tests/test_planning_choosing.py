@@ -1,10 +1,12 @@
 """Chosen poses are better conditioned than drawn ones, and divisions hold what they promise."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from truearm.errors import InputError, WorkError
+from truearm.errors import InputError, UsageError, WorkError
 from truearm.identified import IdentifiedArm
 from truearm.planning import (
     ChoiceOptions,
@@ -70,6 +72,14 @@ def test_frame_and_target_are_determined_along_with_a_free_arm():
     jacobian, columns = unknowns_jacobian(arm, readings, offset)
     assert len(independent_columns(jacobian, columns)) == 27
     assert np.isfinite(choose(arm, readings, 30, offset).after["kappa"])
+
+
+def test_parameters_and_criteria_that_are_none_are_refused(pool):
+    with pytest.raises(UsageError, match=r'no parameter "theta9".*Did you mean "theta'):
+        choose(WORLD, pool, 20, ChoiceOptions(names=["theta1", "theta9"]))
+    wrong: Any = "condition"
+    with pytest.raises(UsageError, match='criterion: "condition". One of "kappa"'):
+        ChoiceOptions(criterion=wrong)
 
 
 def test_a_pool_that_is_too_small_is_refused(pool):

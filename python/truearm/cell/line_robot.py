@@ -20,7 +20,6 @@ from truearm.units import AngleUnit, LengthUnit, to_si
 Floats = NDArray[np.float64]
 
 SENDINGS: Final = 4
-THERE_RAD: Final = 2e-3
 
 
 class LineRobot:

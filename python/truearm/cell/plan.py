@@ -31,7 +31,6 @@ REPEAT: Final = "repeat"
 JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
 JOINT_SPEED_RAD_S: Final = 1.0
 PRIOR_M: Final = 2e-3
-LEVER_M: Final = 1.0
 FREE: Final = 1e3
 
 

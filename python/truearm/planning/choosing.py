@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import choose_poses
 from truearm.endpoints import at_tool
-from truearm.errors import WorkError
+from truearm.errors import UsageError, WorkError, list_names
 from truearm.identified import IdentifiedArm
 from truearm.parameters import KIND_COUNT, THETA, A, D
 
@@ -42,6 +42,10 @@ class ChoiceOptions:
     pose: bool = False
     passes: int = 20
     tool: ArrayLike | None = None
+
+    def __post_init__(self) -> None:
+        if self.criterion not in CRITERIA:
+            raise UsageError(f'"{self.criterion}"', where="criterion", rule=f"One of {list_names(CRITERIA)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +89,7 @@ def choose(
         given: Poses (k, N) that are measured anyway.
 
     Raises:
+        UsageError: If there is no such parameter.
         WorkError: If the pool is smaller than the choice.
     """
     chosen = options or ChoiceOptions()
@@ -124,14 +129,15 @@ def unknowns_jacobian(
         arm: The arm.
         readings: Poses (n, N).
         options: Parameters of the arm, and what is measured; all candidates and a position by default.
+
+    Raises:
+        UsageError: If there is no such parameter.
     """
     chosen, candidates = options or ChoiceOptions(), arm.candidates
-    names, pose = chosen.names, chosen.pose
-    wanted = [
-        column
-        for column, name in zip(candidates.columns, candidates.names, strict=True)
-        if names is None or name in names
-    ]
+    pose = chosen.pose
+    wanted = list(candidates.columns)
+    if chosen.names is not None:
+        wanted = sorted({candidates.column(name) for name in chosen.names})
     chain = arm.chain(arm.robot.flange @ at_tool(arm.robot, chosen.tool))
     values = arm.robot.joints_from_readings(readings)
     jacobian = chain.parameter_jacobian(values, pose=pose)[:, :, wanted]

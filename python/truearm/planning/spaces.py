@@ -17,7 +17,6 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 MAJOR_JOINTS: Final = (1, 2, 3)
-AXES_OF_POSITION: Final = 3
 
 
 class Space(Protocol):

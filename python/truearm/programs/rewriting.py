@@ -289,8 +289,8 @@ class _State:
                 f"{len(listed)} of {target_count(self.program)} targets cannot be corrected:\n"
                 + describe(self.program, listed),
                 way_out="Change them, or allow more with --largest-mm, --largest-deg, --largest-joint-deg or "
-                "--largest-std-mm; --on-refusal keep-nominal leaves such targets as they are where that makes "
-                f"no step{self._why_unsure()}",
+                "--largest-std-mm; --on-refusal keep-nominal leaves such targets as they are where that "
+                f"makes no step{self._why_unsure()}",
             )
         steps = [target for target in sorted(self.refused) if self._makes_a_step(target)]
         if steps:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,6 @@ from truearm.studies.accuracy.poses import Poses, Prepared
 
 Floats = NDArray[np.float64]
 Settings = Mapping[str, Any]
-
-NO_SETTINGS: Final[Settings] = {}
 
 
 class Fitted(Protocol):
