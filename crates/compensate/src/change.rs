@@ -1,13 +1,13 @@
 //! How a correction changes along a path.
 //!
 //! The shift of the tool may change by so much for each metre of the tool's way, its turn by so much for each radian
-//! that the tool turns; a radian counts as [`LEVER`] metres, so that a tool that turns on the spot may
+//! that the tool turns; a radian counts as [`ANGLE_ARM`] metres, so that a tool that turns on the spot may
 //! be shifted differently as well.
 
-use truearm_kinematics::LaneFrame;
+use truearm_estimate::ANGLE_ARM;
+use truearm_kinematics::{LaneFrame, norm};
 
-use crate::corrector::{Correction, Corrector, length};
-use crate::newton::LEVER;
+use crate::corrector::{Correction, Corrector};
 use crate::refusal::{Reason, Refusal};
 
 /// Waypoints further apart in a joint are no path: the arm changes its configuration between them, rad.
@@ -62,8 +62,8 @@ impl Corrector {
         let turned = chord(&before.rotation, &after.rotation);
         let shift = apart(&before.correction.shift, &after.correction.shift);
         let turn = apart(&before.correction.turn, &after.correction.turn);
-        let shift_limit = limits.shift_change * (way + LEVER * turned) + ALWAYS;
-        let turn_limit = limits.turn_change * (turned + way / LEVER) + ALWAYS;
+        let shift_limit = limits.shift_change * (way + ANGLE_ARM * turned) + ALWAYS;
+        let turn_limit = limits.turn_change * (turned + way / ANGLE_ARM) + ALWAYS;
         if shift > shift_limit {
             return Some(Refusal::new(Reason::ShiftChange, shift, shift_limit));
         }
@@ -72,7 +72,7 @@ impl Corrector {
 }
 
 fn apart(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    length(&[b[0] - a[0], b[1] - a[1], b[2] - a[2]])
+    norm([b[0] - a[0], b[1] - a[1], b[2] - a[2]])
 }
 
 /// Twice the sine of half the angle between two rotations, which is the angle but for the third order.

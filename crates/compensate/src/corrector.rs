@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, Transform, dispatch, lane_room};
+use truearm_estimate::ANGLE_ARM;
+use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, Transform, dispatch, lane_room, norm};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::error::CompensateError;
-use crate::limits::{Limits, slides};
+use crate::limits::Limits;
 use crate::model::Model;
-use crate::newton::{LEVER, Plan, Search, toward};
+use crate::newton::{Plan, Search, toward};
 use crate::refusal::{Reason, Refusal};
 use crate::task::{Task, shift, turn};
 
@@ -224,8 +225,8 @@ impl Corrector {
         limits
             .refuse_residual(&self.plan, [found.residual_m, found.residual_rad])
             .or_else(|| self.refuse_joint(workspace, i))
-            .or_else(|| Refusal::above(Reason::Shift, length(&found.shift), limits.largest_shift))
-            .or_else(|| Refusal::above(Reason::Turn, length(&found.turn), limits.largest_turn))
+            .or_else(|| Refusal::above(Reason::Shift, norm(found.shift), limits.largest_shift))
+            .or_else(|| Refusal::above(Reason::Turn, norm(found.turn), limits.largest_turn))
             .or_else(|| Refusal::above(Reason::Spread, std, limits.largest_std))
     }
 
@@ -233,7 +234,7 @@ impl Corrector {
         let limits = &self.options.limits;
         for (joint, (from, to)) in workspace.nominal.iter().zip(&workspace.search.best).enumerate() {
             let (from, to) = (from.0[i], to.0[i]);
-            let slides = slides(&self.calibrated.chain, joint);
+            let slides = self.calibrated.chain.slides(joint);
             let largest = if slides { limits.largest_slide } else { limits.largest_angle };
             let value = (to - from).abs();
             if value > largest {
@@ -257,11 +258,6 @@ impl Correction {
             refusal: Some(refusal),
         }
     }
-}
-
-/// Root of the sum of squares.
-pub(crate) fn length(vector: &[f64; 3]) -> f64 {
-    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// How corrections of a model are searched for.
@@ -290,9 +286,9 @@ impl Plan {
         if !known || !moving.is_sorted_by(|a, b| a < b) {
             return Err(CompensateError::Moving { moving, joints });
         }
-        let unit = |k: &usize| if slides(&model.chain, *k) { LEVER } else { 1.0 };
+        let unit = |k: &usize| if model.chain.slides(*k) { ANGLE_ARM } else { 1.0 };
         let position_first = task != Task::Position && moving.len() < Task::Pose.rows();
-        let turn_weight = if position_first { LEVER * POSITION_FIRST } else { LEVER };
+        let turn_weight = if position_first { ANGLE_ARM * POSITION_FIRST } else { ANGLE_ARM };
         let unit = moving.iter().map(unit).collect();
         let (varied, hopeless, foreseen) = (model.field.is_some(), f64::INFINITY, 0.0);
         Ok(Plan { task, moving, unit, turn_weight, varied, steps, longest, hopeless, foreseen })

@@ -87,15 +87,10 @@ impl Limits {
             let value = reading(joint);
             if value < *low || value > *high {
                 let limit = if value < *low { *low } else { *high };
-                let slides = slides(chain, joint);
+                let slides = chain.slides(joint);
                 return Some(Refusal { reason: Reason::JointLimit, joint: joint + 1, value, limit, slides });
             }
         }
         None
     }
-}
-
-/// Whether a joint, from 0, is a prismatic one.
-pub(crate) fn slides(chain: &Chain, joint: usize) -> bool {
-    chain.joint_columns()[joint] % 5 == 1
 }

@@ -9,14 +9,13 @@
 //! where the rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential
 //! Equations II, section IV.8). What a pose gets does not depend on the poses beside it.
 
+use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::cholesky::{Factor, gram};
 use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task};
 
-/// So far apart 1 rad and 1 m weigh the same, in errors and in joint changes, m: half the length of a lower arm.
-pub(crate) const LEVER: f64 = 0.3;
 /// Error at which the search ends, m: a few roundings of a pose.
 const ENOUGH: f64 = 1e-13;
 /// The same where the parameters vary, which each step leaves a hundredth to a thousandth of the error for.
@@ -62,7 +61,7 @@ impl Plan {
 
     /// Whether there are too few joints to meet all of the task.
     pub fn position_first(&self) -> bool {
-        self.turn_weight < LEVER
+        self.turn_weight < ANGLE_ARM
     }
 }
 
@@ -348,11 +347,7 @@ fn weighted<I: Isa, G: Goal<M>, const M: usize>(
 
 #[inline(always)]
 fn squared<I: Isa>(values: &[Lane]) -> Lane {
-    let mut sum = NO;
-    for value in values {
-        sum = I::mul_add(*value, *value, sum);
-    }
-    sum
+    dot::<I>(values, values)
 }
 
 /// Takes the columns of the stale poses.

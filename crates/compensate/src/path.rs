@@ -4,10 +4,10 @@ use std::num::NonZeroUsize;
 
 use rayon::prelude::*;
 use truearm_estimate::Cancel;
-use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, load_lanes};
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, load_lanes, norm};
 
 use crate::change::Mark;
-use crate::corrector::{Correction, Corrector, Workspace, length};
+use crate::corrector::{Correction, Corrector, Workspace};
 use crate::error::{CompensateError, check_finite, check_length};
 use crate::refusal::{Reason, Refusal};
 
@@ -181,7 +181,7 @@ impl Corrector {
 impl Correction {
     /// Residual (m, rad), size of the correction (m, rad), standard deviation (m).
     pub fn numbers(&self) -> [f64; NUMBERS] {
-        [self.residual_m, self.residual_rad, length(&self.shift), length(&self.turn), self.std_m]
+        [self.residual_m, self.residual_rad, norm(self.shift), norm(self.turn), self.std_m]
     }
 }
 

@@ -9,7 +9,6 @@ use std::sync::Arc;
 
 use crate::corrector::{Corrector, Workspace};
 use crate::error::CompensateError;
-use crate::limits::slides;
 use crate::refusal::Refusal;
 
 /// Between two steps less than this nothing moves, s.
@@ -124,7 +123,7 @@ impl Stream {
         options.check()?;
         let count = corrector.joint_count();
         let chain = &corrector.calibrated.chain;
-        let joints = (0..count).map(|joint| usize::from(slides(chain, joint)));
+        let joints = (0..count).map(|joint| usize::from(chain.slides(joint)));
         let joints =
             joints.map(|kind| Follower::new(options.rate[kind], options.acceleration[kind])).collect();
         Ok(Stream {

@@ -1,6 +1,6 @@
 //! What of a pose is to be met, as rows of an error and of its Jacobian.
 
-use truearm_kinematics::{Isa, Lane, LaneFrame, Screw};
+use truearm_kinematics::{Isa, Lane, LaneFrame, Screw, lane_cross};
 
 /// What the corrected joints bring the tool to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -63,7 +63,7 @@ impl Goal<5> for AxisGoal {
         let [x, y, z] = shift(frame, target);
         let (axis, wanted) = (frame.axis(2), target.axis(2));
         let cosine = dot::<I>(&axis, &wanted);
-        let turn = halved(cross::<I>(&axis, &wanted), cosine * 2.0 + Lane::splat(2.0));
+        let turn = halved(lane_cross::<I>(&axis, &wanted), cosine * 2.0 + Lane::splat(2.0));
         [x, y, z, dot::<I>(&frame.axis(0), &turn), dot::<I>(&frame.axis(1), &turn)]
     }
 
@@ -102,7 +102,7 @@ pub(crate) fn turn<I: Isa>(frame: &LaneFrame, target: &LaneFrame) -> [Lane; 3] {
     for k in 0..3 {
         let (from, to) = (frame.axis(k), target.axis(k));
         trace += dot::<I>(&from, &to);
-        let part = cross::<I>(&from, &to);
+        let part = lane_cross::<I>(&from, &to);
         for (sum, part) in twice.iter_mut().zip(part) {
             *sum += part;
         }
@@ -127,13 +127,4 @@ fn halved(sine: [Lane; 3], denominator: Lane) -> [Lane; 3] {
 #[inline(always)]
 pub(crate) fn dot<I: Isa>(u: &[Lane; 3], v: &[Lane; 3]) -> Lane {
     I::mul_add(u[0], v[0], I::mul_add(u[1], v[1], u[2] * v[2]))
-}
-
-#[inline(always)]
-fn cross<I: Isa>(u: &[Lane; 3], v: &[Lane; 3]) -> [Lane; 3] {
-    [
-        I::mul_add(u[1], v[2], -(u[2] * v[1])),
-        I::mul_add(u[2], v[0], -(u[0] * v[2])),
-        I::mul_add(u[0], v[1], -(u[1] * v[0])),
-    ]
 }

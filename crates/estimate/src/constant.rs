@@ -7,6 +7,8 @@
 
 use faer::{Mat, Par};
 
+use truearm_kinematics::is_length;
+
 use crate::alike::check_poses;
 use crate::dense::Cholesky;
 use crate::layout::{Layout, Problem};
@@ -40,7 +42,7 @@ impl Default for Prior {
 impl Prior {
     /// Standard deviation of the parameter with index 5 * link + (theta, d, a, alpha, beta).
     pub fn of(&self, column: usize) -> f64 {
-        if matches!(column % 5, 1 | 2) { self.length } else { self.angle }
+        if is_length(column) { self.length } else { self.angle }
     }
 }
 

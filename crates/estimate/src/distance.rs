@@ -3,7 +3,7 @@
 //! A distance sees no frame: `world_from_base` drops out, and so do the parameters that only move the arm
 //! as a whole, unless anchors are shared by many poses.
 
-use truearm_kinematics::{Parameters, Transform};
+use truearm_kinematics::{Parameters, Transform, cross, norm};
 
 use crate::EstimateError;
 use crate::layout::{Layout, Problem};
@@ -90,7 +90,7 @@ fn row(problem: &Problem, layout: &Layout, arm: &Arm, point: Point, distance: &D
         DistanceTo::Anchor(anchor) => point.setup.anchors[anchor],
     };
     let difference = [0, 1, 2].map(|k| place[k] - other[k]);
-    let predicted = difference.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let predicted = norm(difference);
     let direction = difference.map(|x| x / predicted.max(f64::MIN_POSITIVE));
     let mut derivative = vec![0.0; layout.len()];
     let mut add = |pose: usize, flange: &Transform, offset: [f64; 3], start: usize, sign: f64| {
@@ -153,8 +153,4 @@ pub fn derivatives(problem: &Problem, point: Point) -> Result<Vec<f64>, Estimate
         row.entries.iter().for_each(|&(at, value)| dense[index * width + at] = value);
     }
     Ok(dense)
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -17,6 +17,7 @@ use crate::EstimateError;
 use crate::distance;
 use crate::layout::{Layout, Problem};
 use crate::rows::{Linearised, Point, linearise};
+use crate::scale::{ANGLE_ARM, column_unit};
 use crate::setup::Setup;
 
 /// A column counts as spanned when less than this share of it stands out of the others' span.
@@ -27,9 +28,6 @@ const ROUNDING: f64 = 1e-10;
 const POSES: usize = 1000;
 /// Parts of a combination below this are left out.
 const NOTEWORTHY: f64 = 0.02;
-/// mm per m, and mm per (1/300 rad) at 300 mm.
-const MM: f64 = 1e3;
-const ANGLE_UNIT: f64 = 300.0;
 
 /// A parameter that the data cannot tell from a combination of others.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,14 +74,12 @@ pub fn identifiability(
 
 fn scale(problem: &Problem, layout: &Layout, column: usize) -> f64 {
     let within = |at: usize| at < layout.frame && at >= 3 || at >= layout.frame + 3 * layout.targets;
-    let angle = if column < layout.arm {
-        !matches!(problem.columns[column] % 5, 1 | 2)
-    } else if column >= layout.arm + layout.groups * layout.group_width() {
-        false
-    } else {
-        within((column - layout.arm) % layout.group_width())
-    };
-    if angle { MM / ANGLE_UNIT } else { 1.0 }
+    if column < layout.arm {
+        return column_unit(problem.columns[column]).recip();
+    }
+    let anchors = layout.arm + layout.groups * layout.group_width();
+    let angle = column < anchors && within((column - layout.arm) % layout.group_width());
+    if angle { ANGLE_ARM.recip() } else { 1.0 }
 }
 
 /// Scaled columns, set-up first: rows of at most [`POSES`] poses, in mm (orientation rows at 300 mm).
@@ -97,7 +93,7 @@ fn dense_rows(problem: &Problem, layout: &Layout, rows: &Linearised) -> Mat<f64>
         let group = layout.group(set.group[pose]).start - layout.arm;
         for row in 0..rows.rows {
             let at = pose * rows.rows + row;
-            let unit = if row < 3 * layout.targets { 1.0 } else { 0.3 };
+            let unit = if row < 3 * layout.targets { 1.0 } else { ANGLE_ARM };
             let line = index * rows.rows + row;
             for k in 0..layout.arm {
                 dense[(line, own + k)] = unit * rows.arm[at * layout.arm + k] * scale(problem, layout, k);

@@ -7,7 +7,7 @@
 //! at zero residual, where log's Jacobian is the identity.
 
 use truearm_kinematics::{
-    Isa, Kernel, Lane, LaneFrame, LaneParameters, Screw, SharedParameters, Transform, dispatch,
+    Isa, Kernel, Lane, LaneFrame, LaneParameters, Screw, SharedParameters, Transform, dispatch, lane_cross,
 };
 
 use crate::EstimateError;
@@ -142,13 +142,13 @@ impl<'a> RowBuilder<'a> {
         columns: &mut Columns,
         row: usize,
     ) {
-        let arm = rotate::<I>(&sweep.frame.rotation, &splat(&group.targets[target]));
+        let arm = rotate::<I>(&sweep.frame.rotation, &Lane::splat_all(&group.targets[target]));
         let mut point = sweep.frame.position;
         for (coordinate, offset) in point.iter_mut().zip(arm) {
             *coordinate += offset;
         }
         for (column, screw) in sweep.screws.iter().enumerate() {
-            let turned = cross::<I>(&screw.angular, &arm);
+            let turned = lane_cross::<I>(&screw.angular, &arm);
             for k in 0..3 {
                 columns.set(column, row + k, weight * (screw.linear[k] + turned[k]));
             }
@@ -206,7 +206,7 @@ impl<'a> RowBuilder<'a> {
             set_block(columns, column, row, &[[zero], [zero], [zero]]);
             column += 1;
         }
-        let predicted = product::<I>(&sweep.frame.rotation, &splat(&group.flange_from_target));
+        let predicted = product::<I>(&sweep.frame.rotation, &Lane::splat_all(&group.flange_from_target));
         set_rotation(columns, column, row, (weight, &predicted));
         let residual = rotation_residual(packet, &group.world_from_base, &predicted);
         for k in 0..3 {
@@ -255,32 +255,13 @@ fn product<I: Isa>(left: &[Lane; 9], right: &[Lane; 9]) -> [Lane; 9] {
     out
 }
 
-#[inline(always)]
-fn cross<I: Isa>(a: &[Lane; 3], b: &[Lane; 3]) -> [Lane; 3] {
-    let mut out = [Lane::ZERO; 3];
-    for (k, value) in out.iter_mut().enumerate() {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        *value = I::mul_add(a[i], b[j], -(a[j] * b[i]));
-    }
-    out
-}
-
 /// A world point in base coordinates.
 #[inline(always)]
 fn into_base<I: Isa>(world_from_base: &Transform, point: &[Lane]) -> [Lane; 3] {
     let inverse = world_from_base.inverse();
-    let mut out = rotate::<I>(&splat(&inverse.rotation), &[point[0], point[1], point[2]]);
+    let mut out = rotate::<I>(&Lane::splat_all(&inverse.rotation), &[point[0], point[1], point[2]]);
     for (value, shift) in out.iter_mut().zip(inverse.translation) {
         *value += Lane::splat(shift);
-    }
-    out
-}
-
-#[inline(always)]
-fn splat<const N: usize>(values: &[f64; N]) -> [Lane; N] {
-    let mut out = [Lane::ZERO; N];
-    for (lane, value) in out.iter_mut().zip(values) {
-        *lane = Lane::splat(*value);
     }
     out
 }

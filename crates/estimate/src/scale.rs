@@ -1,20 +1,22 @@
 //! One unit of each kind: a millimetre and 1/300 rad are alike.
 
-/// Metres that a radian counts.
+use truearm_kinematics::is_length;
+
+/// Metres that a radian counts, in errors and in changes of parameters and joints: half the length of a lower arm.
 pub const ANGLE_ARM: f64 = 0.3;
 
 /// Metres that a unit of a parameter counts, 5 * link + (theta, d, a, alpha, beta): lengths as they are, angles at
-/// 0.3 m.
+/// [`ANGLE_ARM`].
 pub fn column_unit(column: usize) -> f64 {
-    if matches!(column % 5, 1 | 2) { 1.0 } else { ANGLE_ARM }
+    if is_length(column) { 1.0 } else { ANGLE_ARM }
 }
 
-/// Metres that a unit of a pose's row counts: three positions, then rotation vectors at 0.3 m.
+/// Metres that a unit of a pose's row counts: three positions, then rotation vectors at [`ANGLE_ARM`].
 pub fn row_unit(row: usize) -> f64 {
     if row < 3 { 1.0 } else { ANGLE_ARM }
 }
 
-/// A Jacobian (n, m, P) of parameters `columns` in units that are alike: m per m, so mm per mm, and angles at 0.3 m.
+/// A Jacobian (n, m, P) of parameters `columns` in units that are alike: m per m, so mm per mm, and angles at [`ANGLE_ARM`].
 pub fn scaled_jacobian(jacobian: &[f64], rows_per_pose: usize, columns: &[usize]) -> Vec<f64> {
     let width = columns.len();
     let scale: Vec<f64> = columns.iter().map(|&column| column_unit(column).recip()).collect();

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::kernel::{Input, InputKind};
+use crate::spline::{Alone, cubic, quadratic};
 
 /// Largest number of cells that are active at once along one input (cubic memberships).
 pub const MOST_ACTIVE: usize = 4;
@@ -90,7 +91,13 @@ impl Axis {
             offset -= TAU * ((offset - half) / TAU).round();
         }
         let position = offset / self.spacing;
-        if self.degree == 2 { quadratic(position) } else { cubic(position) }
+        if self.degree == 2 {
+            let middle = position.round();
+            let [low, mid, high] = quadratic::<Alone, f64>(position - middle);
+            return (middle as i64 - 1, [low, mid, high, 0.0]);
+        }
+        let below = position.floor();
+        (below as i64 - 1, cubic::<Alone, f64>(position - below))
     }
 
     /// The cells that a raw value excites.
@@ -117,32 +124,9 @@ impl Axis {
     }
 }
 
-/// Quadratic B-spline: three cells.
-#[inline]
-fn quadratic(position: f64) -> (i64, [f64; MOST_ACTIVE]) {
-    let nearest = position.round();
-    let t = position - nearest;
-    let grades = [0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t), 0.0];
-    (nearest as i64 - 1, grades)
-}
-
-/// Cubic B-spline: four cells.
-#[inline]
-fn cubic(position: f64) -> (i64, [f64; MOST_ACTIVE]) {
-    let below = position.floor();
-    let t = position - below;
-    let s = 1.0 - t;
-    let grades = [
-        s * s * s / 6.0,
-        (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-        (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
-        t * t * t / 6.0,
-    ];
-    (below as i64 - 1, grades)
-}
-
-fn range(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)))
+/// The least and the largest of some values.
+pub fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)))
 }
 
 /// The shortest arc that holds all angles: the turn without its largest gap.

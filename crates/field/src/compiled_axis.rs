@@ -6,6 +6,7 @@ use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::cells::{Axis, MOST_ACTIVE};
 use crate::kernel::InputKind;
+use crate::spline::{cubic, quadratic};
 
 /// Added and taken away it rounds to a whole number.
 const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
@@ -130,17 +131,16 @@ impl CompiledAxis {
             offset = I::mul_add(nearest(turns), Lane::splat(-turn.period), offset);
         }
         let position = offset * self.per_spacing;
-        let mut grade = [Lane::ZERO; 4];
         let centre = if self.cubic {
             let below = nearest(position - Lane::splat(0.5));
-            cubic::<I>(position - below, &mut grade);
+            excited.grade.copy_from_slice(&cubic::<I, Lane>(position - below)[..K]);
             below
         } else {
             let middle = nearest(position);
-            quadratic::<I>(position - middle, &mut grade);
+            let [low, mid, high] = quadratic::<I, Lane>(position - middle);
+            excited.grade.copy_from_slice(&[low, mid, high, Lane::ZERO][..K]);
             middle
         };
-        excited.grade.copy_from_slice(&grade[..K]);
         self.cells(centre, &mut excited.cell);
     }
 
@@ -172,25 +172,4 @@ fn once_around(index: i64, wrap: i64) -> i64 {
 #[inline(always)]
 fn nearest(x: Lane) -> Lane {
     (x + Lane::splat(ROUNDING)) - Lane::splat(ROUNDING)
-}
-
-/// Quadratic B-spline: three cells.
-#[inline(always)]
-fn quadratic<I: Isa>(t: Lane, grade: &mut [Lane; 4]) {
-    let (low, high) = (Lane::splat(0.5) - t, Lane::splat(0.5) + t);
-    grade[0] = low * low * 0.5;
-    grade[1] = I::mul_add(-t, t, Lane::splat(0.75));
-    grade[2] = high * high * 0.5;
-}
-
-/// Cubic B-spline: four cells.
-#[inline(always)]
-fn cubic<I: Isa>(t: Lane, grade: &mut [Lane; 4]) {
-    let s = Lane::splat(1.0) - t;
-    let (t2, s2) = (t * t, s * s);
-    let two_thirds = Lane::splat(2.0 / 3.0);
-    grade[0] = s2 * s * (1.0 / 6.0);
-    grade[1] = I::mul_add(t2, t * 0.5 - Lane::splat(1.0), two_thirds);
-    grade[2] = I::mul_add(s2, s * 0.5 - Lane::splat(1.0), two_thirds);
-    grade[3] = t2 * t * (1.0 / 6.0);
 }

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use faer::{Mat, MatMut, MatRef};
+use faer::{Mat, MatMut};
 use rayon::prelude::*;
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, parallelism};
@@ -17,19 +17,16 @@ use crate::model::{BlockPlan, Excited, Implied, Model};
 use crate::pairs::write_covariance;
 use crate::posterior::{LeaveOneOut, Query, Solution};
 use crate::product::{product, times};
+use crate::projection::{Projection, setup_columns};
 
 /// Poses whose covariances are found together.
 const BATCH: usize = 64;
 
-/// Factors of the rows' covariance.
+/// The rows' covariance, factored.
 pub struct DataSpace {
     pub model: Model,
     excited: Vec<Excited>,
-    factor: Cholesky,
-    /// K^-1 S.
-    spread: Mat<f64>,
-    /// Factor of S^T K^-1 S.
-    inner: Cholesky,
+    projection: Projection,
 }
 
 impl DataSpace {
@@ -38,17 +35,12 @@ impl DataSpace {
         let excited: Vec<Excited> =
             (0..training.pose_count()).map(|pose| model.cells.excite(training.values_of(pose))).collect();
         let rows = training.row_count();
-        let error = || FieldError::NotPositiveDefinite { rows };
         let kernels = Implied { cells: &model.cells, excited: &excited };
         let mut matrix = Mat::zeros(rows, rows);
         write_covariance(training, &model.by_column, &model.hyper, &kernels, matrix.as_mut());
         cancel.check()?;
-        let factor = Cholesky::new(matrix, parallelism()).ok_or_else(error)?;
-        let setup = MatRef::from_row_major_slice(&training.setup, rows, training.setup_width);
-        let mut spread = setup.to_owned();
-        factor.solve(spread.as_mut());
-        let inner = Cholesky::new(setup_precision(setup, &spread), faer::Par::Seq).ok_or_else(error)?;
-        Ok(Self { model, excited, factor, spread, inner })
+        let projection = Projection::new(training, matrix)?;
+        Ok(Self { model, excited, projection })
     }
 
     pub fn solve(&self, residual: &[f64]) -> Solution {
@@ -80,16 +72,14 @@ impl DataSpace {
     }
 
     fn setup_step(&self, residual: &[f64]) -> Vec<f64> {
-        let right = times(self.spread.transpose(), residual);
-        if right.is_empty() { Vec::new() } else { self.inner.solve_vector(&right) }
+        let right = times(self.projection.spread.transpose(), residual);
+        if right.is_empty() { Vec::new() } else { self.projection.inner.solve_vector(&right) }
     }
 
     fn alpha(&self, residual: &[f64], step: &[f64]) -> Vec<f64> {
-        let training = &self.model.training;
-        let setup = MatRef::from_row_major_slice(&training.setup, training.row_count(), training.setup_width);
-        let explained = times(setup, step);
+        let explained = times(setup_columns(&self.model.training), step);
         let rest: Vec<f64> = residual.iter().zip(&explained).map(|(all, part)| all - part).collect();
-        self.factor.solve_vector(&rest)
+        self.projection.factor.solve_vector(&rest)
     }
 
     /// J_i^T alpha_i of every pose, (n, P).
@@ -132,9 +122,8 @@ impl DataSpace {
     pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
         let training = &self.model.training;
         let alpha = self.alpha(residual, &self.setup_step(residual));
-        let inverse = self.factor.inverse();
-        let mut root = self.spread.transpose().to_owned();
-        self.inner.solve_lower(root.as_mut());
+        let inverse = self.projection.factor.inverse();
+        let root = self.projection.root();
         let mut out = LeaveOneOut::zeros(training.row_count());
         for pose in 0..training.pose_count() {
             let range = training.rows(pose);
@@ -160,9 +149,8 @@ impl DataSpace {
         let model = &self.model;
         let training = &model.training;
         let alpha = self.alpha(residual, &self.setup_step(residual));
-        let inverse = self.factor.inverse();
-        let mut root = self.spread.transpose().to_owned();
-        self.inner.solve_lower(root.as_mut());
+        let inverse = self.projection.factor.inverse();
+        let root = self.projection.root();
         let mut out = Vec::new();
         for block in blocks {
             let rows: Vec<usize> = block.iter().flat_map(|&pose| training.rows(pose)).collect();
@@ -251,7 +239,7 @@ impl DataSpace {
             let excited = self.model.cells.excite(query.values_of(pose));
             self.cross(&excited, query.jacobian_of(pose), cross.as_mut().subcols_mut(index * rows, rows));
         }
-        let mut lost = product(self.spread.transpose(), cross.as_ref()) * faer::Scale(-1.0);
+        let mut lost = product(self.projection.spread.transpose(), cross.as_ref()) * faer::Scale(-1.0);
         if let Some(setup) = query.setup {
             for (index, pose) in poses.enumerate() {
                 for (i, line) in
@@ -261,8 +249,8 @@ impl DataSpace {
                 }
             }
         }
-        self.factor.solve_lower(cross.as_mut());
-        self.inner.solve_lower(lost.as_mut());
+        self.projection.factor.solve_lower(cross.as_mut());
+        self.projection.inner.solve_lower(lost.as_mut());
         (cross, lost)
     }
 
@@ -306,9 +294,4 @@ pub struct LeftOut {
     pub noise: f64,
     /// Variance of the prediction.
     pub known: f64,
-}
-
-/// S^T K^-1 S, with the precision of a set-up that is known to a metre and a radian: flat, but never singular.
-pub fn setup_precision(setup: MatRef<f64>, spread: &Mat<f64>) -> Mat<f64> {
-    setup.transpose() * spread + Mat::<f64>::identity(setup.ncols(), setup.ncols())
 }

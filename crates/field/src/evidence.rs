@@ -8,7 +8,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat, MatRef};
+use faer::{Accum, Mat};
 use rayon::prelude::*;
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, parallelism};
@@ -16,13 +16,13 @@ use truearm_kinematics::{Isa, Kernel, dispatch};
 
 use crate::FieldError;
 use crate::continuous::{Continuous, Pairing, PoseKernels, dot, exponent_factors, padded, pairings};
-use crate::data_space::setup_precision;
 use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH, AT_SMOOTH_LENGTH,
     Hyper, Product,
 };
 use crate::pairs::{ByColumn, ClassSums, add_products, write_covariance};
 use crate::product::times;
+use crate::projection::Projection;
 use crate::training::Training;
 
 /// The evidence of one training set under any hyper-parameters.
@@ -90,16 +90,9 @@ impl<'a> Evidence<'a> {
 
     /// From the covariance's lower triangle and room for P.
     fn restricted(&self, covariance: Mat<f64>, mut projected: Mat<f64>) -> Result<Restricted, FieldError> {
-        let rows = self.by_column.rows;
-        let error = || FieldError::NotPositiveDefinite { rows };
-        let par = parallelism();
-        let factor = Cholesky::new(covariance, par).ok_or_else(error)?;
-        let setup = MatRef::from_row_major_slice(&self.training.setup, rows, self.training.setup_width);
-        let mut spread = setup.to_owned(); // (R, s)
-        factor.solve(spread.as_mut());
-        let inner = Cholesky::new(setup_precision(setup, &spread), faer::Par::Seq).ok_or_else(error)?;
-        let mut root = spread.transpose().to_owned();
-        inner.solve_lower(root.as_mut());
+        let projection = Projection::new(self.training, covariance)?;
+        let root = projection.root();
+        let Projection { factor, inner, .. } = projection;
         factor.inverse_lower(projected.as_mut());
         triangular::matmul(
             projected.as_mut(),
@@ -110,7 +103,7 @@ impl<'a> Evidence<'a> {
             root.as_ref(),
             BlockStructure::Rectangular,
             -1.0,
-            par,
+            parallelism(),
         );
         let mut alpha = factor.solve_vector(&self.training.residual);
         let common = times(root.as_ref(), &self.training.residual);

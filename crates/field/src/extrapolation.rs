@@ -12,6 +12,7 @@ use crate::FieldError;
 use crate::data_space::{DataSpace, LeftOut};
 use crate::hyper::Hyper;
 use crate::model::Model;
+use crate::outliers::QUANTILE_95;
 use crate::training::Training;
 
 /// Share of the poses that make a tail.
@@ -22,8 +23,6 @@ const FEWEST_POSES: usize = 50;
 const LARGEST: f64 = 6.0;
 /// Share of its predictions that holds in the worst tail.
 const HELD: f64 = 0.93;
-/// 95 % of a standard normal variable lies within this.
-const QUANTILE_95: f64 = 1.959_963_984_540_054;
 
 /// Factor on the standard deviation of the arm's part, at least one.
 ///

@@ -13,7 +13,7 @@ use crate::optimise::{Curvature, Limits};
 use crate::outliers::{self, Judgement};
 use crate::posterior::{Posterior, Solution};
 use crate::refine::relinearised;
-use crate::select::{Found, contest_major, prune_major, refine_with, select_major};
+use crate::select::{Found, contest_major, prune_major, refine, select_major};
 use crate::training::Training;
 use crate::upright::contest_up;
 use crate::widening::with_widenings;
@@ -184,7 +184,7 @@ impl Search<'_> {
         let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
         let middle = middle.lifted(chosen.hyper.up)?;
         let evidence = Evidence::new(&middle, &self.options.cancel);
-        let mut found = refine_with(&evidence, chosen.hyper, chosen.curvature, SEARCH)?;
+        let mut found = refine(&evidence, chosen.hyper, chosen.curvature, SEARCH)?;
         found.evaluations += chosen.evaluations;
         let found = contest_major(&evidence, found, joints)?;
         let mut found = prune_major(&evidence, found)?;
@@ -204,7 +204,7 @@ impl Search<'_> {
         }
         let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
         let evidence = Evidence::new(&large, &self.options.cancel);
-        let found = refine_with(&evidence, hyper, self.curvature.take(), POLISH)?;
+        let found = refine(&evidence, hyper, self.curvature.take(), POLISH)?;
         self.note(&found);
         Ok(found.hyper)
     }
@@ -230,7 +230,7 @@ impl Search<'_> {
 }
 
 fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Found, FieldError> {
-    let better = refine_with(evidence, found.hyper, found.curvature, limits)?;
+    let better = refine(evidence, found.hyper, found.curvature, limits)?;
     Ok(Found { evaluations: found.evaluations + better.evaluations, ..better })
 }
 

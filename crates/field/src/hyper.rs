@@ -25,7 +25,7 @@ pub struct Product {
 pub struct Hyper {
     /// Factor on the constants' prior standard deviations.
     pub constant: f64,
-    /// Amplitude of `own` blocks, rad (for prismatic joints times [`OWN_LEVER`] m).
+    /// Amplitude of `own` blocks, rad (for prismatic joints times [`truearm_estimate::ANGLE_ARM`] m).
     pub own: f64,
     /// Length scale of `own` blocks.
     pub own_length: f64,
@@ -33,9 +33,9 @@ pub struct Hyper {
     pub smooth: [f64; 3],
     /// Length scale of `smooth` blocks.
     pub smooth_length: f64,
-    /// What every joint misses anew at every pose, rad (prismatic: times [`OWN_LEVER`] m).
+    /// What every joint misses anew at every pose, rad (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
     pub repeatability: f64,
-    /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`OWN_LEVER`] m).
+    /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
     pub sag: f64,
     /// The direction, in the base frame, against which `sag` takes links to weigh.
     pub up: [f64; 3],
@@ -53,9 +53,6 @@ pub struct Hyper {
     /// by the evidence.
     pub extrapolation: f64,
 }
-
-/// An `own` amplitude of a revolute joint moves a tool at this distance as much as that of a prismatic one, m.
-pub const OWN_LEVER: f64 = 0.3;
 
 /// One hyper-parameter as the optimiser sees it, in its own unit.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -39,10 +39,12 @@ mod pairs;
 mod posterior;
 mod predict;
 mod product;
+mod projection;
 mod refine;
 pub mod regions;
 mod sag;
 mod select;
+mod spline;
 #[cfg(test)]
 mod tests;
 mod training;

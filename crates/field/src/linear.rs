@@ -1,9 +1,9 @@
 //! From measurements to rows that a field is inferred from.
 
 use truearm_estimate::{Layout, Linearised, Point, Problem, linearise};
-use truearm_kinematics::Joint;
 
 use crate::FieldError;
+use crate::cells::range;
 use crate::fit::FieldOptions;
 use crate::kernel::Input;
 use crate::sag::Levers;
@@ -85,19 +85,7 @@ fn push_row(
 }
 
 fn columns(problem: &Problem, options: &FieldOptions) -> Vec<Column> {
-    let mut joint_of_link = vec![None; problem.chain.link_count()];
-    let mut joint = 0;
-    for (link, slot) in problem.chain.links().iter().zip(&mut joint_of_link) {
-        if link.joint != Joint::Fixed {
-            *slot = Some((joint, link.joint));
-            joint += 1;
-        }
-    }
-    let own = |parameter: usize| match joint_of_link[parameter / 5] {
-        Some((joint, Joint::Revolute)) if parameter.is_multiple_of(5) => Some(joint),
-        Some((joint, Joint::Prismatic)) if parameter % 5 == 1 => Some(joint),
-        _ => None,
-    };
+    let own = |parameter| problem.chain.joint_columns().iter().position(|&column| column == parameter);
     let column = |(k, &parameter): (usize, &usize)| {
         let driven = options.driven.contains(&k);
         Column {
@@ -112,20 +100,14 @@ fn columns(problem: &Problem, options: &FieldOptions) -> Vec<Column> {
 
 fn joint_inputs(problem: &Problem) -> Vec<Input> {
     let set = problem.measurements;
-    let kinds = problem.chain.links().iter().map(|link| link.joint);
-    let moving = kinds.filter(|&joint| joint != Joint::Fixed);
-    moving
-        .enumerate()
-        .map(|(k, joint)| match joint {
-            Joint::Prismatic => {
-                let values = set.joints.iter().skip(k).step_by(set.joint_count);
-                let (low, high) = values
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| (low.min(x), high.max(x)));
-                Input::line(high - low)
-            }
-            _ => Input::ANGLE,
-        })
-        .collect()
+    let input = |k| {
+        if !problem.chain.slides(k) {
+            return Input::ANGLE;
+        }
+        let (low, high) = range(set.joints.iter().skip(k).step_by(set.joint_count));
+        Input::line(high - low)
+    };
+    (0..problem.chain.joint_count()).map(input).collect()
 }
 
 /// Joint values, then features, of every pose.

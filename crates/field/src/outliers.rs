@@ -15,7 +15,7 @@ pub struct Judgement {
     pub score: Vec<f64>,
     /// Length of each pose's leave-one-out residual of the first target, (n,), m.
     pub distance: Vec<f64>,
-    /// Factor that makes 95 % of the standardised components lie within 1.96, at least one.
+    /// Factor that makes 95 % of the standardised components lie within [`QUANTILE_95`], at least one.
     pub inflation: f64,
     /// Poses taken out of the fit.
     pub outliers: Vec<usize>,
@@ -26,7 +26,7 @@ const OVERWHELMING: f64 = 4.753_424_308_8;
 /// Weight of an outlier's rows: their noise is thirty times larger, and they no longer count.
 const NEGLIGIBLE: f64 = 1e-3;
 /// 95 % of a standard normal variable lies within this.
-const QUANTILE_95: f64 = 1.959_963_984_540_054;
+pub const QUANTILE_95: f64 = 1.959_963_984_540_054;
 
 /// Quantile of the chi-squared distribution at a standard normal quantile (Wilson and Hilferty 1931), at odds of one in a
 /// million up to 8 % too large.

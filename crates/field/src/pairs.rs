@@ -9,9 +9,10 @@
 use faer::prelude::ReborrowMut;
 use faer::{ColRef, MatMut};
 use rayon::prelude::*;
+use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
-use crate::hyper::{Hyper, OWN_LEVER};
+use crate::hyper::Hyper;
 use crate::kernel::InputKind;
 use crate::training::{Class, Training};
 
@@ -90,7 +91,7 @@ impl ByColumn {
         let mut own = vec![None; training.inputs.len()];
         for (p, column) in training.columns.iter().enumerate() {
             if let Some(joint) = column.own {
-                let lever = if training.inputs[joint].kind == InputKind::Angle { 1.0 } else { OWN_LEVER };
+                let lever = if training.inputs[joint].kind == InputKind::Angle { 1.0 } else { ANGLE_ARM };
                 own[joint] = Some((p, lever));
             }
         }

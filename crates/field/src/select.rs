@@ -63,14 +63,14 @@ pub fn select_major(
     let first = usual_joints(joints).next().unwrap_or_default();
     let (mut begun, mut usual) = (0, None::<Found>);
     for start in Hyper::starts(&first, joints, noise) {
-        let found = refine(&evidence, start, FIRST)?;
+        let found = refine(&evidence, start, None, FIRST)?;
         begun += found.evaluations;
         if usual.as_ref().is_none_or(|usual| found.value > usual.value) {
             usual = Some(found);
         }
     }
     let usual = usual.ok_or(FieldError::Length { what: "starts", found: 0, expected: 1 })?;
-    let all = refine(&evidence, usual.hyper.with_major((0..joints).collect()), FIRST)?;
+    let all = refine(&evidence, usual.hyper.with_major((0..joints).collect()), None, FIRST)?;
     let mut evaluations = begun + all.evaluations;
     // With fewer joints it can hardly be more.
     if all.value - WORTH * FEWEST as f64 - CHANCE <= net(&usual, joints) {
@@ -100,7 +100,7 @@ pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result
         if rival.major_is_wrist() {
             continue;
         }
-        let candidate = refine(evidence, rival, RIVAL)?;
+        let candidate = refine(evidence, rival, None, RIVAL)?;
         evaluations += candidate.evaluations;
         if net(&candidate, joints) > net(&best, joints) {
             best = candidate;
@@ -135,7 +135,7 @@ fn cheapest_removal(evidence: &Evidence, from: &Found, evaluations: &mut usize) 
             continue;
         }
         let known = from.curvature.as_ref().map(|inverse| inverse.without(Hyper::major_length(position)));
-        let found = refine_with(evidence, candidate, known, REFIT)?;
+        let found = refine(evidence, candidate, known, REFIT)?;
         *evaluations += found.evaluations;
         if best.as_ref().is_none_or(|best| found.value > best.value) {
             best = Some(found);
@@ -144,19 +144,11 @@ fn cheapest_removal(evidence: &Evidence, from: &Found, evaluations: &mut usize) 
     best.ok_or(FieldError::Length { what: "joints of the major block", found: 0, expected: 1 })
 }
 
-/// Maximises the evidence from given hyper-parameters.
+/// Maximises the evidence from given hyper-parameters and what is known of its curvature.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
-pub fn refine(evidence: &Evidence, start: Hyper, limits: Limits) -> Result<Found, FieldError> {
-    refine_with(evidence, start, None, limits)
-}
-
-/// The same with what is known of the evidence's curvature.
-///
-/// # Errors
-/// [`FieldError`] of the evidence.
-pub fn refine_with(
+pub fn refine(
     evidence: &Evidence,
     start: Hyper,
     curvature: Curvature,

@@ -1,8 +1,10 @@
 //! Damped Newton on several starts at once.
 
-use truearm_kinematics::{Chain, KinematicsError, Parameters, SharedParameters, Transform, rotation_log};
+use truearm_kinematics::{
+    Chain, KinematicsError, Parameters, SharedParameters, Transform, norm, rotation_log,
+};
 
-use crate::vector::{norm, sub};
+use crate::vector::sub;
 
 /// Error, m and rad, below which a start has arrived: a few hundred roundings of an arm's length.
 const ARRIVED: f64 = 1e-13;

@@ -8,12 +8,12 @@ use rs_opw_kinematics::glam::{DMat3, DQuat, DVec3};
 use rs_opw_kinematics::kinematic_traits::{Kinematics, Pose};
 use rs_opw_kinematics::kinematics_impl::OPWKinematics;
 use rs_opw_kinematics::parameters::opw_kinematics::Parameters;
-use truearm_kinematics::Transform;
+use truearm_kinematics::{Transform, cross, norm};
 
 use crate::axes::Axes;
 use crate::branch::Planar;
 use crate::shape::{Base, MEETING_M, frame, square};
-use crate::vector::{cross, dot, norm, sub, unit_across};
+use crate::vector::{dot, sub, unit_across};
 
 #[derive(Debug, Clone)]
 pub struct Opw {

@@ -7,12 +7,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use truearm_kinematics::Transform;
+use truearm_kinematics::{Transform, cross};
 
 use crate::axes::Axes;
 use crate::branch::Planar;
 use crate::shape::{Base, MEETING_M, along, frame, square};
-use crate::vector::{Vector, cross, dot, sub, unit_across};
+use crate::vector::{Vector, dot, sub, unit_across};
 
 /// How far beyond its reach a pose of a plain arm may be and still be tried stretched: the arm at hand may
 /// not be quite plain.

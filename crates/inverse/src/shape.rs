@@ -1,12 +1,12 @@
 //! What an arm looks like: the plain arm with a closed form that is nearest to it.
 
-use truearm_kinematics::Transform;
+use truearm_kinematics::{Transform, cross};
 
 use crate::axes::Axes;
 use crate::branch::Planar;
 use crate::opw::Opw;
 use crate::parallel::Parallel;
-use crate::vector::{Line, Vector, cross, dot, sub, unit_across};
+use crate::vector::{Line, Vector, dot, sub, unit_across};
 
 /// How far from square or parallel the axes of an arm may be for the closed form of the plain one to be
 /// a start, radians: ten times what factory calibrations show.

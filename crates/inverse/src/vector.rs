@@ -1,5 +1,7 @@
 //! Vectors of three, and lines.
 
+use truearm_kinematics::{cross, norm};
+
 pub type Vector = [f64; 3];
 
 pub fn add_scaled(a: Vector, scale: f64, b: Vector) -> Vector {
@@ -12,14 +14,6 @@ pub fn sub(a: Vector, b: Vector) -> Vector {
 
 pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub fn norm(a: Vector) -> f64 {
-    dot(a, a).sqrt()
 }
 
 /// `a` without its part along the unit vector `direction`, of unit length; `None` if nothing is left.

@@ -1,6 +1,7 @@
 //! The chain: its links, and the fixed transforms before and after them.
 
 use crate::error::KinematicsError;
+use crate::parameters::is_length;
 use crate::transform::Transform;
 
 /// Names of the parameters of a link, in their order.
@@ -116,6 +117,12 @@ impl Chain {
     /// For each joint, the index of the parameter that its value is added to.
     pub fn joint_columns(&self) -> &[usize] {
         &self.joint_columns
+    }
+
+    /// Whether a joint, from 0, is a prismatic one.
+    #[inline(always)]
+    pub fn slides(&self, joint: usize) -> bool {
+        is_length(self.joint_columns[joint])
     }
 
     /// The parameters of the links as given, 5 L.

@@ -17,14 +17,10 @@ impl LaneFrame {
     /// The same transform for all poses.
     #[inline(always)]
     pub fn splat(transform: &Transform) -> LaneFrame {
-        let mut frame = LaneFrame { rotation: [Lane::ZERO; 9], position: [Lane::ZERO; 3] };
-        for (lane, value) in frame.rotation.iter_mut().zip(&transform.rotation) {
-            *lane = Lane::splat(*value);
+        LaneFrame {
+            rotation: Lane::splat_all(&transform.rotation),
+            position: Lane::splat_all(&transform.translation),
         }
-        for (lane, value) in frame.position.iter_mut().zip(&transform.translation) {
-            *lane = Lane::splat(*value);
-        }
-        frame
     }
 
     /// Axis k, in the base frame.

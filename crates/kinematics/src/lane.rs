@@ -43,6 +43,16 @@ impl Lane {
         Lane([value; LANES])
     }
 
+    /// Several values, each the same for every pose.
+    #[inline(always)]
+    pub fn splat_all<const N: usize>(values: &[f64; N]) -> [Lane; N] {
+        let mut out = [Lane::ZERO; N];
+        for (lane, value) in out.iter_mut().zip(values) {
+            *lane = Lane::splat(*value);
+        }
+        out
+    }
+
     /// The values of `f(0)` to `f(7)`.
     #[inline(always)]
     pub fn from_fn(mut f: impl FnMut(usize) -> f64) -> Lane {

@@ -1,6 +1,6 @@
 //! By how much the joints lift the links: what a joint's drive carries of the links' weights.
 
-use crate::chain::{Chain, Joint};
+use crate::chain::Chain;
 use crate::frame::Carried;
 use crate::isa::Isa;
 use crate::lane::Lane;
@@ -46,11 +46,11 @@ impl Chain {
     ) {
         self.find_ways::<I, true>(joints, parameters, scratch);
         let mut at = 0;
-        for (j, slides) in self.slides().enumerate() {
+        for j in 0..self.joint_count() {
             let mut arm = [Lane::ZERO; 2];
             for way in &scratch.ways[j..] {
                 arm = [arm[0] + way[0], arm[1] + way[1]];
-                out[at] = lift::<I>(slides, &scratch.frames[j][0], &arm, 1.0);
+                out[at] = lift::<I>(self.slides(j), &scratch.frames[j][0], &arm, 1.0);
                 at += 1;
             }
         }
@@ -69,7 +69,7 @@ impl Chain {
         scratch: &mut LeverScratch,
         out: &mut [Lane],
     ) {
-        if self.slides().any(|slides| slides) {
+        if (0..self.joint_count()).any(|j| self.slides(j)) {
             self.find_loads::<I, true>(joints, parameters, heights, scratch, out);
         } else {
             self.find_loads::<I, false>(joints, parameters, heights, scratch, out);
@@ -87,23 +87,16 @@ impl Chain {
     ) {
         self.find_ways::<I, SLIDES>(joints, parameters, scratch);
         let mut heights = heights;
-        for ((j, slides), out) in self.slides().enumerate().zip(out) {
+        for (j, out) in out.iter_mut().enumerate().take(self.joint_count()) {
             let (own, rest) = heights.split_at(scratch.ways.len() - j);
             let mut arm = [Lane::ZERO; 2];
             for (way, weight) in scratch.ways[j..].iter().zip(own) {
                 arm[0] = I::mul_add(way[0], Lane::splat(*weight), arm[0]);
                 arm[1] = I::mul_add(way[1], Lane::splat(*weight), arm[1]);
             }
-            *out = lift::<I>(SLIDES && slides, &scratch.frames[j][0], &arm, own[0]);
+            *out = lift::<I>(SLIDES && self.slides(j), &scratch.frames[j][0], &arm, own[0]);
             heights = rest;
         }
-    }
-
-    /// Whether each joint slides.
-    #[inline(always)]
-    fn slides(&self) -> impl Iterator<Item = bool> {
-        let kinds = self.links().iter().map(|link| link.joint).filter(|joint| *joint != Joint::Fixed);
-        kinds.map(|kind| kind == Joint::Prismatic)
     }
 
     /// Frames and ways into the scratch, without the heights unless `SLIDES`.

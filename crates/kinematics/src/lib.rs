@@ -24,6 +24,7 @@ mod rows;
 mod sweep;
 mod transform;
 mod trig;
+mod vector;
 mod writer;
 mod x86;
 
@@ -36,8 +37,9 @@ pub use isa::{InstructionSet, Isa, Kernel, dispatch, dispatch_on};
 pub use lane::{LANES, Lane, Pick};
 pub use levers::{LeverScratch, lever_count};
 pub use one_pose::OnePose;
-pub use parameters::{LaneParameters, Parameters, SharedParameters};
+pub use parameters::{LaneParameters, Parameters, SharedParameters, is_length};
 pub use rows::{lane_room, load_lanes, store_lanes};
 pub use sweep::Screw;
 pub use transform::{Transform, rotation_exp, rotation_log};
 pub use trig::sin_cos;
+pub use vector::{cross, lane_cross, norm};

@@ -6,6 +6,12 @@ use crate::lane::Lane;
 use crate::one_pose::OnePose;
 use crate::trig::sin_cos;
 
+/// Whether the parameter with index 5 * link + (theta, d, a, alpha, beta) is a length, m, and no angle, rad.
+#[inline(always)]
+pub const fn is_length(column: usize) -> bool {
+    matches!(column % 5, 1 | 2)
+}
+
 /// Absolute parameters of a batch, by link theta, d, a, alpha, beta.
 #[derive(Debug, Clone, Copy)]
 pub enum Parameters<'a> {

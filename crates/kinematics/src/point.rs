@@ -18,8 +18,7 @@ impl Chain {
 
     #[inline(always)]
     fn carry<I: Isa, S: LinkSource>(&self, joints: &[Lane], source: S) -> [Lane; 3] {
-        let [x, y, z] = self.end().translation;
-        let mut point = [Lane::splat(x), Lane::splat(y), Lane::splat(z)];
+        let mut point = Lane::splat_all(&self.end().translation);
         let mut values = joints.iter().rev();
         for (index, link) in self.links().iter().enumerate().rev() {
             let value = if link.joint == Joint::Fixed { None } else { values.next() };

@@ -4,7 +4,8 @@ use crate::chain::{Chain, Convention, Joint};
 use crate::frame::{Carried, LaneFrame, OneFrame};
 use crate::isa::Isa;
 use crate::lane::Lane;
-use crate::parameters::{LaneParameters, LinkSource, LinkValues};
+use crate::parameters::{LaneParameters, LinkSource, LinkValues, is_length};
+use crate::vector::lane_cross;
 
 /// Motion of the end for a unit change of one parameter, in the base frame.
 ///
@@ -47,10 +48,10 @@ impl Chain {
         let mut axes = Wanted { columns, next: 0, slots: [NOT_WANTED; 5], screws };
         *frame = self.walk::<I, _>(joints, parameters, &mut axes);
         for (screw, column) in screws.iter_mut().zip(columns) {
-            if !matches!(column % 5, 1 | 2) {
+            if !is_length(*column) {
                 let (end, point) = (&frame.position, &screw.linear);
                 let arm = [end[0] - point[0], end[1] - point[1], end[2] - point[2]];
-                screw.linear = cross::<I>(&screw.angular, &arm);
+                screw.linear = lane_cross::<I>(&screw.angular, &arm);
             }
         }
     }
@@ -211,13 +212,4 @@ fn modified<I: Isa, F: Carried, A: Axes>(frame: &mut F, link: &LinkValues<Lane>,
     axes.shifts(1, frame, 2);
     frame.turn::<I>(0, 1, link.theta);
     frame.shift::<I>(2, link.d);
-}
-
-#[inline(always)]
-fn cross<I: Isa>(u: &[Lane; 3], v: &[Lane; 3]) -> [Lane; 3] {
-    [
-        I::mul_add(u[1], v[2], -(u[2] * v[1])),
-        I::mul_add(u[2], v[0], -(u[0] * v[2])),
-        I::mul_add(u[0], v[1], -(u[1] * v[0])),
-    ]
 }

@@ -3,6 +3,8 @@
 use truearm_estimate::EstimateError;
 use truearm_kinematics::{Isa, LANES, Lane, exp};
 
+use crate::spline::{cubic, linear, quadratic};
+
 /// Cells of a sensor that may be active at once.
 pub const MOST_ACTIVE: usize = 8;
 /// Cells that B-spline memberships may have active: linear to cubic.
@@ -130,30 +132,11 @@ impl Sensor {
     /// Grades of the B-spline for offsets from the window's first centre.
     #[inline(always)]
     fn spline<I: Isa>(&self, offset: Lane, grades: &mut [Lane; MOST_ACTIVE]) {
-        let one = Lane::splat(1.0);
+        let middle = offset - Lane::splat(1.0);
         match self.active {
-            2 => (grades[0], grades[1]) = (one - offset, offset),
-            3 => {
-                let t = offset - one;
-                let (before, after) = (Lane::splat(0.5) - t, Lane::splat(0.5) + t);
-                grades[0] = before * before * 0.5;
-                grades[1] = Lane::splat(0.75) - t * t;
-                grades[2] = after * after * 0.5;
-            }
-            _ => {
-                let t = offset - one;
-                let s = one - t;
-                grades[0] = s * s * s * (1.0 / 6.0);
-                grades[1] = middle::<I>(t);
-                grades[2] = middle::<I>(s);
-                grades[3] = t * t * t * (1.0 / 6.0);
-            }
+            2 => grades[..2].copy_from_slice(&linear::<I, Lane>(offset)),
+            3 => grades[..3].copy_from_slice(&quadratic::<I, Lane>(middle)),
+            _ => grades[..4].copy_from_slice(&cubic::<I, Lane>(middle)),
         }
     }
-}
-
-/// The cubic B-spline within a spacing of its centre: 2/3 - t^2 + t^3 / 2.
-#[inline(always)]
-fn middle<I: Isa>(t: Lane) -> Lane {
-    I::mul_add(t * t, t * 0.5 - Lane::splat(1.0), Lane::splat(2.0 / 3.0))
 }

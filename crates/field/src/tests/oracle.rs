@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 
 use faer::{Mat, Par};
+use truearm_estimate::ANGLE_ARM;
 use truearm_estimate::dense::{Cholesky, column};
 
 use crate::cells::CellKernel;
-use crate::hyper::{Hyper, OWN_LEVER};
+use crate::hyper::Hyper;
 use crate::kernel::InputKind;
 use crate::model::Model;
 use crate::training::{Class, Training};
@@ -152,7 +153,7 @@ impl<'a, K: Kernels> Oracle<'a, K> {
     }
 
     fn lever(&self, input: usize) -> f64 {
-        if self.training.inputs[input].kind == InputKind::Line { OWN_LEVER } else { 1.0 }
+        if self.training.inputs[input].kind == InputKind::Line { ANGLE_ARM } else { 1.0 }
     }
 
     fn setup_row(&self, row: usize) -> &[f64] {

@@ -1,0 +1,49 @@
+//! What the set-up's unknowns leave of the rows' covariance.
+//!
+//! With K the covariance of the rows (R, R) and flat set-up columns S (R, s) the precision of the rows is
+//! `P = K^-1 - K^-1 S (S^T K^-1 S)^-1 S^T K^-1` (Patterson and Thompson 1971).
+
+use faer::{Mat, MatRef};
+use truearm_estimate::dense::{Cholesky, parallelism};
+
+use crate::FieldError;
+use crate::training::Training;
+
+/// The factors of P.
+pub struct Projection {
+    /// Factor of K.
+    pub factor: Cholesky,
+    /// K^-1 S, (R, s).
+    pub spread: Mat<f64>,
+    /// Factor of S^T K^-1 S, with the precision of a set-up that is known to a metre and a radian: flat, but never singular.
+    pub inner: Cholesky,
+}
+
+impl Projection {
+    /// From the lower triangle of the covariance (R, R) of a training set's rows.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
+    pub fn new(training: &Training, covariance: Mat<f64>) -> Result<Self, FieldError> {
+        let error = || FieldError::NotPositiveDefinite { rows: training.row_count() };
+        let factor = Cholesky::new(covariance, parallelism()).ok_or_else(error)?;
+        let setup = setup_columns(training);
+        let mut spread = setup.to_owned();
+        factor.solve(spread.as_mut());
+        let precision = setup.transpose() * &spread + Mat::<f64>::identity(setup.ncols(), setup.ncols());
+        let inner = Cholesky::new(precision, faer::Par::Seq).ok_or_else(error)?;
+        Ok(Self { factor, spread, inner })
+    }
+
+    /// Q (s, R) with `P = K^-1 - Q^T Q`.
+    pub fn root(&self) -> Mat<f64> {
+        let mut root = self.spread.transpose().to_owned();
+        self.inner.solve_lower(root.as_mut());
+        root
+    }
+}
+
+/// S, (R, s).
+pub fn setup_columns(training: &Training) -> MatRef<'_, f64> {
+    MatRef::from_row_major_slice(&training.setup, training.row_count(), training.setup_width)
+}
