@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import tomli_w
 
-from truearm.cell.cell_file import Cell, parsed
+from truearm.cell.cell_file import Cell
 from truearm.cell.examples import example
 from truearm.cell.measuring import Process
 from truearm.cell.opening import open_session
@@ -17,6 +17,7 @@ from truearm.cell.prediction import Prediction
 from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
 from truearm.cell.virtual.launch import VirtualCell
+from truearm.files import parsed
 
 SPEED = 200.0
 

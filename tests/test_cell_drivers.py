@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from tests.cell_support import cell_text, possible_readings, virtual
 from truearm.cell import Cell, Connected, EmergencyStopError, Expected, RefusedError, StoppedError, movemaster
-from truearm.cell.cell_file import parsed
 from truearm.cell.conformance import ConformanceError, check_robot, check_sensor
 from truearm.cell.playback import PlaybackRobot, PlaybackSensor
 from truearm.cell.prediction import Prediction
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.virtual.launch import release_emergency_stop
+from truearm.files import parsed
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 

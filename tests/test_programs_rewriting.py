@@ -196,7 +196,7 @@ def test_frames_files_say_what_is_wrong_in_them():
         "[tool.a]\nxyz = [1, 2, 3]\nquaternion_wxyz = [1, 1, 0, 0]\n": "must be 1",
         "[tool.a]\nxyz = [1, 2, 3]\nquaternion_wxyz = [1, 0, 0, 0]\neuler_zyx_deg = [0, 0, 0]\n": "give one",
         "[tools.a]\nxyz = [1, 2, 3]\n": "tools",
-        "tool = [": "no TOML",
+        "tool = [": "not TOML",
     }.items():
         with pytest.raises(InputError, match=words):
             Frames.parse(text, where="f.toml")

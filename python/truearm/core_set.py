@@ -7,7 +7,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import MeasurementSet
+from truearm._core import MeasurementSet, Setup
 from truearm.errors import InputError, UsageError
 from truearm.measurements import Measurements
 from truearm.robot import Robot
@@ -96,6 +96,36 @@ def core_set(
             "distances": _distances(data) if selection.distances else [],
         }
     )
+
+
+def measured_points(
+    values: Floats, points: Floats, turned: Floats | None = None, *, group: int = 0
+) -> MeasurementSet:
+    """Points measured at joint values, without a sigma of their own, as the core reads them.
+
+    Args:
+        values: Joint values (n, N).
+        points: (n, T, 3), or (n, 3) of one target.
+        turned: world_from_target rotations (n, 3, 3); None where orientation is not measured.
+        group: Number of the set-up.
+    """
+    count = len(values)
+    return MeasurementSet(
+        {
+            "joints": np.ascontiguousarray(values),
+            "group": np.full(count, group, dtype=np.int64),
+            "targets": np.ascontiguousarray(points.reshape(count, -1, 3)),
+            "rotations": None if turned is None else np.ascontiguousarray(turned),
+            "sigma": np.zeros(count),
+            "weight": np.ones(count),
+            "distances": [],
+        }
+    )
+
+
+def known_setup(point_in_flange: Floats) -> Setup:
+    """The set-up of a device in whose frame the base's place is known, measuring a known point (3,)."""
+    return Setup(np.eye(4)[None], point_in_flange[None, None], np.eye(3)[None], np.zeros((0, 3)))
 
 
 def rotations(data: Measurements) -> Floats:

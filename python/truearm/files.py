@@ -2,7 +2,9 @@
 
 import os
 import tempfile
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from truearm.errors import InputError, UsageError
 
@@ -62,6 +64,18 @@ def decode_text(content: bytes, *, where: str, way_out: str = "Save it as UTF-8"
         raise InputError(
             f"line {line} holds bytes that are not UTF-8", where=where, way_out=way_out
         ) from None
+
+
+def parsed(text: str, *, where: str) -> dict[str, Any]:
+    """The values of a TOML text.
+
+    Raises:
+        InputError: If it is none.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not TOML: {error}", where=where) from None
 
 
 def write_whole(path: Path, content: str | bytes) -> None:

@@ -3,7 +3,6 @@
 Numbers stay in the file's units here; :mod:`truearm.robot` turns them into SI.
 """
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Final, Literal
@@ -12,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from pydantic_core import ErrorDetails
 
 from truearm.errors import InputError, did_you_mean, list_names
+from truearm.files import parsed
 from truearm.rotations import UNIT_TOLERANCE
 from truearm.units import AngleUnit, LengthUnit
 
@@ -131,10 +131,7 @@ def parse_robot_file(text: str, *, where: str) -> RobotFile:
     Raises:
         InputError: If it is not TOML, a key is unknown or missing, or a value breaks its rule.
     """
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=where) from None
+    content = parsed(text, where=where)
     try:
         return RobotFile.model_validate(content)
     except ValidationError as error:

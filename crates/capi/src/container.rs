@@ -22,6 +22,9 @@ pub struct Container<'a> {
 
 impl<'a> Container<'a> {
     /// Reads the bytes of a file.
+    ///
+    /// # Errors
+    /// [`LoadError::NotOurs`], [`LoadError::Altered`].
     pub fn new(bytes: &'a [u8]) -> Result<Self, LoadError> {
         let text = header_text(bytes)?;
         check_digest(bytes)?;
@@ -31,11 +34,17 @@ impl<'a> Container<'a> {
     }
 
     /// The JSON values.
+    ///
+    /// # Errors
+    /// [`LoadError::Content`].
     pub fn content<T: DeserializeOwned>(&self) -> Result<T, LoadError> {
         serde_json::from_str(&self.text).map_err(|error| LoadError::Content(error.to_string()))
     }
 
     /// The numbers of an array.
+    ///
+    /// # Errors
+    /// [`LoadError::Content`].
     pub fn numbers(&self, name: &str) -> Result<Vec<f64>, LoadError> {
         let missing = |_| LoadError::Content(format!("it has no array \"{name}\""));
         let view = self.tensors.tensor(name).map_err(missing)?;

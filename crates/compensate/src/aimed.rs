@@ -24,6 +24,10 @@ pub(crate) struct Aimed {
 }
 
 impl Aimed {
+    /// A model with a tool, flange_from_tool.
+    ///
+    /// # Errors
+    /// [`CompensateError::Kinematics`] if it is no rigid motion.
     pub fn new(model: Arc<Model>, flange_from_tool: &Transform) -> Result<Self, CompensateError> {
         flange_from_tool.check("tool")?;
         let chain = model.chain.with_end(model.chain.end().compose(flange_from_tool))?;
@@ -31,6 +35,7 @@ impl Aimed {
         Ok(Self { model, chain, turned: flange_from_tool.rotation, reach })
     }
 
+    /// Room for one thread.
     pub fn scratch(&self) -> AimedScratch {
         let (joints, width) = (self.chain.joint_count(), self.chain.parameter_count());
         let spread = self.model.spread.as_ref().map_or(0, |spread| spread.column_count());

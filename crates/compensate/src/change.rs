@@ -24,6 +24,7 @@ pub(crate) struct Mark {
 }
 
 impl Mark {
+    /// Of waypoint `i` of a group, and the target of its tool in the base frame.
     #[inline(always)]
     pub fn new(correction: Correction, target: &LaneFrame, i: usize) -> Self {
         let mut mark = Self { correction, point: [0.0; 3], rotation: [0.0; 9] };

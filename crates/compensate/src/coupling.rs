@@ -12,6 +12,7 @@ pub(crate) enum Coupling {
 }
 
 impl Coupling {
+    /// Of a matrix (count, count), row-major, that makes joint values of readings.
     pub fn new(matrix: &[f64], count: usize) -> Self {
         let unit = |(k, &value): (usize, &f64)| value == f64::from(u8::from(k / count == k % count));
         if matrix.iter().enumerate().all(unit) { Self::None } else { Self::Matrix(matrix.to_vec(), count) }

@@ -60,6 +60,14 @@ pub(crate) fn check_length(what: &'static str, found: usize, expected: usize) ->
     if found == expected { Ok(()) } else { Err(CompensateError::Length { what, found, expected }) }
 }
 
+/// Check that all bounds, each with its name, are positive; infinity is.
+pub(crate) fn check_bounds(bounds: &[(&'static str, f64)]) -> Result<(), CompensateError> {
+    match bounds.iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
+        Some(&(what, value)) => Err(CompensateError::Bound { what, value }),
+        None => Ok(()),
+    }
+}
+
 /// Check that all numbers are finite.
 pub(crate) fn check_finite(what: &'static str, values: &[f64]) -> Result<(), CompensateError> {
     match values.iter().find(|value| !value.is_finite()) {

@@ -2,7 +2,7 @@
 
 use truearm_kinematics::Chain;
 
-use crate::error::CompensateError;
+use crate::error::{CompensateError, check_bounds};
 use crate::newton::Plan;
 use crate::refusal::{Reason, Refusal};
 
@@ -50,12 +50,15 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// Largest standard deviation of the tool's position for models that know it, unless told otherwise, m.
+    pub const LARGEST_STD: f64 = 1e-3;
+
     pub(crate) fn check(&self, joints: usize) -> Result<(), CompensateError> {
         if !self.joints.is_empty() && self.joints.len() != joints {
             let (found, expected) = (self.joints.len(), joints);
             return Err(CompensateError::Length { what: "the joint limits", found, expected });
         }
-        let bounds = [
+        check_bounds(&[
             ("the largest joint correction", self.largest_angle),
             ("the largest joint correction", self.largest_slide),
             ("the largest shift", self.largest_shift),
@@ -65,11 +68,7 @@ impl Limits {
             ("the largest change of the turn", self.turn_change),
             ("the residual", self.residual),
             ("the residual turn", self.residual_turn),
-        ];
-        match bounds.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
-            Some((what, value)) => Err(CompensateError::Bound { what, value }),
-            None => Ok(()),
-        }
+        ])
     }
 }
 

@@ -81,6 +81,7 @@ pub(crate) struct Search {
 }
 
 impl Search {
+    /// Room for a model's searches.
     pub fn new(aimed: &Aimed) -> Self {
         let lanes = vec![Lane::ZERO; aimed.chain.joint_count()];
         Self {

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use crate::corrector::{Corrector, Workspace};
-use crate::error::CompensateError;
+use crate::error::{CompensateError, check_bounds};
 use crate::refusal::Refusal;
 
 /// Between two steps less than this nothing moves, s.
@@ -38,7 +38,7 @@ impl Default for StreamOptions {
 
 impl StreamOptions {
     fn check(&self) -> Result<(), CompensateError> {
-        let bounds = [
+        check_bounds(&[
             ("the largest rate of the correction", self.rate[0]),
             ("the largest rate of the correction", self.rate[1]),
             ("the largest acceleration of the correction", self.acceleration[0]),
@@ -46,11 +46,7 @@ impl StreamOptions {
             ("the time of the ramp", self.ramp),
             ("the time that a correction is held", self.hold),
             ("the longest time between set-points", self.deadline),
-        ];
-        match bounds.into_iter().find(|(_, value)| value.is_nan() || *value <= 0.0) {
-            Some((what, value)) => Err(CompensateError::Bound { what, value }),
-            None => Ok(()),
-        }
+        ])
     }
 }
 

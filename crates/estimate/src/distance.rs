@@ -122,6 +122,9 @@ fn rows(problem: &Problem, point: Point) -> Result<Vec<Row>, EstimateError> {
 }
 
 /// Normal equations of all distances.
+///
+/// # Errors
+/// [`EstimateError::Kinematics`].
 pub fn normal_equations(
     problem: &Problem,
     point: Point,
@@ -140,11 +143,17 @@ pub fn normal_equations(
 }
 
 /// Residuals of all distances, m.
+///
+/// # Errors
+/// [`EstimateError::Kinematics`].
 pub fn residuals(problem: &Problem, point: Point) -> Result<Vec<f64>, EstimateError> {
     Ok(rows(problem, point)?.into_iter().map(|row| row.residual).collect())
 }
 
 /// Derivatives (rows, unknowns) of all distances, row-major.
+///
+/// # Errors
+/// [`EstimateError::Kinematics`].
 pub fn derivatives(problem: &Problem, point: Point) -> Result<Vec<f64>, EstimateError> {
     let width = Layout::new(problem).len();
     let rows = rows(problem, point)?;

@@ -17,7 +17,7 @@ use crate::EstimateError;
 use crate::distance;
 use crate::layout::{Layout, Problem};
 use crate::rows::{Linearised, Point, linearise};
-use crate::scale::{ANGLE_ARM, column_unit};
+use crate::scale::{ANGLE_ARM, column_unit, scaled_matrix};
 use crate::setup::Setup;
 
 /// A column counts as spanned when less than this share of it stands out of the others' span.
@@ -69,7 +69,7 @@ pub fn identifiability(
     } else {
         dense_rows(problem, &layout, &linearise(problem, point))
     };
-    Ok(in_order(columns.as_ref(), layout.len() - layout.arm, layout.arm))
+    Ok(in_order(columns.as_ref(), layout.len() - layout.arm))
 }
 
 fn scale(problem: &Problem, layout: &Layout, column: usize) -> f64 {
@@ -116,14 +116,26 @@ fn dense_distances(problem: &Problem, layout: &Layout, point: Point) -> Result<M
     }))
 }
 
-/// Gram-Schmidt in order, twice over for accuracy; the first `own` columns belong to the set-up.
-pub fn in_order(columns: MatRef<f64>, own: usize, arm: usize) -> Identifiability {
+/// Columns of a Jacobian (n, m, P) of parameters `columns`, m rows a pose, that none before them can stand for: their
+/// positions, ascending.
+///
+/// # Errors
+/// [`EstimateError::Length`] where the Jacobian is empty or not of whole poses.
+pub fn independent_columns(
+    jacobian: &[f64],
+    rows: usize,
+    columns: &[usize],
+) -> Result<Vec<usize>, EstimateError> {
+    Ok(independent(scaled_matrix(jacobian, rows, columns)?.as_ref()))
+}
+
+/// Gram-Schmidt in order, twice over for accuracy: columns that those before them do not span.
+fn independent(columns: MatRef<f64>) -> Vec<usize> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut accepted: Vec<usize> = Vec::new();
-    let mut rejected: Vec<usize> = Vec::new();
-    let norms = (0..own + arm).map(|column| columns.col(column).norm_l2());
+    let norms = (0..columns.ncols()).map(|column| columns.col(column).norm_l2());
     let negligible = ROUNDING * norms.fold(0.0, f64::max);
-    for column in 0..own + arm {
+    for column in 0..columns.ncols() {
         let original: Vec<f64> = (0..columns.nrows()).map(|row| columns[(row, column)]).collect();
         let norm = length(&original);
         let mut rest = original;
@@ -137,16 +149,19 @@ pub fn in_order(columns: MatRef<f64>, own: usize, arm: usize) -> Identifiability
         if norm > negligible && left > INDEPENDENT_SHARE * norm {
             basis.push(rest.into_iter().map(|x| x / left).collect());
             accepted.push(column);
-        } else {
-            rejected.push(column);
         }
     }
+    accepted
+}
+
+/// The answer for scaled columns, of which the first `own` belong to the set-up and the others to the arm.
+pub fn in_order(columns: MatRef<f64>, own: usize) -> Identifiability {
+    let accepted = independent(columns);
     let independent = Mat::from_fn(columns.nrows(), accepted.len(), |row, k| columns[(row, accepted[k])]);
     let factors = independent.qr();
-    let undetermined = rejected
-        .iter()
-        .filter(|&&column| column >= own)
-        .map(|&column| confounded(columns, &factors, &accepted, own, column))
+    let undetermined = (own..columns.ncols())
+        .filter(|column| !accepted.contains(column))
+        .map(|column| confounded(columns, &factors, &accepted, own, column))
         .collect();
     Identifiability {
         determined: accepted.iter().filter(|&&column| column >= own).map(|column| column - own).collect(),

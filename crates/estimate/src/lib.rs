@@ -47,7 +47,7 @@ pub use choice::{
 pub use constant::{ConstantFit, ConstantOptions, Prior, fit_constant};
 pub use distance::{Distance, DistanceTo};
 pub use error::EstimateError;
-pub use identifiability::{Confounded, Identifiability, identifiability};
+pub use identifiability::{Confounded, Identifiability, identifiability, independent_columns};
 pub use layout::{Layout, Problem};
 pub use measurements::{MeasurementSet, Noise};
 pub use minimise::Reason;

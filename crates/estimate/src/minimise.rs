@@ -69,6 +69,9 @@ const SMALLEST_STEP: f64 = 1e-14;
 
 impl Objective<'_> {
     /// Normal equations at a state, without the prior.
+    ///
+    /// # Errors
+    /// [`EstimateError::Kinematics`].
     pub fn normal(&self, state: &State) -> Result<Normal, EstimateError> {
         let point = Point { parameters: &state.parameters, setup: &state.setup };
         normal_equations(self.problem, self.packets, point, self.weighting)
@@ -114,6 +117,9 @@ impl Objective<'_> {
     }
 
     /// Minimises from a start.
+    ///
+    /// # Errors
+    /// [`EstimateError::Singular`], [`EstimateError::Kinematics`], [`EstimateError::Cancelled`].
     pub fn minimise(&self, start: State) -> Result<Minimum, EstimateError> {
         let normal = self.normal(&start)?;
         let mut minimum = Minimum { state: start, normal, iterations: 0, reason: Reason::IterationLimit };
@@ -152,6 +158,7 @@ impl Objective<'_> {
         Ok(minimum)
     }
 
+    /// What is said where the rows leave unknowns open.
     pub fn singular(&self) -> EstimateError {
         let unknowns = Layout::new(self.problem).len();
         EstimateError::Singular { unknowns, rows: self.problem.measurements.measured_values() }

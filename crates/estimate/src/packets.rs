@@ -43,6 +43,7 @@ pub struct Packets {
 }
 
 impl Packets {
+    /// All poses of a set, sorted by group.
     pub fn new(set: &MeasurementSet) -> Self {
         let count = set.pose_count().div_ceil(LANES) + set.group_count;
         let mut packed = Self {

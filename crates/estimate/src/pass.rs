@@ -23,6 +23,7 @@ pub struct Normal {
 }
 
 impl Normal {
+    /// No rows yet.
     pub fn zeros(unknowns: usize) -> Self {
         Self { matrix: Mat::zeros(unknowns, unknowns), right: vec![0.0; unknowns], squares: 0.0 }
     }
@@ -82,6 +83,9 @@ impl Kernel for ChunkGram<'_> {
 }
 
 /// Accumulates the normal equations; the sum runs over the chunks in order, whatever the threads.
+///
+/// # Errors
+/// [`EstimateError::Kinematics`].
 pub fn normal_equations(
     problem: &Problem,
     packets: &Packets,

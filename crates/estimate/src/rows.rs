@@ -53,6 +53,7 @@ pub struct RowBuilder<'a> {
 pub type Weighting<'a> = Option<(Noise, &'a [f64])>;
 
 impl<'a> RowBuilder<'a> {
+    /// Rows of a problem at a point, weighted or not.
     pub fn new(problem: &'a Problem<'a>, point: Point<'a>, weighting: Weighting<'a>) -> Self {
         let one = point.parameters.len() == problem.chain.parameter_count();
         let shared = one.then(|| SharedParameters::new(point.parameters));
@@ -64,6 +65,7 @@ impl<'a> RowBuilder<'a> {
         self.layout.arm + self.layout.group_width() + 1
     }
 
+    /// Rows of a pose, m.
     pub fn rows(&self) -> usize {
         self.problem.measurements.rows_per_pose()
     }
@@ -362,6 +364,9 @@ pub fn residuals(problem: &Problem, point: Point) -> Result<Vec<f64>, EstimateEr
 }
 
 /// [`residuals`] of measurements that are sorted into lanes already.
+///
+/// # Errors
+/// [`EstimateError::Kinematics`] where the chain refuses the joint values.
 pub fn residuals_of(problem: &Problem, packets: &Packets, point: Point) -> Result<Vec<f64>, EstimateError> {
     if problem.measurements.is_distances() {
         return distance::residuals(problem, point);

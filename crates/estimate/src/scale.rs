@@ -1,6 +1,9 @@
 //! One unit of each kind: a millimetre and 1/300 rad are alike.
 
+use faer::Mat;
 use truearm_kinematics::is_length;
+
+use crate::EstimateError;
 
 /// Metres that a radian counts, in errors and in changes of parameters and joints: half the length of a lower arm.
 pub const ANGLE_ARM: f64 = 0.3;
@@ -22,4 +25,22 @@ pub fn scaled_jacobian(jacobian: &[f64], rows_per_pose: usize, columns: &[usize]
     let scale: Vec<f64> = columns.iter().map(|&column| column_unit(column).recip()).collect();
     let entry = |(at, value): (usize, &f64)| value * row_unit(at / width % rows_per_pose) * scale[at % width];
     jacobian.iter().enumerate().map(entry).collect()
+}
+
+/// The same as a matrix (n m, P).
+///
+/// # Errors
+/// [`EstimateError::Length`] where the entries are none, or no whole poses.
+pub fn scaled_matrix(
+    jacobian: &[f64],
+    rows_per_pose: usize,
+    columns: &[usize],
+) -> Result<Mat<f64>, EstimateError> {
+    let (width, found) = (columns.len(), jacobian.len());
+    let expected = (rows_per_pose * width).max(1);
+    if found == 0 || !found.is_multiple_of(expected) {
+        return Err(EstimateError::Length { what: "the Jacobian", found, expected });
+    }
+    let scaled = scaled_jacobian(jacobian, rows_per_pose, columns);
+    Ok(Mat::from_fn(found / width, width, |i, j| scaled[i * width + j]))
 }

@@ -11,6 +11,9 @@ impl Compass {
     /// Steps along both axes as long as one leads up, then halves the step (Hooke and Jeeves 1961, without patterns).
     ///
     /// `value` gives what is to be made largest first; `None` where it has no value. `None` if the start has none.
+    ///
+    /// # Errors
+    /// Those of `value`.
     pub fn search<E>(
         &self,
         mut value: impl FnMut([f64; 2]) -> Result<Option<(f64, f64)>, E>,

@@ -6,7 +6,7 @@
 use std::cmp::Reverse;
 
 use rayon::prelude::*;
-use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, lane_room, load_lanes};
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
@@ -276,14 +276,9 @@ impl Evaluate<'_> {
         }
         let mut sums = bank.sum_scratch();
         let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
-        let mut inputs = vec![Lane::ZERO; bank.input_count];
-        let (wide, width) = (bank.input_count * LANES, bank.parameter_count);
-        for (values, out) in values.chunks(wide).zip(out.chunks_mut(width * LANES)) {
-            for (k, pose) in values.chunks_exact(bank.input_count).enumerate() {
-                for (lane, value) in inputs.iter_mut().zip(pose) {
-                    lane.0[k] = *value;
-                }
-            }
+        let mut inputs = vec![Lane::ZERO; lane_room(bank.input_count)];
+        for (group, out) in out.chunks_mut(bank.parameter_count * LANES).enumerate() {
+            load_lanes::<I>(values, bank.input_count, group * LANES, &mut inputs);
             bank.group::<I, K>(|input| inputs[input], &mut excited, &mut sums, out);
         }
     }

@@ -64,6 +64,7 @@ pub struct CompiledAxis {
 }
 
 impl CompiledAxis {
+    /// The axis of an input, from 0.
     pub fn new(input: usize, axis: &Axis) -> Self {
         let count = axis.count as f64;
         let period = match axis.input.kind {

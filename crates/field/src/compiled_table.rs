@@ -23,6 +23,7 @@ pub struct Line {
 }
 
 impl Line {
+    /// The table of a block over one axis, numbered among the compiled ones, whose first sum is `single`.
     pub fn new(block: &Block, (axis, cells): Numbered<'_>, single: usize) -> Self {
         let mut weights = vec![0.0; cells.row_room()];
         for (cell, weight) in block.weights.iter().enumerate() {
@@ -116,6 +117,7 @@ impl Row {
 }
 
 impl Sheet {
+    /// No tables yet for the parameters `outputs`.
     pub fn new(outputs: &[usize]) -> Self {
         Self {
             outputs: outputs.to_vec(),

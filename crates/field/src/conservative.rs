@@ -8,7 +8,7 @@
 //! inputs together, fitted to exact values and raised, see [`Conservative::fit`]. Where an input leaves the range
 //! that the tables were fitted in, and nowhere above, stands the largest value that the prior allows.
 
-use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, lane_room, load_lanes};
 
 use crate::FieldError;
 use crate::bank::Bank;
@@ -139,16 +139,11 @@ impl Kernel for All<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) {
         let count = self.field.input_count();
-        let mut lanes = vec![Lane::ZERO; count];
+        let mut lanes = vec![Lane::ZERO; lane_room(count)];
         let mut scratch = self.field.scratch();
-        let groups = self.inputs.chunks(count * LANES).zip(self.out.chunks_mut(BOUNDED * LANES));
-        for (inputs, out) in groups {
-            for (pose, row) in inputs.chunks_exact(count).enumerate() {
-                for (lane, value) in lanes.iter_mut().zip(row) {
-                    lane.0[pose] = *value;
-                }
-            }
-            let std = self.field.group::<I>(&lanes, inputs.len() / count, &mut scratch);
+        for (group, out) in self.out.chunks_mut(BOUNDED * LANES).enumerate() {
+            load_lanes::<I>(self.inputs, count, group * LANES, &mut lanes);
+            let std = self.field.group::<I>(&lanes[..count], out.len() / BOUNDED, &mut scratch);
             for (pose, out) in out.chunks_exact_mut(BOUNDED).enumerate() {
                 out[0] = std[0].0[pose];
                 out[1] = std[1].0[pose];

@@ -30,6 +30,10 @@ pub struct DataSpace {
 }
 
 impl DataSpace {
+    /// Factors the covariance of a model's rows.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn new(model: Model, cancel: &Cancel) -> Result<Self, FieldError> {
         let training = &model.training;
         let excited: Vec<Excited> =
@@ -43,6 +47,7 @@ impl DataSpace {
         Ok(Self { model, excited, projection })
     }
 
+    /// Constants, field and set-up from residuals (R,).
     pub fn solve(&self, residual: &[f64]) -> Solution {
         let training = &self.model.training;
         let step = self.setup_step(residual);
@@ -119,6 +124,10 @@ impl DataSpace {
         Block { name: plan.name.to_owned(), grid, outputs, weights }
     }
 
+    /// What each pose's residuals (R,) would be if it had taken no part.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
     pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
         let training = &self.model.training;
         let alpha = self.alpha(residual, &self.setup_step(residual));
@@ -141,6 +150,9 @@ impl DataSpace {
     }
 
     /// Residuals of whole blocks of poses that would have taken no part, with their variances, block by block.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
     pub fn leave_blocks_out(
         &self,
         residual: &[f64],
@@ -183,6 +195,7 @@ impl DataSpace {
         Ok(out)
     }
 
+    /// Covariance (n, m, m) of the rows of each configuration of a query.
     pub fn covariance(&self, query: &Query) -> Vec<f64> {
         let mut out = vec![0.0; query.poses() * query.rows * query.rows];
         for first in (0..query.poses()).step_by(BATCH) {

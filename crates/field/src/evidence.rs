@@ -54,12 +54,16 @@ struct Restricted {
 }
 
 impl<'a> Evidence<'a> {
+    /// Of a training set; looks at `cancel` before each point.
     pub fn new(training: &'a Training, cancel: &'a Cancel) -> Self {
         let (by_column, pairings) = (ByColumn::new(training), pairings(training));
         Self { training, by_column, pairings, room: Mutex::new(None), cancel }
     }
 
     /// Evidence and prior with their gradient at a point.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn score(&self, hyper: &Hyper) -> Result<Score, FieldError> {
         self.cancel.check()?;
         let kernels = Continuous::new(&self.pairings, hyper);

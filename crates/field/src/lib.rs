@@ -63,7 +63,7 @@ pub use fit::{FieldFit, FieldOptions, fit_field, restore};
 pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};
 pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME};
 pub use kernel::{Input, InputKind};
-pub use outliers::Judgement;
+pub use outliers::{Judgement, QUANTILE_95};
 pub use posterior::Posterior;
 pub use predict::measurement_covariance;
 pub use sag::{Levers, SAG_NAME, Sag, SagScratch, UPRIGHT};

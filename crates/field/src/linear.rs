@@ -10,6 +10,9 @@ use crate::sag::Levers;
 use crate::training::{Column, Training};
 
 /// Rows of a problem linearised at a point, the constants' prior centred on the nominal arm.
+///
+/// # Errors
+/// [`FieldError::Length`].
 pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Training, FieldError> {
     let set = problem.measurements;
     let layout = Layout::new(problem);

@@ -152,6 +152,7 @@ pub struct BlockPlan<'a> {
 }
 
 impl BlockPlan<'_> {
+    /// The block's grid of cells.
     pub fn grid(&self) -> Grid {
         Grid {
             inputs: self.axes.iter().map(|axis| axis.0).collect(),
@@ -169,6 +170,7 @@ pub struct Model {
 }
 
 impl Model {
+    /// Cells for a training set under hyper-parameters, with memberships of a degree, 2 or 3.
     pub fn new(training: Training, hyper: Hyper, degree: usize) -> Self {
         let by_column = ByColumn::new(&training);
         let cells = Cells::new(&training, &by_column, &hyper, degree);

@@ -28,6 +28,7 @@ pub struct PairTable {
 }
 
 impl PairTable {
+    /// Makes room for one pose with `count` others, all zero.
     pub fn clear(&mut self, joints: usize, products: usize, count: usize) {
         self.own.resize(joints, Vec::new());
         self.sag.resize(joints, Vec::new());
@@ -75,6 +76,7 @@ struct Group {
 const STEP: usize = 4 * LANES;
 
 impl ByColumn {
+    /// The columns of a training set's Jacobian.
     pub fn new(training: &Training) -> Self {
         let (rows, width) = (training.row_count(), training.columns.len());
         let mut jacobian = vec![0.0; (rows + STEP) * width];
@@ -146,6 +148,7 @@ pub struct ClassSums {
 }
 
 impl ClassSums {
+    /// Sums for a row, with the rows from `first` on.
     #[inline(always)]
     pub fn fill<I: Isa>(&mut self, by_column: &ByColumn, row: usize, first: usize) {
         let count = by_column.rows - first;

@@ -61,10 +61,12 @@ impl Query<'_> {
         self.values.len() / self.widths.0
     }
 
+    /// Inputs (I,) of a configuration.
     pub fn values_of(&self, pose: usize) -> &[f64] {
         &self.values[pose * self.widths.0..(pose + 1) * self.widths.0]
     }
 
+    /// Rows (m, P) of a configuration.
     pub fn jacobian_of(&self, pose: usize) -> &[f64] {
         let size = self.rows * self.widths.1;
         &self.jacobian[pose * size..(pose + 1) * size]
@@ -303,11 +305,15 @@ pub struct LeaveOneOut {
 }
 
 impl LeaveOneOut {
+    /// Of so many rows, all of them sampled.
     pub fn zeros(rows: usize) -> Self {
         Self { residual: vec![0.0; rows], standardised: vec![0.0; rows], sampled: vec![true; rows] }
     }
 
     /// A pose's left-out residual and its covariance, judged as if its rows had their full weight.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
     pub fn set(
         &mut self,
         model: &Model,

@@ -19,6 +19,9 @@ pub struct Refined {
 }
 
 /// Gauss-Newton on the exact model with the factor of the linear one: the remainder is of second order in the CEPs.
+///
+/// # Errors
+/// [`FieldError`] of the posterior, the bank and the residuals.
 pub fn relinearised(
     problem: &Problem,
     point: Point,

@@ -113,6 +113,10 @@ fn factored(normal: &Mat<f64>) -> Result<Cholesky, FieldError> {
 }
 
 impl WeightSpace {
+    /// Factors the normal equations of a model's weights.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn new(model: Model, cancel: &Cancel) -> Result<Self, FieldError> {
         let error = FieldError::NotPositiveDefinite { rows: model.training.row_count() };
         let (unknowns, width) = unknowns(&model).ok_or(error)?;
@@ -127,6 +131,9 @@ impl WeightSpace {
     }
 
     /// The same posterior with other weights of the rows: the changed poses' share is taken out and put in again.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
     pub fn reweighed(mut self, weight: Vec<f64>) -> Result<Self, FieldError> {
         let training = &self.model.training;
         let differs = |&pose: &usize| training.rows(pose).any(|row| training.weight[row] != weight[row]);
@@ -148,6 +155,10 @@ impl WeightSpace {
         WeightSpaceParts { model: &self.model, unknowns: &self.unknowns }
     }
 
+    /// Constants, field and set-up from residuals (R,).
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
     pub fn solve(&self, residual: &[f64]) -> Result<Solution, FieldError> {
         let solution = self.unknowns_of(residual)?;
         let training = &self.model.training;
@@ -207,6 +218,10 @@ impl WeightSpace {
         Block { name: plan.name.to_owned(), grid, outputs, weights }
     }
 
+    /// What each pose's residuals (R,) would be if it had taken no part; of large sets exactly for some poses alone.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`].
     pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
         let training = &self.model.training;
         let solution = column(&self.unknowns_of(residual)?);
@@ -268,6 +283,7 @@ impl WeightSpace {
         Ok(())
     }
 
+    /// Covariance (n, m, m) of the rows of each configuration of a query.
     pub fn covariance(&self, query: &Query) -> Vec<f64> {
         let mut out = vec![0.0; query.poses() * query.rows * query.rows];
         for first in (0..query.poses()).step_by(BATCH) {

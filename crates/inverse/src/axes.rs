@@ -16,6 +16,10 @@ pub struct Axes {
 }
 
 impl Axes {
+    /// The axes of a chain.
+    ///
+    /// # Errors
+    /// [`KinematicsError`] of the chain's parts.
     pub fn of(chain: &Chain) -> Result<Axes, KinematicsError> {
         let before = match chain.convention() {
             Convention::Standard => 0,

@@ -33,6 +33,7 @@ pub struct Planar {
 }
 
 impl Planar {
+    /// The planar part of an arm with a base of two parallel axes across the first; `None` where it has none.
     pub fn of_five_axes(axes: &Axes, base: &Base) -> Option<Planar> {
         let [_, _, third, fourth, fifth] = axes.lines.as_slice() else {
             return None;

@@ -41,6 +41,7 @@ pub struct Left {
 }
 
 impl Newton {
+    /// For a chain at its nominal parameters.
     pub fn new(chain: &Chain) -> Newton {
         let weight = if chain.joint_count() < 6 { POSITION_FIRST } else { 1.0 };
         Newton { chain: chain.clone(), parameters: SharedParameters::new(&chain.nominal()), weight }
@@ -54,6 +55,9 @@ impl Newton {
     }
 
     /// base_from_end at joint values.
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn pose(&self, joints: &[f64]) -> Result<Transform, KinematicsError> {
         let mut matrix = [0.0; 16];
         self.chain.poses(joints, Parameters::Prepared(&self.parameters), &mut matrix)?;
@@ -61,6 +65,9 @@ impl Newton {
     }
 
     /// Improve `starts`, at most `steps` steps each; what is left of each.
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn improve(
         &self,
         target: &Transform,

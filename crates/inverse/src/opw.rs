@@ -82,6 +82,8 @@ impl Opw {
         })
     }
 
+    /// Joint values, rad, at which the plain arm's end has the pose, base_from_end; up to eight, near the seed where a
+    /// joint is open.
     pub fn candidates(&self, base_from_end: &Transform, seed: &[f64; 6]) -> Vec<[f64; 6]> {
         let wrist = self.model_from_base.compose(base_from_end).compose(&self.end_from_wrist);
         let r = &wrist.rotation;

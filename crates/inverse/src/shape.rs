@@ -35,6 +35,7 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// The shape of an arm by its axes.
     pub fn of(axes: &Axes) -> Shape {
         let base = axes.all_revolute.then(|| Base::of(axes)).flatten();
         let Some(base) = base else {
@@ -49,6 +50,7 @@ impl Shape {
         Shape::None(Planar::of_five_axes(axes, &base).map(Box::new))
     }
 
+    /// How an arm of this shape is solved.
     pub fn method(&self) -> Method {
         match self {
             Shape::Opw(_) => Method::SphericalWrist,
@@ -123,10 +125,12 @@ pub fn frame(x: Vector, y: Vector, z: Vector, origin: Vector) -> Transform {
     Transform { rotation: [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]], translation: origin }
 }
 
+/// Whether a line is across a unit direction, within [`SQUARE_RAD`].
 pub fn square(line: &Line, direction: Vector) -> bool {
     dot(line.direction, direction).abs() < SQUARE_RAD
 }
 
+/// Whether a line is along a unit direction, either way, within [`SQUARE_RAD`].
 pub fn along(line: &Line, direction: Vector) -> bool {
     let across = cross(line.direction, direction);
     dot(across, across) < SQUARE_RAD * SQUARE_RAD

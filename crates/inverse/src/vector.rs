@@ -4,14 +4,17 @@ use truearm_kinematics::{cross, norm};
 
 pub type Vector = [f64; 3];
 
+/// a + scale b.
 pub fn add_scaled(a: Vector, scale: f64, b: Vector) -> Vector {
     [0, 1, 2].map(|i| a[i] + scale * b[i])
 }
 
+/// a - b.
 pub fn sub(a: Vector, b: Vector) -> Vector {
     add_scaled(a, -1.0, b)
 }
 
+/// a . b.
 pub fn dot(a: Vector, b: Vector) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

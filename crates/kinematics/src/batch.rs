@@ -31,6 +31,9 @@ impl Chain {
     }
 
     /// See [`Batch::positions`].
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn positions(
         &self,
         joints: &[f64],
@@ -41,6 +44,9 @@ impl Chain {
     }
 
     /// See [`Batch::poses`].
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn poses(
         &self,
         joints: &[f64],
@@ -51,6 +57,9 @@ impl Chain {
     }
 
     /// See [`Batch::position_jacobian`].
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn position_jacobian(
         &self,
         joints: &[f64],
@@ -61,6 +70,9 @@ impl Chain {
     }
 
     /// See [`Batch::pose_jacobian`].
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn pose_jacobian(
         &self,
         joints: &[f64],
@@ -71,6 +83,9 @@ impl Chain {
     }
 
     /// See [`Batch::joint_position_jacobian`].
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn joint_position_jacobian(
         &self,
         joints: &[f64],
@@ -81,6 +96,9 @@ impl Chain {
     }
 
     /// See [`Batch::joint_pose_jacobian`].
+    ///
+    /// # Errors
+    /// [`KinematicsError::Length`].
     pub fn joint_pose_jacobian(
         &self,
         joints: &[f64],

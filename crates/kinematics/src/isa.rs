@@ -225,11 +225,13 @@ mod vector {
         }
     }
 
+    /// Runs a kernel that was compiled for AVX2.
     #[target_feature(enable = "avx2,fma")]
     pub fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Avx2>()
     }
 
+    /// Runs a kernel that was compiled for AVX-512.
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
     pub fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Avx512>()

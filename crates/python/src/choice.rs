@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use truearm_estimate::{
-    Choice as Core, ChoiceOptions, Criterion, Observability, choose_poses as choose, observability_of,
+    Choice as Core, ChoiceOptions, Criterion, Observability, choose_poses as choose,
+    independent_columns as independent, observability_of,
 };
 
 use crate::door::{CoreError, long, quick};
@@ -93,6 +94,18 @@ pub fn observability(
     let rows = jacobian.shape()[1];
     let found = quick(py, || observability_of(&values, rows, &columns))?;
     Ok(by_name(&found))
+}
+
+/// Columns that none before them can stand for, in order.
+#[pyfunction]
+pub fn independent_columns(
+    py: Python<'_>,
+    jacobian: PyReadonlyArray3<'_, f64>,
+    columns: Vec<usize>,
+) -> PyResult<Vec<usize>> {
+    let values = checked("jacobian", &jacobian, columns.len())?;
+    let rows = jacobian.shape()[1];
+    quick(py, || independent(&values, rows, &columns))
 }
 
 fn checked(name: &str, jacobian: &PyReadonlyArray3<'_, f64>, width: usize) -> PyResult<Vec<f64>> {

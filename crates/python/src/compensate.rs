@@ -1,5 +1,6 @@
 //! `_core.ArmModel`, `_core.Corrector` and `_core.Solver`: joints to command.
 
+use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -21,12 +22,6 @@ use crate::field::Field;
 
 /// So many waypoints are done before anybody thinks of Ctrl-C.
 const QUICK: usize = 20_000;
-
-impl Failure for CompensateError {
-    fn into_exception(self) -> PyErr {
-        CoreError::new_err(self.to_string())
-    }
-}
 
 /// An arm as somebody believes it to be, see the stub.
 #[pyclass(frozen, module = "truearm._core")]
@@ -156,6 +151,23 @@ impl Corrector {
         let (calibrated, programming) = (Arc::clone(&calibrated.core), Arc::clone(&programming.core));
         let core = Core::new(calibrated, programming, &tool, options.core()?);
         Ok(Self::wrap(core.map_err(Failure::into_exception)?))
+    }
+
+    /// The bounds where nothing is stated, but for those of joints.
+    #[staticmethod]
+    fn usual() -> HashMap<&'static str, f64> {
+        let usual = Limits::default();
+        HashMap::from([
+            ("largest_angle", usual.largest_angle),
+            ("largest_slide", usual.largest_slide),
+            ("largest_shift", usual.largest_shift),
+            ("largest_turn", usual.largest_turn),
+            ("largest_std", Limits::LARGEST_STD),
+            ("shift_change", usual.shift_change),
+            ("turn_change", usual.turn_change),
+            ("residual", usual.residual),
+            ("residual_turn", usual.residual_turn),
+        ])
     }
 
     fn with_tool(&self, tool: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {

@@ -1,5 +1,6 @@
 //! The one door into the core: it lets other Python threads run, honours Ctrl-C and translates errors.
 
+use std::fmt::Display;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
@@ -7,9 +8,12 @@ use std::time::Duration;
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use truearm_compensate::CompensateError;
 use truearm_estimate::{Cancel, EstimateError};
 use truearm_field::FieldError;
+use truearm_inverse::InverseError;
 use truearm_kinematics::{InstructionSet, KinematicsError};
+use truearm_text::TextError;
 
 create_exception!(
     truearm._core,
@@ -27,13 +31,17 @@ pub trait Failure {
     fn into_exception(self) -> PyErr;
 }
 
-impl Failure for KinematicsError {
-    fn into_exception(self) -> PyErr {
-        CoreError::new_err(self.to_string())
-    }
-}
+/// An error whose words are the message.
+trait Worded: Display {}
 
-impl Failure for EstimateError {
+impl Worded for KinematicsError {}
+impl Worded for EstimateError {}
+impl Worded for FieldError {}
+impl Worded for CompensateError {}
+impl Worded for InverseError {}
+impl Worded for TextError {}
+
+impl<E: Worded> Failure for E {
     fn into_exception(self) -> PyErr {
         CoreError::new_err(self.to_string())
     }
@@ -90,12 +98,6 @@ where
 /// Refuse to start with a setting of the environment that nobody knows.
 pub fn check_environment() -> PyResult<()> {
     InstructionSet::from_environment().map(|_| ()).map_err(Failure::into_exception)
-}
-
-impl Failure for FieldError {
-    fn into_exception(self) -> PyErr {
-        CoreError::new_err(self.to_string())
-    }
 }
 
 /// Work on a pool of its own with so many threads, or on the common one; results do not depend on it.

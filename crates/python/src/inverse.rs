@@ -2,7 +2,7 @@
 
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use truearm_inverse::{Arm, Inverse as Core, InverseError, Method, Readings};
+use truearm_inverse::{Arm, Inverse as Core, Method, Readings};
 use truearm_kinematics::{Joint, Transform};
 
 use crate::chain::Chain;
@@ -11,12 +11,6 @@ use crate::door::{CoreError, Failure, quick};
 type Rows<'py> = PyReadonlyArray2<'py, f64>;
 /// Whether the wrist is in front, the elbow up, and the wrist flipped.
 type Sides = (bool, bool, Option<bool>);
-
-impl Failure for InverseError {
-    fn into_exception(self) -> PyErr {
-        CoreError::new_err(self.to_string())
-    }
-}
 
 /// Inverse kinematics, see the stub.
 #[pyclass(frozen, module = "truearm._core")]

@@ -24,6 +24,8 @@ mod text;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     door::check_environment()?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("ANGLE_ARM_M", truearm_estimate::ANGLE_ARM)?;
+    module.add("NORMAL_95", truearm_field::QUANTILE_95)?;
     module.add("CoreError", module.py().get_type::<door::CoreError>())?;
     module.add_class::<chain::Chain>()?;
     module.add_class::<measured::MeasurementSet>()?;
@@ -48,6 +50,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(division::divide, module)?)?;
     module.add_function(wrap_pyfunction!(division::divide_rows, module)?)?;
     module.add_function(wrap_pyfunction!(choice::observability, module)?)?;
+    module.add_function(wrap_pyfunction!(choice::independent_columns, module)?)?;
     module.add_function(wrap_pyfunction!(greedy::choose_informative, module)?)?;
     module.add_function(wrap_pyfunction!(greedy::choose_telling, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::linearise, module)?)?;

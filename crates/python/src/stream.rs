@@ -10,7 +10,7 @@ use crate::compensate::Corrector;
 use crate::door::Failure;
 
 /// Options by keyword; SI.
-#[derive(FromPyObject)]
+#[derive(FromPyObject, IntoPyObject)]
 #[pyo3(from_item_all)]
 pub struct Keywords {
     rate: [f64; 2],
@@ -42,6 +42,13 @@ impl Stream {
         };
         let core = Core::new(Arc::new(corrector.core().clone()), options);
         Ok(Self { core: Mutex::new(core.map_err(Failure::into_exception)?) })
+    }
+
+    /// The options where nothing is stated.
+    #[staticmethod]
+    fn usual() -> Keywords {
+        let StreamOptions { rate, acceleration, ramp, hold, deadline } = StreamOptions::default();
+        Keywords { rate, acceleration, ramp, hold, deadline }
     }
 
     fn switch(&self, on: bool) {

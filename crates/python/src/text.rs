@@ -3,9 +3,9 @@
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use truearm_text::{Numbers, TextError, Words, scan_lines as scan, splice_in_pieces};
+use truearm_text::{Numbers, Words, scan_lines as scan, splice_in_pieces};
 
-use crate::door::{CoreError, Failure, quick};
+use crate::door::quick;
 
 type Integers<'py> = Bound<'py, PyArray1<i32>>;
 type Scanned<'py> = (
@@ -18,12 +18,6 @@ type Scanned<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i16>>,
 );
-
-impl Failure for TextError {
-    fn into_exception(self) -> PyErr {
-        CoreError::new_err(self.to_string())
-    }
-}
 
 /// Lines and numbers of a text, see the stub.
 #[pyfunction]

@@ -1,7 +1,6 @@
 """The cell file: which arm, which devices at which ports, and how to measure."""
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.protocols import Robot, Sensor
 from truearm.cell.schema import Positive, Quaternion, Section, Share, Vector3, checked
 from truearm.errors import InputError
-from truearm.files import read_text
+from truearm.files import parsed, read_text
 from truearm.robot import Robot as Arm
 from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
 from truearm.units import to_si
@@ -196,18 +195,6 @@ class Cell:
 
     def _flange(self, readings: Floats) -> Floats:
         return self.arm.flange_chain.pose(self.arm.joints_from_readings(readings))
-
-
-def parsed(text: str, *, where: str) -> dict[str, Any]:
-    """The values of a TOML text.
-
-    Raises:
-        InputError: If it is none.
-    """
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {error}", where=where) from None
 
 
 def _arm(file: CellFile, folder: Path) -> Arm:

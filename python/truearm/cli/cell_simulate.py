@@ -48,10 +48,9 @@ def command(
     changes = _changes(speed, seed, fault or [])
     import tomli_w
 
-    from truearm.cell.cell_file import parsed
     from truearm.cell.virtual.launch import VirtualCell
     from truearm.cli.until_interrupted import until_interrupted
-    from truearm.files import read_text, write_whole
+    from truearm.files import parsed, read_text, write_whole
 
     if target.resolve() == cell.resolve():
         raise UsageError("this is the cell file itself", where=str(target), way_out="Name another with -o")

@@ -8,10 +8,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import BeforeValidator, Field
 
-from truearm.cell.cell_file import parsed
 from truearm.cell.schema import Positive, Section, checked
 from truearm.errors import InputError, UsageError
-from truearm.files import read_text
+from truearm.files import parsed, read_text
 from truearm.options import Options
 
 ARM_NAME: Final = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")

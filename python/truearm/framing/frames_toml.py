@@ -1,6 +1,5 @@
 """Frames that were found, written into a frames file beside what it holds already."""
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +9,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from truearm.errors import Notice
-from truearm.files import read_text, write_whole
+from truearm.files import parsed, read_text, write_whole
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, FrameEntry, Frames
 from truearm.rotations import quaternion_from_matrix
@@ -84,7 +83,7 @@ def _content(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {"format": FORMAT, "length_unit": "mm"}
     Frames.load(path)
-    return tomllib.loads(read_text(path))
+    return parsed(read_text(path), where=str(path))
 
 
 def _key(content: Mapping[str, Any], kind: str, name: str) -> str | None:

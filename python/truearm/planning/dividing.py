@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Regions, divide
+from truearm.core_set import known_setup
 from truearm.errors import InputError
 from truearm.files import read_text, write_whole
 from truearm.identified import IdentifiedArm
 from truearm.planning.choosing import Criterion
-from truearm.planning.workspace import Workspace, known_setup
+from truearm.planning.workspace import Workspace
 
 Floats = NDArray[np.float64]
 

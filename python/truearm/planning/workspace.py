@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import MeasurementSet, Setup
+from truearm._core import MeasurementSet
+from truearm.core_set import measured_points
 from truearm.errors import InputError
 from truearm.planning.accessibility import Rule
 from truearm.planning.pool import PoolOptions, draw_pool
@@ -57,24 +58,3 @@ class Workspace:
         self.readings.append(readings)
         self.points.append(points)
         return measured_points(values, points)
-
-
-def measured_points(values: Floats, points: Floats) -> MeasurementSet:
-    """Points (n, 3) measured at joint values (n, N), one set-up, as the core reads them."""
-    count = len(values)
-    return MeasurementSet(
-        {
-            "joints": np.ascontiguousarray(values),
-            "group": np.zeros(count, dtype=np.int64),
-            "targets": np.ascontiguousarray(points[:, None]),
-            "rotations": None,
-            "sigma": np.zeros(count),
-            "weight": np.ones(count),
-            "distances": [],
-        }
-    )
-
-
-def known_setup(point_in_flange: Floats) -> Setup:
-    """The set-up of a device in whose frame the base's place is known, measuring a known point (3,)."""
-    return Setup(np.eye(4)[None], point_in_flange[None, None], np.eye(3)[None], np.zeros((0, 3)))

@@ -3,7 +3,6 @@
 A TOML file with a table `[tool.NAME]` or `[object.NAME]` a frame; docs/reference/programs.md has all keys.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from scipy.spatial.transform import Rotation
 
 from truearm.errors import InputError
-from truearm.files import read_text
+from truearm.files import parsed, read_text
 from truearm.programs.environment import Frame, Transform
 from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
 
@@ -106,9 +105,7 @@ class Frames:
     def parse(cls, text: str, *, where: str = "frames") -> "Frames":
         """The frames of the text of a file."""
         try:
-            content = FramesFile.model_validate(tomllib.loads(text))
-        except tomllib.TOMLDecodeError as error:
-            raise InputError(f"this is no TOML: {error}", where=where) from None
+            content = FramesFile.model_validate(parsed(text, where=where))
         except ValidationError as error:
             first = error.errors()[0]
             key = ".".join(str(part) for part in first["loc"])

@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import MeasurementSet, Problem, linearise, setup_jacobian
+from truearm._core import Problem, linearise, setup_jacobian
 from truearm.calibration import Calibration
+from truearm.core_set import measured_points
 from truearm.errors import UsageError, WorkError, list_names
 
 Floats = NDArray[np.float64]
@@ -123,16 +124,11 @@ class Candidates:
     @cached_property
     def _problem(self) -> Problem:
         arm, selection, count = self.calibration.arm, self.calibration.selection, len(self)
-        measured = MeasurementSet(
-            {
-                "joints": arm.robot.joints_from_readings(self.readings),
-                "group": np.full(count, self._number, dtype=np.int64),
-                "targets": np.zeros((count, len(selection.targets), AXES)),
-                "rotations": np.repeat(np.eye(AXES)[None], count, axis=0) if selection.orientation else None,
-                "sigma": np.zeros(count),
-                "weight": np.ones(count),
-                "distances": [],
-            }
+        measured = measured_points(
+            arm.robot.joints_from_readings(self.readings),
+            np.zeros((count, len(selection.targets), AXES)),
+            np.repeat(np.eye(AXES)[None], count, axis=0) if selection.orientation else None,
+            group=self._number,
         )
         return Problem(arm.flange_chain, measured, list(range(arm.table.size)), arm.world_is_known)
 

@@ -14,7 +14,6 @@ backlash_deg = 0.01
 harmonics = [{ order = 100, amplitude_deg = 0.005 }]
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, Final
@@ -33,18 +32,6 @@ def describe(robot: Robot, seed: int, imperfections: Imperfections, names: Seque
     """JSON values of an arm; the robot as the text of a robot file."""
     content = {name: value for name, value in asdict(imperfections).items() if value is not None}
     return {"robot": robot.to_toml(), "seed": seed, "parameters": list(names), "imperfections": content}
-
-
-def parse(text: str, *, where: str) -> dict[str, Any]:
-    """The values of a TOML text.
-
-    Raises:
-        InputError: If it is none.
-    """
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(str(error), where=where, rule="This must be TOML") from None
 
 
 def write(content: Mapping[str, Any]) -> str:

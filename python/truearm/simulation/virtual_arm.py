@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm._core import Chain
 from truearm.arrays import as_rows
 from truearm.errors import InputError
+from truearm.files import parsed
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.simulation import arm_file
@@ -123,7 +124,7 @@ class VirtualArm:
         Raises:
             InputError: If the text is no TOML, a key is not known or a value breaks a rule.
         """
-        return cls.from_dict(arm_file.parse(text, where=where), where=where)
+        return cls.from_dict(parsed(text, where=where), where=where)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values that `from_dict` makes the same arm of."""

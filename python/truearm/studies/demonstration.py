@@ -9,10 +9,11 @@ import tomli_w
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.cell.cell_file import Cell, parsed
+from truearm.cell.cell_file import Cell
 from truearm.cell.examples import example
 from truearm.cell.virtual.world import true_arm, true_frame
 from truearm.compensation import Compensator
+from truearm.files import parsed
 from truearm.measurements import Measurements
 from truearm.registration import register
 from truearm.rotations import rigid_inverse

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, Regions, Setup
+from truearm.core_set import known_setup, measured_points
 from truearm.identified import IdentifiedArm
 from truearm.planning.dividing import DivisionOptions, divide_space, named_columns
 from truearm.planning.pool import PoolOptions, needed_pool
 from truearm.planning.spaces import Space
-from truearm.planning.workspace import Workspace, known_setup, measured_points
+from truearm.planning.workspace import Workspace
 from truearm.robot import Robot
 from truearm.simulation import PAPER_PARAMETERS
 from truearm.studies.setting import (

@@ -10,9 +10,6 @@ const LATE: u32 = 100;
 /// Reason of a set-point that is not finite.
 const NOT_FINITE: u32 = 1;
 
-/// Largest standard deviation that a controller accepts unless told otherwise, m.
-const LARGEST_STD_M: f64 = 1e-3;
-
 /// What is corrected, and how far; infinity switches a bound off.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
@@ -44,7 +41,7 @@ impl CorrectorOptions {
             largest_slide_m: limits.largest_slide,
             largest_shift_m: limits.largest_shift,
             largest_turn_rad: limits.largest_turn,
-            largest_std_m: LARGEST_STD_M,
+            largest_std_m: truearm_compensate::Limits::LARGEST_STD,
         }
     }
 

@@ -83,6 +83,9 @@ impl<'a, const M: usize> Present<'a, M> {
     }
 
     /// Adds candidates until there are `count`.
+    ///
+    /// # Errors
+    /// [`EstimateError::NotFinite`].
     pub fn fill(&mut self, count: usize) -> Result<(), EstimateError> {
         while self.chosen.len() < count {
             self.add()?;
@@ -91,6 +94,9 @@ impl<'a, const M: usize> Present<'a, M> {
     }
 
     /// Exchanges until nothing better is found, or `most` times; gives how many exchanges were made.
+    ///
+    /// # Errors
+    /// [`EstimateError::NotFinite`], [`EstimateError::Cancelled`].
     pub fn settle(&mut self, most: usize, cancel: &Cancel) -> Result<usize, EstimateError> {
         for made in 0..most {
             cancel.check()?;

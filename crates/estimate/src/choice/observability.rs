@@ -4,7 +4,7 @@ use faer::Mat;
 
 use crate::EstimateError;
 use crate::dense::singular_values;
-use crate::scale::scaled_jacobian;
+use crate::scale::scaled_matrix;
 
 /// What a choice of poses is to make best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,11 +117,6 @@ pub fn observability_of(
     rows: usize,
     columns: &[usize],
 ) -> Result<Observability, EstimateError> {
-    let (width, found) = (columns.len(), jacobian.len());
-    if found == 0 || !found.is_multiple_of((rows * width).max(1)) {
-        let expected = (rows * width).max(1);
-        return Err(EstimateError::Length { what: "the Jacobian", found, expected });
-    }
-    let scaled = scaled_jacobian(jacobian, rows, columns);
-    observability(&Mat::from_fn(found / width, width, |i, j| scaled[i * width + j]), found / (rows * width))
+    let matrix = scaled_matrix(jacobian, rows, columns)?;
+    observability(&matrix, matrix.nrows() / rows)
 }

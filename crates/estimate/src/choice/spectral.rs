@@ -89,6 +89,9 @@ fn negative_pivots(mut a: Mat<f64>) -> usize {
 }
 
 /// Exchanges until a pass through the chosen poses changes nothing, or `passes` times; gives how many were made.
+///
+/// # Errors
+/// [`EstimateError::NotFinite`], [`EstimateError::Cancelled`].
 pub fn settle<const M: usize>(
     pool: &Pool<M>,
     given: &Mat<f64>,

@@ -1,6 +1,6 @@
 //! The association cells that eight inputs excite.
 
-use truearm_kinematics::{Isa, LANES, Lane};
+use truearm_kinematics::{Isa, LANES, Lane, lane_room, load_lanes};
 
 use crate::cmac::network::{Composition, Network};
 use crate::cmac::sensor::{MOST_ACTIVE, Window};
@@ -8,6 +8,7 @@ use crate::cmac::sensor::{MOST_ACTIVE, Window};
 /// Scratch and result of [`Excited::by`].
 pub struct Excited {
     window: Window,
+    inputs: Vec<Lane>,
     scratch: Vec<Lane>,
     /// The first active cell of each input.
     pub first: [u64; LANES],
@@ -23,6 +24,7 @@ impl Excited {
         let room = vec![Lane::ZERO; network.active_count()];
         Self {
             window: Window { first: [0; LANES], grades: [Lane::ZERO; MOST_ACTIVE] },
+            inputs: vec![Lane::ZERO; lane_room(network.input_count())],
             scratch: room.clone(),
             first: [0; LANES],
             grades: room,
@@ -34,16 +36,13 @@ impl Excited {
     #[inline(always)]
     pub fn by<I: Isa>(&mut self, network: &Network, inputs: &[f64]) {
         let (width, options) = (network.input_count(), network.options());
-        let (rows, strides) = (inputs.len() / width, network.strides());
+        let strides = network.strides();
+        load_lanes::<I>(inputs, width, 0, &mut self.inputs);
         self.first = [0; LANES];
         self.grades[0] = Lane::splat(1.0);
         let mut filled = 1;
         for (index, sensor) in network.sensors().iter().enumerate() {
-            let mut values = [0.0; LANES];
-            for i in 0..LANES {
-                values[i] = inputs[i.min(rows - 1) * width + index];
-            }
-            sensor.excite::<I>(Lane(values), options.membership, &mut self.window);
+            sensor.excite::<I>(self.inputs[index], options.membership, &mut self.window);
             for i in 0..LANES {
                 self.first[i] += self.window.first[i] * strides[index];
             }
@@ -67,12 +66,5 @@ impl Excited {
 
 #[inline(always)]
 fn composed(composition: Composition, a: Lane, b: Lane) -> Lane {
-    if composition == Composition::Product {
-        return a * b;
-    }
-    let mut out = [0.0; LANES];
-    for i in 0..LANES {
-        out[i] = if a.0[i] < b.0[i] { a.0[i] } else { b.0[i] };
-    }
-    Lane(out)
+    if composition == Composition::Product { a * b } else { a.where_below(b, a, b) }
 }

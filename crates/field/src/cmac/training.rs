@@ -232,6 +232,10 @@ impl TrainingOptions {
     }
 }
 
+/// Checks the length of an array.
+///
+/// # Errors
+/// [`EstimateError::Length`].
 pub fn check_length(what: &'static str, found: usize, expected: usize) -> Result<(), EstimateError> {
     if found == expected { Ok(()) } else { Err(EstimateError::Length { what, found, expected }) }
 }

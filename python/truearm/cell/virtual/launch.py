@@ -17,7 +17,7 @@ import numpy as np
 import tomli_w
 from pydantic import BaseModel
 
-from truearm.cell.cell_file import Cell, parsed
+from truearm.cell.cell_file import Cell
 from truearm.cell.line_robot import LineRobot
 from truearm.cell.line_sensor import LineSensor
 from truearm.cell.rv_m2 import RvM2
@@ -33,6 +33,7 @@ from truearm.cell.virtual.universal_robots import VirtualUr, VirtualUrStream
 from truearm.cell.virtual.wires import PtyWire, TcpWire, Wire
 from truearm.cell.virtual.world import World
 from truearm.errors import InputError, WorkError
+from truearm.files import parsed
 from truearm.units import RADIANS_PER_DEGREE
 
 DEVICES: Final = ("robot", "sensor")

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Chain, Setup, linearise
+from truearm._core import Chain, Setup, linearise, setup_jacobian
 from truearm.core_set import Selection, core_set
 from truearm.fitting import Fits, Task, fit_rows
 from truearm.identified import IdentifiedArm
@@ -34,6 +34,8 @@ class Poses:
         points: Where the constant model puts the target (n, 3).
         rotations: base_from_flange rotations (n, 3, 3).
         jacobian: Derivatives of the points with respect to all parameters of the L links (n, 3, 5 L).
+        setup: Derivatives of the points with respect to shift and turn of the base and shift of the target
+            (n, 3, 9).
         revolute: Whether each joint turns (N,).
         links: The link that each joint moves (N,).
         heights: Derivative of the height of each link's end with respect to each joint (n, L, N).
@@ -43,6 +45,7 @@ class Poses:
     points: Floats
     rotations: Floats
     jacobian: Floats
+    setup: Floats
     revolute: NDArray[np.bool_]
     links: NDArray[np.int64]
     heights: Floats
@@ -57,6 +60,7 @@ class Poses:
             self.points[rows],
             self.rotations[rows],
             self.jacobian[rows],
+            self.setup[rows],
             self.revolute,
             self.links,
             self.heights[rows],
@@ -130,6 +134,7 @@ class Prepared:
             points=points,
             rotations=flange[:, :3, :3],
             jacobian=jacobian,
+            setup=setup_jacobian(problem, model.constants, setup),
             revolute=np.array([kind == "revolute" for kind in arm.joints])[moving],
             links=np.flatnonzero(moving),
             heights=_heights(arm, joints, model.constants),

@@ -7,8 +7,8 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from truearm.cell.cell_file import parsed
 from truearm.cell.examples import example
+from truearm.files import parsed
 from truearm.planning.configurations import Configuration
 from truearm.planning.spaces import CartesianSpace
 from truearm.robot import Robot

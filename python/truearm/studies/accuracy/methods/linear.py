@@ -77,10 +77,7 @@ def fit_linear(grid: Sequence[Sequence[Ridge]], poses: Poses, residuals: Floats,
 
 def with_constants(columns: Columns, poses: Poses) -> Floats:
     """Columns (n, 3, p + q): those of a correction, of all constants, of frame and of target."""
-    count = len(poses)
-    shifts = np.broadcast_to(np.eye(3), (count, 3, 3))
-    turns = -np.cross(poses.points[:, None, :], shifts).transpose(0, 2, 1)
-    return np.concatenate([columns(poses), poses.jacobian, shifts, turns, poses.rotations], axis=2)
+    return np.concatenate([columns(poses), poses.jacobian, poses.setup], axis=2)
 
 
 def _scores(
