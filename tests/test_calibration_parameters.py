@@ -125,7 +125,7 @@ def test_a_confounded_parameter_is_said_in_words():
     measured, setup = exact_set(robot)
     arm = IdentifiedArm(robot, frame="world")
     found = identify(arm, measured, setup)
-    assert "d1 cannot be told from d0." in found.words
+    assert "d1 cannot be distinguished from d0." in found.words
 
 
 def test_a_shift_along_parallel_axes_is_told_by_no_pose():

@@ -50,7 +50,7 @@ def test_a_calibration_as_people_run_it(folder):
     for word in ("nominal", "constant", "variable", "mean", "RMS", "95 %", "99 %", "max", "mm"):
         assert word in done.stdout
     assert "14 of 20 parameters" in done.stdout
-    assert "cannot be told from" in done.stdout
+    assert "cannot be distinguished from" in done.stdout
     assert "truearm evaluate result/calibration.calib" in done.stdout
     assert files(folder) == ["calibration.calib", "summary.json"]
     calibration = ta.Calibration.load("result/calibration.calib")

@@ -76,8 +76,8 @@ def _sentence(names: Sequence[str], entry: Confounded) -> str:
     largest = sorted(parts, key=lambda part: -abs(part[1]))
     others = [names[k] for k, _ in largest]
     if not others and not with_setup:
-        return f"{names[index]} changes next to nothing that was measured."
+        return f"{names[index]} hardly affected what was measured."
     setup = ["the place of device or target"] if with_setup else []
     named = others[: MAX_NAMED - len(setup)] + setup
     told = " and ".join(part for part in (", ".join(named[:-1]), named[-1]) if part)
-    return f"{names[index]} cannot be told from {told}."
+    return f"{names[index]} cannot be distinguished from {told}."

@@ -36,6 +36,11 @@ def held_errors(facts: Facts) -> Section:
         return Section(title, [Text(_without_rows(facts))])
     errors = facts.errors_mm
     parts: list[Part] = [histogram(errors), cumulative(errors)]
+    words = (
+        "Along the joints, lines are medians over stretches with equally many poses, and dots are errors of "
+        f"the {facts.best} model."
+    )
+    parts.append(Text(words, is_note=True))
     parts += [along_joint(facts, joint) for joint in range(len(facts.joints))]
     parts += orientation(facts)
     return Section(title, [*parts, worst(facts.held, facts)])
@@ -129,7 +134,7 @@ def along_joint(facts: Facts, joint: int) -> Figure:
         if model == name:
             traces.append(points(q[known][:DRAWN], _known(errors)[:DRAWN], model, showlegend=False))
             shown["points"] = _known(errors)[:DRAWN]
-        traces.append(line(middles, medians, model, name=f"{model}, median"))
+        traces.append(line(middles, medians, model))
         shown[model] = _known(medians)
     return Figure(
         f"Error along joint {joint + 1}",

@@ -14,7 +14,10 @@ from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
-CELLS: Final = 12
+CELLS: Final = (6, 12)
+"""Fewest and most cells of a map along an axis."""
+IN_CELL: Final = 5
+"""Configurations that a cell should have on average."""
 FEWEST_IN_CELL: Final = 2
 DRAWN: Final = 1500
 MAPPED_JOINTS: Final = 3
@@ -82,7 +85,8 @@ def pair_map(facts: Facts, found: Known, pair: tuple[int, int]) -> Figure:
 
 def _means(places: Floats, values: Floats) -> tuple[Floats, list[Floats], list[Floats]]:
     """Means (c, c) of values in cells of places (n, 2), with the cells' middles and edges."""
-    edges = [np.linspace(float(x.min()), float(x.max()), CELLS + 1) for x in places.T]
+    cells = int(np.clip(np.sqrt(len(values) / IN_CELL), *CELLS))
+    edges = [np.linspace(float(x.min()), float(x.max()), cells + 1) for x in places.T]
     sums, _, _ = np.histogram2d(places[:, 0], places[:, 1], edges, weights=values)
     counts, _, _ = np.histogram2d(places[:, 0], places[:, 1], edges)
     means = np.where(counts >= FEWEST_IN_CELL, sums / np.maximum(counts, 1), np.nan)
