@@ -102,8 +102,8 @@ def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
     texts = [_from_to(names[k], k, nominal, found) for k in order[:MOST_NAMED]]
     rest = f" and {len(order) - MOST_NAMED} more" if len(order) > MOST_NAMED else ""
     text = (
-        f"{', '.join(texts)}{rest}: so far from its table no {arm.robot.name} is. It is another robot, or "
-        "the table or the data are wrong."
+        f"{', '.join(texts)}{rest}: no {arm.robot.name} deviates so far from its table. It is another robot, "
+        "or the table or the data are wrong."
     )
     return [Notice("far_from_nominal", text)]
 
@@ -111,4 +111,4 @@ def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
 def _from_to(name: str, place: int, nominal: Floats, found: Floats) -> str:
     unit = "mm" if place % KIND_COUNT in (D, A) else "deg"
     before, after = (float(table.flat[place]) / to_si(1.0, unit) for table in (nominal, found))
-    return f"{name} comes out {after:.1f} {unit} where {before:.1f} is nominal"
+    return f"{name} is {after:.1f} {unit} in place of the nominal {before:.1f}"

@@ -66,8 +66,8 @@ def command(
     if as_json:
         print_json({"measurements": str(output / MEASURED), "path_error_mm": errors, **summary})
         return
-    for words, sizes in zip(("as it is   ", "compensated"), errors.values(), strict=True):
-        say(f"A path, {words}: the tool errs {sizes['mean']:.3f} mm mean, {sizes['max']:.3f} mm max.")
+    for words, sizes in zip(("as it is", "compensated"), errors.values(), strict=True):
+        say(f"Error on a path, {words}: mean {sizes['mean']:.3f} mm, largest {sizes['max']:.3f} mm.")
     _print_places(output)
 
 

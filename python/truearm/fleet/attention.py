@@ -68,7 +68,7 @@ def order(found: Sequence[Reason]) -> tuple[int, float]:
 def _no_gain(arm: Row) -> Iterator[Reason]:
     before, after = arm["nominal_mean_mm"], arm["mean_mm"]
     if not helps(before, after):
-        words = f"The calibration does not help: {after:.3f} mm on average, {before:.3f} before."
+        words = f"The calibration does not help: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
         yield Reason("no_gain", words, after / before)
 
 
@@ -85,7 +85,9 @@ def _drifted(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
         if is_sure:
             yield Reason("drift", f"Drift since the last calibration: {change}.{moved}", drift["mean_mm"])
     elif drift["mean_mm"] > limits.drift_mm:
-        unsure = "" if is_sure else " That is within what both calibrations leave open: measure more poses."
+        unsure = (
+            "" if is_sure else " That is within the uncertainty of both calibrations: measure more poses."
+        )
         words = f"Drift beyond {limits.drift_mm:g} mm: {change}.{moved}{unsure}"
         yield Reason("drift", words, drift["mean_mm"])
 

@@ -23,7 +23,7 @@ COLUMNS: Final = (
     "held-out rows",
     "mean, mm",
     "max, mm",
-    "mean before, mm",
+    "nominal mean, mm",
     "drift mean, mm",
     "drift max, mm",
     "why",
@@ -76,7 +76,7 @@ def _table(arms: Sequence[Judged], reports: Collection[str]) -> Table:
         "Arms, those that need attention first",
         COLUMNS,
         [_cells(arm, reports) for arm in arms],
-        says="Errors are those of rows that took no part in the fit. Drift is how far predicted positions "
+        says="Errors are those of held-out rows. Drift is how far predicted positions "
         "moved since the last calibration, over the poses of the data.",
         left=LEFT,
     )
@@ -102,7 +102,7 @@ def _errors(arms: Sequence[Judged]) -> Figure | None:
     if not arms:
         return None
     names = [arm.row["arm"] for arm in arms]
-    marks = [("nominal", "before", "nominal_mean_mm"), ("variable", "after", "mean_mm")]
+    marks = [("nominal", "nominal", "nominal_mean_mm"), ("variable", "calibrated", "mean_mm")]
     traces = [
         {
             "type": "scatter",
@@ -118,7 +118,7 @@ def _errors(arms: Sequence[Judged]) -> Figure | None:
     layout = {"xaxis": _names(), "yaxis": {"title": {"text": "mean error, mm"}, "type": "log"}}
     return Figure(
         "Mean held-out error of each arm",
-        f"The largest is left on {worst.row['arm']}: {worst.row['mean_mm']:.3f} mm.",
+        f"The largest is that of {worst.row['arm']}: {worst.row['mean_mm']:.3f} mm.",
         traces,
         {**layout, **legend()},
         is_wide=True,
@@ -140,7 +140,7 @@ def _drift(arms: Sequence[Judged]) -> Figure | None:
     unsure = {
         "type": "scatter",
         "mode": "markers",
-        "name": "what both calibrations leave open",
+        "name": f"{SURE:g} standard deviations of both",
         "x": names,
         "y": [None if drift["std_mm"] is None else SURE * drift["std_mm"] for _, drift in known],
         "marker": {"color": "@ink", "symbol": "line-ew-open", "size": 24, "line": {"width": 2}},
@@ -149,8 +149,8 @@ def _drift(arms: Sequence[Judged]) -> Figure | None:
     layout = {"xaxis": _names(), "yaxis": {"title": {"text": "change, mm"}, "rangemode": "tozero"}}
     return Figure(
         "Change of predicted positions since the last calibration",
-        f"{name} moved most: {most['mean_mm']:.3f} mm on average. What stays below its line, "
-        f"{SURE:g} standard deviations of both calibrations, may be none.",
+        f"{name} changed most: {most['mean_mm']:.3f} mm on average. A change below its line, "
+        f"{SURE:g} standard deviations of both calibrations together, is not significant.",
         [bars, unsure],
         {**layout, **legend()},
         is_wide=True,
@@ -166,7 +166,7 @@ def _meaning(fleet: Fleet) -> list[str]:
     limits = ", ".join(f"{name} = {value:g}" for name, value in stated.items())
     return [
         "An arm needs attention if its calibration does not help, if it moved since its last calibration by "
-        "more than both calibrations leave open, if its error is beyond a limit or stands out of its kind, "
-        "if many of its rows are outliers, or if its 95 % intervals hold too little.",
+        "more than the uncertainty of both, if its error exceeds a limit or is far above that of its kind, "
+        "if many of its rows are outliers, or if its 95 % intervals hold too few held-out coordinates.",
         f"Limits of the fleet file: {limits or 'none'}.",
     ]

@@ -61,9 +61,9 @@ class Judged:
         if row["status"] == FAILED:
             return "It could not be calibrated."
         return (
-            f"On {row['held_out']} held-out rows it misses by {row['mean_mm']:.3f} mm on average and "
-            f"{row['max_mm']:.3f} mm at most; before {row['nominal_mean_mm']:.3f} and "
-            f"{row['nominal_max_mm']:.3f}."
+            f"On {row['held_out']} held-out rows the mean error is {row['mean_mm']:.3f} mm and the largest "
+            f"{row['max_mm']:.3f} mm; with the nominal model they are {row['nominal_mean_mm']:.3f} mm and "
+            f"{row['nominal_max_mm']:.3f} mm."
         )
 
     def to_dict(self) -> dict[str, Any]:

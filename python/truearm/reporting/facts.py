@@ -68,6 +68,11 @@ class Facts:
         return "distance error" if self.calibration.selection.distances else "position error"
 
     @property
+    def point_name(self) -> str:
+        """What `point` is called in sentences."""
+        return "robot file's tool" if self.calibration.selection.distances else "measured point"
+
+    @property
     def models(self) -> list[str]:
         """Names of the models, the plainest first."""
         return list(self.calibration.models)

@@ -11,6 +11,7 @@ from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 Floats = NDArray[np.float64]
 
 LEAST_TOLD: Final = 1e-6
+DECIMALS: Final = 3
 DIGITS: Final = 4
 """Significant digits of what figures are drawn from: finer than a pixel."""
 
@@ -35,14 +36,19 @@ def mm(length_m: float) -> str:
 
 def fixed(value: float) -> str:
     """A number of tables: three decimals."""
-    return f"{value:.3f}"
+    return f"{_no_minus_zero(value, DECIMALS):.{DECIMALS}f}"
+
+
+def _no_minus_zero(value: float, decimals: int) -> float:
+    """The rounded value; zero has no sign."""
+    return round(value, decimals) + 0.0
 
 
 def short(*values: float) -> list[str]:
     """Numbers of a sentence, with as many decimals as the smallest needs for two digits, at most three."""
     sizes = [abs(value) for value in values if value and np.isfinite(value)]
     decimals = 2 if not sizes else int(np.clip(1 - np.floor(np.log10(min(sizes))), 0, 3))
-    return [f"{value:.{decimals}f}" for value in values]
+    return [f"{_no_minus_zero(value, decimals):.{decimals}f}" for value in values]
 
 
 def percent(share: float) -> str:

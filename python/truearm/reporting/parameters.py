@@ -70,7 +70,7 @@ def table(facts: Facts) -> Table:
         f"Parameters of the constant model{_purpose(facts)}",
         ["", "unit", "nominal", "correction", "standard error", "at the point, mm", "determined?"],
         rows,
-        says=f"{largest[0]} has the largest effect: its correction moves the measured point by "
+        says=f"{largest[0]} has the largest effect: its correction moves the {facts.point_name} by "
         f"{largest[1]:.3f} mm (root mean square over the poses).",
         left=(0, 1, 6),
     )

@@ -13,8 +13,8 @@ def parameters(facts: Facts) -> Section:
     poses = "poses" if facts.update is None else "poses of the calibration before the update"
     words = (
         f"The {poses} determine {found.rank} of {found.parameters} parameters of the arm, and with frames "
-        f"and targets {found.total_rank} unknowns; the condition number is {found.condition:.0f}. As "
-        "constants, the others keep their nominal values."
+        f"and targets {found.total_rank} unknowns; the condition number is {found.condition:.0f}. The "
+        "constants of the others are nominal."
     )
     parts: list[Part] = [Text(words)]
     parts += [] if facts.best == CONSTANT else [varying_parameters(facts)]

@@ -41,7 +41,7 @@ def _overall(facts: Facts, found: Known) -> str:
     kind = "exact" if found.is_exact else "upper bounds, which compensation judges by"
     where = "the measured poses" if facts.readings is not None else "poses in the usual ranges of the joints"
     return (
-        "Standard deviation of the measured point as the arm's model gives it, without noise of the "
+        f"Standard deviation of the {facts.point_name} as the arm's model gives it, without noise of the "
         f"measurement (root of the summed variances of x, y and z): the median over {where} is {near} mm, "
         f"over all configurations in the joints' whole ranges {median} mm, and 90 % of these are below "
         f"{tenth} mm. The values are {kind}, at {len(found.std_mm)} configurations."
