@@ -280,6 +280,12 @@ def test_data_that_cannot_be(known, tmp_path):
     arm, calibration = known
     with pytest.raises(ta.InputError, match=r"12 measured values in 4 poses .* 10 to 20"):
         ta.update(calibration, arm.measure(arm.poses(4, seed=3)))
+    parts = [
+        ta.Measurements.from_dataframe(arm.measure_table(arm.poses(count, seed=count)), name=f"of{count}")
+        for count in (12, 3)
+    ]
+    with pytest.raises(ta.InputError, match='3 poses of set-up "of3".*at least 4'):
+        ta.update(calibration, ta.Measurements.concatenate(parts))
     other = VirtualArm(ta.Robot.load("ur10"), seed=1)
     with pytest.raises(ta.InputError, match="6 joint columns"):
         ta.update(calibration, other.measure(other.poses(15)))

@@ -14,20 +14,20 @@ Output: TypeAlias = Annotated[
     typer.Option("-o", "--output", metavar="NEW.calib|DIR", help="Where the updated calibration goes."),
 ]
 KeepFrame: TypeAlias = Annotated[
-    bool, typer.Option("--keep-frame", help="The device stands where it stood: tells joint 1 too.")
+    bool, typer.Option("--keep-frame", help="The device stands where it stood: determines joint 1 too.")
 ]
 KeepTool: TypeAlias = Annotated[
-    bool, typer.Option("--keep-tool", help="The target sits where it sat: tells the last joint too.")
+    bool, typer.Option("--keep-tool", help="The target sits where it sat: determines the last joint too.")
 ]
 NewTool: TypeAlias = Annotated[
-    bool, typer.Option("--new-tool", help="It is another target: it shows nothing of the arm.")
+    bool, typer.Option("--new-tool", help="It is another target: found anew, not compared.")
 ]
 OffsetDeg: TypeAlias = Annotated[
     float, typer.Option(metavar="DEG", help="How far an offset may have changed (standard deviation).")
 ]
 ToolMm: TypeAlias = Annotated[float, typer.Option(metavar="MM", help="The same of the target on the tool.")]
 Level: TypeAlias = Annotated[
-    float, typer.Option(metavar="SHARE", help="Of unchanged arms that are not said to hold.")
+    float, typer.Option(metavar="SHARE", help="Level of significance: unchanged arms not said to hold.")
 ]
 RollBack: TypeAlias = Annotated[
     bool, typer.Option("--roll-back", help="Write the calibration as it was before, bit for bit.")

@@ -17,7 +17,7 @@ from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.turning_sense import check_turns
-from truearm.updating.estimating import Estimate, estimate, surprise
+from truearm.updating.estimating import MOST_PARTS, Estimate, estimate, surprise
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
 from truearm.updating.scene import Scene
@@ -30,6 +30,8 @@ from truearm.validation import Errors
 Verdict = Literal["holds", "moved", "field"]
 
 MOST_OUTLIERS: Final = 0.2
+FOUND_FROM: Final = 3
+"""Poses of a set-up that find its frame and target when others are left out."""
 IMPLAUSIBLE: Final = 5.0
 """An offset so many prior standard deviations off is not believed."""
 
@@ -136,12 +138,14 @@ def update(
     unknowns = Unknowns.of(calibration, task, chosen)
     _check_kept(calibration, task, unknowns, chosen)
     _check_enough(data, task, unknowns)
+    _check_groups(data, task)
     with stages("asking what the calibration expects"):
         _ = calibration.spread
     with stages("finding what moved"):
         held = _held(calibration, Scene(task, data, calibration, unknowns))
         unknowns = unknowns.holding(held)
         kept, outliers = _without_outliers(calibration, task, data, unknowns)
+        _check_groups(data.select(kept), task)
         scene = Scene(task, data.select(kept), calibration, unknowns)
         found = _Found(calibration, scene, chosen, held)
         return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
@@ -259,6 +263,22 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
         way_out=f"Measure at least {wanted // per_pose + 1} poses; 10 to 20 are a good number: "
         "truearm plan --acceptance 15",
     )
+
+
+def _check_groups(data: Measurements, task: Task) -> None:
+    """Each pose is judged by the others: they have to find its frame and target."""
+    fewest = FOUND_FROM + -(-len(data) // MOST_PARTS)
+    points = np.isfinite(data.targets[:, list(task.selection.targets)])
+    seen = np.logical_or.reduce(np.logical_and.reduce(points, axis=2), axis=1)
+    for group in task.groups:
+        count = int((seen & (data.group == group)).sum())
+        if count < fewest:
+            raise InputError(
+                f"{count} poses of set-up {list_names([group])}",
+                where=", ".join(data.files),
+                rule=f"An update needs at least {fewest} of each, outliers not counted",
+                way_out="Measure more poses there, or leave the set-up out",
+            )
 
 
 def _without_outliers(
