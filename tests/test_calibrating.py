@@ -426,6 +426,7 @@ def test_undetermined_parameters_stay_nominal(variable):
         ({"degree": 4}, '"4" is not known'),
         ({"holdot": 0.3}, 'no option "holdot".*Did you mean "holdout"'),
         ({"features": "warmth"}, 'no column "warmth"'),
+        ({"demanded_mm": float("nan")}, "Zero or more, and finite"),
         ({"prior_mm": 0.0}, "must be positive"),
         ({"model": "constant", "features": "warmth"}, "features belong to what varies"),
     ],

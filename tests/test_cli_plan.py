@@ -1,6 +1,7 @@
 """`truearm plan`: poses that can be measured, determine the arm, and come in a good order."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -149,3 +150,20 @@ def test_poses_of_a_cell_are_proposed_that_it_can_measure(calib, tmp_path, capsy
 def test_wrong_proposals_are_told(words, message, calib, capsys):
     assert main(["plan", *[calib if word == "CALIB" else word for word in words]]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["ur10", "-n", "7"], 1, "7 poses have 21 measured values. 25 unknowns .* Choose 9 poses or more"),
+        (["ur10", "-n", "20", "--sigma-mm", "0"], 2, "--sigma-mm: 0. It must be positive"),
+        (["ur10", "-n", "20", "--sigma-mm", "nan"], 2, "--sigma-mm: nan. It must be positive"),
+        (["-n", "9", "--next", "5", "--from", "arm.calib"], 2, "--next or --acceptance says how many"),
+        (["--next", "5", "--acceptance", "5", "--from", "arm.calib"], 2, "one at a time"),
+    ],
+)
+def test_what_cannot_be_planned_is_said(words, status, message, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plan", *words, "-o", "p.csv"]) == status
+    assert re.search(message, " ".join(capsys.readouterr().err.split()))
+    assert not (tmp_path / "p.csv").exists()

@@ -36,6 +36,19 @@ def test_a_new_set_up_is_found_and_the_rest_judged(known):
     assert list(found.to_dict()) == ["n_frame", "n_judged", "errors"]
 
 
+def test_rows_that_the_calibration_was_fitted_to_are_told(known):
+    arm, calibration = known
+    table = arm.measure_table(arm.poses(120))
+    (notice,) = ta.evaluate(calibration, ta.Measurements.from_dataframe(table)).notices
+    assert (notice.kind, len(notice.rows)) == ("known_rows", 120)
+    assert str(notice).startswith("All rows took part in the fit")
+    table.loc[3:, "x"] += 1e-5
+    (notice,) = ta.evaluate(calibration, ta.Measurements.from_dataframe(table)).notices
+    assert str(notice).startswith("Rows 1, 2 and 3 took part")
+    table.loc[:3, "x"] += 1e-5
+    assert not ta.evaluate(calibration, ta.Measurements.from_dataframe(table)).notices
+
+
 @pytest.mark.parametrize(("count", "expected"), [(30, 10), (1500, 400)])
 def test_a_third_and_400_at_most_find_the_frame(known, count, expected):
     arm, calibration = known

@@ -171,7 +171,7 @@ def test_one_row_cannot_be_split():
 
 
 def test_one_value_to_split_by_leaves_nothing_to_train_on():
-    with pytest.raises(InputError, match="no row would be"):
+    with pytest.raises(UsageError, match='all rows are equal in "place".*leave out --split-by'):
         split_rows(measured(20, place=1.0), SplitRule(split_by=("place",)))
 
 
@@ -230,3 +230,9 @@ def test_files_without_poses_to_validate_keep_the_plain_split():
 def test_purposes_are_no_part_of_what_was_measured():
     assert planned(50).hash() == measured(50).hash()
     assert planned(50).select([5, 6]).purpose.tolist() == ["validate", "train"]
+
+
+def test_of_many_set_ups_without_training_rows_few_are_named():
+    data = measured(40, group=[f"g{k}" for k in range(40)])
+    with pytest.raises(InputError, match=r'"g\d+" and 7 others trains'):
+        split_rows(data, SplitRule())

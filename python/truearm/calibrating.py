@@ -122,8 +122,21 @@ def _task(robot: Robot, data: Measurements, options: Options, threads: int | Non
             rule="With the world as frame the base is part of the arm, so there can be one set-up only",
             way_out="Calibrate from one of them, or leave --frame out",
         )
+    _check_features(data, options.features)
     arm = IdentifiedArm(robot, options.frame, options.parallel_within_deg)
     return Task(arm, selection, data.groups, options, threads, stages)
+
+
+def _check_features(data: Measurements, names: Sequence[str]) -> None:
+    """Raise InputError where a feature is missing, empty in a row, or the same in all rows."""
+    for name, values in zip(names, feature_values(data, names).T, strict=True):
+        if np.ptp(values) == 0.0:
+            raise InputError(
+                f'the feature "{name}" is {values[0]:g} in all rows',
+                where=", ".join(data.files),
+                rule="What parameters are to vary with has to vary",
+                way_out="Measure over its range, or leave it out",
+            )
 
 
 def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> tuple[Validation, HeldRows]:

@@ -15,6 +15,7 @@ from truearm.core_set import Use, core_set, rotations, select
 from truearm.defaults import SEED
 from truearm.doubts import no_help
 from truearm.errors import InputError, Notice, UsageError, list_names
+from truearm.fitted_rows import known_rows
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.held_rows import HeldRows
 from truearm.judging import judge, model_inputs
@@ -116,6 +117,7 @@ def evaluate(
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
+    notices += known_rows(calibration.learned_from, data)
     selection = select(data, chosen.use, chosen.judge_target)
     if selection.distances:
         raise InputError(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
 from truearm.core_set import Selection
+from truearm.errors import Notice
 from truearm.fitting import Fits
 from truearm.measurements import Measurements
 from truearm.splitting import Split
@@ -54,6 +55,11 @@ class FittedRows:
         variable = fits.variable
         return cls(fits.data, side, variable.weights, variable.residuals, variable.scores, variable.distances)
 
+    def among(self, data: Measurements) -> NDArray[np.bool_]:
+        """Which rows (n,) of other measurements are among these: by readings and first point."""
+        known = set(_marks(self.data))
+        return np.array([mark in known for mark in _marks(data)], dtype=np.bool_)
+
     def outliers(self) -> list[dict[str, Any]]:
         """File, row, score and distance_mm of each outlier, the worst first."""
         found = np.flatnonzero(self.score > 1.0)
@@ -66,6 +72,24 @@ class FittedRows:
             }
             for k in found[np.argsort(-self.score[found], kind="stable")]
         ]
+
+
+def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:
+    """A notice of rows that the calibration was fitted to: what it says of them, it knows from them."""
+    known = np.zeros(len(data), dtype=np.bool_) if fitted is None else fitted.among(data)
+    if not known.any():
+        return []
+    named = "All rows" if known.all() else f"{data.row_names(known)[:1].upper()}{data.row_names(known)[1:]}"
+    text = (
+        f"{named} took part in the fit of this calibration: how good it is where it was not measured, they "
+        "do not say."
+    )
+    return [Notice("known_rows", text, tuple(data.rows[known].tolist()))]
+
+
+def _marks(data: Measurements) -> list[bytes]:
+    """What tells each row (n,) from others: its readings, and its first point if there is one."""
+    return [row.tobytes() for row in np.hstack([data.readings, data.targets[:, :1].reshape(len(data), -1)])]
 
 
 def sides(count: int, split: Split) -> NDArray[np.int64]:

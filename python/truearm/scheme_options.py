@@ -1,5 +1,6 @@
 """How the paper's schemes are fitted: options of `truearm calibrate --model regions|cmac|fcmac`."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -76,8 +77,8 @@ class SchemeOptions:
         ):
             if not getattr(self, name) > 0:
                 raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
-        if self.demanded_mm < 0.0:
-            raise UsageError(f"{self.demanded_mm}", where="demanded_mm", rule="It must not be negative")
+        if not 0.0 <= self.demanded_mm < math.inf:
+            raise UsageError(f"{self.demanded_mm}", where="demanded_mm", rule="Zero or more, and finite")
         if not self.scheme_joints or len(set(self.scheme_joints)) < len(self.scheme_joints):
             raise UsageError(f"{list(self.scheme_joints)}", where="scheme_joints", rule="Each joint once")
         if self.cells and len(self.cells) != len(self.scheme_joints):

@@ -18,6 +18,7 @@ from truearm.measurements import Measurements
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+NAMED: Final = 5
 RANGE_FORM: Final = re.compile(r"q([1-9]\d*):(low|high):(.+)")
 
 
@@ -181,6 +182,13 @@ def _drawn_keys(data: Measurements, rows: Rows, rule: SplitRule, rng: np.random.
     """Held-out mask (r,): the rows of the last share of the permuted keys."""
     _, index = np.unique(_key_columns(data, rule.split_by)[rows], axis=0, return_inverse=True)
     count = int(index.max()) + 1
+    if count == 1:
+        raise UsageError(
+            f"all rows are equal in {list_names(rule.split_by)}",
+            where=str(data.sources[rows[0]]),
+            rule="Rows that are equal in these columns stay together, so there would be nothing to hold out",
+            way_out="Name columns that tell rows apart, or leave out --split-by",
+        )
     drawn = rng.permutation(count)[int((1.0 - rule.holdout) * count) :]
     return np.isin(index.reshape(-1), drawn)
 
@@ -261,8 +269,9 @@ def _check_groups(data: Measurements, split: Split) -> None:
     trained = set(data.group[split.train].tolist())
     missing = [group for group in data.groups if group not in trained]
     if missing:
+        more = f" and {len(missing) - NAMED} others" if len(missing) > NAMED else ""
         raise InputError(
-            f"no row of the set-up {list_names(missing)} trains",
+            f"no row of the set-up {list_names(missing[:NAMED])}{more} trains",
             where=", ".join(data.files),
             rule="The frame and tool of every set-up are found from its training rows",
             way_out="Give a larger --train-size or another --seed; "

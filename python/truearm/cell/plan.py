@@ -14,7 +14,7 @@ from truearm.cell.prediction import Prediction
 from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
 from truearm.columns import VALIDATE
-from truearm.errors import WorkError
+from truearm.errors import UsageError, WorkError
 from truearm.identified import IdentifiedArm
 from truearm.planning.choosing import Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
 from truearm.planning.spreading import fill
@@ -51,6 +51,10 @@ class PlanOptions:
     seed: int = 0
     order: str = "short"
     sigma_mm: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.sigma_mm < np.inf:
+            raise UsageError(f"{self.sigma_mm:g}", where="--sigma-mm", rule="It must be positive and finite")
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ PICTURES: Final = (".png", ".svg", ".pdf")
 
 def command(
     robot: option.RobotOrNone = None,
-    count: option.Count = 60,
+    count: option.Count = None,
     output: option.Output = Path("poses.csv"),
     cell: option.CellReaching = None,
     criterion: option.Criterion = "d",
@@ -63,6 +63,10 @@ def command(
     _check_counts({"--next": next_count, "--acceptance": acceptance, "--count": count})
     _check_outputs(output, picture, known, cell)
     if known is not None or next_count is not None or acceptance is not None:
+        if count is not None:
+            raise UsageError(
+                "--count is given where poses are proposed", rule="--next or --acceptance says how many"
+            )
         _propose(
             _Asked(robot, known, next_count, acceptance, group, cell, seed, order), output, picture, as_json
         )
@@ -71,7 +75,7 @@ def command(
         raise UsageError("no robot is named", rule="truearm plan ROBOT, or with --from CALIB")
     known_cell = None if cell is None else Cell.load(cell)
     arm = _arm_of(robot, known_cell)
-    options = PlanOptions(count, criterion, seed, order, sigma_mm)  # type: ignore[arg-type]
+    options = PlanOptions(count or option.COUNT, criterion, seed, order, sigma_mm)  # type: ignore[arg-type]
     with ends_promptly(), told_stages()("choosing poses"):
         plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
     write(plan, output)
@@ -148,7 +152,7 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
 
     if asked.calibration is None or (asked.next_count is None) == (asked.acceptance is None):
         raise UsageError(
-            "--next and --acceptance propose poses from a calibration",
+            "--next or --acceptance propose poses from a calibration, one at a time",
             rule="truearm plan --next N --from CALIB, or --acceptance N --from CALIB",
         )
     calibration = Calibration.load(asked.calibration)

@@ -1,7 +1,7 @@
 """Arguments and options of `truearm plan`."""
 
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import Annotated, Final, TypeAlias
 
 import typer
 
@@ -15,7 +15,10 @@ RobotOrNone: TypeAlias = Annotated[
         autocompletion=robots_like,
     ),
 ]
-Count: TypeAlias = Annotated[int, typer.Option("-n", "--count", metavar="N", help="Poses to fit to.")]
+COUNT: Final = 60
+Count: TypeAlias = Annotated[
+    int | None, typer.Option("-n", "--count", metavar="N", help=f"Poses to fit to.  [default: {COUNT}]")
+]
 Output: TypeAlias = Annotated[Path, typer.Option("-o", "--output", metavar="CSV", help="Where the poses go.")]
 CellReaching: TypeAlias = Annotated[
     Path | None, typer.Option(metavar="CELL", help="A cell file whose sensor has to reach the poses.")

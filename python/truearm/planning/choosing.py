@@ -90,7 +90,7 @@ def choose(
 
     Raises:
         UsageError: If there is no such parameter.
-        WorkError: If the pool is smaller than the choice.
+        WorkError: If the pool is smaller than the choice, or the choice too small to determine the unknowns.
     """
     chosen = options or ChoiceOptions()
     if len(readings) < count:
@@ -101,6 +101,7 @@ def choose(
         )
     jacobian, columns = unknowns_jacobian(arm, readings, chosen)
     kept = independent_columns(jacobian, columns)
+    _check_enough(count + (0 if given is None else len(given)), jacobian.shape[1], len(kept))
     measured = None
     if given is not None and len(given):
         measured = unknowns_jacobian(arm, given, chosen)[0][:, :, kept]
@@ -118,6 +119,16 @@ def choose(
     )
     rows = np.array(core.chosen, dtype=np.int64)
     return Choice(rows, core.before, core.after, core.exchanges, core.well_conditioned)
+
+
+def _check_enough(count: int, values: int, unknowns: int) -> None:
+    """Raise WorkError where so many poses, each of so many values, cannot determine the unknowns."""
+    if count * values < unknowns:
+        raise WorkError(
+            f"{count} poses have {count * values} measured values",
+            rule=f"{unknowns} unknowns of arm and set-up are to be determined",
+            way_out=f"Choose {-(-unknowns // values)} poses or more",
+        )
 
 
 def unknowns_jacobian(

@@ -12,7 +12,7 @@ from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import Use, select
 from truearm.errors import InputError, Notice, UsageError, WorkError, list_names
-from truearm.fitted_rows import OVERWHELMING
+from truearm.fitted_rows import OVERWHELMING, known_rows
 from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
@@ -132,6 +132,7 @@ def update(
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
+    notices += known_rows(calibration.learned_from, data)
     task = _task(calibration, data, chosen, stages)
     if task.selection.orientation:
         check_turns(data, calibration.robot)
