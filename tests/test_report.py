@@ -234,6 +234,13 @@ def test_the_report_of_an_update_says_what_was_judged_how():
     assert f"constant {held.holdout['constant'].position.mean:.3f}" in text
     assert "joint 1 kept confounded with the frame" in text
     assert "more_poses" not in [advice.kind for advice in made.advice]
+    titles = [title for title, _ in made.figures]
+    along = figures_of(made.html)["figures"][titles.index("Error along joint 1")]
+    assert [(trace["name"], trace["mode"]) for trace in along["traces"]] == [
+        ("nominal", "markers"),
+        ("constant", "markers"),
+    ]
+    assert along["layout"]["yaxis"]["type"] == "log"
 
 
 @pytest.mark.parametrize(

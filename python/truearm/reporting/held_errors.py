@@ -38,7 +38,7 @@ def held_errors(facts: Facts) -> Section:
     parts: list[Part] = [histogram(errors), cumulative(errors)]
     words = (
         "Along the joints, lines are medians over stretches with equally many poses, and dots are errors of "
-        f"the {facts.best} model."
+        f"the {facts.best} model; where poses are too few for lines, all models have dots."
     )
     parts.append(Text(words, is_note=True))
     parts += [along_joint(facts, joint) for joint in range(len(facts.joints))]
@@ -131,11 +131,14 @@ def along_joint(facts: Facts, joint: int) -> Figure:
         errors = facts.errors_mm[model]
         known = np.isfinite(errors)
         _, middles, medians = running_median(q[known], errors[known], JOINT_BINS, FEWEST_IN_BIN)
-        if model == name:
-            traces.append(points(q[known][:DRAWN], _known(errors)[:DRAWN], model, showlegend=False))
-            shown["points"] = _known(errors)[:DRAWN]
-        traces.append(line(middles, medians, model))
-        shown[model] = _known(medians)
+        has_line = len(middles) > 1
+        if model == name or not has_line:
+            single = _known(errors)[:DRAWN]
+            traces.append(points(q[known][:DRAWN], single, model, showlegend=not has_line))
+            shown[f"{model}, points"] = single
+        if has_line:
+            traces.append(line(middles, medians, model))
+            shown[model] = _known(medians)
     return Figure(
         f"Error along joint {joint + 1}",
         _where_along(q, facts.errors_mm[name], unit),
