@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from truearm.errors import Notice
 from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
-from truearm.parameters import KIND_COUNT, A, D
+from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.units import to_si
 from truearm.validation import Errors, Validation
 
@@ -89,7 +89,7 @@ def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:
 
 def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
     found, nominal = constant.constants, arm.table
-    length = np.isin(np.arange(KIND_COUNT), (D, A))
+    length = are_lengths(range(KIND_COUNT))
     change = found - nominal
     change[:, ~length] = np.arctan2(np.sin(change[:, ~length]), np.cos(change[:, ~length]))
     share = np.abs(change) / np.where(length, FAR_M, FAR_RAD)
@@ -109,6 +109,6 @@ def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
 
 
 def _from_to(name: str, place: int, nominal: Floats, found: Floats) -> str:
-    unit = "mm" if place % KIND_COUNT in (D, A) else "deg"
+    unit = "mm" if are_lengths([place])[0] else "deg"
     before, after = (float(table.flat[place]) / to_si(1.0, unit) for table in (nominal, found))
     return f"{name} is {after:.1f} {unit} in place of the nominal {before:.1f}"

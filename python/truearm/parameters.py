@@ -17,6 +17,11 @@ KIND_COUNT: Final = len(KINDS)
 PARALLEL_WITHIN_DEG: Final = 5.0
 
 
+def are_lengths(columns: Sequence[int] | range) -> NDArray[np.bool_]:
+    """Which parameters, by index 5 * row + (theta, d, a, alpha, beta), are lengths and no angles."""
+    return np.isin(np.asarray(columns) % KIND_COUNT, (D, A))
+
+
 @dataclass(frozen=True)
 class Candidates:
     """Parameters of a chain that a calibration may correct.

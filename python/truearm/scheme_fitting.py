@@ -18,9 +18,10 @@ from truearm._core import (
     regional_ceps,
 )
 from truearm.errors import UsageError
-from truearm.parameters import KIND_COUNT, A, D
+from truearm.parameters import are_lengths
 from truearm.scheme_options import SchemeOptions
 from truearm.schemes import FCMAC, REGIONS, NetworkCeps, RegionalCeps, Scheme, training_pairs
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ def well_determined(problem: Problem, constant: ConstantFit, columns: Sequence[i
     Least squares in small regions has no prior to hold a parameter that even the whole set hardly tells.
     """
     jacobian, _ = linearise(problem, constant.parameters, constant.setup)
-    lengths = np.isin(np.array(columns) % KIND_COUNT, (A, D))
+    lengths = are_lengths(columns)
     rows = jacobian.reshape(-1, len(columns)) * np.where(lengths, 1.0, 1.0 / ANGLE_LEVER_M)
     kept = list(range(len(columns)))
     while len(kept) > 1:
@@ -136,7 +137,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
     division = {
         "low": features.min(axis=0),
         "high": features.max(axis=0),
-        "accuracy": options.demanded_mm / 1e3,
+        "accuracy": options.demanded_mm / MM_PER_METRE,
         "regions": options.most_regions,
         "halving": options.halving,
         "order": "worst",
@@ -152,7 +153,7 @@ def _fit_regions(rows: SchemeRows, options: SchemeOptions) -> tuple[RegionalCeps
     details = {
         "regions": len(leaves),
         "regions_with_rows": int(np.isfinite(fit.ceps[leaves]).all(axis=1).sum()),
-        "prior_mm": float(1e3 * np.max(fit.prior)) if len(fit.prior) else None,
+        "prior_mm": float(MM_PER_METRE * np.max(fit.prior)) if len(fit.prior) else None,
         "condition_median": float(np.median(kappa)) if len(kappa) else None,
     }
     return RegionalCeps(inputs, tuple(rows.columns), regions, fit.ceps), details
@@ -166,7 +167,7 @@ def _train_on_ceps(
     trained = network.train(inputs, wanted, {**options.training, "columns": list(rows.columns)})
     details |= {
         "epochs": trained.epochs,
-        "largest_left_mm": 1e3 * trained.largest,
+        "largest_left_mm": MM_PER_METRE * trained.largest,
         "ended": trained.reason,
     }
     return SchemeFit(_kept(name, rows, options, trained.network), SchemeDetails(**details))

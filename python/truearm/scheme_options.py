@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from truearm.errors import UsageError
+from truearm.units import MM_PER_METRE
 
 MAJOR_JOINTS: Final = (1, 2, 3)
 KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
@@ -109,6 +110,6 @@ class SchemeOptions:
         return {
             "rate": self.rate,
             "normalise": self.normalise,
-            "tolerance": self.tolerance_mm / 1e3,
+            "tolerance": self.tolerance_mm / MM_PER_METRE,
             "epochs": self.epochs,
         }

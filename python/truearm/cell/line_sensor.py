@@ -14,7 +14,7 @@ from truearm.cell.patterns import numbers_in, pattern_of
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive
 from truearm.robot import Robot
-from truearm.units import LengthUnit, to_si
+from truearm.units import MM_PER_METRE, LengthUnit, to_si
 
 Floats = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ class LineSensor:
         if not np.all(numbers.pop("ok", np.ones(1)) == 1.0):
             reason = "the instrument does not vouch for it"
         elif np.ptp(points, axis=0).max() > to_si(self._settings.spread_mm, "mm"):
-            reason = f"the lines spread by {1e3 * np.ptp(points, axis=0).max():.2f} mm"
+            reason = f"the lines spread by {MM_PER_METRE * np.ptp(points, axis=0).max():.2f} mm"
         return Reading(
             points.mean(axis=0),
             sigma_m,

@@ -221,9 +221,10 @@ class Process:
     def _register(self) -> None:
         _, joints, points = points_and_joints(self._session, "registration")
         found = register_cell(self._cell, joints, points)
-        self._session.set_registration(found.world_from_base, MM_PER_METRE * found.residual_m, found.poses)
+        residual_mm = MM_PER_METRE * found.residual_m
+        self._session.set_registration(found.world_from_base, residual_mm, found.poses)
         self._prediction.register(found.world_from_base, found.residual_m)
-        self._say(f"frame registered from {found.poses} contacts, {1e3 * found.residual_m:.2f} mm RMS")
+        self._say(f"frame registered from {found.poses} contacts, {residual_mm:.2f} mm RMS")
 
     def _resume(self) -> None:
         """Know again what a former process knew."""

@@ -19,6 +19,7 @@ from truearm.identified import IdentifiedArm
 from truearm.planning.choosing import Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
 from truearm.planning.spreading import fill
 from truearm.robot import Robot
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
@@ -135,7 +136,7 @@ def expected_mm(
     # Of what the poses do not tell normal equations lose the prior in rounding; this root keeps it.
     root = np.linalg.qr(np.vstack([rows, np.eye(scaled.shape[2])])).R
     spread = np.linalg.solve(root.T, scaled.reshape(-1, scaled.shape[2]).T)
-    return float(1e3 * np.sqrt(np.square(spread).sum() / len(pool)))
+    return float(MM_PER_METRE * np.sqrt(np.square(spread).sum() / len(pool)))
 
 
 SETUP_UNKNOWNS: Final = 9

@@ -9,6 +9,7 @@ import pandas as pd
 from truearm.cell.plan import Plan
 from truearm.cell.proposed import Proposed
 from truearm.files import write_whole
+from truearm.units import MM_PER_METRE
 
 COLOURS: Final = {
     "train": "tab:blue",
@@ -32,7 +33,7 @@ def draw(plan: Plan | Proposed, path: Path) -> None:
     figure = Figure(figsize=(9.0, 4.5), layout="constrained")
     purposes = np.array(plan.poses.purpose)
     for axes, (a, b) in zip(figure.subplots(1, 2), ((0, 1), (0, 2)), strict=True):
-        millimetres = 1e3 * plan.points
+        millimetres = MM_PER_METRE * plan.points
         axes.plot(millimetres[:, a], millimetres[:, b], color="0.8", linewidth=0.6)
         for purpose, colour in COLOURS.items():
             chosen = millimetres[purposes == purpose]

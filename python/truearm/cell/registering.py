@@ -70,7 +70,7 @@ def _check_spread(points: Floats) -> None:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) / np.sqrt(len(points))
     if spread[1] < LEAST_SPREAD_M:
         raise WorkError(
-            f"the contacts lie within {1e3 * spread[1]:.0f} mm of a line",
+            f"the contacts lie within {MM_PER_METRE * spread[1]:.0f} mm of a line",
             where="registration",
             rule="A frame can be told from points in a plane or in space only",
             way_out="Give poses that are farther apart",

@@ -13,6 +13,7 @@ from truearm.cell.prediction import Prediction
 from truearm.cell.sequence import steps_of
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
@@ -68,5 +69,5 @@ def problem_of(cell: Cell, prediction: Prediction, step: Step) -> str:
     places = clearance.places(step.readings[None], prediction.world_from_base)
     gap = float(clearance.gaps(places, carriage[None])[0, 0])
     if gap < clearance.margin_m:
-        return f"link and table come within {1e3 * gap:.0f} mm"
+        return f"link and table come within {MM_PER_METRE * gap:.0f} mm"
     return ""

@@ -126,10 +126,11 @@ class TablePanel:
     def _carriage_for(self, expected: Expected) -> Floats:
         panel, standoff = self.panel, expected.radius_m + STANDOFF_MARGIN_M
         if 2.0 * expected.radius_m > panel.area_m.min():
+            across, along = (MM_PER_METRE * panel.area_m).tolist()
             raise RefusedError(
-                f"the point may be {1e3 * expected.radius_m:.0f} mm off",
+                f"the point may be {MM_PER_METRE * expected.radius_m:.0f} mm off",
                 where=self._port.where,
-                rule=f"The panel of {1e3 * panel.area_m[0]:g} x {1e3 * panel.area_m[1]:g} mm must catch it",
+                rule=f"The panel of {across:g} x {along:g} mm must catch it",
             )
         angle = panel.angle(expected.pointing_in_world)
         if angle < panel.least_angle_rad:
@@ -141,7 +142,7 @@ class TablePanel:
         carriage = panel.carriage_under(expected.point_in_world, standoff)
         ends = np.array([carriage, carriage + (standoff + expected.radius_m) * panel.normal])
         if (ends < 0.0).any() or (ends > self.ranges_m).any():
-            place = ", ".join(f"{1e3 * value:.0f}" for value in carriage)
+            place = ", ".join(f"{MM_PER_METRE * value:.0f}" for value in carriage)
             raise RefusedError(
                 f"the carriage would have to be at {place} mm",
                 where=self._port.where,

@@ -9,6 +9,7 @@ from truearm.cli.arguments import AsJson, CellFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest, tell
 from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
+from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
     from truearm.cell.rehearsal import Rehearsal
@@ -78,7 +79,7 @@ def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:
                 "readings": each.step.readings.tolist(),
                 "point_in_world_mm": None
                 if each.point_in_world is None
-                else (1e3 * each.point_in_world).tolist(),
+                else (MM_PER_METRE * each.point_in_world).tolist(),
                 "problem": each.problem,
             }
             for each in plan.steps
@@ -92,7 +93,9 @@ def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:
     )
     for each in plan.steps:
         place = (
-            "" if each.point_in_world is None else " ".join(f"{1e3 * x:7.1f}" for x in each.point_in_world)
+            ""
+            if each.point_in_world is None
+            else " ".join(f"{MM_PER_METRE * x:7.1f}" for x in each.point_in_world)
         )
         problem = f"  cannot be measured: {each.problem}" if each.problem else ""
         say(f"{each.step.kind:>12} {each.step.pose + 1:5d}  {place}{problem}")

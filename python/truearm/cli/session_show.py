@@ -7,6 +7,7 @@ import typer
 from truearm.cli.arguments import AsJson, SessionFile
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.errors import UsageError
+from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
     from truearm.cell.session import Session
@@ -95,7 +96,7 @@ def _show_pose(session: "Session", pose: int, *, as_json: bool) -> None:
 def _reading(row: dict[str, Any]) -> list[str]:
     import json
 
-    point = ["" if row[key] is None else f"{1e3 * row[key]:.3f}" for key in ("x_m", "y_m", "z_m")]
+    point = ["" if row[key] is None else f"{MM_PER_METRE * row[key]:.3f}" for key in ("x_m", "y_m", "z_m")]
     if not row["valid"]:
         state = row["reason"]
     elif row["outcome"] is None:

@@ -11,7 +11,7 @@ from truearm.calibration import Calibration
 from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT
-from truearm.parameters import KIND_COUNT, A, D
+from truearm.parameters import are_lengths
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
@@ -118,6 +118,6 @@ def _constants(calibration: Calibration) -> dict[str, tuple[float, float, bool]]
     values = np.ravel(calibration.models[CONSTANT].constants)
     variances = np.diag(calibration.constant.covariance)
     return {
-        name: (float(values[columns[name]]), float(variances[k]), columns[name] % KIND_COUNT in (D, A))
+        name: (float(values[columns[name]]), float(variances[k]), bool(are_lengths([columns[name]])[0]))
         for k, name in enumerate(calibration.constant.names)
     }

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from truearm.rotations import matrix_from_quaternion, quaternion_from_matrix
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
@@ -154,7 +155,7 @@ class EulerPose:
         wanted = near[:, 3:6][:, self.columns]
         angles = _nearest_angles(poses[:, :3, :3], np.deg2rad(wanted))
         written = np.empty((len(poses), 6))
-        written[:, :3] = poses[:, :3, 3] * 1e3
+        written[:, :3] = poses[:, :3, 3] * MM_PER_METRE
         written[:, [3 + column for column in self.columns]] = np.rad2deg(angles)
         return written
 
@@ -184,7 +185,7 @@ class QuaternionPose:
         quaternions = quaternion_from_matrix(poses[:, :3, :3])
         flipped = np.sum(quaternions * near[:, 3:7], axis=1) < 0.0
         quaternions[flipped] *= -1.0
-        return np.hstack([poses[:, :3, 3] * 1e3, quaternions])
+        return np.hstack([poses[:, :3, 3] * MM_PER_METRE, quaternions])
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from truearm.models import VARIABLE
 from truearm.options import Options
 from truearm.schemes import add_ceps, training_pairs
 from truearm.studies.experiment import Experiment
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 Parameters = Callable[[Floats], Floats]
@@ -141,7 +142,7 @@ def trained_network(
     notes = {
         "epochs": float(trained.epochs),
         "converged": float(trained.converged),
-        "largest_left_mm": 1e3 * trained.largest,
+        "largest_left_mm": MM_PER_METRE * trained.largest,
     }
     return _network(made, constant, trained.network, notes)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from truearm.parameters import KIND_COUNT, A, D
+from truearm.parameters import are_lengths
 from truearm.studies.accuracy.methods.searching import Effort, folds, search_rows
 from truearm.studies.accuracy.poses import Poses
 
@@ -110,7 +110,7 @@ def _sums(columns: Floats, residuals: Floats) -> tuple[Floats, Floats]:
 def _penalty(ridge: Ridge, poses: Poses) -> Floats:
     """Inverse covariance of all weights."""
     own, links = len(ridge.penalty), poses.jacobian.shape[2]
-    lengths = np.isin(np.arange(links) % KIND_COUNT, (A, D))
+    lengths = are_lengths(range(links))
     whole = np.zeros((own + links + 9, own + links + 9))
     whole[:own, :own] = ridge.penalty
     deviations = np.concatenate([np.where(lengths, CONSTANT_M, CONSTANT_RAD), np.full(9, SETUP)])
