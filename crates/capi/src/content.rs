@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use serde::Deserialize;
+use truearm_field::StoredAxis;
 
 /// The part that every layout has.
 #[derive(Deserialize)]
@@ -53,15 +54,11 @@ pub struct ModelContent {
 pub struct BlockContent {
     pub name: String,
     pub inputs: Vec<usize>,
-    pub axes: Vec<AxisContent>,
+    pub axes: Vec<StoredAxis>,
     pub outputs: Vec<usize>,
     /// Which way is up in the base frame; the `sag` block says it where it is not the z axis.
     pub up: Option<[f64; 3]>,
 }
-
-/// Is an angle, scale, origin, spacing, count, closed, degree.
-#[derive(Deserialize)]
-pub struct AxisContent(pub bool, pub f64, pub f64, pub f64, pub usize, pub bool, pub usize);
 
 #[derive(Deserialize)]
 pub struct ConservativeContent {

@@ -3,10 +3,7 @@
 use std::sync::Arc;
 
 use truearm_compensate::{Limits, Model, Spread};
-use truearm_field::{
-    Axis, Bank, Block, Conservative, ConservativeParts, Grid, Input, InputKind, Levers, SAG_NAME, Sag,
-    UPRIGHT,
-};
+use truearm_field::{Axis, Bank, Block, Conservative, ConservativeParts, Grid, Levers, UPRIGHT};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
 
 use crate::container::Container;
@@ -84,13 +81,10 @@ fn calibrated(container: &Container, content: &Content, coupling: &[f64]) -> Res
     let constants = container.numbers(&format!("{name}.constants"))?;
     let mut model = Model::new(chain, &constants, coupling)?;
     if let Some(stored) = &content.models[name].blocks {
-        let mut blocks = blocks(container, stored, name)?;
-        let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
+        let blocks = blocks(container, stored, name)?;
         let up = stored.iter().find_map(|block| block.up).unwrap_or(UPRIGHT);
         let levers = Levers::new(model.chain()).along(up)?;
-        let sag = sag.map(|block| Sag { levers, outputs: block.outputs, weights: block.weights });
-        let bank = Bank { input_count: inputs, parameter_count: width, blocks, sag };
-        bank.check()?;
+        let bank = Bank::restored(inputs, width, blocks, levers)?;
         model = model.with_field(bank.compiled(), content.options.features.len())?;
     }
     if let Some(stored) = &content.conservative {
@@ -119,21 +113,16 @@ fn conservative(
 
 fn blocks(container: &Container, stored: &[BlockContent], name: &str) -> Result<Vec<Block>, LoadError> {
     let block = |(number, block): (usize, &BlockContent)| {
-        let axis = |axis: &crate::content::AxisContent| Axis {
-            input: Input { kind: if axis.0 { InputKind::Angle } else { InputKind::Line }, scale: axis.1 },
-            origin: axis.2,
-            spacing: axis.3,
-            count: axis.4,
-            closed: axis.5,
-            degree: axis.6,
-        };
         let weights = container.numbers(&format!("{name}.block{number}.weights"))?;
         if !weights.iter().all(|weight| weight.is_finite()) {
             return Err(incomplete("a weight of its field is not finite"));
         }
         Ok(Block {
             name: block.name.clone(),
-            grid: Grid { inputs: block.inputs.clone(), axes: block.axes.iter().map(axis).collect() },
+            grid: Grid {
+                inputs: block.inputs.clone(),
+                axes: block.axes.iter().copied().map(Axis::restored).collect(),
+            },
             outputs: block.outputs.clone(),
             weights,
         })

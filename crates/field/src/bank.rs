@@ -3,7 +3,7 @@
 use crate::FieldError;
 use crate::cells::{Axis, Grid, MOST_AXES};
 use crate::compiled::Compiled;
-use crate::sag::Sag;
+use crate::sag::{Levers, SAG_NAME, Sag};
 
 /// One FCMAC: a grid of cells, each with a weight for every parameter that the block drives.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +35,23 @@ impl Bank {
     /// A field that is zero everywhere.
     pub fn empty(input_count: usize, parameter_count: usize) -> Self {
         Self { input_count, parameter_count, blocks: Vec::new(), sag: None }
+    }
+
+    /// A field of stored blocks, of which the one named [`SAG_NAME`] goes with the arm's levers.
+    ///
+    /// # Errors
+    /// As [`Bank::check`].
+    pub fn restored(
+        input_count: usize,
+        parameter_count: usize,
+        mut blocks: Vec<Block>,
+        levers: Levers,
+    ) -> Result<Self, FieldError> {
+        let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
+        let sag = sag.map(|block| Sag { levers, outputs: block.outputs, weights: block.weights });
+        let bank = Self { input_count, parameter_count, blocks, sag };
+        bank.check()?;
+        Ok(bank)
     }
 
     /// Checks that weights, grids and indices fit together, once, where a bank comes from outside.

@@ -28,6 +28,9 @@ pub struct Axis {
     pub degree: usize,
 }
 
+/// An axis as calibrations store it: is an angle, scale, origin, spacing, count, closed, degree.
+pub type StoredAxis = (bool, f64, f64, f64, usize, bool, usize);
+
 /// Cells that a value excites, and how much; grades add up to one where the axis covers the value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Active {
@@ -71,6 +74,18 @@ impl Axis {
         let middle = 0.5 * (low + high);
         let origin = middle - 0.5 * spacing * (count - 1) as f64;
         Self { input, origin, spacing, count, closed: false, degree }
+    }
+
+    /// The axis that is stored so; not yet checked.
+    pub fn restored((angle, scale, origin, spacing, count, closed, degree): StoredAxis) -> Self {
+        let kind = if angle { InputKind::Angle } else { InputKind::Line };
+        Self { input: Input { kind, scale }, origin, spacing, count, closed, degree }
+    }
+
+    /// How it is stored.
+    pub fn stored(&self) -> StoredAxis {
+        let angle = self.input.kind == InputKind::Angle;
+        (angle, self.input.scale, self.origin, self.spacing, self.count, self.closed, self.degree)
     }
 
     /// Whether it can be evaluated: positive finite numbers, cells enough and not too many, a known degree.

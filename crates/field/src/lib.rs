@@ -54,7 +54,7 @@ mod weight_space;
 mod widening;
 
 pub use bank::{Bank, Block};
-pub use cells::{Axis, Grid};
+pub use cells::{Axis, Grid, StoredAxis};
 pub use compiled::{Compiled, FieldScratch};
 pub use conservative::{BOUNDED, Conservative, ConservativeParts};
 pub use conservative_fit::{ConservativePlan, Samples};
@@ -66,5 +66,5 @@ pub use kernel::{Input, InputKind};
 pub use outliers::{Judgement, QUANTILE_95};
 pub use posterior::Posterior;
 pub use predict::measurement_covariance;
-pub use sag::{Levers, SAG_NAME, Sag, SagScratch, UPRIGHT};
+pub use sag::{Levers, Sag, SagScratch, UPRIGHT};
 pub use training::{Class, Column, Training};

@@ -10,6 +10,9 @@ use truearm_kinematics::{
     dispatch, lever_count,
 };
 
+use crate::bank::Block;
+use crate::cells::Grid;
+
 /// Name of the block.
 pub const SAG_NAME: &str = "sag";
 
@@ -54,6 +57,18 @@ pub struct Loads {
     pub outputs: Vec<usize>,
     /// Of each lever its weight and those of the same joint behind it, (L,).
     heights: Vec<f64>,
+}
+
+impl Sag {
+    /// How it is stored: as a block over all joints without cells.
+    pub fn stored(&self) -> Block {
+        Block {
+            name: SAG_NAME.to_owned(),
+            grid: Grid { inputs: (0..self.levers.joint_count()).collect(), axes: Vec::new() },
+            outputs: self.outputs.clone(),
+            weights: self.weights.clone(),
+        }
+    }
 }
 
 impl Levers {

@@ -4,26 +4,15 @@ use numpy::PyReadonlyArrayDyn;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truearm_field::{Axis, Block, Grid, Input, InputKind, SAG_NAME, Sag};
+use truearm_field::{Axis, Block, Grid, Sag, StoredAxis};
 
 use crate::measured::matrix;
 
 /// Key of the direction that a `sag` block takes for up, in the base frame.
 const UP: &str = "up";
 
-/// One axis as stored: is an angle, scale, origin, spacing, count, closed, degree.
-type StoredAxis = (bool, f64, f64, f64, usize, bool, usize);
-
 pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<'py, PyDict>> {
-    let axes: Vec<StoredAxis> = block
-        .grid
-        .axes
-        .iter()
-        .map(|axis| {
-            let angle = axis.input.kind == InputKind::Angle;
-            (angle, axis.input.scale, axis.origin, axis.spacing, axis.count, axis.closed, axis.degree)
-        })
-        .collect();
+    let axes: Vec<StoredAxis> = block.grid.axes.iter().map(Axis::stored).collect();
     let stored = PyDict::new(py);
     stored.set_item("name", &block.name)?;
     stored.set_item("inputs", &block.grid.inputs)?;
@@ -35,13 +24,7 @@ pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<
 
 /// The sag as a block over all joints without cells, and which way is up in it.
 pub(crate) fn sag_into<'py>(py: Python<'py>, sag: &Sag) -> PyResult<Bound<'py, PyDict>> {
-    let block = Block {
-        name: SAG_NAME.to_owned(),
-        grid: Grid { inputs: (0..sag.levers.joint_count()).collect(), axes: Vec::new() },
-        outputs: sag.outputs.clone(),
-        weights: sag.weights.clone(),
-    };
-    let stored = block_into(py, &block)?;
+    let stored = block_into(py, &sag.stored())?;
     stored.set_item(UP, sag.levers.up().to_vec())?;
     Ok(stored)
 }
@@ -57,14 +40,13 @@ pub(crate) fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {
         stored.get_item(name)?.ok_or_else(message)
     };
     let axes: Vec<StoredAxis> = item("axes")?.extract()?;
-    let axis = |(angle, scale, origin, spacing, count, closed, degree): StoredAxis| {
-        let kind = if angle { InputKind::Angle } else { InputKind::Line };
-        Axis { input: Input { kind, scale }, origin, spacing, count, closed, degree }
-    };
     let weights: PyReadonlyArrayDyn<'_, f64> = item("weights")?.extract()?;
     Ok(Block {
         name: item("name")?.extract()?,
-        grid: Grid { inputs: item("inputs")?.extract()?, axes: axes.into_iter().map(axis).collect() },
+        grid: Grid {
+            inputs: item("inputs")?.extract()?,
+            axes: axes.into_iter().map(Axis::restored).collect(),
+        },
         outputs: item("outputs")?.extract()?,
         weights: weights.as_array().iter().copied().collect(),
     })

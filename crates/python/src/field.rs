@@ -14,9 +14,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
-    Bank, Block, Compiled, FieldFit as CoreFit, FieldOptions, Hyper, Input, Levers, MAJOR_NAME,
-    Posterior as CorePosterior, Product, SAG_NAME, Sag, UPRIGHT, WRIST_NAME, fit_field as fit,
-    measurement_covariance, restore,
+    Bank, Compiled, FieldFit as CoreFit, FieldOptions, Hyper, Input, Levers, MAJOR_NAME,
+    Posterior as CorePosterior, Product, UPRIGHT, WRIST_NAME, fit_field as fit, measurement_covariance,
+    restore,
 };
 
 use crate::blocks::{block_from, block_into, sag_into, up_of};
@@ -263,13 +263,10 @@ impl Field {
         nominal: &Chain,
     ) -> PyResult<Self> {
         let up = blocks.iter().find_map(|block| up_of(block).transpose()).unwrap_or(Ok(UPRIGHT))?;
-        let mut blocks: Vec<Block> = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
-        let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
+        let blocks = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
         let levers = Levers::new(nominal.core()).along(up).map_err(Failure::into_exception)?;
-        let sag = sag.map(|block| Sag { levers, outputs: block.outputs, weights: block.weights });
-        let core = Bank { input_count, parameter_count, blocks, sag };
-        core.check().map_err(|error| CoreError::new_err(error.to_string()))?;
-        Ok(Self::wrap(core))
+        let core = Bank::restored(input_count, parameter_count, blocks, levers);
+        Ok(Self::wrap(core.map_err(Failure::into_exception)?))
     }
 
     #[getter]
