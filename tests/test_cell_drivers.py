@@ -2,6 +2,7 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from hypothesis import strategies as st
 
 from tests.cell_support import cell_text, possible_readings, virtual
 from truearm.cell import Cell, Connected, EmergencyStopError, Expected, RefusedError, StoppedError, movemaster
+from truearm.cell.channels import ConnectionEndedError
 from truearm.cell.conformance import ConformanceError, check_robot, check_sensor
+from truearm.cell.device_errors import DeviceGoneError
+from truearm.cell.line_sensor import LineSensor
 from truearm.cell.playback import PlaybackRobot, PlaybackSensor
 from truearm.cell.prediction import Prediction
 from truearm.cell.session import Step
@@ -165,3 +169,14 @@ def test_movemaster_numbers_read_back(values):
 @pytest.mark.parametrize("text", ["", "1,2,3,4,5", "+1.0,+2.0,+3.0,+4.0", "+1.0,+2.0,x3.0,+4.0,+5.0"])
 def test_damaged_movemaster_numbers_are_none(text):
     assert movemaster.parse_numbers(text) is None
+
+
+def test_an_instrument_that_cannot_be_set_up_lets_go_of_its_port(monkeypatch):
+    settings = {"port": "tcp://127.0.0.1:1", "answer": "(?P<x>.*) (?P<y>.*) (?P<z>.*)", "setup": ("START",)}
+    sensor = LineSensor(LineSensor.Settings(**settings), Robot.load("ur5e"))
+    channel = Mock(write=Mock(side_effect=ConnectionEndedError("cut")))
+    monkeypatch.setattr("truearm.cell.line_port.open_channel", lambda *_, **__: channel)
+    for _ in range(2):
+        with pytest.raises(DeviceGoneError, match="cut"):
+            sensor.connect()
+    assert channel.close.call_count == 2
