@@ -11,7 +11,7 @@ from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.units import to_si
-from truearm.validation import Errors, Validation
+from truearm.validation import Validation
 
 Floats = NDArray[np.float64]
 
@@ -35,8 +35,9 @@ def doubts(
     arm: IdentifiedArm, models: Mapping[str, ArmModel], validation: Validation, best: str
 ) -> list[Notice]:
     """What speaks against a calibration whose model `best` is used."""
+    before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
     return [
-        *no_help(validation.holdout, best, f"{validation.judged} rows"),
+        *no_help(before, after, f"mean error on {validation.judged} rows"),
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, models[CONSTANT]),
     ]
@@ -62,14 +63,13 @@ def helps(before_mm: float, after_mm: float) -> bool:
     return after_mm < min(before_mm, LARGE_MM)
 
 
-def no_help(errors: Mapping[str, Errors], best: str, rows: str) -> list[Notice]:
-    """A warning where a calibration whose model `best` is used is of no use on the rows it was judged on."""
-    before, after = (errors[name].position.mean for name in (NOMINAL, best))
-    if helps(before, after):
+def no_help(before_mm: float, after_mm: float, what: str) -> list[Notice]:
+    """A warning where a calibration is of no use, by errors of the nominal model and its own, and their name."""
+    if helps(before_mm, after_mm):
         return []
     text = (
-        f"The calibration does not help: on {rows} its mean error is {after:.4g} mm, that of the nominal "
-        f"model {before:.4g} mm. Do not use it until the reason is found. {CHECKS}."
+        f"The calibration does not help: its {what} is {after_mm:.4g} mm, that of the nominal model "
+        f"{before_mm:.4g} mm. Do not use it until the reason is found. {CHECKS}."
     )
     return [Notice(NO_HELP, text)]
 

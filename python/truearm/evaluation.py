@@ -20,18 +20,19 @@ from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.held_rows import HeldRows
 from truearm.judging import judge, model_inputs
 from truearm.measurements import Measurements
-from truearm.models import ArmModel
+from truearm.models import NOMINAL, ArmModel
 from truearm.plausibility import check_against
 from truearm.registration import register
 from truearm.turning_sense import check_turns
 from truearm.units import MM_PER_METRE
-from truearm.validation import Errors, row_errors
+from truearm.validation import Errors, RowErrors, row_errors
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 MOST_FRAME_ROWS: Final = 400
 FEWEST_FRAME_ROWS: Final = 3
+FAR_ROWS: Final = "far_rows"
 FAR: Final = 8.0
 """Times the median distance, and the constants' noise: what no row misses by that belongs to the others."""
 
@@ -142,10 +143,11 @@ def evaluate(
     with stages("judging"):
         chosen_rows = data.select(judged)
         errors = judge(task, models, chosen_rows, data.select(frame if len(frame) else judged))
+    spoiled = []
     if not (chosen.keep_frames or chosen.keep_tool):
-        notices = [*notices, *_spoiled(task, calibration, data.select(frame))]
+        spoiled = _spoiled(task, calibration, data.select(frame))
+    notices = [*notices, *(spoiled or _of_no_use(errors, calibration.model_name))]
     statistics = {name: found.statistics() for name, found in errors.items()}
-    notices = [*notices, *no_help(statistics, calibration.model_name, "the rows that were judged")]
     return Evaluation(len(frame), len(judged), statistics, tuple(notices), HeldRows.of(chosen_rows, errors))
 
 
@@ -185,6 +187,12 @@ def _setup(
         return fit_constant(task.problem(measured, []), fit_options(task, parameters=parameters)).setup
 
 
+def _of_no_use(errors: Mapping[str, RowErrors], best: str) -> list[Notice]:
+    """A warning where the calibration does not help; medians, since single rows may be wrong."""
+    before, after = (MM_PER_METRE * float(np.nanmedian(errors[name].distance_m)) for name in (NOMINAL, best))
+    return no_help(before, after, "median error on the rows that were judged")
+
+
 def _spoiled(task: Task, calibration: Calibration, data: Measurements) -> list[Notice]:
     """What rows that found frame and tool lie far from where the others put them."""
     model = calibration.model
@@ -205,7 +213,7 @@ def _spoiled(task: Task, calibration: Calibration, data: Measurements) -> list[N
         "Among the rows that found frame and tool some lie far from where the others put them, and move "
         f"both: row {named}. Take them out, or let more rows find the frame (--frame-rows)."
     )
-    return [Notice("far_rows", text, tuple(data.rows[far].tolist()))]
+    return [Notice(FAR_ROWS, text, tuple(data.rows[far].tolist()))]
 
 
 def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:

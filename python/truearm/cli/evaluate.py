@@ -43,7 +43,7 @@ def command(
     from truearm.calibration import Calibration
     from truearm.cli.error_tables import print_errors
     from truearm.doubts import NO_HELP
-    from truearm.evaluation import EvaluationOptions, evaluate
+    from truearm.evaluation import FAR_ROWS, EvaluationOptions, evaluate
     from truearm.measurements import Measurements
 
     options = EvaluationOptions(
@@ -71,6 +71,6 @@ def command(
     say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
     print_errors(found.errors, f"{found.n_judged} rows")
     others = " ".join(map(str, measurements))
-    useful = all(notice.kind != NO_HELP for notice in found.notices)
+    useful = all(notice.kind not in (NO_HELP, FAR_ROWS) for notice in found.notices)
     next_one = [compensate_command(known, calibration)] if useful else []
     suggest(f"truearm report {calibration} {others} -o other.html", *next_one)

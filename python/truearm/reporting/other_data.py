@@ -1,8 +1,7 @@
 """Chapter: the same models judged on other measurements."""
 
-from truearm.doubts import helps
+from truearm.doubts import NO_HELP
 from truearm.evaluation import Evaluation
-from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
 from truearm.reporting.held_errors import cumulative, histogram
 from truearm.reporting.numbers import count_of, fixed, short
@@ -11,9 +10,9 @@ from truearm.reporting.verdict import HEADINGS, STATISTICS
 from truearm.units import MM_PER_METRE
 
 
-def _no_help(found: Evaluation, best: str) -> str:
-    """A warning where the nominal model does as well."""
-    if helps(found.errors[NOMINAL].position.mean, found.errors[best].position.mean):
+def _no_help(found: Evaluation) -> str:
+    """A warning where the calibration is of no use there."""
+    if all(notice.kind != NO_HELP for notice in found.notices):
         return ""
     return " On these measurements the calibration does not help."
 
@@ -39,7 +38,7 @@ def other_data(facts: Facts) -> Section:
         ["model", *HEADINGS],
         rows,
         says=f"{how}. The mean error of the {facts.best} model is {here} mm here, and {there} mm on the "
-        f"{facts.judged} poses of its own data.{_no_help(found, facts.best)}",
+        f"{facts.judged} poses of its own data.{_no_help(found)}",
         strong=[list(errors).index(facts.best)],
     )
     parts: list[Part] = [table]
