@@ -64,7 +64,7 @@ def helps(before_mm: float, after_mm: float) -> bool:
 
 
 def no_help(before_mm: float, after_mm: float, what: str) -> list[Notice]:
-    """A warning where a calibration is of no use, by errors of the nominal model and its own, and their name."""
+    """A warning where a calibration is of no use: errors of the nominal model, its own, what they are."""
     if helps(before_mm, after_mm):
         return []
     text = (
