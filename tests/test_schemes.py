@@ -106,7 +106,7 @@ def test_what_a_scheme_cannot_do_is_refused(calibrations, arm):
         ({"region_ceps": "best"}, "shrunk or least_squares"),
         ({"scheme_joints": (1, 1)}, "once"),
         ({"cells": (3,)}, "scheme_joints"),
-        ({"demanded_mm": -1.0}, "negative"),
+        ({"demanded_mm": -1.0}, "Zero or more"),
         ({"rate": 0.0}, "positive"),
         ({"repeatability_mm": 0.0}, "positive"),
         ({"model": "regions", "features": ("t",)}, "varies"),
