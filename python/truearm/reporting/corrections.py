@@ -37,10 +37,12 @@ def compensation(facts: Facts) -> Section:
     data = rows.data.select(np.arange(min(len(rows.data), MOST_POSES)))
     task = _task(len(facts.joints))
     alone = Limits(change_mm_per_mm=None, change_mrad_per_rad=None)
+    named = not np.array_equal(calibration.robot.tool, np.eye(4))
     found = Compensator(calibration, task=task, limits=alone, features=facts.features or None).joints(
-        data.readings
+        data.readings, tool=None if named else facts.point
     )
-    parts: list[Part] = [Text(_overall(found, task, len(rows.data))), *_sizes(facts, found)]
+    of = "the robot file's tool" if named else "the measured target, as the robot file names no tool"
+    parts: list[Part] = [Text(_overall(found, (task, of), len(rows.data))), *_sizes(facts, found)]
     return Section(title, [*parts, *largest(facts, data, found), *_refusals(data, found)])
 
 
@@ -48,14 +50,16 @@ def _task(joints: int) -> Task:
     return "pose" if joints >= FULL_POSE else "axis" if joints == AXIS else "position"
 
 
-def _overall(found: Compensated, task: Task, count: int) -> str:
+def _overall(found: Compensated, asked: tuple[Task, str], count: int) -> str:
+    """In a sentence; `asked` are the task and whose it is."""
+    task, of = asked
     corrected = int((~found.refused).sum())
     met = {"pose": "position and orientation", "axis": "position and tool axis", "position": "position"}[task]
     refused = f"{int(found.refused.sum()) or 'none'} refused"
     which = "first " if len(found.q) < count else ""
     return (
         f"The {which}{count_of(len(found.q), 'measured pose')}, each corrected as a waypoint of a program "
-        f"({met} of the robot file's tool, not of the measured target): {corrected} corrected, {refused}."
+        f"({met} of {of}): {corrected} corrected, {refused}."
     )
 
 
