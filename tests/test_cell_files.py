@@ -1,5 +1,6 @@
 """Cell files, lists of poses and session files: what is wrong with them is said in words."""
 
+import contextlib
 import sqlite3
 
 import numpy as np
@@ -143,3 +144,17 @@ def test_what_is_no_session_is_told(tmp_path):
         open_session(
             tmp_path / "none" / "s.db", Cell.from_toml(cell_text()), poses_of(Cell.from_toml(cell_text()), 8)
         )
+
+
+def test_a_database_of_somebody_else_is_left_as_it_is(tmp_path):
+    path = tmp_path / "accounts.db"
+    with contextlib.closing(sqlite3.connect(path)) as other:
+        other.execute("CREATE TABLE accounts (name TEXT)")
+        other.commit()
+    before = path.read_bytes()
+    for writing in (True, False):
+        with pytest.raises(InputError, match="this is no session file"):
+            Session(path, writing=writing)
+    assert path.read_bytes() == before
+    with pytest.raises(InputError, match="this is a directory"):
+        Session(tmp_path, writing=False)

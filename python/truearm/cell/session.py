@@ -66,7 +66,8 @@ class Session:
             WorkError: If another process is writing to it.
         """
         if not path.is_file():
-            raise InputError("there is no such file", where=str(path))
+            what = "this is a directory" if path.is_dir() else "there is no such file"
+            raise InputError(what, where=str(path))
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
                 raise InputError(
@@ -81,10 +82,10 @@ class Session:
             f"{path.resolve().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
         )
         try:
+            self._check_version()
             if writing:
                 self._db.execute("PRAGMA journal_mode=WAL")
                 self._db.execute("PRAGMA synchronous=FULL")
-            self._check_version()
         except BaseException:
             self.close()
             raise
