@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from truearm._core import independent_columns
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.identified import IdentifiedArm
 from truearm.planning import (
@@ -18,7 +19,7 @@ from truearm.planning import (
     divide_space,
     draw_pool,
 )
-from truearm.planning.choosing import independent_columns, unknowns_jacobian
+from truearm.planning.choosing import unknowns_jacobian
 from truearm.planning.drawing import draw_regions, draw_tree
 from truearm.robot import Robot
 from truearm.simulation import PAPER_PARAMETERS, VirtualArm

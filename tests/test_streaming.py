@@ -4,10 +4,20 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm._core import Corrector, Stream
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.streaming import CorrectionStream, StreamOptions
 
 CYCLE = 0.004
+
+
+def test_what_is_not_stated_is_the_core_s_in_streams_and_bounds():
+    stated, usual = StreamOptions().core(), Stream.usual()
+    assert stated.keys() == usual.keys()
+    assert all(stated[name] == pytest.approx(value, rel=1e-15) for name, value in usual.items())
+    bounds = ta.Limits().core(ta.Robot.load("ur5e"))
+    assert bounds.keys() == {"joints"} | Corrector.usual().keys()
+    assert {name: bounds[name] for name in Corrector.usual()} == pytest.approx(Corrector.usual(), rel=1e-15)
 
 
 @pytest.fixture(scope="module")

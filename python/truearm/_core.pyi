@@ -8,6 +8,12 @@ from numpy.typing import NDArray
 
 __version__: str
 
+ANGLE_ARM_M: float
+"""Metres that a radian counts where lengths and angles are compared."""
+
+NORMAL_95: float
+"""95 % of a standard normal variable lies within this."""
+
 class CoreError(ValueError):
     """The core refused its input; the message says the value, the rule and the way out."""
 
@@ -478,6 +484,10 @@ class Corrector:
             CoreError: If the models have different joints or an option breaks a rule.
         """
 
+    @staticmethod
+    def usual() -> dict[str, float]:
+        """The bounds of `options` where nothing is stated, but for those of joints."""
+
     def with_tool(self, tool: NDArray[np.float64]) -> Corrector:
         """The same for another flange_from_tool (4, 4)."""
 
@@ -514,6 +524,10 @@ class Stream:
         Raises:
             CoreError: An option is not positive.
         """
+
+    @staticmethod
+    def usual() -> dict[str, Any]:
+        """The options where nothing is stated."""
 
     def switch(self, on: bool) -> None:
         """Ramp the correction up or down from now on."""
@@ -923,6 +937,14 @@ def observability(jacobian: NDArray[np.float64], columns: Sequence[int]) -> dict
         kappa, the condition number of M; kappa_normal, that of M^t M, equation (4) as meant; o1 (Borm and
         Menq), o2 (Driels and Pathre), o3 (Nahvi, Hollerbach and Hayward), o4 (Nahvi and Hollerbach), o5 (Sun
         and Hollerbach); log_det of M^t M.
+    """
+
+def independent_columns(jacobian: NDArray[np.float64], columns: Sequence[int]) -> list[int]:
+    """Positions of the columns of a Jacobian (n, m, P) that none before them can stand for, ascending.
+
+    Args:
+        jacobian: m and rad.
+        columns: A parameter of each one's kind (P,).
     """
 
 @final

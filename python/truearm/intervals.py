@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import residuals
+from truearm._core import NORMAL_95, residuals
 from truearm.core_set import core_set
 from truearm.fitting import Fits, Task
 from truearm.judging import model_inputs
@@ -14,7 +14,6 @@ from truearm.models import VARIABLE
 
 Floats = NDArray[np.float64]
 
-NORMAL_95: Final = 1.959963984540054
 MOST_ROWS: Final = 500
 """More rows change the share by less than its own uncertainty, and cost time."""
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import (
+    ANGLE_ARM_M,
     ConstantFit,
     Network,
     Problem,
@@ -26,7 +27,6 @@ from truearm.units import MM_PER_METRE
 Floats = NDArray[np.float64]
 
 JUDGING_SHARE: Final = 0.2
-ANGLE_LEVER_M: Final = 0.3
 LARGEST_CONDITION_OF_WHOLE: Final = 300.0
 CONDITION_OF_WHOLE: Final = 30.0
 """A region is not divided where its condition number would be so many times that of the whole."""
@@ -93,7 +93,7 @@ def well_determined(problem: Problem, constant: ConstantFit, columns: Sequence[i
     """
     jacobian, _ = linearise(problem, constant.parameters, constant.setup)
     lengths = are_lengths(columns)
-    rows = jacobian.reshape(-1, len(columns)) * np.where(lengths, 1.0, 1.0 / ANGLE_LEVER_M)
+    rows = jacobian.reshape(-1, len(columns)) * np.where(lengths, 1.0, 1.0 / ANGLE_ARM_M)
     kept = list(range(len(columns)))
     while len(kept) > 1:
         _, singular, right = np.linalg.svd(rows[:, kept], full_matrices=False)

@@ -1,18 +1,13 @@
 """What is left when the model has said all it knows: noise of the instrument and of the joints."""
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import FieldFit
+from truearm._core import ANGLE_ARM_M, FieldFit
 from truearm.fitting import Task
 from truearm.measurements import Measurements
 
 Floats = NDArray[np.float64]
-
-PRISMATIC_LEVER_M: Final = 0.3
-"""What a prismatic joint misses in m for each rad of the hyper-parameter."""
 
 
 def unexplained(task: Task, fit: FieldFit, data: Measurements) -> float:
@@ -24,7 +19,7 @@ def unexplained(task: Task, fit: FieldFit, data: Measurements) -> float:
     end[:3, 3] = fit.setup.targets[0, 0]
     chain = task.arm.chain(task.arm.robot.flange @ end)
     jacobian = chain.joint_jacobian(task.arm.robot.joints_from_readings(data.readings))
-    levers = np.where(np.array(task.arm.robot.joints) == "prismatic", PRISMATIC_LEVER_M, 1.0)
+    levers = np.where(np.array(task.arm.robot.joints) == "prismatic", ANGLE_ARM_M, 1.0)
     missed = fit.hyper["repeatability"][0] * jacobian * levers
     variance = np.square(missed).sum(axis=(1, 2)).mean() / 3.0
     return float(np.sqrt(fit.hyper["noise_position"][0] ** 2 + variance))

@@ -16,7 +16,7 @@ from truearm.cell.session import Step
 from truearm.columns import VALIDATE
 from truearm.errors import UsageError, WorkError
 from truearm.identified import IdentifiedArm
-from truearm.planning.choosing import Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
+from truearm.planning.choosing import SETUP_KINDS, Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
 from truearm.planning.spreading import fill
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
@@ -129,7 +129,7 @@ def expected_mm(
     """
     chosen = choose(arm, pool, count, wanted).rows
     jacobian, _ = unknowns_jacobian(arm, pool, wanted)
-    links = jacobian.shape[2] - (0 if arm.world_is_known else SETUP_UNKNOWNS)
+    links = jacobian.shape[2] - (0 if arm.world_is_known else len(SETUP_KINDS))
     prior = np.concatenate([np.full(jacobian.shape[2] - links, FREE), np.full(links, PRIOR_M)])
     scaled = jacobian * prior
     rows = scaled[chosen].reshape(-1, scaled.shape[2]) / (1e-3 * sigma_mm)
@@ -137,9 +137,6 @@ def expected_mm(
     root = np.linalg.qr(np.vstack([rows, np.eye(scaled.shape[2])])).R
     spread = np.linalg.solve(root.T, scaled.reshape(-1, scaled.shape[2]).T)
     return float(MM_PER_METRE * np.sqrt(np.square(spread).sum() / len(pool)))
-
-
-SETUP_UNKNOWNS: Final = 9
 
 
 def measurable_pool(arm: Robot, cell: Cell | None, size: int, seed: int) -> Floats:

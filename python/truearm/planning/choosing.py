@@ -7,19 +7,19 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm._core import choose_poses
+from truearm._core import Problem, choose_poses, independent_columns, linearise, setup_jacobian
+from truearm.core_set import known_setup, measured_points
 from truearm.endpoints import at_tool
 from truearm.errors import UsageError, WorkError, list_names
 from truearm.identified import IdentifiedArm
-from truearm.parameters import KIND_COUNT, THETA, A, D
+from truearm.parameters import THETA, D
 
 Floats = NDArray[np.float64]
 Criterion = Literal["kappa", "d", "o1", "o2", "o3", "o4", "o5"]
 
 CRITERIA: Final = ("kappa", "d", "o1", "o2", "o3", "o4", "o5")
-LENGTH_PER_ANGLE_M: Final = 0.3
-"""Columns are taken per mm and per 1/300 rad, so that all move the tool about alike."""
-INDEPENDENT: Final = 1e-6
+SETUP_KINDS: Final = (D, D, D, THETA, THETA, THETA, D, D, D)
+"""Kinds of the unknowns of the set-up: shift and turn of the base, shift of the target."""
 
 
 @dataclass(frozen=True)
@@ -150,44 +150,12 @@ def unknowns_jacobian(
     if chosen.names is not None:
         wanted = sorted({candidates.column(name) for name in chosen.names})
     chain = arm.chain(arm.robot.flange @ at_tool(arm.robot, chosen.tool))
-    values = arm.robot.joints_from_readings(readings)
-    jacobian = chain.parameter_jacobian(values, pose=pose)[:, :, wanted]
+    count = len(readings)
+    turned = np.repeat(np.eye(3)[None], count, axis=0) if pose else None
+    measured = measured_points(arm.robot.joints_from_readings(readings), np.zeros((count, 3)), turned)
+    problem, setup = Problem(chain, measured, wanted, arm.world_is_known), known_setup(np.zeros(3))
+    jacobian, _ = linearise(problem, arm.table, setup)
     if arm.world_is_known:
         return jacobian, wanted
-    setup = _setup_jacobian(chain.pose(values), pose=pose)
-    return np.concatenate([setup, jacobian], axis=2), [D, D, D, THETA, THETA, THETA, D, D, D, *wanted]
-
-
-def _setup_jacobian(poses: Floats, *, pose: bool) -> Floats:
-    """Derivatives (n, 3 or 6, 9) for shift and turn of the base, and shift of the target."""
-    found = np.zeros((len(poses), 6 if pose else 3, 9))
-    found[:, :3, :3] = np.eye(3)
-    x, y, z = poses[:, :3, 3].T
-    zero = np.zeros_like(x)
-    found[:, :3, 3:6] = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]]).transpose(2, 0, 1)
-    found[:, :3, 6:] = poses[:, :3, :3]
-    if pose:
-        found[:, 3:, 3:6] = np.eye(3)
-    return found
-
-
-def independent_columns(jacobian: Floats, columns: Sequence[int]) -> list[int]:
-    """Positions of columns that none before them can stand for, in order.
-
-    Args:
-        jacobian: Derivatives (n, m, P).
-        columns: A parameter of each one's kind.
-    """
-    scale = np.array([1.0 if c % KIND_COUNT in (A, D) else 1.0 / LENGTH_PER_ANGLE_M for c in columns])
-    rows = jacobian.reshape(-1, len(columns)) * scale
-    largest = np.linalg.norm(rows, axis=0).max()
-    kept: list[int] = []
-    basis = np.empty((len(rows), 0))
-    for k in range(len(columns)):
-        left = rows[:, k] - basis @ (basis.T @ rows[:, k])
-        left -= basis @ (basis.T @ left)
-        size = np.linalg.norm(left)
-        if size > INDEPENDENT * largest:
-            kept.append(k)
-            basis = np.column_stack([basis, left / size])
-    return kept
+    own = setup_jacobian(problem, arm.table, setup)[:, :, : len(SETUP_KINDS)]
+    return np.concatenate([own, jacobian], axis=2), [*SETUP_KINDS, *wanted]

@@ -2,21 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Chain
+from truearm._core import ANGLE_ARM_M, Chain
 from truearm.parameters import KIND_COUNT, A, D
 from truearm.studies.experiment import Experiment
 from truearm.studies.schemes import Scheme
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
-
-ANGLE_LEVER_MM: Final = 300.0
-"""An angle CEP counts as what it moves at this distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +75,9 @@ def along(made: Experiment, found: Trace, readings: Floats) -> dict[str, float]:
 
 def scaled_ceps(parameters: Floats) -> Floats:
     """Parameters (n, L, 5) in mm, angles at 300 mm."""
-    scale = np.full(KIND_COUNT, ANGLE_LEVER_MM)
-    scale[[A, D]] = MM_PER_METRE
-    return np.asarray(parameters * scale)
+    scale = np.full(KIND_COUNT, ANGLE_ARM_M)
+    scale[[A, D]] = 1.0
+    return np.asarray(parameters * (scale * MM_PER_METRE))
 
 
 def over_seeds(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

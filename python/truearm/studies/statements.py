@@ -6,10 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm._core import Network
+from truearm._core import Network, independent_columns
 from truearm.identified import IdentifiedArm
 from truearm.parameters import ALPHA, BETA, A, D
-from truearm.planning.choosing import independent_columns
 from truearm.planning.dividing import named_columns
 from truearm.simulation import PAPER_PARAMETERS, VirtualArm
 from truearm.studies.schemes import NETWORK

@@ -7,9 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import residuals
+from truearm._core import NORMAL_95, residuals
 from truearm.core_set import core_set
-from truearm.intervals import NORMAL_95
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.models import ArmModel
