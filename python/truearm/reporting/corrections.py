@@ -12,7 +12,7 @@ from truearm.limits import Limits, Task
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, fixed, lean, short
+from truearm.reporting.numbers import count_of, fixed, lean, short, signed
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 
 Floats = NDArray[np.float64]
@@ -117,7 +117,7 @@ def largest(facts: Facts, data: Measurements, found: Compensated) -> list[Table]
             fixed(found.correction_mm[k]),
             fixed(found.correction_mrad[k]),
             fixed(found.std_mm[k]),
-            ", ".join(f"{value:+.3f}" for value in change[k]),
+            ", ".join(signed(value, 3) for value in change[k]),
         ]
         for k in order
     ]

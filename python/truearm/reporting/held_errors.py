@@ -209,7 +209,7 @@ def worst(held: HeldRows, facts: Facts) -> Table:
     for k in order:
         place = [Path(str(held.sources[k])).name] if several else []
         missed = [fixed(errors[name][k]) for name in facts.models]
-        rows.append([str(held.rows[k]), *place, *missed, ", ".join(f"{value:.1f}" for value in shown[k])])
+        rows.append([str(held.rows[k]), *place, *missed, ", ".join(fixed(value, 1) for value in shown[k])])
     columns = ["row", *(["file"] if several else []), *(f"{name}, mm" for name in facts.models)]
     units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
     share = mine[order].sum() / mine[mine >= 0].sum()

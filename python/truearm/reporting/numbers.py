@@ -12,6 +12,7 @@ Floats = NDArray[np.float64]
 
 LEAST_TOLD: Final = 1e-6
 DECIMALS: Final = 3
+CHANGE_DECIMALS: Final = 4
 DIGITS: Final = 4
 """Significant digits of what figures are drawn from: finer than a pixel."""
 
@@ -34,9 +35,14 @@ def mm(length_m: float) -> str:
     return fixed(length_m * MM_PER_METRE)
 
 
-def fixed(value: float) -> str:
-    """A number of tables: three decimals."""
-    return f"{_no_minus_zero(value, DECIMALS):.{DECIMALS}f}"
+def fixed(value: float, decimals: int = DECIMALS) -> str:
+    """A number of tables."""
+    return f"{_no_minus_zero(value, decimals):.{decimals}f}"
+
+
+def signed(value: float, decimals: int = CHANGE_DECIMALS) -> str:
+    """A change in tables, with its sign."""
+    return f"{_no_minus_zero(value, decimals):+.{decimals}f}"
 
 
 def _no_minus_zero(value: float, decimals: int) -> float:

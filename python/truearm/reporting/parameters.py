@@ -9,7 +9,7 @@ from truearm.models import CONSTANT
 from truearm.parameters import KIND_COUNT, KINDS
 from truearm.reporting.charts import colour_bar
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, lean
+from truearm.reporting.numbers import count_of, lean, signed
 from truearm.reporting.parts import Cell, Figure, Table
 from truearm.reporting.style import DIVERGING
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
@@ -60,7 +60,7 @@ def table(facts: Facts) -> Table:
                 name,
                 unit_of(column),
                 f"{nominal[column] / unit:.3f}",
-                f"{change / unit:+.4f}" if known else NO_WORDS,
+                signed(change / unit) if known else NO_WORDS,
                 f"{errors[name] / unit:.4f}" if known else NO_WORDS,
                 f"{effect:.3f}" if known else NO_WORDS,
                 Cell("determined", "good") if known else Cell(_remark(name, words.get(name, "")), "fair"),

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, fixed, listed, probability
+from truearm.reporting.numbers import count_of, fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
 
@@ -46,7 +46,7 @@ def _offsets(told: Mapping[str, Any]) -> Table:
             why = f"confounded with the {entry['confounded']}" if entry["confounded"] else "not determined"
             rows.append([name, "kept", "", "", why])
             continue
-        change = f"{entry['change']:+.4f} {entry['unit']}"
+        change = f"{signed(entry['change'])} {entry['unit']}"
         rows.append(
             [
                 name,
@@ -77,7 +77,7 @@ def _motion(motion: Mapping[str, Any]) -> list[str]:
     if motion["kept"]:
         return ["", "", "", "kept"]
     shifts = "; ".join(", ".join(f"{value:+.3f}" for value in shift) for shift in motion["shift_mm"])
-    turn = "" if motion["turn_deg"] is None else ", ".join(f"{value:+.4f}" for value in motion["turn_deg"])
+    turn = "" if motion["turn_deg"] is None else ", ".join(signed(value) for value in motion["turn_deg"])
     if motion["p"] is None:
         return [shifts, turn, "", "found anew, not tested"]
     return [shifts, turn, probability(motion["p"]), "significant" if motion["moved"] else ""]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import WorkError
 from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import signed
 from truearm.reporting.parameters import POSES, effect_mm, per_unit, unit_of
 from truearm.reporting.parts import Table
 from truearm.reporting.sweeps import corrections
@@ -34,7 +35,7 @@ def varying_parameters(facts: Facts) -> Table:
                 name,
                 unit_of(column),
                 f"{nominal[column] / unit:.3f}",
-                *(f"{value / unit:+.4f}" for value in ends),
+                *(signed(value / unit) for value in ends),
                 *([] if spread is None else [f"{spread[column] / unit:.4f}"]),
                 f"{effects[column]:.3f}",
             ]
