@@ -203,6 +203,12 @@ def test_an_arm_on_a_wall_is_recognised_by_how_it_gives_way():
     np.testing.assert_allclose(again.position_std(q), calibration.position_std(q), rtol=1e-6)
 
 
+def test_threads_are_counted_from_one(variable):
+    arm, data, _ = variable
+    with pytest.raises(ta.UsageError, match="-1 threads"):
+        ta.calibrate(arm.robot, data, threads=-1)
+
+
 def test_same_bits_whatever_the_number_of_threads():
     arm = VirtualArm.paper(seed=4)
     data = arm.measure(arm.poses(120))

@@ -136,6 +136,12 @@ def test_readings_are_checked_at_the_door(q: Any, message: str) -> None:
         Robot.load("ur5").position(q)
 
 
+@pytest.mark.parametrize("table", ["x", [[1.0], [1.0, 2.0]], {}])
+def test_a_dictionary_without_numbers_is_refused(table: object) -> None:
+    with pytest.raises(InputError, match=r"values of table are not numbers"):
+        Robot.from_dict({**Robot.load("ur10").to_dict(), "table": table})
+
+
 @pytest.mark.parametrize("name", library_names())
 def test_dictionary_and_toml_bring_back_the_same_robot(name: str) -> None:
     robot = Robot.load(name)

@@ -10,6 +10,18 @@ from truearm.errors import InputError, list_rows
 RIGID_WITHIN: Final = 1e-8
 
 
+def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
+    """`values` as a C-contiguous array; `what` they are is for messages.
+
+    Raises:
+        InputError: If these are no numbers, or rows of different lengths.
+    """
+    try:
+        return np.ascontiguousarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{what} are not numbers: {error}") from None
+
+
 def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.float64], bool]:
     """`values` (n, columns) or (columns,) as a C-contiguous (n, columns) array.
 
@@ -24,10 +36,7 @@ def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.f
     Raises:
         InputError: If these are no numbers, the shape is another, or a value is not finite.
     """
-    try:
-        array = np.ascontiguousarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{what} are not numbers: {error}") from None
+    array = as_numbers(values, what=what)
     single = np.ndim(values) == 1
     rows = array.reshape(1, -1) if single else array
     if rows.ndim != 2 or rows.shape[1] != columns:

@@ -20,7 +20,7 @@ from truearm._core import (
     fit_field,
 )
 from truearm.core_set import Selection, core_set, distance_count
-from truearm.errors import InputError, WorkError, list_names
+from truearm.errors import InputError, UsageError, WorkError, list_names
 from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
@@ -62,6 +62,11 @@ class Task:
     options: Options
     threads: int | None = None
     stages: Stages = no_stages
+
+    def __post_init__(self) -> None:
+        """Check what the core takes as it is."""
+        if self.threads is not None and self.threads < 1:
+            raise UsageError(f"{self.threads} threads", rule="At least 1, or None for all there are")
 
     def problem(self, measured: MeasurementSet, columns: Sequence[int]) -> Problem:
         """The core's problem of rows and parameters asked for."""

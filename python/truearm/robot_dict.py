@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.arrays import as_numbers
 from truearm.errors import InputError
 from truearm.robot_data import Payload, RobotData
 from truearm.urdf_names import UrdfNames
@@ -39,17 +40,17 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of a Robot from what to_dict gave.
 
     Raises:
-        InputError: If a key is missing.
+        InputError: If a key is missing, or an array holds something else than numbers.
     """
     keys = (*TEXTS, *ARRAYS, "joints", "base_row", "limits", "payload")
     missing = [key for key in keys if key not in content]
     if missing:
         raise InputError(f'key "{missing[0]}" is missing', where="robot")
     fields: dict[str, Any] = {key: content[key] for key in TEXTS}
-    fields |= {key: np.array(content[key], dtype=np.float64) for key in ARRAYS}
+    fields |= {key: as_numbers(content[key], what=f"values of {key}") for key in ARRAYS}
     fields["joints"] = tuple(content["joints"])
     row = content["base_row"]
-    fields["base_row"] = None if row is None else np.array(row, dtype=np.float64)
+    fields["base_row"] = None if row is None else as_numbers(row, what="values of base_row")
     fields["limits"] = _limits(content["limits"])
     payload = content["payload"]
     if payload is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import ArmModel, CoreError, Solver
-from truearm.arrays import as_rows, check_finite
+from truearm.arrays import as_numbers, as_rows, check_finite
 from truearm.endpoints import at_tool
 from truearm.errors import InputError, UsageError, WorkError, list_rows
 from truearm.inputs import feature_columns
@@ -91,10 +91,7 @@ def as_poses(base_from_tool: ArrayLike) -> tuple[Floats, bool]:
     Raises:
         InputError: If the shape is another, a number is not finite, or a last row is not 0 0 0 1.
     """
-    try:
-        poses = np.ascontiguousarray(base_from_tool, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the poses are not numbers: {error}") from None
+    poses = as_numbers(base_from_tool, what="the poses")
     single = poses.ndim == 2
     poses = poses[None] if single else poses
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
