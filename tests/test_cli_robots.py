@@ -131,7 +131,7 @@ def test_strange_numbers_are_warned_of(tmp_path, capsys):
         (
             ["import", "raw.csv", "-o", "out.csv", "--joint-unit", "grad"],
             2,
-            '"grad" is not known. Either deg or rad',
+            '"grad" is not known. Either rad or deg',
         ),
         (["import", "raw.csv", "-o", "out.csv", "--decimal", ";"], 2, '";" is not known'),
         (["import", "raw.csv", "-o", "out.csv", "--delimiter", "ab"], 2, '"ab" is no delimiter'),

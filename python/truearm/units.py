@@ -1,10 +1,11 @@
-"""Units at the edges: metres and radians per unit that a file or an option may state."""
+"""Units at the edges: metres and radians per unit that a file or an option states; imports nothing heavy."""
 
 import math
-from typing import Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 LengthUnit = Literal["m", "mm"]
 AngleUnit = Literal["rad", "deg"]
@@ -14,7 +15,7 @@ ANGLE_UNITS: Final = ("rad", "deg")
 RADIANS_PER_DEGREE: Final = math.pi / 180.0
 MM_PER_METRE: Final = 1e3
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+Number = TypeVar("Number", float, "NDArray[np.float64]")
 
 
 def to_si(value: Number, unit: str) -> Number:
