@@ -95,7 +95,7 @@ def calibrate(
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(*notices, *_open_setup(task, final.identifiability), *_mounting(variable)),
+        notices=(*notices, *_open_setup(task, final.identifiability), *mounting(variable)),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
@@ -165,10 +165,6 @@ def _open_setup(task: Task, found: Identifiability) -> list[Notice]:
         "target are not harmed, but where the base stands in the world is not known."
     )
     return [Notice("open_setup", text)]
-
-
-def _mounting(details: VariableDetails | None) -> list[Notice]:
-    return [] if details is None else mounting(details.hyper)
 
 
 def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> VariableSpread | None:

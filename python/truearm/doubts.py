@@ -1,11 +1,12 @@
 """Whether what a calibration found can be true: signs of wrong data or of another robot."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.details import VariableDetails
 from truearm.errors import Notice
 from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
@@ -43,10 +44,10 @@ def doubts(
     ]
 
 
-def mounting(hyper: Mapping[str, Sequence[float]]) -> list[Notice]:
-    """A notice where the field takes another direction than the base's z axis for up."""
-    up = hyper["up"]
-    if tuple(up) == UPRIGHT:
+def mounting(variable: VariableDetails | None) -> list[Notice]:
+    """A notice where the field, if there is one, takes another direction than the base's z axis for up."""
+    up = UPRIGHT if variable is None else tuple(variable.hyper["up"])
+    if up == UPRIGHT:
         return []
     shown = ", ".join(f"{part:.2g}" for part in up)
     text = (

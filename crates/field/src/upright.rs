@@ -13,7 +13,7 @@ use crate::select::{Found, refine};
 use crate::training::Training;
 
 const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Directions beside the base's z axis: every one is within some 30 degrees of one of them, or of its opposite.
+/// Directions beside the base's z axis: any is within 36 degrees of z, of one of them or of an opposite.
 const DIRECTIONS: [[f64; 3]; 8] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
