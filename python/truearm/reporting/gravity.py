@@ -44,12 +44,12 @@ def sag(facts: Facts) -> Figure | None:
         max(_explained(_without(taken, _giving_way(facts, poses, way)), moved) for way in ways)
         for ways in ([up], _across(up))
     )
-    reach, height = _reach_mm(facts, poses), moved.reshape(-1, 3) @ up
+    reach, height = _reach_mm(facts, poses, up), moved.reshape(-1, 3) @ up
     _, middles, medians = running_median(reach, height, BINS, FEWEST)
     near, far = short(float(medians[0]), float(medians[-1]))
     return Figure(
         "Vertical deviation, beyond what constants can take over",
-        f"Its median is {near} mm close to the base's axis and {far} mm far out. Vertical levers of the "
+        f"Its median is {near} mm close to the base and {far} mm far out. Vertical levers of the "
         f"links about the joints would explain {percent(share)} of the variance of all three coordinates, "
         f"horizontal ones up to {percent(other)}. {_verdict(facts, moved, share, other)}.",
         [
@@ -57,7 +57,7 @@ def sag(facts: Facts) -> Figure | None:
             line(middles, medians, facts.best, line={"color": "@ink", "width": 2}),
         ],
         {
-            "xaxis": axis("distance from the base's z axis, mm"),
+            "xaxis": axis("distance from the vertical through the base, mm"),
             "yaxis": axis("vertical deviation, mm"),
         },
     )
@@ -144,10 +144,10 @@ def _links(facts: Facts) -> Iterator[Chain]:
         yield Chain(robot.convention, list(robot.joints[:count]), table, robot.base, np.eye(4))
 
 
-def _reach_mm(facts: Facts, poses: Floats) -> Floats:
-    """Distance of the measured point from the base's z axis (n,)."""
+def _reach_mm(facts: Facts, poses: Floats, up: Floats) -> Floats:
+    """Distance of the measured point from the vertical through the base's origin (n,)."""
     place = _chain(facts).position(facts.calibration.robot.joints_from_readings(poses))
-    return np.asarray(MM_PER_METRE * np.linalg.norm(place[:, :2], axis=1))
+    return np.asarray(MM_PER_METRE * np.linalg.norm(place - np.outer(place @ up, up), axis=1))
 
 
 def _explained(basis: Floats, moved: Floats) -> float:
