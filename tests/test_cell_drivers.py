@@ -163,7 +163,7 @@ def test_the_read_out_of_the_rv_m2_leads_back_to_the_joints(angles):
 def test_movemaster_numbers_read_back(values):
     read = movemaster.parse_numbers(movemaster.listed(values))
     assert read is not None
-    assert read.tolist() == values
+    assert list(read) == values
 
 
 @pytest.mark.parametrize("text", ["", "1,2,3,4,5", "+1.0,+2.0,+3.0,+4.0", "+1.0,+2.0,x3.0,+4.0,+5.0"])

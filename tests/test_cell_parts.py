@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from truearm._core import Chain
 from truearm.cell import ur_packets
 from truearm.cell.cell_file import ClearanceSection
-from truearm.cell.clearance import Clearance
+from truearm.cell.clearance import TOOL_MARGIN_M, Clearance
 from truearm.cell.framing import framed, unframed
 from truearm.cell.judge import Rules, judge
 from truearm.cell.line_port import LinePort
@@ -97,7 +98,7 @@ RULES = Rules(contacts=2, attempts=6, agree_m=0.4e-3, likely_m=4e-3)
 
 def readings(*points_mm):
     return [
-        Stored(k, point is not None, None if point is None else np.array([point, 0.0, 0.0]) / 1e3, 6e-5)
+        Stored(k, point is not None, None if point is None else (point / 1e3, 0.0, 0.0), 6e-5)
         for k, point in enumerate(points_mm, start=1)
     ]
 
@@ -145,15 +146,34 @@ def test_the_gap_between_link_and_column_is_that_of_the_nearest_points():
     sizes = ClearanceSection(link_radius_mm=10.0, column_radius_mm=10.0, column_mm=400.0)
     clearance = Clearance(arm, arm.tool, panel, sizes)
     stretched = np.array([[0.0, 0.0, -1e-9, 0.0, 0.0]])
-    places = clearance.places(stretched, np.eye(4))
-    links = places.links[0]
-    outermost = links[np.argmax(np.linalg.norm(links[:, :2], axis=1))]
-    middle = panel.axes[:, :2] @ (0.5 * panel.area_m)
-    above = outermost + np.array([0.0, 0.2, 0.1])
-    gap = clearance.gaps(places, (above - middle)[None])[0, 0]
+    last_link = Chain(arm.convention, list(arm.joints), arm.table, arm.base, np.eye(4))
+    outermost = last_link.position(stretched)[0]
+    beside, through = (outermost + np.array([0.0, y, 0.1]) - panel.middle_m for y in (0.2, 0.0))
+    gap = clearance.gaps(stretched, beside[None], np.eye(4))[0, 0]
     assert gap == pytest.approx(0.2 - 0.02, abs=2e-3)
-    through = clearance.gaps(places, (outermost + np.array([0.0, 0.0, 0.1]) - middle)[None])
-    assert through[0, 0] < 0.0
+    meeting = clearance.gaps(stretched, through[None], np.eye(4))[0, 0]
+    assert meeting < 0.0
+    assert clearance.meets(stretched[0], beside, np.eye(4)) is None
+    assert clearance.meets(stretched[0], through, np.eye(4)) == meeting
+
+
+def test_a_margin_is_that_of_the_nearest_places_on_both_ways():
+    arm, panel, sizes = Robot.load("rv-m2"), PanelSection().geometry(), ClearanceSection()
+    clearance = Clearance(arm, arm.tool, panel, sizes)
+    frame = np.eye(4)
+    frame[:3, 3] = [0.4, -0.25, -0.1]
+    stops = [np.radians(row) for row in ([0.0, 40.0, -60.0, -50.0, 0.0], [25.0, 50.0, -80.0, -40.0, 10.0])]
+    carriages = [np.array([0.5, 0.1, 0.05]), np.array([0.7, -0.1, 0.1])]
+    found = clearance.margin(stops, carriages, frame)
+    shares = [(a, b) for a in np.linspace(0.0, 1.0, 41) for b in np.linspace(0.0, 1.0, 41)]
+    readings, places = (
+        np.array([way[0] + share[k] * (way[1] - way[0]) for share in shares])
+        for k, way in enumerate((stops, carriages))
+    )
+    gaps = clearance.gaps(readings, places, frame).min(axis=0)
+    least = min(gaps[0] - 1e-3 * sizes.margin_mm, gaps[1] - TOOL_MARGIN_M)
+    assert least - 1e-9 <= found <= least + 5e-3
+    assert clearance.margin(stops[:1], carriages[:1], frame) >= found
 
 
 @pytest.mark.parametrize(
@@ -168,7 +188,7 @@ def test_the_gap_between_link_and_column_is_that_of_the_nearest_points():
 )
 def test_positions_as_movemaster_controllers_write_them(text, found):
     numbers = parse_numbers(text)
-    assert (None if numbers is None else numbers.tolist()) == found
+    assert (None if numbers is None else list(numbers)) == found
 
 
 def test_lines_that_come_may_end_in_any_way():

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 SPINE = ["truearm-kinematics", "truearm-estimate", "truearm-field", "truearm-compensate", "truearm-python"]
-BESIDE = ["truearm-text", "truearm-inverse"]
+BESIDE = ["truearm-text", "truearm-inverse", "truearm-clearance"]
 ABOVE = ["truearm-capi"]
 CRATES = [SPINE[0], *BESIDE, *SPINE[1:], *ABOVE]
 LONGEST_FILE = 500

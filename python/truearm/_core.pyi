@@ -140,6 +140,54 @@ class Inverse:
         """For each row whether the wrist is in front, the elbow up and the wrist flipped."""
 
 @final
+class Clearance:
+    """Gaps between an arm's links and tool and what a table carries, m; negative where they meet.
+
+    Links are capsules between the ends of their chains, the column is one too; of the tool, the points given
+    stay out of the plate. Rows are joint values (J,) of the arm, places (3,) of the carriage.
+
+    Raises:
+        CoreError: A shape does not fit, there is no row, a number is not finite, a step is not above 0.
+    """
+
+    def __init__(
+        self,
+        links: Sequence[Chain],
+        tool: Sequence[Chain],
+        column: tuple[Sequence[float], Sequence[float], float],
+        plate: tuple[Sequence[float], Sequence[Sequence[float]], Sequence[float], float],
+    ) -> None:
+        """Take over the sizes of both.
+
+        Args:
+            links: Base to the end of each link that has a length.
+            tool: Base to each point of the tool.
+            column: Its begin, seen from the carriage, and the way to its end (3,); its radius and a link's
+                together.
+            plate: Corner of the panel (3,), seen from the carriage; unit vectors of rows, of columns and out
+                of the face; its size along rows and columns; how far the plate reaches beyond.
+        """
+
+    def gaps(
+        self,
+        joints: NDArray[np.float64],
+        carriages: NDArray[np.float64],
+        table_from_base: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Gaps (n, 2) of links and tool, with arm (n, J) and carriage (n, 3) at one place after another."""
+
+    def least(
+        self,
+        arm: tuple[NDArray[np.float64], float],
+        table: tuple[NDArray[np.float64], float],
+        table_from_base: NDArray[np.float64],
+    ) -> tuple[float, float]:
+        """Least gap of the links and of the tool, however fast arm and carriage go along their ways.
+
+        Ways are straight between stops (s, J) and (p, 3); each comes with the step at which it is looked at.
+        """
+
+@final
 class MeasurementSet:
     """Measurements of n poses, as the estimators read them. SI units; NaN where nothing was measured.
 

@@ -8,6 +8,7 @@ use std::time::Duration;
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use truearm_clearance::ClearanceError;
 use truearm_compensate::CompensateError;
 use truearm_estimate::{Cancel, EstimateError};
 use truearm_field::FieldError;
@@ -39,6 +40,7 @@ impl Worded for EstimateError {}
 impl Worded for FieldError {}
 impl Worded for CompensateError {}
 impl Worded for InverseError {}
+impl Worded for ClearanceError {}
 impl Worded for TextError {}
 
 impl<E: Worded> Failure for E {

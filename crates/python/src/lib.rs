@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 mod blocks;
 mod chain;
 mod choice;
+mod clearance;
 mod cmac;
 mod compensate;
 mod conservative;
@@ -44,6 +45,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::Field>()?;
     module.add_class::<field::Posterior>()?;
     module.add_class::<inverse::Inverse>()?;
+    module.add_class::<clearance::Clearance>()?;
     module.add_function(wrap_pyfunction!(choice::choose_poses, module)?)?;
     module.add_function(wrap_pyfunction!(regions::regional_ceps, module)?)?;
     module.add_function(wrap_pyfunction!(regions::fill_without_data, module)?)?;

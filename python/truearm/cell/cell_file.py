@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -181,17 +182,23 @@ class Cell:
         """Nominal points of the target (n, 3) in the base frame, m, of readings (n, N)."""
         return np.asarray((self._flange(readings) @ self.flange_from_target)[:, :3, 3])
 
-    def target_in_base(self, readings: Floats) -> tuple[Floats, Floats]:
-        """Nominal target (3,) in the base frame, m, and direction of the tool there (3,), of readings (N,).
+    def target_seen_from(self, frame_from_base: Floats, readings: Floats) -> tuple[Floats, Floats]:
+        """Nominal target (3,), m, and direction of the tool there (3,) in a frame, of readings (N,).
 
         The direction is that from flange to target, or the flange's z where they coincide.
         """
         # Readings of a step are checked already, and this is on the way of every pose.
         base_from_flange = self.arm.flange_chain.pose((self.arm.coupling @ readings)[None])[0]
-        turn, lever = base_from_flange[:3, :3], self.flange_from_target[:3, 3]
+        columns = (frame_from_base @ base_from_flange @ self._target_in_flange).T
+        return columns[0, :3], columns[1, :3]
+
+    @cached_property
+    def _target_in_flange(self) -> Floats:
+        """Columns (4, 2) of the target, a point, and of the tool's direction there."""
+        lever = self.flange_from_target[:3, 3]
         length = math.hypot(*lever)
         along = lever / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-        return base_from_flange[:3, 3] + turn @ lever, turn @ along
+        return np.array([[*lever, 1.0], [*along, 0.0]]).T
 
     def _flange(self, readings: Floats) -> Floats:
         return self.arm.flange_chain.pose(self.arm.joints_from_readings(readings))

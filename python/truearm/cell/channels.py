@@ -5,142 +5,126 @@ import os
 import select
 import socket
 import termios
-from typing import Final, Protocol
+import time
+from typing import Final
 
 import serial
 
 from truearm.cell.device_errors import PortUnavailableError
 
-# What pyserial raises; TypeError where the port was closed in the middle of a call.
-SERIAL_ERRORS: Final = (serial.SerialException, OSError, TypeError, termios.error)
+# What pyserial raises where a port cannot be opened.
+SERIAL_ERRORS: Final = (serial.SerialException, OSError, termios.error)
 
 # The longest a read waits before it looks whether the call was stopped.
 SLICE_S: Final = 0.02
 CHUNK: Final = 65536
+# No descriptor.
+CLOSED: Final = -1
 
 
 class ConnectionEndedError(OSError):
     """The other side has gone."""
 
 
-class Channel(Protocol):
-    """An open connection."""
+class Channel:
+    """An open connection, a serial port or a TCP one: what has come, and what is sent, as bytes."""
+
+    def __init__(self, port: serial.Serial | socket.socket, limit_s: float, *, ended: str) -> None:
+        """Take over a port that does not block; `ended` says what it means when it gives nothing."""
+        self._port, self._limit_s, self._ended = port, limit_s, ended
+        self._number = port.fileno()
 
     def read(self, *, wait: bool = True) -> bytes:
-        """What has come, after waiting a slice at most, or not at all; empty where nothing has."""
+        """What has come, after waiting a slice at most, or not at all; empty where nothing has.
+
+        Raises:
+            ConnectionEndedError: If the other side has gone, or the connection was closed.
+        """
+        try:
+            if not select.select([self._number], [], [], SLICE_S if wait else 0.0)[0]:
+                return b""
+            data = os.read(self._number, CHUNK)
+        except BlockingIOError:
+            return b""
+        except (OSError, ValueError) as error:  # ValueError: closed in mid-wait
+            raise _ended(error) from None
+        if not data:
+            raise ConnectionEndedError(self._ended)
+        return data
 
     def write(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all of it.
+
+        Raises:
+            ConnectionEndedError: If the other side has gone, or does not take it within the limit.
+        """
+        until = time.monotonic() + self._limit_s
+        while data:
+            try:
+                data = data[os.write(self._number, data) :]
+            except BlockingIOError:
+                self._wait_to_write(until)
+            except OSError as error:
+                raise _ended(error) from None
+
+    def _wait_to_write(self, until: float) -> None:
+        try:
+            if select.select([], [self._number], [], max(0.0, until - time.monotonic()))[1]:
+                return
+        except (OSError, ValueError) as error:  # ValueError: closed in mid-wait
+            raise _ended(error) from None
+        raise ConnectionEndedError(f"it could not be sent within {self._limit_s:g} s")
 
     def close(self) -> None:
         """End the connection."""
-
-
-class SerialChannel:
-    """A serial port or a pseudo-terminal, for this process alone."""
-
-    def __init__(self, device: str, port: str, baud: int, limit_s: float, *, frame: str = "8N1") -> None:
-        """Open it; `frame` gives bits, parity and stop bits as in "8N1" or "8E2".
-
-        Raises:
-            PortUnavailableError: If there is no such port, somebody else has it, or it may not be opened.
-        """
-        bits, parity, stops = int(frame[0]), frame[1], int(frame[2])
-        try:
-            self._port = serial.Serial(
-                port,
-                baud,
-                bytesize=bits,
-                parity=parity,
-                stopbits=stops,
-                timeout=SLICE_S,
-                write_timeout=limit_s,
-                exclusive=True,
-            )
-        except SERIAL_ERRORS as error:
-            raise _unavailable(device, port, error, limit_s) from None
-        self._limit_s = limit_s
-
-    def read(self, *, wait: bool = True) -> bytes:
-        """See Channel."""
-        try:
-            number = self._port.fileno()
-            if not select.select([number], [], [], SLICE_S if wait else 0.0)[0]:
-                return b""
-            data = os.read(number, CHUNK)
-        except (*SERIAL_ERRORS, ValueError) as error:  # ValueError: closed in mid-wait
-            raise ConnectionEndedError(str(error)) from None
-        if not data:
-            raise ConnectionEndedError("the port is gone")
-        return data
-
-    def write(self, data: bytes) -> None:
-        """See Channel. What the port does not take within its limit ends the connection."""
-        try:
-            number = self._port.fileno()
-            while len(data) > (sent := _sent(number, data)):
-                data = data[sent:]
-                if not select.select([], [number], [], self._limit_s)[1]:
-                    raise ConnectionEndedError(f"nothing could be sent within {self._limit_s:g} s")
-        except (*SERIAL_ERRORS, ValueError) as error:
-            raise ConnectionEndedError(str(error)) from None
-
-    def close(self) -> None:
-        """See Channel."""
+        self._number = CLOSED
         self._port.close()
 
 
-class TcpChannel:
-    """A TCP connection."""
+def open_serial(device: str, port: str, baud: int, limit_s: float, *, frame: str = "8N1") -> Channel:
+    """A serial port or a pseudo-terminal, for this process alone.
 
-    def __init__(self, device: str, host: str, port: int, limit_s: float) -> None:
-        """Connect.
+    Args:
+        device: What people call the device.
+        port: Its name.
+        baud: Bits a second.
+        limit_s: How long the port may take to take what is sent.
+        frame: Bits, parity and stop bits as in "8N1" or "8E2".
 
-        Raises:
-            PortUnavailableError: If nobody listens there, or not within the limit.
-        """
-        place = f"tcp://{host}:{port}"
-        try:
-            self._socket = socket.create_connection((host, port), timeout=limit_s)
-        except TimeoutError:
-            raise PortUnavailableError(
-                f"no connection within {limit_s:g} s", where=f"{device} at {place}"
-            ) from None
-        except OSError as error:
-            raise PortUnavailableError(
-                f"no connection: {error.strerror or error} (limit {limit_s:g} s)",
-                where=f"{device} at {place}",
-                way_out="Check that the device is on and listens at this port",
-            ) from None
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket.settimeout(SLICE_S)
+    Raises:
+        PortUnavailableError: If there is no such port, somebody else has it, or it may not be opened.
+    """
+    bits, parity, stops = int(frame[0]), frame[1], int(frame[2])
+    try:
+        opened = serial.Serial(port, baud, bytesize=bits, parity=parity, stopbits=stops, exclusive=True)
+    except SERIAL_ERRORS as error:
+        raise _unavailable(device, port, error, limit_s) from None
+    os.set_blocking(opened.fileno(), False)
+    return Channel(opened, limit_s, ended="the port is gone")
 
-    def read(self, *, wait: bool = True) -> bytes:
-        """See Channel."""
-        try:
-            if not (wait or select.select([self._socket], [], [], 0.0)[0]):
-                return b""
-            data = self._socket.recv(CHUNK)
-        except TimeoutError:
-            return b""
-        except ValueError:  # closed in mid-read
-            raise ConnectionEndedError("it was closed") from None
-        except OSError as error:
-            raise ConnectionEndedError(error.strerror or str(error)) from None
-        if not data:
-            raise ConnectionEndedError("the other side closed it")
-        return data
 
-    def write(self, data: bytes) -> None:
-        """See Channel."""
-        try:
-            self._socket.sendall(data)
-        except OSError as error:
-            raise ConnectionEndedError(error.strerror or str(error)) from None
+def open_tcp(device: str, host: str, port: int, limit_s: float) -> Channel:
+    """A TCP connection.
 
-    def close(self) -> None:
-        """See Channel."""
-        self._socket.close()
+    Raises:
+        PortUnavailableError: If nobody listens there, or not within the limit.
+    """
+    place = f"tcp://{host}:{port}"
+    try:
+        opened = socket.create_connection((host, port), timeout=limit_s)
+    except TimeoutError:
+        raise PortUnavailableError(
+            f"no connection within {limit_s:g} s", where=f"{device} at {place}"
+        ) from None
+    except OSError as error:
+        raise PortUnavailableError(
+            f"no connection: {error.strerror or error} (limit {limit_s:g} s)",
+            where=f"{device} at {place}",
+            way_out="Check that the device is on and listens at this port",
+        ) from None
+    opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    opened.setblocking(False)
+    return Channel(opened, limit_s, ended="the other side closed it")
 
 
 def open_channel(
@@ -153,16 +137,12 @@ def open_channel(
     """
     if address.startswith("tcp://"):
         host, _, port = address.removeprefix("tcp://").rpartition(":")
-        return TcpChannel(device, host, int(port), limit_s)
-    return SerialChannel(device, address, baud, limit_s, frame=frame)
+        return open_tcp(device, host, int(port), limit_s)
+    return open_serial(device, address, baud, limit_s, frame=frame)
 
 
-def _sent(number: int, data: bytes) -> int:
-    """How much of `data` a descriptor that does not block took at once."""
-    try:
-        return os.write(number, data)
-    except BlockingIOError:
-        return 0
+def _ended(error: Exception) -> ConnectionEndedError:
+    return ConnectionEndedError(getattr(error, "strerror", None) or str(error))
 
 
 def _unavailable(device: str, port: str, error: Exception, limit_s: float) -> PortUnavailableError:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
 from truearm.cell.device_errors import DeviceError, RefusedError
-from truearm.cell.paths import Paths
 from truearm.cell.reading import Expected
 from truearm.cell.table_panel import TablePanel
 
@@ -72,15 +71,18 @@ class Crew:
         carriage, here = table.carriage, self._here
         if carriage is None or here is None or world_from_base is None:
             raise RefusedError("where arm and table are is not known", where="the cell")
-        paths = Paths(self._clearance_of(table), world_from_base, expected.radius_m)
-        end, direct = table.carriage_for(expected), paths.along([here, *way])
+        end = table.carriage_for(expected)
+
+        def apart(arm: list[Floats], carriages: list[Floats]) -> bool:
+            return clearance.margin(arm, carriages, world_from_base) > expected.radius_m
+
+        clearance = self._clearance_of(table)
         for first, over in self._detours(table, way, carriage, end):
-            arm = direct if first is way else paths.along([here, *first])
-            together, down, up = paths.margins(arm, [[carriage, end], [carriage, *over], [over[-1], end]])
-            if self._cell.file.process.together and together.min() > 0.0:
+            arm, low = [here, *first], over[-1]
+            if self._cell.file.process.together and apart(arm, [carriage, end]):
                 self._together(first, expected)
                 return
-            if min(down[0].min(), up[:, 0].min(), up[-1].min()) > 0.0:
+            if apart([here], [carriage, *over]) and apart(arm, [low]) and apart([first[-1]], [low, end]):
                 for place in over:
                     table.go_to(place)
                 self._along(first)

@@ -8,10 +8,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.session import Stored
+from truearm.cell.session import Point, Stored
 
 Floats = NDArray[np.float64]
-Point = tuple[float, ...]
 
 REPEATS_WHEN_SUSPICIOUS: Final = 1
 
@@ -25,12 +24,14 @@ class Verdict:
         attempts: The accepted readings, by attempt.
         reason: Why again, or why it is given up.
         suspicious: Whether the readings agree with each other but not with the prediction.
+        off_m: How far the mean of those that agree is from the prediction; infinite where none is valid.
     """
 
     decision: Literal["again", "accept", "give up"]
     attempts: tuple[int, ...] = ()
     reason: str = ""
     suspicious: bool = False
+    off_m: float = math.inf
 
 
 NOTHING_YET: Final = Verdict("again")
@@ -63,22 +64,21 @@ def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict
     if not readings:
         return NOTHING_YET
     valid = [(reading, reading.point) for reading in readings if reading.valid and reading.point is not None]
-    points = [tuple(point.tolist()) for _, point in valid]
+    points = [point for _, point in valid]
     agreeing = _largest_cluster(points, rules.agree_m)
-    far = (
-        bool(agreeing)
-        and math.dist(mean_point([points[k] for k in agreeing]), expected.tolist()) > rules.likely_m
-    )
+    mean = mean_point([points[k] for k in agreeing]) if agreeing else None
+    off_m = math.inf if mean is None else math.dist(mean, expected.tolist())
+    far = mean is not None and off_m > rules.likely_m
     needed = rules.contacts + (REPEATS_WHEN_SUSPICIOUS if far else 0)
     if len(agreeing) >= needed and 2 * len(agreeing) > len(points):
-        return Verdict("accept", tuple(valid[k][0].attempt for k in agreeing), suspicious=far)
+        return Verdict("accept", tuple(valid[k][0].attempt for k in agreeing), "", far, off_m)
     reason = _reason(len(readings), len(points), len(agreeing), far=far)
-    return Verdict("again" if len(readings) < rules.attempts else "give up", (), reason, far)
+    return Verdict("again" if len(readings) < rules.attempts else "give up", (), reason, far, off_m)
 
 
 def mean_point(points: Sequence[Point]) -> Point:
     """The mean of points."""
-    return tuple(math.fsum(column) / len(points) for column in zip(*points, strict=True))
+    return tuple([math.fsum(column) / len(points) for column in zip(*points, strict=True)])
 
 
 def _largest_cluster(points: Sequence[Point], within: float) -> list[int]:

@@ -1,6 +1,5 @@
 """Lines to and from a device, with time limits, and a way to end a wait from another thread."""
 
-import re
 import threading
 import time
 from collections import deque
@@ -13,8 +12,7 @@ from truearm.cell.device_errors import DeviceError, gone, silent, stopped
 from truearm.cell.schema import Frame, Positive, Section
 
 LONGEST_LINE: Final = 65536
-# Devices end lines as they like, and not always as they want them ended: an empty line means nothing.
-ENDS: Final = re.compile(rb"[\r\n]")
+ENDS: Final = (b"\r", b"\n")
 TERMINATORS: Final = {"lf": b"\n", "cr": b"\r", "crlf": b"\r\n"}
 
 
@@ -209,11 +207,10 @@ class LinePort:
             raise gone(self.device, self.address, str(error)) from None
         if not data:
             return False
-        *lines, rest = ENDS.split(self._rest + data)
-        self._rest = rest[-LONGEST_LINE:] if rest else rest
-        for line in lines:
-            if line:
-                self._lines.append(line.decode("ascii", "replace"))
+        # Devices end lines as they like, and not always as they want them ended: an empty line means nothing.
+        lines = (self._rest + data).splitlines()
+        self._rest = b"" if data.endswith(ENDS) else lines.pop()[-LONGEST_LINE:]
+        self._lines.extend([line.decode("ascii", "replace") for line in lines if line])
         return True
 
     def _open_channel(self) -> Channel:

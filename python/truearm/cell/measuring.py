@@ -14,7 +14,7 @@ from truearm.cell.accepted import points_and_joints, points_of_last_check
 from truearm.cell.cell_file import Cell
 from truearm.cell.crew import Crew
 from truearm.cell.device_errors import DeviceError, PortUnavailableError, RefusedError, StoppedError
-from truearm.cell.judge import Rules, Verdict, judge, mean_point
+from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.registering import register_cell
@@ -136,7 +136,7 @@ class Process:
             verdict = judge(readings, point, rules)
             self._keep(step, reading, joints, point, verdict, len(readings))
             placed = reading.valid and not verdict.suspicious
-        self._tell(step, readings, verdict, point)
+        self._tell(step, verdict)
         return verdict.decision == "accept"
 
     def _known_of(self, step: Step) -> list[Stored]:
@@ -271,13 +271,12 @@ class Process:
                 way_out="Find what moves; then measure the rest as a new session: a set-up of its own",
             )
 
-    def _tell(self, step: Step, readings: list[Stored], verdict: Verdict, expected: Floats) -> None:
+    def _tell(self, step: Step, verdict: Verdict) -> None:
         self._done = step.step + 1
         if verdict.decision == "give up":
             self._say(f"{step.kind} {step.pose + 1} skipped: {verdict.reason}")
             return
-        points = [r.point.tolist() for r in readings if r.attempt in verdict.attempts and r.point is not None]
-        residual_mm = MM_PER_METRE * math.dist(mean_point(points), expected.tolist())
+        residual_mm = MM_PER_METRE * verdict.off_m
         self._say(f"{step.kind} {step.pose + 1} stored, {residual_mm:.3f} mm from the prediction")
 
     def _say(self, text: str) -> None:
@@ -287,4 +286,5 @@ class Process:
 
 
 def _stored(attempt: int, reading: Reading) -> Stored:
-    return Stored(attempt, reading.valid, reading.point_in_world, reading.sigma_m)
+    point = None if reading.point_in_world is None else tuple(reading.point_in_world.tolist())
+    return Stored(attempt, reading.valid, point, reading.sigma_m)

@@ -66,18 +66,18 @@ def listed(values: Sequence[int] | Tenths) -> str:
     return ",".join(f"{value / 10:+.1f}" for value in np.asarray(values).tolist())
 
 
-def parse_numbers(text: str) -> Tenths | None:
+def parse_numbers(text: str) -> tuple[int, ...] | None:
     """Five numbers with one decimal as whole tenths; None if the text is anything else."""
     if NUMBERS.fullmatch(text) is None:
         return None
-    return np.rint([10.0 * float(part) for part in text.split(",")]).astype(np.int64)
+    return tuple([round(10.0 * float(part)) for part in text.split(",")])
 
 
 def whereabouts(arm: Robot, readings: Floats) -> Floats:
     """Position x, y, z in mm and angles p, r in deg (5,) that the controller computes, not yet rounded."""
-    point = _point(arm, readings) * MM_PER_METRE
-    degrees = np.asarray(readings) / RADIANS_PER_DEGREE
-    return np.array([*point, degrees[1:4].sum(), degrees[4]])
+    point = (_point(arm, readings) * MM_PER_METRE).tolist()
+    degrees = (readings / RADIANS_PER_DEGREE).tolist()
+    return np.array([*point, sum(degrees[1:4]), degrees[4]])
 
 
 def readings_near(arm: Robot, where: Floats, seed: Floats) -> Floats | None:

@@ -67,8 +67,12 @@ class Panel:
 
     def carriage_under(self, point: Floats, standoff_m: float) -> Floats:
         """Where the carriage (3,) has to be for its middle to be `standoff_m` before a point (3,)."""
-        middle = self.axes[:, :2] @ (0.5 * self.area_m)
-        return np.asarray(point - self.offset_m - middle - standoff_m * self.normal)
+        return np.asarray(point - self.middle_m - standoff_m * self.normal)
+
+    @cached_property
+    def middle_m(self) -> Floats:
+        """From the carriage to the middle of the effective area (3,)."""
+        return np.asarray(self.offset_m + self.axes[:, :2] @ (0.5 * self.area_m))
 
     def holds(self, seen: Floats, margin_m: float = 0.0) -> bool:
         """Whether a point as seen by the panel lies over its effective area."""

@@ -58,11 +58,11 @@ class Prediction:
 
     def expected(self, step: Step) -> Expected:
         """What the sensor is prepared for; where nothing is known, the middle of nowhere with no bound."""
-        nominal, direction = self._cell.target_in_base(step.readings)
         if self.world_from_base is None:
+            direction = self._cell.target_seen_from(np.eye(4), step.readings)[1]
             return Expected(step.readings, np.zeros(3), np.inf, direction)
-        turn, shift = self.world_from_base[:3, :3], self.world_from_base[:3, 3]
-        return Expected(step.readings, turn @ nominal + shift, self.radius_m, turn @ direction)
+        point, direction = self._cell.target_seen_from(self.world_from_base, step.readings)
+        return Expected(step.readings, point, self.radius_m, direction)
 
     def point(self, expected: Expected) -> Floats:
         """The point (3,) by which a reading is judged."""

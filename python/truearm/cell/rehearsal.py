@@ -66,8 +66,7 @@ def problem_of(cell: Cell, prediction: Prediction, step: Step) -> str:
     except RefusedError as error:
         return f"{error.what}. {error.rule}"
     clearance = Clearance(cell.arm, cell.flange_from_target, cell.sensor.panel, cell.file.clearance)
-    places = clearance.places(step.readings[None], prediction.world_from_base)
-    gap = float(clearance.gaps(places, carriage[None])[0, 0])
-    if gap < clearance.margin_m:
+    gap = clearance.meets(step.readings, carriage, prediction.world_from_base)
+    if gap is not None:
         return f"link and table come within {MM_PER_METRE * gap:.0f} mm"
     return ""

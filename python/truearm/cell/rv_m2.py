@@ -166,8 +166,9 @@ class RvM2:
         before = self._known_count()
         way = _apart(target, before)
         share = min(1.0, self._leg / _longest(way))
-        step = tuple(round(share * each) for each in way)
-        there, beyond = (tuple(b + n * s for b, s in zip(before, step, strict=True)) for n in (1, 2))
+        step = tuple([round(share * each) for each in way])
+        there = _beyond(before, step)
+        beyond = _beyond(there, step)
         self._port.send(f"MJ {movemaster.listed(step)}")
         self._count, self._guesses = None, [there, before, beyond]
         self._seen_at = -math.inf
@@ -217,13 +218,12 @@ class RvM2:
         self._port.drain()
         self._port.send("WH")
         try:
-            numbers = movemaster.parse_numbers(self._port.receive(limit_s, doing="say where it is"))
+            return movemaster.parse_numbers(self._port.receive(limit_s, doing="say where it is"))
         except DeviceSilentError:
             self._silences += 1
             if self._silences >= TRIES // 2:
                 raise
             return None
-        return None if numbers is None else tuple(numbers.tolist())
 
     def _recognised(self, seen: Tenths, guesses: list[Tenths]) -> Tenths | None:
         for guess in guesses:
@@ -237,7 +237,7 @@ class RvM2:
 
     def _fits(self, seen: Tenths, count: Tenths) -> bool:
         nominal = movemaster.whereabouts(self._arm, readings_of(count)).tolist()
-        fits = all(abs(a - 0.1 * b) <= READOUT_TOLERANCE for a, b in zip(nominal, seen, strict=True))
+        fits = max([abs(a - 0.1 * b) for a, b in zip(nominal, seen, strict=True)]) <= READOUT_TOLERANCE
         if fits:
             self._silences, self._seen_at = 0, time.monotonic()
         return fits
@@ -275,7 +275,11 @@ def _count_of(readings: Floats) -> Tenths:
 
 
 def _apart(target: Tenths, start: Tenths) -> Tenths:
-    return tuple(to - at for to, at in zip(target, start, strict=True))
+    return tuple([to - at for to, at in zip(target, start, strict=True)])
+
+
+def _beyond(start: Tenths, step: Tenths) -> Tenths:
+    return tuple([at + by for at, by in zip(start, step, strict=True)])
 
 
 def _longest(way: Tenths) -> int:

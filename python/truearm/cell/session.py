@@ -23,6 +23,7 @@ from truearm.errors import InputError, WorkError
 from truearm.rotations import quaternion_from_matrix
 
 Floats = NDArray[np.float64]
+Point = tuple[float, ...]
 
 ADD_READING: Final = "INSERT INTO readings VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)"
 STEPS_LEFT: Final = (
@@ -47,11 +48,11 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """A reading of a step as it is in the file: the attempt, from 1, and its point (3,) if there is one."""
+    """A reading of a step as it is in the file: the attempt, from 1, and its point, m, if there is one."""
 
     attempt: int
     valid: bool
-    point: Floats | None
+    point: Point | None
     sigma_m: float
 
 
@@ -249,8 +250,8 @@ class Session:
             )
 
 
-def _point(values: Sequence[float | None]) -> Floats | None:
-    return None if values[0] is None else np.array(values)
+def _point(values: tuple[Any, ...]) -> Point | None:
+    return None if values[0] is None else values
 
 
 def _listed(values: Floats) -> str:

@@ -88,6 +88,7 @@ class TablePanel:
         del arm
         self._settings, self.panel = settings, settings.panel.geometry()
         self.ranges_m = to_si(np.array(settings.ranges_mm), "mm")
+        self._most_m = self.ranges_m.tolist()
         self._port = LinePort.of(self.name, settings)
         self._number = 0
         self._travel_m = 0.0
@@ -140,8 +141,8 @@ class TablePanel:
                 rule=f"At least {np.degrees(panel.least_angle_rad):g} deg are needed",
             )
         carriage = panel.carriage_under(expected.point_in_world, standoff)
-        ends = np.array([carriage, carriage + (standoff + expected.radius_m) * panel.normal])
-        if (ends < 0.0).any() or (ends > self.ranges_m).any():
+        touching = carriage + (standoff + expected.radius_m) * panel.normal
+        if not (self._holds(carriage) and self._holds(touching)):
             place = ", ".join(f"{MM_PER_METRE * value:.0f}" for value in carriage)
             raise RefusedError(
                 f"the carriage would have to be at {place} mm",
@@ -149,6 +150,10 @@ class TablePanel:
                 rule=f"It moves from 0, 0, 0 to {self._settings.ranges_mm} mm",
             )
         return carriage
+
+    def _holds(self, carriage: Floats) -> bool:
+        """Whether a place (3,) is within the table's ranges; plain numbers are quicker for so few."""
+        return all(0.0 <= at <= most for at, most in zip(carriage.tolist(), self._most_m, strict=True))
 
     def prepare(self, expected: Expected) -> None:
         """See Sensor. The panel waits under the point, out of reach of what is expected."""
@@ -188,7 +193,8 @@ class TablePanel:
 
     def lowered(self, carriage: Floats, depth_m: float) -> Floats:
         """Where the carriage (3,) is when it goes back by `depth_m` from a place (3,), as far as it can."""
-        return np.asarray(np.clip(carriage - depth_m * self.panel.normal, 0.0, self.ranges_m))
+        back = carriage - depth_m * self.panel.normal
+        return np.asarray(np.minimum(np.maximum(back, 0.0), self.ranges_m))
 
     @property
     def carriage(self) -> Floats | None:

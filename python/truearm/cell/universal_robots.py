@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from truearm.cell import ur_packets
-from truearm.cell.channels import Channel, ConnectionEndedError, TcpChannel
+from truearm.cell.channels import Channel, ConnectionEndedError, open_tcp
 from truearm.cell.device_errors import (
     DeviceError,
     DeviceRestartedError,
@@ -78,7 +78,7 @@ class UniversalRobots:
         self._script.open()
         try:
             host, port, limit = self._settings.host, self._settings.realtime_port, self._settings.timeout_s
-            self._stream = _Stream(self.name, self.address, TcpChannel(self.name, host, port, limit), limit)
+            self._stream = _Stream(self.name, self.address, open_tcp(self.name, host, port, limit), limit)
             self._state()
         except BaseException:
             self.close()

@@ -110,13 +110,12 @@ class VirtualRvM2:
 
     def _target(self, word: str, numbers: str, at: Floats) -> Floats | None:
         """Readings that MJ or MP leads to; None if it cannot be done."""
-        values = movemaster.parse_numbers(numbers)
-        if values is None or word not in ("MJ", "MP"):
+        parsed = movemaster.parse_numbers(numbers)
+        if parsed is None or word not in ("MJ", "MP"):
             return None
+        values = np.array(parsed)
         target = (
-            at + TENTH * values
-            if word == "MJ"
-            else movemaster.readings_near(self._arm, np.asarray(0.1 * values), at)
+            at + TENTH * values if word == "MJ" else movemaster.readings_near(self._arm, 0.1 * values, at)
         )
         low, high = self._arm.limits.T
         if target is None or (target < low - 1e-9).any() or (target > high + 1e-9).any():

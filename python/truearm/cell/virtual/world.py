@@ -79,7 +79,7 @@ class World:
             0
         ]
         point = self.world_from_base @ base_from_target[:, 3]
-        return point[:3], self.world_from_base[:3, :3] @ self.cell.target_in_base(q[0])[1]
+        return point[:3], self.cell.target_seen_from(self.world_from_base, q[0])[1]
 
     def touch(self, travel_m: float, now: float) -> Touch | None:
         """Bring the panel up by `travel_m` at the most; None if it feels nothing."""
@@ -118,12 +118,9 @@ class World:
         readings, carriages = (
             np.array([mover.at(moment) for moment in moments]) for mover in (self.arm, self.table)
         )
-        places = self.clearance.places(readings, self.world_from_base)
-        for gaps in (self.clearance.gaps, self.clearance.tool_gaps):
-            if np.diag(gaps(places, carriages)).min() < 0.0:
-                self.shared.count(COLLISIONS)
-                self.emergency_stop(now)
-                return
+        if self.clearance.gaps(readings, carriages, self.world_from_base).min() < 0.0:
+            self.shared.count(COLLISIONS)
+            self.emergency_stop(now)
 
     def emergency_stop(self, now: float) -> None:
         """All that moves stands still, and nothing moves again."""

@@ -1,0 +1,46 @@
+//! Gaps between the arm and what the table carries.
+
+use crate::arm::Place;
+use crate::table::{Column, Plate};
+
+/// Distances to the nearest things, metres; negative where they meet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gaps {
+    /// Between links and column.
+    pub links: f64,
+    /// Between tool and plate.
+    pub tool: f64,
+}
+
+impl Gaps {
+    /// Of nothing at all.
+    const NONE: Gaps = Gaps { links: f64::INFINITY, tool: f64::INFINITY };
+
+    fn or_less(self, other: Gaps) -> Gaps {
+        Gaps { links: self.links.min(other.links), tool: self.tool.min(other.tool) }
+    }
+}
+
+/// What the table carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clearance {
+    /// Behind the panel.
+    pub column: Column,
+    /// Around the panel.
+    pub plate: Plate,
+}
+
+impl Clearance {
+    /// The least gaps with the arm and the carriage at their places.
+    pub fn gaps(&self, arm: &Place, carriage: [f64; 3]) -> Gaps {
+        let links = arm.links.windows(2).map(|link| self.column.gap([link[0], link[1]], carriage));
+        let tool = arm.tool.iter().map(|&point| self.plate.gap(point, carriage));
+        Gaps { links: links.fold(f64::INFINITY, f64::min), tool: tool.fold(f64::INFINITY, f64::min) }
+    }
+
+    /// The least gaps over all combinations of places of the one and of the other.
+    pub fn least(&self, arm: &[Place], carriages: &[[f64; 3]]) -> Gaps {
+        let all = arm.iter().flat_map(|place| carriages.iter().map(|&carriage| self.gaps(place, carriage)));
+        all.fold(Gaps::NONE, Gaps::or_less)
+    }
+}

@@ -1,0 +1,48 @@
+//! What can be wrong with an arm, or with a way that is asked about.
+
+use thiserror::Error;
+use truearm_kinematics::KinematicsError;
+
+/// Why gaps could not be told.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ClearanceError {
+    /// A chain, or joint values.
+    #[error(transparent)]
+    Kinematics(#[from] KinematicsError),
+    /// An arm with more joints before a link than in all.
+    #[error("a link has {joints} joints before it, the arm has {all}")]
+    Joints {
+        /// Of the link.
+        joints: usize,
+        /// Of the arm.
+        all: usize,
+    },
+    /// Numbers that do not fill rows.
+    #[error("{got} numbers were given, they must fill rows of {width}, one at least")]
+    Rows {
+        /// How many numbers.
+        got: usize,
+        /// How many a row has.
+        width: usize,
+    },
+    /// Rows of another width.
+    #[error("a place has {got} numbers, it must have {wanted}")]
+    Width {
+        /// How many a row has.
+        got: usize,
+        /// How many it should have.
+        wanted: usize,
+    },
+    /// A number that is NaN or infinite.
+    #[error("a place holds {value}, all its numbers must be finite")]
+    NotFinite {
+        /// The number.
+        value: f64,
+    },
+    /// A step of a way.
+    #[error("the step is {value}, it must be above 0")]
+    Step {
+        /// The step.
+        value: f64,
+    },
+}

@@ -1,0 +1,45 @@
+//! What the table carries: the column behind the panel, and the plate around it, seen from the carriage.
+
+use crate::segment::{distance, dot, minus, plus};
+
+/// The column that carries the panel, as a capsule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Column {
+    /// Where it begins, from the carriage.
+    pub top: [f64; 3],
+    /// From there to its end; it has a length.
+    pub down: [f64; 3],
+    /// Its radius and that of a link together.
+    pub radius: f64,
+}
+
+impl Column {
+    /// From a link to the column of a carriage at a place; negative where they meet.
+    pub fn gap(&self, link: [[f64; 3]; 2], carriage: [f64; 3]) -> f64 {
+        let [begin, end] = link;
+        distance(begin, minus(end, begin), plus(carriage, self.top), self.down) - self.radius
+    }
+}
+
+/// The plate around the panel: flat, and as deep as one likes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plate {
+    /// From the carriage to the corner of the panel.
+    pub corner: [f64; 3],
+    /// Unit vectors of rows, of columns, and out of the face.
+    pub axes: [[f64; 3]; 3],
+    /// Size of the panel along rows and columns.
+    pub area: [f64; 2],
+    /// How far the plate reaches beyond the panel.
+    pub rim: f64,
+}
+
+impl Plate {
+    /// From a point to the plate of a carriage at a place; negative below its face.
+    pub fn gap(&self, point: [f64; 3], carriage: [f64; 3]) -> f64 {
+        let from_corner = minus(point, plus(carriage, self.corner));
+        let [u, v, above] = self.axes.map(|axis| dot(axis, from_corner));
+        let beside = |at: f64, size: f64| (-self.rim - at).max(at - size - self.rim);
+        above.max(beside(u, self.area[0])).max(beside(v, self.area[1]))
+    }
+}
