@@ -164,7 +164,7 @@ def test_a_margin_is_that_of_the_nearest_places_on_both_ways():
     frame[:3, 3] = [0.4, -0.25, -0.1]
     stops = [np.radians(row) for row in ([0.0, 40.0, -60.0, -50.0, 0.0], [25.0, 50.0, -80.0, -40.0, 10.0])]
     carriages = [np.array([0.5, 0.1, 0.05]), np.array([0.7, -0.1, 0.1])]
-    found = clearance.margin(stops, carriages, frame)
+    found = clearance.margin(np.array(stops), np.array(carriages), frame)
     shares = [(a, b) for a in np.linspace(0.0, 1.0, 41) for b in np.linspace(0.0, 1.0, 41)]
     readings, places = (
         np.array([way[0] + share[k] * (way[1] - way[0]) for share in shares])
@@ -173,7 +173,7 @@ def test_a_margin_is_that_of_the_nearest_places_on_both_ways():
     gaps = clearance.gaps(readings, places, frame).min(axis=0)
     least = min(gaps[0] - 1e-3 * sizes.margin_mm, gaps[1] - TOOL_MARGIN_M)
     assert least - 1e-9 <= found <= least + 5e-3
-    assert clearance.margin(stops[:1], carriages[:1], frame) >= found
+    assert clearance.margin(np.array(stops[:1]), np.array(carriages[:1]), frame) >= found
 
 
 @pytest.mark.parametrize(

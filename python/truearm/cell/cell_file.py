@@ -188,7 +188,7 @@ class Cell:
         The direction is that from flange to target, or the flange's z where they coincide.
         """
         # Readings of a step are checked already, and this is on the way of every pose.
-        base_from_flange = self.arm.flange_chain.pose((self.arm.coupling @ readings)[None])[0]
+        base_from_flange = self.arm.flange_chain.pose(self.arm.values_of(readings[None]))[0]
         columns = (frame_from_base @ base_from_flange @ self._target_in_flange).T
         return columns[0, :3], columns[1, :3]
 

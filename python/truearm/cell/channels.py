@@ -17,7 +17,7 @@ SERIAL_ERRORS: Final = (serial.SerialException, OSError, termios.error)
 
 # The longest a read waits before it looks whether the call was stopped.
 SLICE_S: Final = 0.02
-CHUNK: Final = 65536
+CHUNK: Final = 4096
 # No descriptor.
 CLOSED: Final = -1
 
@@ -58,11 +58,12 @@ class Channel:
         Raises:
             ConnectionEndedError: If the other side has gone, or does not take it within the limit.
         """
-        until = time.monotonic() + self._limit_s
+        until = None
         while data:
             try:
                 data = data[os.write(self._number, data) :]
             except BlockingIOError:
+                until = until or time.monotonic() + self._limit_s
                 self._wait_to_write(until)
             except OSError as error:
                 raise _ended(error) from None

@@ -34,7 +34,7 @@ class Clearance:
     """Gaps between an arm at readings (N,) and a table whose carriage is at places (3,)."""
 
     def __init__(self, arm: Robot, flange_from_target: Floats, panel: Panel, sizes: ClearanceSection) -> None:
-        self._coupling = arm.coupling.T
+        self._values_of = arm.values_of
         self._margin_m = to_si(sizes.margin_mm, "mm")
         radii = to_si(sizes.link_radius_mm + sizes.column_radius_mm, "mm")
         self._gaps = Gaps(
@@ -52,17 +52,17 @@ class Clearance:
             carriages: Where the carriage is at the same time (n, 3), m.
             world_from_base: Where the base stands (4, 4) in the frame of the table.
         """
-        return self._gaps.gaps(readings @ self._coupling, carriages, world_from_base)
+        return self._gaps.gaps(self._values_of(readings), carriages, world_from_base)
 
-    def margin(self, arm: list[Floats], table: list[Floats], world_from_base: Floats) -> float:
+    def margin(self, arm: Floats, table: Floats, world_from_base: Floats) -> float:
         """How much farther than they have to they keep apart, however fast one or the other goes; m.
 
         Args:
-            arm: Readings (N,) between which the joints go straight; a single one where the arm stands.
-            table: Places (3,) between which the carriage goes straight, m; likewise.
+            arm: Readings (s, N) between which the joints go straight; one row where the arm stands.
+            table: Places (p, 3) between which the carriage goes straight, m; likewise.
             world_from_base: Where the base stands (4, 4) in the frame of the table.
         """
-        ways = (np.array(arm) @ self._coupling, ARM_STEP_RAD), (np.array(table), TABLE_STEP_M)
+        ways = (self._values_of(arm), ARM_STEP_RAD), (table, TABLE_STEP_M)
         links, tool = self._gaps.least(*ways, world_from_base)
         return min(links - self._margin_m, tool - TOOL_MARGIN_M)
 

@@ -73,16 +73,17 @@ class Crew:
             raise RefusedError("where arm and table are is not known", where="the cell")
         end = table.carriage_for(expected)
 
-        def apart(arm: list[Floats], carriages: list[Floats]) -> bool:
+        def apart(arm: Floats, carriages: Floats) -> bool:
             return clearance.margin(arm, carriages, world_from_base) > expected.radius_m
 
-        clearance = self._clearance_of(table)
+        clearance, direct = self._clearance_of(table), np.array([carriage, end])
         for first, over in self._detours(table, way, carriage, end):
-            arm, low = [here, *first], over[-1]
-            if self._cell.file.process.together and apart(arm, [carriage, end]):
+            arm = np.array([here, *first])
+            if self._cell.file.process.together and apart(arm, direct):
                 self._together(first, expected)
                 return
-            if apart([here], [carriage, *over]) and apart(arm, [low]) and apart([first[-1]], [low, end]):
+            by = np.array([carriage, *over, end])
+            if apart(arm[:1], by[:-1]) and apart(arm, by[-2:-1]) and apart(arm[-1:], by[-2:]):
                 for place in over:
                     table.go_to(place)
                 self._along(first)

@@ -168,9 +168,9 @@ class LinePort:
         while not self._lines:
             if self._interrupted.is_set():
                 raise stopped(self.device, self.address)
-            if time.monotonic() >= until:
-                raise silent(self.device, self.address, limit, doing=doing)
             self._take()
+            if not self._lines and time.monotonic() >= until:
+                raise silent(self.device, self.address, limit, doing=doing)
         return self._lines.popleft()
 
     def pause(self, seconds: float) -> None:

@@ -102,7 +102,7 @@ def readings_near(arm: Robot, where: Floats, seed: Floats) -> Floats | None:
 
 def _point(arm: Robot, readings: Floats) -> Floats:
     """The nominal tool point (3,) of readings that are known to be sound."""
-    return np.asarray(arm.chain.position(np.ascontiguousarray((arm.coupling @ readings)[None]))[0])
+    return np.asarray(arm.chain.position(arm.values_of(readings[None]))[0])
 
 
 NEWTON_STEPS: Final = 30

@@ -57,6 +57,11 @@ class Panel:
     def _metres_of_counts(self) -> Floats:
         return np.asarray(self.axes[:, :2] * (self.area_m / self.counts))
 
+    @cached_property
+    def shorter_m(self) -> float:
+        """The shorter side of the effective area."""
+        return float(self.area_m.min())
+
     def seen(self, carriage: Floats, point: Floats) -> Floats:
         """A point in the table's frame as the panel sees it (3,): along u, along v, above its face; m."""
         return np.asarray(self.axes.T @ (point - carriage - self.offset_m))

@@ -236,7 +236,7 @@ class RvM2:
         return None
 
     def _fits(self, seen: Tenths, count: Tenths) -> bool:
-        nominal = movemaster.whereabouts(self._arm, readings_of(count)).tolist()
+        nominal: list[float] = movemaster.whereabouts(self._arm, readings_of(count)).tolist()
         fits = max([abs(a - 0.1 * b) for a, b in zip(nominal, seen, strict=True)]) <= READOUT_TOLERANCE
         if fits:
             self._silences, self._seen_at = 0, time.monotonic()

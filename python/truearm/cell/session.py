@@ -176,7 +176,7 @@ class Session:
 
     def add_outcome(self, step: int, outcome: str, *, reason: str = "", attempts: Sequence[int] = ()) -> None:
         """Keep what became of a step, and which of its readings are the accepted ones."""
-        row = (step, outcome, reason, json.dumps(list(attempts)), time.time())
+        row = (step, outcome, reason, str(list(attempts)), time.time())
         self._db.execute("INSERT INTO outcomes VALUES (?, ?, ?, ?, ?)", row)
 
     def add_event(self, kind: str, message: str, step: int | None = None) -> None:

@@ -89,6 +89,7 @@ class TablePanel:
         self._settings, self.panel = settings, settings.panel.geometry()
         self.ranges_m = to_si(np.array(settings.ranges_mm), "mm")
         self._most_m = self.ranges_m.tolist()
+        self._sigma_m = to_si(settings.sigma_mm, "mm")
         self._port = LinePort.of(self.name, settings)
         self._number = 0
         self._travel_m = 0.0
@@ -126,7 +127,7 @@ class TablePanel:
 
     def _carriage_for(self, expected: Expected) -> Floats:
         panel, standoff = self.panel, expected.radius_m + STANDOFF_MARGIN_M
-        if 2.0 * expected.radius_m > panel.area_m.min():
+        if 2.0 * expected.radius_m > panel.shorter_m:
             across, along = (MM_PER_METRE * panel.area_m).tolist()
             raise RefusedError(
                 f"the point may be {MM_PER_METRE * expected.radius_m:.0f} mm off",
@@ -172,7 +173,7 @@ class TablePanel:
         seconds = 2.0 * MM_PER_METRE * self._travel_m / self._settings.touch_speed_mm_s
         with self._busy:
             answer = self._ask(f"TOUCH {MM_PER_METRE * self._travel_m:.3f}", self._limit(seconds))
-        now, sigma_m = time.time(), to_si(self._settings.sigma_mm, "mm")
+        now, sigma_m = time.time(), self._sigma_m
         if answer == "NONE":
             return Reading(None, sigma_m, now, False, answer, "no contact")
         *place, u, v, temperature_c = _numbers(answer, ANSWER_NUMBERS, self._port.where)
