@@ -1,8 +1,13 @@
 """Parts of the cell alone: frames of lines, the panel, patterns, packets, verdicts, clearance."""
 
+import contextlib
 import os
 import re
+import socket
+import time
 import tty
+from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -13,6 +18,8 @@ from truearm._core import Chain
 from truearm.cell import ur_packets
 from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.clearance import TOOL_MARGIN_M, Clearance
+from truearm.cell.crew import Crew
+from truearm.cell.device_errors import DeviceGoneError, DeviceSilentError, EmergencyStopError
 from truearm.cell.framing import framed, unframed
 from truearm.cell.judge import Rules, judge
 from truearm.cell.line_port import LinePort
@@ -25,6 +32,8 @@ from truearm.cell.virtual.line_devices import answer_for
 from truearm.errors import InputError
 from truearm.robot import Robot
 
+# More than a socket takes that nobody reads.
+LONG = "x" * 12_000_000
 TEXTS = st.text("ABCXYZ 0123456789.-", min_size=1).map(str.strip).filter(bool)
 
 
@@ -191,6 +200,37 @@ def test_positions_as_movemaster_controllers_write_them(text, found):
     assert (None if numbers is None else list(numbers)) == found
 
 
+@contextlib.contextmanager
+def tcp_port(limit_s):
+    """A port, and the socket at its other end."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = LinePort("device", f"tcp://127.0.0.1:{server.getsockname()[1]}", limit_s)
+        port.open()
+        other, _ = server.accept()
+        with other:
+            yield port, other
+        port.close()
+
+
+def test_a_device_that_is_slow_to_take_what_is_sent_is_waited_for():
+    with tcp_port(5.0) as (port, other), ThreadPoolExecutor(1) as aside:
+        sending = aside.submit(port.send, LONG)
+        time.sleep(0.2)
+        assert not sending.done()
+        taken = 0
+        while taken < len(LONG) + 1:
+            taken += len(other.recv(1 << 20))
+        sending.result(5.0)
+
+
+def test_a_device_that_takes_nothing_is_gone_within_the_limit():
+    with tcp_port(0.2) as (port, _):
+        began = time.monotonic()
+        with pytest.raises(DeviceGoneError, match="device at tcp://.*could not be sent within 0.2 s"):
+            port.send(LONG)
+        assert time.monotonic() - began < 2.0
+
+
 def test_lines_that_come_may_end_in_any_way():
     own, other = os.openpty()
     tty.setraw(other)
@@ -201,3 +241,14 @@ def test_lines_that_come_may_end_in_any_way():
     port.close()
     os.close(own)
     os.close(other)
+
+
+def test_what_ended_a_way_is_raised_where_the_sensor_fails_too():
+    noted = []
+    cell = Mock(arm=Robot.load("rv-m2"))
+    cell.robot.move_joints.side_effect = EmergencyStopError("pressed", where="arm")
+    cell.sensor.stop.side_effect = DeviceSilentError("no answer", where="table")
+    crew = Crew(cell, lambda kind, message: noted.append((kind, message)))
+    with pytest.raises(EmergencyStopError, match="pressed"):
+        crew._together([np.zeros(5)], Mock())
+    assert noted == [("failed", "stop sensor: table: no answer.")]

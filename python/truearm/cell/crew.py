@@ -115,7 +115,8 @@ class Crew:
         try:
             self._along(way)
         except BaseException:
-            self._cell.sensor.stop()
+            # What ended the way is to be raised, not that the sensor failed too.
+            self._tried("stop sensor", self._cell.sensor.stop)
             wait([coming], LETS_GO_WITHIN_S)
             raise
         coming.result()
