@@ -22,8 +22,8 @@ from truearm.fitting import (
     feature_ranges,
     feature_values,
     fit_rows,
+    group_unknowns,
     no_stages,
-    setup_unknowns,
 )
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
@@ -95,7 +95,7 @@ def calibrate(
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(*notices, *_open_setup(task, final.identifiability), *mounting(variable)),
+        notices=(*notices, *_open_setup(task, final.identifiability, final.data), *mounting(variable)),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
@@ -155,10 +155,13 @@ def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> tu
     return validation, HeldRows.of(held, errors)
 
 
-def _open_setup(task: Task, found: Identifiability) -> list[Notice]:
+def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[Notice]:
     """A notice where frames and targets cannot all be told apart, as on a SCARA or from poses too alike."""
-    unknowns, rank = setup_unknowns(task), found.total_rank - found.rank
-    if task.selection.distances or rank >= unknowns:
+    if task.selection.distances:
+        return []
+    unknowns = sum(group_unknowns(task, data.select(data.group == group)) for group in task.groups)
+    rank = found.total_rank - found.rank
+    if rank >= unknowns:
         return []
     text = (
         f"The poses determine {rank} of {unknowns} unknowns of frame and target: predictions of the measured "

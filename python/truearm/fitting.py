@@ -20,7 +20,7 @@ from truearm._core import (
     fit_field,
 )
 from truearm.core_set import Selection, core_set, distance_count
-from truearm.errors import InputError, UsageError, WorkError, list_names
+from truearm.errors import InputError, UsageError, WorkError, counted, list_names
 from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
@@ -130,6 +130,7 @@ def fit_rows(task: Task, data: Measurements, hyper: Hyper | None = None) -> Fits
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
     began = time.perf_counter()
     _check_enough(task, data, setup_unknowns(task))
+    _check_set_ups(task, data)
     with task.stages("finding frame and tool"), core_errors(data):
         nominal = fit_constant(task.problem(measured, []), fit_options(task))
     with task.stages("asking what the poses determine"):
@@ -273,11 +274,29 @@ def _check_enough(task: Task, data: Measurements, rank: int) -> None:
     else:
         way_out = f"Measure at least {needed} poses to train on, or use a larger --train-size"
     raise WorkError(
-        f"{values} measured values in {len(data)} training rows cannot determine up to {unknowns} unknowns",
+        f"{values} measured values in {counted(len(data), 'training row')} cannot determine up to {unknowns} "
+        "unknowns",
         where=", ".join(data.files),
         rule="There must be more measured values than unknowns",
         way_out=way_out,
     )
+
+
+def _check_set_ups(task: Task, data: Measurements) -> None:
+    """Refuse a set-up whose rows cannot find its own frame and target."""
+    for group in task.groups:
+        rows = data.select(data.group == group)
+        values, unknowns = _measured_values(task, rows), group_unknowns(task, rows)
+        if task.selection.distances or values > unknowns:
+            continue
+        raise WorkError(
+            f"{values} measured values in {counted(len(rows), 'training row')} cannot determine the "
+            f"{unknowns} unknowns of frame and target of set-up {list_names([group])}",
+            where=", ".join(rows.files or data.files),
+            rule="In each set-up there must be more measured values than unknowns",
+            way_out="Measure more poses there. If device and target stood where they did in another set-up, "
+            'give the rows of both the same name in a column "group"',
+        )
 
 
 def _measured_values(task: Task, data: Measurements) -> int:
@@ -300,6 +319,14 @@ def setup_unknowns(task: Task) -> int:
     frame = frame_unknowns(task)
     points = 1 if task.selection.distances else len(task.selection.targets)
     return len(task.groups) * (frame + 3 * points + (3 if task.selection.orientation else 0))
+
+
+def group_unknowns(task: Task, rows: Measurements) -> int:
+    """Unknowns of the one set-up of `rows`, as far as they measured of it: what was not measured is none."""
+    seen = np.isfinite(rows.targets[:, list(task.selection.targets)]).all(axis=2).any(axis=0).sum()
+    turned = task.selection.orientation and rows.orientations is not None
+    turns = 3 if turned and np.isfinite(rows.orientations).all(axis=1).any() else 0
+    return frame_unknowns(task) + 3 * int(seen) + turns
 
 
 @contextmanager
