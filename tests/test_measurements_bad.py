@@ -97,7 +97,10 @@ CONTENTS = {
     "JSON": (b'{"q1": 0}', "JSON, not CSV"),
     "UTF-16": ("q1,x".encode("utf-16"), "UTF-16 text. Save it as UTF-8"),
     "Latin-1": (b"q1,x,y,z,\xb0C\n1,2,3,4,5", "line 1 holds bytes that are not UTF-8"),
-    "semicolons": (b"q1;x;y;z\n0;1,5;2;3\n", 'by semicolons.*truearm import data.csv -o .* --delimiter ";"'),
+    "semicolons": (
+        b"q1;x;y;z\n0;1,5;2;3\n",
+        'by semicolons.*truearm import .* --delimiter ";"',
+    ),
     "tabs": (b"q1\tx\ty\tz\n0\t1\t2\t3\n", "separated by tabs.*--delimiter tab"),
     "open quote": (b'q1,x,y,z\n0,1,2,"3\n', "not CSV"),
 }

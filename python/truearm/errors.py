@@ -4,6 +4,8 @@ Every error says what was found, where, which rule it breaks and the way out. Th
 the message and exits with status 1, or 2 for :class:`UsageError`.
 """
 
+import re
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -79,6 +81,12 @@ def list_rows(rows: Iterable[int], noun: str = "row") -> str:
 def counted(count: int, noun: str) -> str:
     """A number with its noun: "1 row", "0 rows", "12 rows"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def typed(text: object) -> str:
+    """A path or name as shells read it as one word: quoted where it holds blanks or what they act on."""
+    word = str(text)
+    return word if re.fullmatch(r"[\w@%+=:,./-][\w@%+=:,./#-]*", word) else shlex.quote(word)
 
 
 def list_names(names: Iterable[str], last: str = "and") -> str:

@@ -324,9 +324,9 @@ def setup_unknowns(task: Task) -> int:
 def group_unknowns(task: Task, rows: Measurements) -> int:
     """Unknowns of the one set-up of `rows`, as far as they measured of it: what was not measured is none."""
     seen = np.isfinite(rows.targets[:, list(task.selection.targets)]).all(axis=2).any(axis=0).sum()
-    turned = task.selection.orientation and rows.orientations is not None
-    turns = 3 if turned and np.isfinite(rows.orientations).all(axis=1).any() else 0
-    return frame_unknowns(task) + 3 * int(seen) + turns
+    turns = rows.orientations if task.selection.orientation else None
+    turned = turns is not None and np.isfinite(turns).all(axis=1).any()
+    return frame_unknowns(task) + 3 * int(seen) + (3 if turned else 0)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from truearm.errors import InputError, list_rows
+from truearm.errors import InputError, list_rows, typed
 from truearm.files import decode_text, read_bytes
 
 Floats = NDArray[np.float64]
@@ -132,12 +133,13 @@ def read_csv_table(path: Path) -> Table:
     header = text.lstrip().splitlines()[0]
     other = [mark for mark in DELIMITERS if mark != "," and mark in header]
     if other and header.count(",") < header.count(other[0]):
+        decimal = '","' if re.search(r"\d,\d", text) else '"."'
         raise InputError(
             f"its fields are separated by {DELIMITERS[other[0]]}",
             where=where,
             rule="Measurement files have commas between fields and points as decimal marks",
-            way_out=f"Convert it with: truearm import {path.name} -o measurements.csv "
-            f"--delimiter {quoted_delimiter(other[0])} --decimal ...",
+            way_out=f"Convert it with: truearm import {typed(path)} -o measurements.csv "
+            f"--delimiter {quoted_delimiter(other[0])} --decimal {decimal}",
         )
     return split_table(text, ",", where=where)
 

@@ -20,9 +20,11 @@ COLOURS: Final = {
 
 
 def write(plan: Plan | Proposed, path: Path) -> None:
-    """Write the poses: q1 ... qN in rad and m, approach, purpose."""
+    """Write the poses: q1 ... qN in rad and m, approach, purpose, and the set-up that is meant, if one is."""
     columns = {f"q{j + 1}": column for j, column in enumerate(plan.poses.readings.T)}
     table = pd.DataFrame(columns | {"approach": plan.poses.approach, "purpose": plan.poses.purpose})
+    if plan.poses.group is not None:
+        table["group"] = plan.poses.group
     write_whole(path, table.to_csv(index=False, lineterminator="\n"))
 
 

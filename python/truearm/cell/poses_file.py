@@ -27,11 +27,13 @@ class Poses:
         readings: Joint readings (n, N), rad or m.
         approach: From which side joints come (n,): 1 from lower readings, -1 from higher, 0 from anywhere.
         purpose: What each is for (n,), such as "train", "validate" or "repeat".
+        group: Set-up of a calibration that they are meant for; None for any.
     """
 
     readings: Floats
     approach: NDArray[np.int64]
     purpose: tuple[str, ...]
+    group: str | None = None
 
     def __len__(self) -> int:
         return len(self.readings)

@@ -1,6 +1,6 @@
 """Poses that a calibration proposes, in a good order: to learn more, or to check that it still holds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -91,7 +91,8 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
     candidates = _candidates(calibration, options, cell)
     workspace = measurable_pool(calibration.robot, cell, WORKSPACE, options.seed + 1)
     found = next_poses(candidates, workspace, options.count)
-    return _ordered(candidates, found, found.rows, "train", options, cell)
+    proposed = _ordered(candidates, found, found.rows, "train", options, cell)
+    return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))
 
 
 def propose_acceptance(

@@ -20,7 +20,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import REPORT_NAME, make_report
 from truearm.defaults import HOLDOUT, SEED
-from truearm.errors import InputError, UsageError
+from truearm.errors import InputError, UsageError, typed
 from truearm.files import write_whole
 from truearm.scheme_options import SchemeOptions
 
@@ -139,9 +139,9 @@ def suggest_next(calibration: "Calibration", file: Path) -> None:
     from truearm.doubts import NO_HELP
 
     if any(notice.kind == NO_HELP for notice in calibration.notices):
-        suggest(f"truearm report {file}")
+        suggest(f"truearm report {typed(file)}")
     else:
-        suggest(f"truearm evaluate {file} OTHER.csv", compensate_command(calibration, file))
+        suggest(f"truearm evaluate {typed(file)} OTHER.csv", compensate_command(calibration, file))
 
 
 def compensate_command(calibration: "Calibration", file: Path) -> str:
@@ -149,7 +149,7 @@ def compensate_command(calibration: "Calibration", file: Path) -> str:
     from truearm.programs.declaring import may_differ
 
     declared = " --controller MODEL" if may_differ(calibration.robot) else ""
-    return f"truearm compensate {file} PROGRAM{declared} --dry-run"
+    return f"truearm compensate {typed(file)} PROGRAM{declared} --dry-run"
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:

@@ -2,6 +2,7 @@
 
 from truearm.cli.arguments import AsJson, CellFile
 from truearm.cli.console import print_json, say, suggest
+from truearm.errors import typed
 
 
 def command(
@@ -25,4 +26,4 @@ def command(
     say(f"{known.sensor.name} at {known.sensor.address} answers.")
     say(f"{known.robot.name} at {known.robot.address} answers; its joints:")
     say("  " + ", ".join(f"{reading:.4f}" for reading in readings))
-    suggest(f"truearm measure {cell} poses.csv --dry-run")
+    suggest(f"truearm measure {typed(cell)} poses.csv --dry-run")

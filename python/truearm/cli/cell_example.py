@@ -7,7 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say, suggest
-from truearm.errors import InputError, UsageError, did_you_mean
+from truearm.errors import InputError, UsageError, did_you_mean, typed
 
 
 def command(
@@ -38,6 +38,6 @@ def command(
         return
     say(f"Cell file: {output}")
     if name in SIMULATED:
-        suggest(f"truearm cell simulate {output}", f"truearm cell check {output}")
+        suggest(f"truearm cell simulate {typed(output)}", f"truearm cell check {typed(output)}")
     else:
-        suggest(f"truearm cell check {output}", when="Name the recorded file in it, then:")
+        suggest(f"truearm cell check {typed(output)}", when="Name the recorded file in it, then:")

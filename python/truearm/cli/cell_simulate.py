@@ -9,7 +9,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, CellFile
 from truearm.cli.console import print_json, say, suggest, tell
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 
 FAULTS: Final = "lost, delayed, duplicated, garbled, missed, outlier, restart, emergency_stop"
 
@@ -64,9 +64,8 @@ def command(
             print_json({"cell": str(target)})
         else:
             say(f"The virtual cell is ready. Its cell file: {target}")
-            suggest(
-                f"truearm measure {target} poses.csv -o session.db", when="Try next, in another terminal:"
-            )
+            measure = f"truearm measure {typed(target)} poses.csv -o session.db"
+            suggest(measure, when="Try next, in another terminal:")
         sys.stdout.flush()
         until_interrupted(threading.Event())
     tell("The virtual cell has ended.")

@@ -15,7 +15,7 @@ from truearm.cli.given import given_options
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 from truearm.files import refuse_own_input, write_whole
 
 OnRefusal = Literal["stop", "keep-nominal"]
@@ -95,7 +95,7 @@ def command(
             say(f"Written: {path}")
         if done.changed.any():
             options = given_options(context, "dry_run", "output", "report", "as_json")
-            _suggest(f"{calibration} {program}{options}", calibration, dry_run=dry_run)
+            _suggest(f"{typed(calibration)} {typed(program)}{options}", calibration, dry_run=dry_run)
     if not dry_run:
         done.refuse_unchanged()
 
@@ -137,7 +137,7 @@ def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:
         suggest(f"truearm compensate {asked} -o OUT")
     else:
         when = "Run it slowly at first. Whether the arm is as it was calibrated tells:"
-        suggest(f"truearm evaluate {calibration} MEASURED.csv", when=when)
+        suggest(f"truearm evaluate {typed(calibration)} MEASURED.csv", when=when)
 
 
 def _one_of(option: str, given: str, choices: Any) -> Any:  # noqa: ANN401

@@ -17,6 +17,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, war
 from truearm.cli.interrupt import end_at_once, ends_promptly
 from truearm.cli.measure_progress import Teller
 from truearm.cli.progress import told_stages
+from truearm.errors import typed
 from truearm.files import write_whole
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ def _print_places(output: Path) -> None:
     print_places(output)
     say(f"{'Path:':<13}{output / PATH} and {CORRECTED}")
     suggest(
-        f"truearm session show {output / SESSION}",
-        f"truearm plan rv-m2 -n 100 --cell {output / CELL} -o {output / 'more.csv'}",
-        f"truearm compensate {output / CALIBRATION_NAME} {output / PATH} --dry-run",
+        f"truearm session show {typed(output / SESSION)}",
+        f"truearm plan rv-m2 -n 100 --cell {typed(output / CELL)} -o {typed(output / 'more.csv')}",
+        f"truearm compensate {typed(output / CALIBRATION_NAME)} {typed(output / PATH)} --dry-run",
     )

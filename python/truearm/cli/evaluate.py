@@ -10,6 +10,7 @@ from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
+from truearm.errors import typed
 
 
 def command(
@@ -70,7 +71,7 @@ def command(
         how = f"{found.n_frame} rows found {'the frame' if keep_tool else 'frame and tool'}"
     say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
     print_errors(found.errors, f"{found.n_judged} rows")
-    others = " ".join(map(str, measurements))
+    others = " ".join(map(typed, measurements))
     useful = all(notice.kind not in (NO_HELP, FAR_ROWS) for notice in found.notices)
     next_one = [compensate_command(known, calibration)] if useful else []
-    suggest(f"truearm report {calibration} {others} -o other.html", *next_one)
+    suggest(f"truearm report {typed(calibration)} {others} -o other.html", *next_one)

@@ -7,6 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, CalibFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest
+from truearm.errors import typed
 from truearm.files import refuse_own_input
 
 READ_AS_ROBOT: Final = ("dh-toml", "urdf")
@@ -86,4 +87,5 @@ def command(
         say(f"{made.rows} samples.")
     say(f"Written: {output}")
     if to in READ_AS_ROBOT:
-        suggest(f"truearm robots {output}{f'#{made.chain}' if made.chain else ''}")
+        read = f"{output}#{made.chain}" if made.chain else output
+        suggest(f"truearm robots {typed(read)}")

@@ -10,6 +10,7 @@ from truearm.cli.calibrate import check_directory
 from truearm.cli.console import FAILED, print_json, print_table, say, say_wrapped, suggest, tell
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
+from truearm.errors import typed
 
 if TYPE_CHECKING:
     from truearm.fleet import FleetRun
@@ -51,7 +52,7 @@ def command(
     if as_json:
         print_json(run.content)
     else:
-        _print(run, output, again=f"truearm fleet {fleet} -o {output}")
+        _print(run, output, again=f"truearm fleet {typed(fleet)} -o {typed(output)}")
     if run.failed:
         raise typer.Exit(FAILED)
 
@@ -70,7 +71,8 @@ def _print(run: "FleetRun", output: Path, *, again: str) -> None:
     if run.failed:
         suggest(again, when="Finished arms are kept. When the others are put right:")
         return
-    suggest(f"truearm report {output / run.arms[0].row['arm'] / 'calibration.calib'}", when="Look into one:")
+    first = output / run.arms[0].row["arm"] / "calibration.calib"
+    suggest(f"truearm report {typed(first)}", when="Look into one:")
 
 
 def _cells(arm: "Judged") -> list[str]:

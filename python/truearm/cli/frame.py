@@ -7,7 +7,7 @@ import typer
 
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit
 from truearm.cli.console import print_json, suggest, warn
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 
 
 def command(
@@ -76,7 +76,7 @@ def command(
         print_json({"name": name, "file": str(output), **found.to_dict()})
         return
     print_frame(found, name, known, output)
-    suggest(f"truearm compensate {calibration} PROGRAM --frames {output} --dry-run")
+    suggest(f"truearm compensate {typed(calibration)} PROGRAM --frames {typed(output)} --dry-run")
 
 
 def _asked(tool: str | None, work_object: str | None) -> tuple[str, str]:

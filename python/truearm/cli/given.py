@@ -1,8 +1,8 @@
 """The options that a command was given, for commands that it names."""
 
-import shlex
-
 import typer
+
+from truearm.errors import typed
 
 
 def given_options(context: typer.Context, *left_out: str) -> str:
@@ -23,4 +23,4 @@ def given_options(context: typer.Context, *left_out: str) -> str:
         value = context.params[name]
         for one in value if isinstance(value, list | tuple) else [value]:
             words += [parameter.opts[-1]] if one is True else [parameter.opts[-1], str(one)]
-    return "".join(f" {shlex.quote(word)}" for word in words)
+    return "".join(f" {typed(word)}" for word in words)

@@ -7,7 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 from truearm.files import refuse_own_input, write_whole
 
 DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
@@ -77,7 +77,7 @@ def command(
     say_wrapped(f"{output}: {len(frame)} rows, {', '.join(frame.columns)}.")
     if left_out:
         say_wrapped(f"Left out: {', '.join(left_out)}. Keep them with --keep.")
-    suggest(f"truearm calibrate ROBOT {output} -o result")
+    suggest(f"truearm calibrate ROBOT {typed(output)} -o result")
 
 
 def _pairs(options: list[str], option: str) -> dict[str, str]:

@@ -9,6 +9,7 @@ from truearm.cli.arguments import AsJson, CellFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest, tell
 from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
+from truearm.errors import typed
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def command(
     if dry_run:
         _print_rehearsal(rehearse(known, wanted), as_json=as_json)
         if not as_json:
-            suggest(f"truearm measure {cell} {poses} -o {output}")
+            suggest(f"truearm measure {typed(cell)} {typed(poses)} -o {typed(output)}")
         return
     try:
         with open_session(output, known, wanted) as session:
@@ -66,7 +67,7 @@ def command(
         print_json({"end": end, "session": str(output), **found})
         return
     say_wrapped(f"{end[0].upper()}{end[1:]}: {found['measured']} of {found['poses']} poses measured.")
-    suggest(f"truearm session export {output} -o measurements.csv")
+    suggest(f"truearm session export {typed(output)} -o measurements.csv")
 
 
 def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:

@@ -10,10 +10,11 @@ from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import UsageError, list_names
+from truearm.errors import UsageError, list_names, typed
 from truearm.files import refuse_own_input
 
 if TYPE_CHECKING:
+    from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import Plan
     from truearm.cell.proposed import Proposed
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 NUMBERS: Final = (20, 40, 60, 100, 200)
 ORDERS: Final = ("short", "paper")
+MEASURED: Final = "Measure them; then:"
 PICTURES: Final = (".png", ".svg", ".pdf")
 
 
@@ -83,9 +85,9 @@ def command(
         draw(plan, picture)
     _print(plan, output, order, as_json=as_json)
     if not as_json and cell is not None:
-        suggest(f"truearm measure {cell} {output} --dry-run")
+        suggest(f"truearm measure {typed(cell)} {typed(output)} --dry-run")
     elif not as_json:
-        suggest(f"truearm calibrate {robot} MEASUREMENTS.csv -o result", when="Measure them; then:")
+        suggest(f"truearm calibrate {typed(robot)} MEASUREMENTS.csv -o result", when=MEASURED)
 
 
 def _check_words(criterion: str, order: str) -> None:
@@ -173,7 +175,18 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
         return
     _print_proposed(proposed, output)
     if asked.acceptance is not None:
-        suggest(f"truearm update {asked.calibration} MEASUREMENTS.csv", when="Measure them; then:")
+        suggest(f"truearm update {typed(asked.calibration)} MEASUREMENTS.csv", when=MEASURED)
+    else:
+        suggest(f"truearm calibrate {_again(asked, calibration)} -o result", when="Then calibrate from all:")
+
+
+def _again(asked: _Asked, calibration: "Calibration") -> str:
+    """The arm and the files that are calibrated from once more, with the new measurements."""
+    from truearm.cli.naming import name_of
+
+    robot = asked.robot or name_of(calibration.robot)
+    files = ["OLD.csv"] if calibration.rows is None else calibration.rows.data.files
+    return " ".join(typed(word) for word in (robot, *files, "MEASUREMENTS.csv"))
 
 
 def _print_proposed(proposed: "Proposed", output: Path) -> None:
@@ -185,6 +198,10 @@ def _print_proposed(proposed: "Proposed", output: Path) -> None:
         say_wrapped(
             f"Expected standard deviation of the target's position over the workspace: {before:.3f} mm now, "
             f"{after:.3f} mm when these are measured too."
+        )
+        say_wrapped(
+            f'Measure them in the set-up "{proposed.poses.group}", with device and target where they were, '
+            'and keep the column "group", which says so.'
         )
         return
     say("Smallest change that is noticed in 95 of 100 cases:")

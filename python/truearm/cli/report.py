@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 from truearm.files import write_whole
 
 if TYPE_CHECKING:
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 REPORT_NAME: Final = "report.html"
 PAGE: Final = ".html"
 PRINT: Final = ".pdf"
+
+OTHER: Final = "other"
+"""Name of the report on other measurements that is proposed."""
 
 
 def command(
@@ -75,7 +78,7 @@ def command(
             say_wrapped(f"- {entry.name} {entry.words}")
     say(f"Report: {target}")
     if other is None:
-        suggest(f"truearm report {calibration} OTHER.csv -o {target}")
+        suggest(f"truearm report {typed(calibration)} OTHER.csv -o {typed(target.with_stem(OTHER))}")
 
 
 def _judged(

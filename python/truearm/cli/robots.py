@@ -6,6 +6,7 @@ import typer
 
 from truearm.cli.arguments import ROBOT_HELP, AsJson, robots_like
 from truearm.cli.console import print_json, print_table, suggest
+from truearm.errors import typed
 from truearm.library import library_names
 
 
@@ -33,8 +34,8 @@ def command(
     show_robot(Robot.load(robot), as_json=as_json)
     if not as_json:
         suggest(
-            f"truearm plan {robot} -n 60 -o poses.csv",
-            f"truearm calibrate {robot} measurements.csv -o result",
+            f"truearm plan {typed(robot)} -n 60 -o poses.csv",
+            f"truearm calibrate {typed(robot)} measurements.csv -o result",
         )
 
 

@@ -7,6 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, SessionFile
 from truearm.cli.console import print_json, say, suggest
+from truearm.errors import typed
 
 
 def command(
@@ -23,11 +24,13 @@ def command(
     """
     from truearm.cell.accepted import accepted_table
     from truearm.cell.session import Session
+    from truearm.cli.naming import name_of
     from truearm.errors import WorkError
     from truearm.files import write_whole
+    from truearm.robot import Robot
 
     with Session(session, writing=False) as known:
-        table, arm = accepted_table(known), str(known.meta("arm")["name"]).lower()
+        table, arm = accepted_table(known), Robot.from_dict(known.meta("arm"))
     if table.empty:
         raise WorkError("no pose is measured yet", where=str(session))
     write_whole(output, table.drop(columns="step").to_csv(index=False, lineterminator="\n"))
@@ -35,4 +38,4 @@ def command(
         print_json({"measurements": str(output), "rows": len(table)})
         return
     say(f"{len(table)} measurements: {output}")
-    suggest(f"truearm calibrate {arm} {output} -o result")
+    suggest(f"truearm calibrate {name_of(arm)} {typed(output)} -o result")

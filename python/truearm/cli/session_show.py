@@ -6,7 +6,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, SessionFile
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _show(session: "Session", *, as_json: bool) -> None:
         counts = ", ".join(f"{count} {kind}" for kind, count in found["events"].items())
         say_wrapped(f"Events: {counts}. The last: {found['last_event']}")
     if found["measured"]:
-        suggest(f"truearm session export {session.path} -o measurements.csv")
+        suggest(f"truearm session export {typed(session.path)} -o measurements.csv")
 
 
 def _stretch(row: dict[str, Any]) -> list[str]:

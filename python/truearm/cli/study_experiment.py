@@ -11,6 +11,7 @@ from truearm.cli.console import print_json, print_table, say, suggest, tell
 from truearm.cli.interrupt import end_at_once, ends_promptly
 from truearm.cli.measure_progress import Teller
 from truearm.cli.progress import told_stages
+from truearm.errors import typed
 from truearm.files import write_whole
 
 JSON_NAME: Final = "experiment.json"
@@ -69,4 +70,4 @@ def command(
     print_table(("the paper", "what comes out here", "agrees"), rows, left=(0, 1, 2))
     for path in (output / PAGE_NAME, output / JSON_NAME, *files):
         say(f"Written: {path}")
-    suggest(f"truearm session show {output / 'session.db'}")
+    suggest(f"truearm session show {typed(output / 'session.db')}")

@@ -10,7 +10,7 @@ from truearm.cli.calibrate import check_directory
 from truearm.cli.console import print_json, print_table, say, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 from truearm.files import write_whole
 
 FIGURES: Final = ("6", "7", "8", "paths", "noise", "cmac")
@@ -68,7 +68,7 @@ def command(
     for path in (output / PAGE_NAME, output / JSON_NAME, *files):
         say(f"Written: {path}")
     if figure:
-        suggest(f"truearm study paper -o {output}", when="All figures over twenty arms:")
+        suggest(f"truearm study paper -o {typed(output)}", when="All figures over twenty arms:")
 
 
 def _word(reached: bool | None) -> str:

@@ -9,7 +9,7 @@ from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, Use
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import UsageError
+from truearm.errors import UsageError, typed
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -142,11 +142,13 @@ def _write(found: "Update", place: Path) -> None:
 def _suggest(found: "Update", old: Path, place: Path | None) -> None:
     """What to do next."""
     if found.verdict == "field":
-        suggest(f"truearm plan --next 20 --from {old} -o poses.csv", when="Poses that teach most:")
+        suggest(f"truearm plan --next 20 --from {typed(old)} -o poses.csv", when="Poses that teach most:")
     elif place is not None:
-        suggest(f"truearm update --roll-back {place} -o OLD.calib", when="Back to the old one:")
+        suggest(f"truearm update --roll-back {typed(place)} -o OLD.calib", when="Back to the old one:")
     elif found.verdict == "moved":
-        suggest(f"truearm update {old} MEASUREMENTS -o NEW.calib", when="Nothing was written. To do so:")
+        suggest(
+            f"truearm update {typed(old)} MEASUREMENTS -o NEW.calib", when="Nothing was written. To do so:"
+        )
 
 
 def _verdict(found: "Update") -> str:

@@ -73,6 +73,11 @@ class Candidates:
         return np.ascontiguousarray(found)
 
     @property
+    def set_up(self) -> str:
+        """Name of the set-up they would be measured in."""
+        return self.calibration.groups[self._number]
+
+    @property
     def orientation(self) -> Mask:
         """Which of the m measured values are rotations."""
         selection = self.calibration.selection

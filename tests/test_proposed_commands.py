@@ -1,0 +1,100 @@
+"""Commands that commands propose: typed as they stand, they work."""
+
+import shlex
+from types import SimpleNamespace
+
+import pandas as pd
+import pytest
+
+import truearm as ta
+from truearm.cli import main, session_export
+from truearm.errors import typed
+from truearm.simulation import VirtualArm
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with blanks in its names of files: an arm of its own, and measurements of it."""
+    monkeypatch.chdir(tmp_path)
+    robot = ta.Robot.load("rv-m2")
+    (tmp_path / "my arm.toml").write_text(robot.to_toml().replace('"RV-M2"', '"Our 5"'))
+    arm = VirtualArm(ta.Robot.load("my arm.toml"), seed=1)
+    arm.measure_table(arm.poses(40)).to_csv("my data.csv", index=False)
+    return arm
+
+
+def proposed(text, begin):
+    """The words of the proposed command that begins so."""
+    return shlex.split(
+        next(line for line in text.splitlines() if line.strip().startswith(f"truearm {begin}"))
+    )
+
+
+@pytest.mark.parametrize(
+    "word", ["a b.csv", "it's.csv", "$x.csv", "#x.csv", "a;b.csv", "C:\\x.csv", "plain.csv", ""]
+)
+def test_words_are_read_back_by_a_shell(word):
+    assert shlex.split(typed(word)) == [word]
+
+
+def test_the_tip_of_a_urdf_needs_no_quotes():
+    assert typed("arm.urdf#base_link,tool0") == "arm.urdf#base_link,tool0"
+
+
+def test_files_with_blanks_are_proposed_as_one_word(folder, capsys):
+    assert main(["calibrate", "my arm.toml", "my data.csv", "-o", "my out", "--model", "constant"]) == 0
+    words = proposed(capsys.readouterr().out, "evaluate")
+    assert words == ["truearm", "evaluate", "my out/calibration.calib", "OTHER.csv"]
+    assert main(["robots", "my arm.toml"]) == 0
+    words = proposed(capsys.readouterr().out, "plan")
+    assert main(words[1:]) == 0
+    assert "'my arm.toml'" in capsys.readouterr().out
+
+
+def test_next_poses_measured_and_calibrated_from_as_proposed_share_the_set_up(folder, capsys):
+    assert main(["calibrate", "my arm.toml", "my data.csv", "-o", "out", "--model", "constant"]) == 0
+    capsys.readouterr()
+    assert main(["plan", "--next", "4", "--from", "out/calibration.calib", "-o", "more.csv"]) == 0
+    words = proposed(capsys.readouterr().out, "calibrate")
+    assert words[2:] == ["ROBOT", "my data.csv", "MEASUREMENTS.csv", "-o", "result"]
+    poses = pd.read_csv("more.csv")
+    readings = poses[[f"q{j}" for j in range(1, 6)]].to_numpy()
+    found = folder.measure_table(readings, seed=5).join(poses[["approach", "purpose", "group"]])
+    found.to_csv("MEASUREMENTS.csv", index=False)
+    words[words.index("ROBOT")] = "my arm.toml"
+    assert main([*words[1:], "--model", "constant"]) == 0
+    calibration = ta.Calibration.load("result/calibration.calib")
+    assert calibration.groups == ("my data",)
+    assert calibration.validation.holdout["constant"].position.max < 2.0
+
+
+@pytest.mark.parametrize(("name", "word"), [("abb-irb-120", "abb-irb-120"), ("my arm.toml", "ROBOT")])
+def test_a_session_s_arm_is_called_as_the_library_knows_it(name, word, folder, monkeypatch, capsys):
+    class Session:
+        def __init__(self, path, *, writing):
+            assert not writing
+
+        def __enter__(self):
+            return SimpleNamespace(meta=lambda _: ta.Robot.load(name).to_dict())
+
+        def __exit__(self, *_):
+            return None
+
+    monkeypatch.setattr("truearm.cell.session.Session", Session)
+    monkeypatch.setattr(
+        "truearm.cell.accepted.accepted_table", lambda _: pd.DataFrame({"step": [1], "q1": [0.0]})
+    )
+    session_export.command("session.db")
+    assert proposed(capsys.readouterr().out, "calibrate")[2] == word
+
+
+@pytest.mark.parametrize(("decimal", "mark"), [(",", ","), (".", ".")])
+def test_a_table_with_other_marks_comes_in_as_proposed(decimal, mark, folder, tmp_path, capsys):
+    (tmp_path / "raw files").mkdir()
+    table = pd.read_csv("my data.csv").rename(columns={f"q{j}": f"q{j}_rad" for j in range(1, 6)})
+    table.to_csv("raw files/a.csv", sep=";", decimal=decimal, index=False)
+    assert main(["calibrate", "my arm.toml", "raw files/a.csv", "-o", "out"]) == 1
+    words = shlex.split(capsys.readouterr().err.split("Convert it with: ")[1].rstrip(".\n"))
+    assert words[-2:] == ["--decimal", mark] or decimal == "."
+    assert main([*words[1:], "--joint-unit", "rad", "--length-unit", "m"]) == 0
+    assert len(ta.Measurements.read_csv("measurements.csv")) == 40
