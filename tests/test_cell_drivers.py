@@ -10,15 +10,17 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.cell_support import cell_text, possible_readings, virtual
+from tests.cell_support import cell_text, measured, possible_readings, virtual
 from truearm.cell import Cell, Connected, EmergencyStopError, Expected, RefusedError, StoppedError, movemaster
 from truearm.cell.channels import ConnectionEndedError
 from truearm.cell.conformance import ConformanceError, check_robot, check_sensor
 from truearm.cell.device_errors import DeviceGoneError
 from truearm.cell.line_sensor import LineSensor
 from truearm.cell.playback import PlaybackRobot, PlaybackSensor
+from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
-from truearm.cell.session import Step
+from truearm.cell.session import Session, Step
+from truearm.cell.summary import summary_of
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.virtual.launch import release_emergency_stop
 from truearm.files import parsed
@@ -47,6 +49,29 @@ def texts():
         "line": (tomli_w.dumps(line), SIX_PLACES),
         "trigger": (cell_text("tracker", sensor={"trigger": "MEASURE", "average": 2}), SIX_PLACES),
     }
+
+
+def test_a_target_at_a_limit_is_not_sent_beyond_it():
+    with virtual(cell_text("ur", arm="abb-irb-120")) as (_, found):
+        robot = Cell.from_toml(found).robot
+        limit = Robot.load("abb-irb-120").limits[3, 1]
+        assert round(limit, 6) > limit
+        with Connected(robot):
+            robot.move_joints(np.array([0.0, 0.1, 0.1, limit, 0.1, 0.0]))
+            assert abs(robot.read_joints()[3] - limit) < 2e-6
+
+
+def test_a_pose_beside_a_limit_is_approached_within_it(tmp_path):
+    text = cell_text("tracker", arm="abb-irb-120", process={"registration_poses": 4})
+    arm = Robot.load("abb-irb-120")
+    readings = np.random.default_rng(0).uniform(-0.5, 0.5, (6, 6))
+    readings[1::2, 3] = np.radians(159.0)
+    poses = Poses(readings, np.full(6, -1), ("",) * 6)
+    assert (readings + np.radians(3.0) > arm.limits[:, 1]).any()
+    with virtual(text) as (_, found):
+        measured(found, poses, tmp_path / "session.db")
+    with Session(tmp_path / "session.db", writing=False) as session:
+        assert summary_of(session)["measured"] == 6
 
 
 @pytest.mark.parametrize("name", texts())

@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 
 JOINTS: Final = 6
 THERE_RAD: Final = 2e-4
+DIGITS: Final = 6
 STILL_RAD_S: Final = 1e-3
 SENDINGS: Final = 8
 STOP_RAD_S2: Final = 4.0
@@ -96,7 +97,7 @@ class UniversalRobots:
                 where=self._script.where,
                 rule=f"Its limits are {np.degrees(low[joint]):g} to {np.degrees(high[joint]):g} deg",
             )
-        self._move(f"[{','.join(f'{value:.6f}' for value in target)}]", target)
+        self._move(f"[{','.join(f'{value:.{DIGITS}f}' for value in _within(target, low, high))}]", target)
 
     def move_pose(self, base_from_tool: Floats) -> None:
         """See Robot. The controller's own inverse kinematics and tool centre point are used."""
@@ -184,6 +185,12 @@ class UniversalRobots:
         if self._stream is None:
             raise DeviceError("not connected", where=f"{self.name} at {self.address}")
         return self._stream
+
+
+def _within(target: Floats, low: Floats, high: Floats) -> Floats:
+    """A target as it is sent: one at a limit is not rounded beyond it, where no arm would move to."""
+    last = 10.0**DIGITS
+    return np.clip(np.round(target, DIGITS), np.ceil(low * last) / last, np.floor(high * last) / last)
 
 
 class _Stream:
