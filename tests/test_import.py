@@ -221,6 +221,16 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     ),
     "joint unit": (PLAIN, {"joint_unit": "grad"}, '--joint-unit: "grad" is not known. Either rad or deg'),
     "decimal mark": (PLAIN, {"decimal": ";"}, '--decimal: ";" is not known'),
+    "lines above the header": (
+        "Hall 4; cell 2\n" + PLAIN.replace(",", ";"),
+        {"delimiter": ";"},
+        "another number of fields.*--skip-lines leaves out lines above the header",
+    ),
+    "no name of ours": (
+        PLAIN.upper(),
+        {"columns": {}},
+        "none of its columns has a name of ours. They are J1, J2, PX, PY, PZ. .*--map q1=COLUMN:deg",
+    ),
     "no position": (PLAIN, {"columns": {"q1": "J1"}}, "No position x, y, z"),
 }
 

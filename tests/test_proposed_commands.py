@@ -1,6 +1,7 @@
 """Commands that commands propose: typed as they stand, they work."""
 
 import shlex
+from pathlib import Path
 from types import SimpleNamespace
 
 import pandas as pd
@@ -84,7 +85,7 @@ def test_a_session_s_arm_is_called_as_the_library_knows_it(name, word, folder, m
     monkeypatch.setattr(
         "truearm.cell.accepted.accepted_table", lambda _: pd.DataFrame({"step": [1], "q1": [0.0]})
     )
-    session_export.command("session.db")
+    session_export.command(Path("session.db"))
     assert proposed(capsys.readouterr().out, "calibrate")[2] == word
 
 

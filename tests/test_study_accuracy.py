@@ -93,10 +93,29 @@ def test_a_method_that_cannot_be_fitted_says_why_and_stops_no_other(file, tmp_pa
     out = tmp_path / "out"
     given = ["--methods", "nominal,constant", "--sizes", "5,30", "--seeds", "1", "--splits", "random"]
     assert study(file, out, *given) == 0
-    capsys.readouterr()
+    assert "2 of them could not be fitted" in capsys.readouterr().out
     text = (out / "accuracy.md").read_text()
     assert "Could not be fitted" in text
     assert "15 measured values in 5 training rows" in text
+
+
+@pytest.mark.parametrize(
+    ("rows", "given", "words"),
+    [
+        (12, [], "arm.csv has 12 rows, of which 8 can train, fewer than the 20 or 30 asked for"),
+        (80, ["--splits", "target"], 'has 80 rows, which cannot be split by "target"'),
+    ],
+)
+def test_a_study_that_nothing_can_be_asked_of_is_refused(rows, given, words, table, tmp_path, capsys):
+    few, enough, out = tmp_path / "arm.csv", tmp_path / "more.csv", tmp_path / "out"
+    one_target = table.drop(columns=["x2", "y2", "z2"])
+    one_target.head(rows).to_csv(few, index=False)
+    assert study(few, out, *FAST, "--splits", "random", *given) == 1
+    assert words in capsys.readouterr().err
+    assert not out.exists()
+    table.to_csv(enough, index=False)
+    assert study(few, out, f"ur10={enough}", *FAST, "--splits", "random", *given, "--workers", "1") == 0
+    assert f"Warning: Nothing is asked of a set: {few.parent}" in capsys.readouterr().err
 
 
 def test_a_method_that_breaks_is_told_and_tried_again(file, tmp_path, monkeypatch, capsys):

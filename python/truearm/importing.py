@@ -26,6 +26,7 @@ STATE_ENCODING: Final = (
     '"Unicode text" of a spreadsheet'
 )
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
+UNEVEN: Final = "Correct or remove them; --skip-lines leaves out lines above the header"
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,13 @@ def import_table(path: Path, plan: ImportPlan) -> pd.DataFrame:
         if ours in columns:
             raise UsageError(f'column "{ours}" is named twice', where="--keep")
         columns[ours] = _kept(table, ours, theirs, plan)
+    if not columns:
+        raise InputError(
+            "none of its columns has a name of ours",
+            where=str(path),
+            rule=f"They are {', '.join(table.names)}",
+            way_out="Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on",
+        )
     frame = pd.DataFrame(columns)
     Measurements.from_dataframe(frame, name=str(path))
     return frame
@@ -119,7 +127,7 @@ def _read(path: Path, plan: ImportPlan) -> Table:
     delimiter = plan.delimiter or _plain_delimiter(text, where)
     if delimiter == plan.decimal:
         raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
-    return split_table(text, delimiter, where=where)
+    return split_table(text, delimiter, where=where, uneven=UNEVEN)
 
 
 def _decode(content: bytes, encoding: str, where: str) -> str:

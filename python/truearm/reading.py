@@ -20,6 +20,7 @@ Texts = NDArray[np.str_]
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
+UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
 REMARKS: Final = ("#", "sep=", "SEP=")
 
 
@@ -157,8 +158,10 @@ def check_is_table(text: str, *, where: str) -> None:
             )
 
 
-def split_table(text: str, delimiter: str, *, where: str) -> Table:
+def split_table(text: str, delimiter: str, *, where: str, uneven: str = UNEVEN) -> Table:
     """The fields of a text with a header line; every line must have as many as the header.
+
+    `uneven` is the way out where a line has another number.
 
     Raises:
         InputError: If a name is missing or repeated, a line has another number of fields, or there
@@ -178,7 +181,7 @@ def split_table(text: str, delimiter: str, *, where: str) -> Table:
             f"{list_rows(bad)} {'has' if len(bad) == 1 else 'have'} another number of fields than the "
             f"header's {len(header)}; {list_rows(bad[:1])} has {len(rows[bad[0] - 1])}",
             where=where,
-            way_out="Correct or remove them; if the decimal mark is a comma, use truearm import",
+            way_out=uneven,
         )
     if not rows:
         raise InputError("there are no data rows below the header", where=where)

@@ -141,7 +141,8 @@ def _words(given: str | None) -> tuple[str, ...]:
 
 
 def _warn_of(study: "Study") -> None:
-    """Read all sets before any work, and say what is to be known of them; refuse columns that none has."""
+    """Read all sets before any work, and say what is to be known of them; refuse what none can answer."""
+    from truearm.studies.accuracy.cells import check_askable
     from truearm.studies.accuracy.sets import read_set
 
     for one in study.sets:
@@ -150,6 +151,7 @@ def _warn_of(study: "Study") -> None:
     for name in study.asked.split_by:
         if name not in columns:
             raise UsageError(f'no set has a column "{name}"', where="--split-by")
+    warn(check_askable(study.sets, study.asked))
 
 
 def _write(summary: Mapping[str, Any], output: Path) -> list[Path]:
@@ -177,6 +179,9 @@ def _print(summary: Mapping[str, Any], outcome: "Outcome", files: Sequence[Path]
     if not summary["groups"]:
         tell("No question has all its methods yet.")
     say(f"{len(outcome.records)} of {outcome.asked} results are there, {outcome.run} of them found now.")
+    failed = sum("failed" in record for record in outcome.records)
+    if failed:
+        say(f"{failed} of them could not be fitted: {files[0]} says why.")
     for path in files:
         say(f"Written: {path}")
     suggest("truearm calibrate ROBOT MEASUREMENTS -o DIR", when="Calibrate an arm with ours:")

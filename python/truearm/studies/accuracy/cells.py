@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.defaults import SEED
-from truearm.errors import UsageError
+from truearm.errors import InputError, Notice, UsageError, counted, list_names
 from truearm.studies.accuracy.sets import DataSet, read_set
 from truearm.studies.accuracy.splits import Cut, Kind, cuts, divide
 
@@ -90,6 +90,32 @@ def list_cells(sets: Sequence[DataSet], asked: Asked) -> list[Cell]:
         for one in sets
         for cell in _cells_of(one, kind, size, (turn, seed), asked.split_by)
     ]
+
+
+def check_askable(sets: Sequence[DataSet], asked: Asked) -> list[Notice]:
+    """Notices of the sets of which nothing can be asked.
+
+    Raises:
+        InputError: If that is so of all sets.
+    """
+    notices = [_unaskable(one, asked) for one in sets if not list_cells([one], asked)]
+    if len(notices) == len(sets):
+        raise InputError(
+            "; ".join(notices),
+            rule="A question needs a split that its measurements allow, and rows enough to train on",
+            way_out="Give smaller --sizes, other --splits, or more measurements",
+        )
+    return [Notice("no_question", f"Nothing is asked of a set: {words}.") for words in notices]
+
+
+def _unaskable(data_set: DataSet, asked: Asked) -> str:
+    data = read_set(data_set).data
+    possible = cuts(data, asked.kinds, asked.split_by, 0)
+    what = f"{data_set.file} has {counted(len(data), 'row')}"
+    if not possible:
+        return f"{what}, which cannot be split by {list_names(asked.kinds, 'or')}"
+    most = max(len(divide(data_set, cut, asked.seeds[0]).train) for cut in possible)
+    return f"{what}, of which {most} can train, fewer than the {' or '.join(asked.sizes)} asked for"
 
 
 def _cells_of(
