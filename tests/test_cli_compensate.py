@@ -215,7 +215,20 @@ def test_seeds_of_a_path_are_no_targets(arm, capsys):
     counts = json.loads(Path("seeds.json").read_text())["counts"]
     assert (counts["targets"], counts["moves"], counts["changed"]) == (3, 3, 3)
     assert main([*words[:-1], "x.csv", "--largest-mm", "0.001"]) == 1
-    assert "3 of 3 targets cannot be corrected" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "3 of 3 targets cannot be corrected" in told
+    assert "Change them, or allow more with --largest-mm; --on-refusal" in told
+
+
+def test_no_option_is_named_where_none_helps(arm, capsys):
+    wrist, far = np.array([0.1, 0.2, -0.3, 0.4, 0.0, 0.5]), arm.poses(1, seed=5)[0]
+    np.savetxt("path.csv", [wrist, far], delimiter=",", header="q1,q2,q3,q4,q5,q6", comments="")
+    words = ["compensate", "arm.calib", "path.csv", "--controller", "nominal", "-o", "out.csv"]
+    assert main([*words, "--largest-joint-deg", "0.5"]) == 1
+    told = capsys.readouterr().err
+    assert "the tool stays" in told
+    assert "No option allows a tool to stay away" in told
+    assert "--largest-mm" not in told
 
 
 def test_a_directory_takes_files_of_the_same_names():

@@ -297,7 +297,7 @@ def test_places_and_line_ends(tmp_path):
 def test_languages_by_ending(tmp_path):
     assert language_of(tmp_path / "A.SRC").name == "KRL"
     assert len({language.name for language in LANGUAGES}) == len(LANGUAGES)
-    with pytest.raises(UsageError, match="no known language"):
+    with pytest.raises(UsageError, match='the ending ".xyz" is not known. Languages are'):
         language_of(tmp_path / "a.xyz")
 
 

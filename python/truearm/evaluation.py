@@ -1,7 +1,7 @@
 """Errors of a calibration on measurements that it has not seen, mostly in a new set-up."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -82,7 +82,7 @@ class Evaluation:
     n_judged: int
     errors: Mapping[str, Errors]
     notices: tuple[Notice, ...] = ()
-    rows: HeldRows | None = None
+    rows: HeldRows | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the notices and the rows."""

@@ -27,7 +27,12 @@ def feature_columns(given: Mapping[str, ArrayLike] | None, names: Sequence[str],
     if set(known) != set(names):
         what = list_names(sorted(map(str, known))) or "no features"
         needed = list_names(names) or "none"
-        raise UsageError(f"{what} given", where="features", rule=f"The calibration needs {needed}")
+        raise UsageError(
+            f"{what} given",
+            where="features",
+            rule=f"The calibration needs {needed}",
+            way_out=f"Give --feature {names[0]}=NUMBER, or in Python features={{...}}" if names else "",
+        )
     columns = np.empty((count, len(names)))
     for k, name in enumerate(names):
         try:

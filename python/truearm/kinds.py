@@ -26,7 +26,7 @@ def required(value: object, kind: type[T], noun: str) -> T:
         return value
     raise UsageError(
         f"{noun} {'are' if noun.endswith('s') else 'is'} of type {type(value).__name__}",
-        rule=f"A truearm.{kind.__name__} is needed",
+        rule=f"A {kind.__module__.partition('.')[0]}.{kind.__name__} is needed",
         way_out=WAYS.get(kind.__name__, ""),
     )
 

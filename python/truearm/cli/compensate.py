@@ -104,7 +104,7 @@ def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> l
     """The program's files, where there is something to write, and the report."""
     from truearm.programs.report import report_of
 
-    paths = [] if output is None or not done.changed.any() else done.save(_place(output))
+    paths = [] if output is None or not done.changed.any() else done.save(output)
     if report is not None:
         content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
         write_whole(report, f"{content}\n")
@@ -122,14 +122,6 @@ def _check_outputs(
         refuse_own_input(Path(output), calibration, frames)
     if output is None and not dry_run:
         raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
-
-
-def _place(output: str) -> Path:
-    """The path of an output; a directory, named by a slash at its end, is made if needed."""
-    place = Path(output)
-    if output.endswith("/"):
-        place.mkdir(parents=True, exist_ok=True)
-    return place
 
 
 def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:

@@ -37,7 +37,7 @@ def language_of(path: Path, name: str | None = None, known: Sequence[Language] =
         return found[0]
     asked = f'language "{name}"' if name is not None else f'the ending "{path.suffix}"'
     raise UsageError(
-        f"{asked} belongs to {'no' if not found else 'more than one'} known language",
+        f"{asked} belongs to more than one language" if found else f"{asked} is not known",
         where=str(path),
         rule=f"Languages are {list_names(one.name for one in known)}",
         way_out="Name one with --language",

@@ -29,6 +29,14 @@ Bools = NDArray[np.bool_]
 
 UNSURE: Final = 8
 """Code of refusals where the calibration is less certain than allowed."""
+NOT_REACHED: Final = (2, 3)
+ALLOWING: Final = {
+    5: "--largest-joint-deg",
+    6: "--largest-mm",
+    7: "--largest-deg",
+    UNSURE: "--largest-std-mm",
+}
+"""The option that allows more, by the code of a refusal."""
 NAMED: Final = 10
 Tell = Callable[[str, int, int], None]
 
@@ -166,7 +174,7 @@ class Rewritten:
 
         Args:
             output: The file, further ones getting its name with their endings; or a directory for files of
-                the same names.
+                the same names, which is made where a slash at its end says that it is one.
 
         Raises:
             UsageError: If it is the program itself.
@@ -174,6 +182,8 @@ class Rewritten:
             WorkError: If no target was changed.
         """
         self.refuse_unchanged()
+        if str(output).endswith("/"):
+            Path(output).mkdir(parents=True, exist_ok=True)
         paths = output_paths(self.program, Path(output))
         write_outputs(paths, self.contents)
         return paths
@@ -232,7 +242,7 @@ class _State:
     known: Bools
     reasons: dict[int, str] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
-    unsure: bool = False
+    codes: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.corrected = np.array(self.nominal)
@@ -265,13 +275,21 @@ class _State:
                 self.std_mm[rows] = found.std_mm
             for refusal in found.refusals:
                 self.refused[int(which[refusal.number - 1])] = refusal.reason
-            self.unsure |= any(refusal.code == UNSURE for refusal in found.refusals)
+            self.codes |= {refusal.code for refusal in found.refusals}
             refused = which[np.asarray(found.refused, dtype=bool)]
             self.corrected[refused] = self.nominal[refused]
 
+    def _what_helps(self) -> str:
+        """What can be done about the refusals there are: bounds that have an option may be allowed more."""
+        options = " or ".join(option for code, option in ALLOWING.items() if code in self.codes)
+        allow = f", or allow more with {options}" if options else ""
+        away = ". No option allows a tool to stay away" if self.codes.intersection(NOT_REACHED) else ""
+        keep = "--on-refusal keep-nominal leaves such targets as they are where that makes no step"
+        return f"Change them{allow}; {keep}{away}{self._why_unsure()}"
+
     def _why_unsure(self) -> str:
         """What can be done where the calibration is unsure because it knows positions alone."""
-        if not (self.unsure and self.models.positions_only):
+        if not (UNSURE in self.codes and self.models.positions_only):
             return ""
         return (
             ". This calibration knows positions alone, so it is sure of tools near the points that were "
@@ -288,9 +306,7 @@ class _State:
             raise WorkError(
                 f"{len(listed)} of {target_count(self.program)} targets cannot be corrected:\n"
                 + describe(self.program, listed),
-                way_out="Change them, or allow more with --largest-mm, --largest-deg, --largest-joint-deg or "
-                "--largest-std-mm; --on-refusal keep-nominal leaves such targets as they are where that "
-                f"makes no step{self._why_unsure()}",
+                way_out=self._what_helps(),
             )
         steps = [target for target in sorted(self.refused) if self._makes_a_step(target)]
         if steps:
