@@ -231,10 +231,13 @@ def test_no_option_is_named_where_none_helps(arm, capsys):
     assert "--largest-mm" not in told
 
 
-def test_a_directory_takes_files_of_the_same_names():
+def test_a_directory_takes_files_of_the_same_names(arm):
     Path("out").mkdir(exist_ok=True)
     assert run("-o", "out") == 0
     assert Path("out/demo.mod").exists()
+    compensator = ta.Compensator(ta.Calibration.load("arm.calib"))
+    done = ta.compensate_program("demo.mod", compensator, controller="nominal")
+    assert done.save("made/for it/") == [Path("made/for it/demo.mod")]
 
 
 def test_refusals_of_positions_alone_name_the_tool(arm, capsys):

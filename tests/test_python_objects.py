@@ -138,3 +138,24 @@ def test_lists_of_measurements_are_put_together(data, calibration):
     parts = [data.select(np.arange(30)), data.select(np.arange(30, 60))]
     whole, parted = ta.evaluate(calibration, data), ta.evaluate(calibration, parts)
     assert parted.to_dict() == whole.to_dict()
+
+
+def test_an_evaluation_prints_without_its_rows(calibration, data):
+    found = ta.evaluate(calibration, data)
+    assert found.rows is not None
+    assert len(repr(found)) < 1000
+
+
+def test_types_that_are_needed_are_called_by_their_package(robot):
+    with pytest.raises(ta.UsageError, match="A pandas.DataFrame is needed"):
+        ta.Measurements.from_dataframe(None)  # type: ignore[arg-type]
+    with pytest.raises(ta.UsageError, match="A truearm.Measurements is needed"):
+        ta.calibrate(robot, "data.csv")  # type: ignore[arg-type]
+
+
+def test_a_missing_feature_is_told_with_the_ways_to_give_it(robot):
+    arm = VirtualArm(robot, seed=2)
+    table = arm.measure_table(arm.poses(60)).assign(temperature_C=np.linspace(20.0, 25.0, 60))
+    found = ta.calibrate(robot, ta.Measurements.from_dataframe(table), features=["temperature_C"])
+    with pytest.raises(ta.UsageError, match=r"Give --feature temperature_C=NUMBER, or in Python features="):
+        found.position(np.zeros(6))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import MeasurementSet, Setup
-from truearm.errors import InputError, UsageError
+from truearm.errors import InputError, UsageError, count_of
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
@@ -202,5 +202,5 @@ def _check_asked(data: Measurements, use: Use | None, judge_target: int) -> None
         raise UsageError(
             f"there is no target {judge_target} to judge at",
             where=where,
-            rule=f"{data.target_count} targets were measured",
+            rule=f"There {'is' if data.target_count == 1 else 'are'} {count_of(data.target_count, 'target')}",
         )

@@ -78,7 +78,7 @@ def list_rows(rows: Iterable[int], noun: str = "row") -> str:
     return f"{noun}s {', '.join(named[:-1])} and {named[-1]}"
 
 
-def counted(count: int, noun: str) -> str:
+def count_of(count: int, noun: str) -> str:
     """A number with its noun: "1 row", "0 rows", "12 rows"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 

@@ -14,7 +14,7 @@ from truearm.calibration import Calibration
 from truearm.core_set import Use, core_set, rotations, select
 from truearm.defaults import SEED
 from truearm.doubts import no_help
-from truearm.errors import InputError, Notice, UsageError, list_names
+from truearm.errors import InputError, Notice, UsageError, count_of, list_names
 from truearm.fitted_rows import known_rows
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.held_rows import HeldRows
@@ -161,7 +161,8 @@ def _divide(data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]
         count = options.frame_rows or min(len(rows) // 3, MOST_FRAME_ROWS)
         if not FEWEST_FRAME_ROWS <= count < len(rows):
             raise InputError(
-                f"{len(rows)} rows of set-up {list_names([group])}, of which {count} would find its frame",
+                f"{count_of(len(rows), 'row')} of set-up {list_names([group])}, of which {count} would find "
+                "its frame",
                 where=", ".join(data.files),
                 rule=f"At least {FEWEST_FRAME_ROWS} rows find the frame, and some must be left to judge",
                 way_out="Measure more poses or give another --frame-rows",

@@ -20,7 +20,7 @@ from truearm._core import (
     fit_field,
 )
 from truearm.core_set import Selection, core_set, distance_count
-from truearm.errors import InputError, UsageError, WorkError, counted, list_names
+from truearm.errors import InputError, UsageError, WorkError, count_of, list_names
 from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
@@ -274,8 +274,8 @@ def _check_enough(task: Task, data: Measurements, rank: int) -> None:
     else:
         way_out = f"Measure at least {needed} poses to train on, or use a larger --train-size"
     raise WorkError(
-        f"{values} measured values in {counted(len(data), 'training row')} cannot determine up to {unknowns} "
-        "unknowns",
+        f"{values} measured values in {count_of(len(data), 'training row')} cannot determine up to "
+        f"{unknowns} unknowns",
         where=", ".join(data.files),
         rule="There must be more measured values than unknowns",
         way_out=way_out,
@@ -290,7 +290,7 @@ def _check_set_ups(task: Task, data: Measurements) -> None:
         if task.selection.distances or values > unknowns:
             continue
         raise WorkError(
-            f"{values} measured values in {counted(len(rows), 'training row')} cannot determine the "
+            f"{values} measured values in {count_of(len(rows), 'training row')} cannot determine the "
             f"{unknowns} unknowns of frame and target of set-up {list_names([group])}",
             where=", ".join(rows.files or data.files),
             rule="In each set-up there must be more measured values than unknowns",

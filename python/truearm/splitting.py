@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from truearm.columns import VALIDATE
 from truearm.defaults import HOLDOUT, SEED
-from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
 from truearm.measurements import Measurements
 
 Rows = NDArray[np.int64]
@@ -252,7 +252,7 @@ def _check_sizes(train: int, holdout: int, rule: SplitRule, where: str) -> None:
     if holdout == 0 or train == 0:
         side = "held out" if holdout == 0 else "left to train on"
         raise InputError(
-            f"no row would be {side}: {train + holdout} rows, of which {holdout} held out",
+            f"no row would be {side}: {count_of(train + holdout, 'row')}, of which {holdout} held out",
             where=where,
             way_out="Measure more poses, or hold out another share",
         )

@@ -20,7 +20,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import REPORT_NAME, make_report
 from truearm.defaults import HOLDOUT, SEED
-from truearm.errors import InputError, UsageError, typed
+from truearm.errors import InputError, UsageError, count_of, typed
 from truearm.files import write_whole
 from truearm.scheme_options import SchemeOptions
 
@@ -207,7 +207,8 @@ def print_results(calibration: "Calibration") -> None:
     from truearm.cli.error_tables import print_errors
 
     validation, summary = calibration.validation, calibration.summary
-    trained = f"fitted to {validation.n_train} rows, judged on {validation.n_holdout} others"
+    others = count_of(validation.n_holdout, "other")
+    trained = f"fitted to {count_of(validation.n_train, 'row')}, judged on {others}"
     if validation.n_planned:
         whole = validation.n_planned == validation.n_holdout
         trained += f", {'' if whole else f'{validation.n_planned} of them '}planned to validate"
@@ -215,7 +216,7 @@ def print_results(calibration: "Calibration") -> None:
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
     print_determined(calibration)
     of = "distance" if calibration.selection.distances else "position"
-    print_errors(validation.holdout, f"{validation.n_holdout} held-out rows", of)
+    print_errors(validation.holdout, count_of(validation.n_holdout, "held-out row"), of)
     per = "distance" if calibration.selection.distances else "coordinate"
     say(f"Standard deviation of what the model does not explain: {summary['noise_mm']:.3f} mm per {per}.")
     if validation.coverage_95 is not None:

@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
-from truearm.errors import typed
+from truearm.errors import count_of, typed
 
 
 def command(
@@ -68,9 +68,9 @@ def command(
     if keep_frames:
         how = "frame and tool kept"
     else:
-        how = f"{found.n_frame} rows found {'the frame' if keep_tool else 'frame and tool'}"
-    say(f"{known.robot.name}: {how}, {found.n_judged} rows judged.")
-    print_errors(found.errors, f"{found.n_judged} rows")
+        how = f"{count_of(found.n_frame, 'row')} found {'the frame' if keep_tool else 'frame and tool'}"
+    say(f"{known.robot.name}: {how}, {count_of(found.n_judged, 'row')} judged.")
+    print_errors(found.errors, count_of(found.n_judged, "row"))
     others = " ".join(map(typed, measurements))
     useful = all(notice.kind not in (NO_HELP, FAR_ROWS) for notice in found.notices)
     next_one = [compensate_command(known, calibration)] if useful else []

@@ -7,7 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, CalibFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest
-from truearm.errors import typed
+from truearm.errors import count_of, typed
 from truearm.files import refuse_own_input
 
 READ_AS_ROBOT: Final = ("dh-toml", "urdf")
@@ -84,7 +84,7 @@ def command(
     if made.difference_m is not None:
         say(f"Read again, its forward kinematics are ours within {made.difference_m:.0e} m.")
     if made.rows is not None:
-        say(f"{made.rows} samples.")
+        say(f"{count_of(made.rows, 'sample')}.")
     say(f"Written: {output}")
     if to in READ_AS_ROBOT:
         read = f"{output}#{made.chain}" if made.chain else output

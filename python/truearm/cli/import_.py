@@ -7,7 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest
-from truearm.errors import UsageError, typed
+from truearm.errors import UsageError, count_of, typed
 from truearm.files import refuse_own_input, write_whole
 
 DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
@@ -74,7 +74,7 @@ def command(
         names = [str(name) for name in frame.columns]
         print_json({"output": str(output), "rows": len(frame), "columns": names, "left_out": left_out})
         return
-    say_wrapped(f"{output}: {len(frame)} rows, {', '.join(frame.columns)}.")
+    say_wrapped(f"{output}: {count_of(len(frame), 'row')}, {', '.join(frame.columns)}.")
     if left_out:
         say_wrapped(f"Left out: {', '.join(left_out)}. Keep them with --keep.")
     suggest(f"truearm calibrate ROBOT {typed(output)} -o result")

@@ -9,7 +9,7 @@ from truearm.cli.arguments import AsJson, CellFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest, tell
 from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
-from truearm.errors import typed
+from truearm.errors import count_of, typed
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -88,9 +88,10 @@ def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:
         print_json({"seconds": plan.seconds, "steps": rows})
         return
     kinds = [each.step.kind for each in plan.steps]
+    contacts, poses, checks = (kinds.count(kind) for kind in ("registration", "pose", "check"))
     say_wrapped(
-        f"{kinds.count('registration')} contacts for the frame, {kinds.count('pose')} poses, "
-        f"{kinds.count('check')} checks: about {plan.seconds / 60:.0f} min."
+        f"{count_of(contacts, 'contact')} for the frame, {count_of(poses, 'pose')}, "
+        f"{count_of(checks, 'check')}: about {plan.seconds / 60:.0f} min."
     )
     for each in plan.steps:
         place = (

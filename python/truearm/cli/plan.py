@@ -10,7 +10,7 @@ from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
-from truearm.errors import UsageError, list_names, typed
+from truearm.errors import UsageError, count_of, list_names, typed
 from truearm.files import refuse_own_input
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ def _again(asked: _Asked, calibration: "Calibration") -> str:
 
 def _print_proposed(proposed: "Proposed", output: Path) -> None:
     told = proposed.to_dict()
-    say(f"{told['count']} poses: {output}")
+    say(f"{count_of(told['count'], 'pose')}: {output}")
     say(_motion(proposed.seconds))
     if "noticed" not in told:
         before, after = told["expected_before_mm"], told["expected_after_mm"][-1]

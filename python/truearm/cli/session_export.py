@@ -7,7 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, SessionFile
 from truearm.cli.console import print_json, say, suggest
-from truearm.errors import typed
+from truearm.errors import count_of, typed
 
 
 def command(
@@ -37,5 +37,5 @@ def command(
     if as_json:
         print_json({"measurements": str(output), "rows": len(table)})
         return
-    say(f"{len(table)} measurements: {output}")
+    say(f"{count_of(len(table), 'measurement')}: {output}")
     suggest(f"truearm calibrate {name_of(arm)} {typed(output)} -o result")

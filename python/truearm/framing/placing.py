@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import WorkError
+from truearm.errors import WorkError, count_of
 from truearm.framing.agreement import check_agreement, check_places, far_rows
 from truearm.framing.identified_frame import IdentifiedFrame
 from truearm.registration import register
@@ -62,7 +62,7 @@ def object_from_points(
 
 def _check_count(points: Floats) -> None:
     if len(points) < FEWEST:
-        raise _too_little(f"{len(points)} points")
+        raise _too_little(count_of(len(points), "point"))
 
 
 def _check_spread(points: Floats, least_m: float) -> None:

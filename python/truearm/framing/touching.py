@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import WorkError
+from truearm.errors import WorkError, count_of
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.identified_frame import IdentifiedFrame
 
@@ -43,7 +43,7 @@ def tool_from_touches(
     counts = np.bincount(number)
     if counts.max() < FEWEST or counts.min() < 2:
         raise WorkError(
-            f"{len(point)} touches at {len(names)} points",
+            f"touches at {count_of(len(names), 'point')}, {len(point)} in all",
             rule=f"One point is touched at least {FEWEST} times, and no point once",
             way_out='Name the point of each touch in a column "group" where several were touched',
         )

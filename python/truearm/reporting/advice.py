@@ -6,11 +6,12 @@ from typing import Final
 
 import numpy as np
 
+from truearm.errors import count_of
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.known import Known, Stretch, weakest
-from truearm.reporting.numbers import count_of, listed, percent, short, shown_readings
+from truearm.reporting.numbers import listed, percent, short, shown_readings
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -54,15 +55,15 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     outliers = facts.summary["outliers"]
     if not outliers:
         return
-    named = listed([f"{entry['row']}" for entry in outliers[:ROWS_NAMED]])
+    named = [f"{entry['row']}" for entry in outliers[:ROWS_NAMED]]
+    named += [f"{len(outliers) - ROWS_NAMED} more"] if len(outliers) > ROWS_NAMED else []
     rows = "row" if len(outliers) == 1 else "rows"
-    more = f" and {len(outliers) - ROWS_NAMED} more" if len(outliers) > ROWS_NAMED else ""
     largest = short(outliers[0]["distance_mm"])[0]
     share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
     words = (
         f"{count_of(len(outliers), 'measurement')} cannot be of the arm that the others show: {rows} "
-        f"{named}{more}, up to {largest} mm off. Measure these poses again. Usual causes are an interrupted "
-        "beam, a loose target, or an arm that had not settled."
+        f"{listed(named)}, up to {largest} mm off. Measure these poses again. Usual causes are an "
+        "interrupted beam, a loose target, or an arm that had not settled."
     )
     yield Advice("outliers", "Check the outliers.", words, facts.mean_mm() + share)
 

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation import Compensated, Compensator
+from truearm.errors import count_of
 from truearm.limits import Limits, Task
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, fixed, lean, short, signed
+from truearm.reporting.numbers import fixed, lean, short, signed
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 
 Floats = NDArray[np.float64]

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
+from truearm.errors import count_of
 from truearm.evaluation import Evaluation
 from truearm.held_rows import HeldRows
-from truearm.reporting.numbers import count_of, shown_readings, unit_of
+from truearm.reporting.numbers import shown_readings, unit_of
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]

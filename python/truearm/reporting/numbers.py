@@ -67,11 +67,6 @@ def probability(p: float) -> str:
     return f"{p:.2g}" if p >= LEAST_TOLD else f"< {LEAST_TOLD:g}"
 
 
-def count_of(count: int, noun: str) -> str:
-    """A count with its noun: "1 pose", "400 poses"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def listed(words: Sequence[str]) -> str:
     """Words with commas and "and"."""
     return ", ".join(words[:-1]) + (" and " if len(words) > 1 else "") + words[-1]

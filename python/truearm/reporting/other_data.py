@@ -1,10 +1,11 @@
 """Chapter: the same models judged on other measurements."""
 
 from truearm.doubts import NO_HELP
+from truearm.errors import count_of
 from truearm.evaluation import Evaluation
 from truearm.reporting.facts import Facts
 from truearm.reporting.held_errors import cumulative, histogram
-from truearm.reporting.numbers import count_of, fixed, short
+from truearm.reporting.numbers import fixed, short
 from truearm.reporting.parts import Part, Section, Table
 from truearm.reporting.verdict import HEADINGS, STATISTICS
 from truearm.units import MM_PER_METRE

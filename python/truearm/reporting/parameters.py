@@ -5,11 +5,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import count_of
 from truearm.models import CONSTANT
 from truearm.parameters import KIND_COUNT, KINDS
 from truearm.reporting.charts import colour_bar
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, lean, signed
+from truearm.reporting.numbers import lean, signed
 from truearm.reporting.parts import Cell, Figure, Table
 from truearm.reporting.style import DIVERGING
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE

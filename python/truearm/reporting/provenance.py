@@ -4,9 +4,10 @@ import os
 from datetime import UTC, datetime
 from pathlib import Path
 
+from truearm.errors import count_of
 from truearm.options import Options
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, fixed
+from truearm.reporting.numbers import fixed
 from truearm.reporting.option_words import in_words, shown_options
 from truearm.reporting.parts import Part, Section, Table, Text
 

@@ -4,9 +4,10 @@ from typing import Final
 
 import numpy as np
 
+from truearm.errors import count_of
 from truearm.reporting.charts import colour_bar
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, lean, short
+from truearm.reporting.numbers import lean, short
 from truearm.reporting.parameters import effect_mm
 from truearm.reporting.parts import Figure
 from truearm.reporting.style import SEQUENTIAL

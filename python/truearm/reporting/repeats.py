@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import count_of
 from truearm.reporting.charts import axis
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
-from truearm.reporting.numbers import count_of, fixed, lean, short
+from truearm.reporting.numbers import fixed, lean, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.simulation import approach_in_sequence
 from truearm.units import MM_PER_METRE

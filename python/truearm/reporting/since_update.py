@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from truearm.errors import count_of
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import count_of, fixed, listed, probability, signed
+from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
 

@@ -5,10 +5,11 @@ from typing import Final
 import numpy as np
 
 from truearm.doubts import helps
+from truearm.errors import count_of
 from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
-from truearm.reporting.numbers import count_of, fixed, listed, short
+from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
 from truearm.validation import Statistics
 

@@ -11,7 +11,7 @@ from scipy.special import gammainccinv
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import Use, select
-from truearm.errors import InputError, Notice, UsageError, WorkError, list_names
+from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
 from truearm.fitted_rows import OVERWHELMING, known_rows
 from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
@@ -257,12 +257,12 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
         return
     per_pose = max(scene_values // max(len(data), 1), 1)
     raise InputError(
-        f"{scene_values} measured values in {len(data)} poses cannot tell {wanted} unknowns of offsets, "
-        "frame and tool",
+        f"{scene_values} measured values in {count_of(len(data), 'pose')} cannot tell {wanted} unknowns of "
+        "offsets, frame and tool",
         where=", ".join(data.files),
         rule="There must be more measured values than unknowns",
         way_out=f"Measure at least {wanted // per_pose + 1} poses; 10 to 20 are a good number: "
-        "truearm plan --acceptance 15",
+        "truearm plan --acceptance 15 --from CALIB",
     )
 
 
@@ -275,7 +275,7 @@ def _check_groups(data: Measurements, task: Task) -> None:
         count = int((seen & (data.group == group)).sum())
         if count < fewest:
             raise InputError(
-                f"{count} poses of set-up {list_names([group])}",
+                f"{count_of(count, 'pose')} of set-up {list_names([group])}",
                 where=", ".join(data.files),
                 rule=f"An update needs at least {fewest} of each, outliers not counted",
                 way_out="Measure more poses there, or leave the set-up out",

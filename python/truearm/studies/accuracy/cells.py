@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from truearm.defaults import SEED
-from truearm.errors import InputError, Notice, UsageError, counted, list_names
+from truearm.errors import InputError, Notice, UsageError, count_of, list_names
 from truearm.studies.accuracy.sets import DataSet, read_set
 from truearm.studies.accuracy.splits import Cut, Kind, cuts, divide
 
@@ -111,7 +111,7 @@ def check_askable(sets: Sequence[DataSet], asked: Asked) -> list[Notice]:
 def _unaskable(data_set: DataSet, asked: Asked) -> str:
     data = read_set(data_set).data
     possible = cuts(data, asked.kinds, asked.split_by, 0)
-    what = f"{data_set.file} has {counted(len(data), 'row')}"
+    what = f"{data_set.file} has {count_of(len(data), 'row')}"
     if not possible:
         return f"{what}, which cannot be split by {list_names(asked.kinds, 'or')}"
     most = max(len(divide(data_set, cut, asked.seeds[0]).train) for cut in possible)
