@@ -144,12 +144,12 @@ def suggest_next(calibration: "Calibration", file: Path) -> None:
         suggest(f"truearm evaluate {typed(file)} OTHER.csv", compensate_command(calibration, file))
 
 
-def compensate_command(calibration: "Calibration", file: Path) -> str:
-    """The command that shows what a calibration does to a program."""
+def compensate_command(calibration: "Calibration", file: Path, more: str = "") -> str:
+    """The command that shows what a calibration does to a program, with more options, each after a space."""
     from truearm.programs.declaring import may_differ
 
     declared = " --controller MODEL" if may_differ(calibration.robot) else ""
-    return f"truearm compensate {typed(file)} PROGRAM{declared} --dry-run"
+    return f"truearm compensate {typed(file)} PROGRAM{declared}{more} --dry-run"
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:
