@@ -663,19 +663,13 @@ def residuals(problem: Problem, parameters: NDArray[np.float64], setup: Setup) -
         setup: Frames, targets and anchors.
     """
 
+def find_bytes(text: bytes, word: bytes) -> int | None:
+    """Where `word` stands in `text` for the first time; None if it does not."""
+
 def scan_lines(
     text: bytes,
-) -> tuple[
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.int32],
-    NDArray[np.float64],
-    NDArray[np.int16],
-]:
-    """Lines of a program's text and all their numbers.
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Lines of a program's text and where all their numbers are.
 
     Digits within names are no numbers; a sign belongs to its number unless something that it could be
     subtracted from stands before it. Lines end with a line feed.
@@ -683,11 +677,22 @@ def scan_lines(
     Returns:
         First byte of each line and the length of the text (l + 1,); for each line which of the different
         lines it is, numbers apart (l,); for each different line the first that is so (k,); for each line its
-        first number, and how many there are (l + 1,); and of the numbers (m,) the first byte, the byte behind
-        the last, the value, and the digits behind the point, at most 400.
+        first number, and how many there are (l + 1,); and the first byte of each number (m,).
 
     Raises:
         CoreError: The text has 2 GiB or more.
+    """
+
+def read_numbers(
+    text: bytes, starts: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.int16]]:
+    """What numbers say that begin at `starts` (n, k), as `scan_lines` finds them.
+
+    Returns:
+        Of each the byte behind the last, the value, and the digits behind the point, at most 400, (n, k) each.
+
+    Raises:
+        CoreError: At one of the places no number begins.
     """
 
 def splice_numbers(

@@ -9,6 +9,8 @@ use crate::model::Model;
 
 /// What is left of a variance by less than this part is rounding.
 const ROUNDING: f64 = 1e-12;
+/// Columns of a factor whose products are summed at once: sums of one would wait for one another.
+const TOGETHER: usize = 2;
 /// Unknowns of base and tool.
 const MOVED: usize = 9;
 
@@ -30,8 +32,8 @@ pub struct ConstantSpread {
     columns: Vec<usize>,
     /// Unknowns of base and tool, 9 or none.
     moved: usize,
-    /// Lower triangle, row by row: the covariance is F F^T.
-    factor: Vec<f64>,
+    /// F, of which the covariance is F F^T: its columns from the diagonal down, [`TOGETHER`] beside one another.
+    factor: Vec<[f64; TOGETHER]>,
 }
 
 impl ConstantSpread {
@@ -46,7 +48,8 @@ impl ConstantSpread {
         let count = columns.len() + moved;
         check_length("the covariance", covariance.len(), count * count)?;
         check_finite("the covariance", covariance)?;
-        Ok(ConstantSpread { factor: semidefinite_factor(covariance, count), columns, moved })
+        let factor = side_by_side(&semidefinite_factor(covariance, count), count);
+        Ok(ConstantSpread { factor, columns, moved })
     }
 
     fn check(&self, model: &Model) -> Result<(), CompensateError> {
@@ -66,17 +69,23 @@ impl ConstantSpread {
     fn variance<I: Isa>(&self, moved: &[[Lane; 3]; MOVED], scratch: &AimedScratch) -> Lane {
         let count = self.columns.len();
         let mut sum = Lane::ZERO;
-        for column in 0..count + self.moved {
-            let mut motion = [Lane::ZERO; 3];
-            for row in column..count + self.moved {
+        let mut place = 0;
+        for first in (0..count + self.moved).step_by(TOGETHER) {
+            let mut motions = [[Lane::ZERO; 3]; TOGETHER];
+            for row in first..count + self.moved {
                 let linear = if row < count { &scratch.screws[row].linear } else { &moved[row - count] };
-                let factor = Lane::splat(self.factor[row * (row + 1) / 2 + column]);
-                for i in 0..3 {
-                    motion[i] = I::mul_add(linear[i], factor, motion[i]);
+                for column in 0..TOGETHER {
+                    let factor = Lane::splat(self.factor[place][column]);
+                    for i in 0..3 {
+                        motions[column][i] = I::mul_add(linear[i], factor, motions[column][i]);
+                    }
                 }
+                place += 1;
             }
-            for value in motion {
-                sum = I::mul_add(value, value, sum);
+            for motion in motions {
+                for value in motion {
+                    sum = I::mul_add(value, value, sum);
+                }
             }
         }
         sum
@@ -189,4 +198,17 @@ fn semidefinite_factor(covariance: &[f64], count: usize) -> Vec<f64> {
         }
     }
     factor
+}
+
+/// A lower triangle, row by row, as columns from the diagonal down, [`TOGETHER`] beside one another; zeros above it.
+fn side_by_side(factor: &[f64], count: usize) -> Vec<[f64; TOGETHER]> {
+    let mut columns = Vec::new();
+    for first in (0..count).step_by(TOGETHER) {
+        for row in first..count {
+            let below =
+                |column: usize| if column <= row { factor[row * (row + 1) / 2 + column] } else { 0.0 };
+            columns.push(std::array::from_fn(|k| below(first + k)));
+        }
+    }
+    columns
 }

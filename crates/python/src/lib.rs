@@ -66,7 +66,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;
     module.add_function(wrap_pyfunction!(field::fit_field, module)?)?;
+    module.add_function(wrap_pyfunction!(text::find_bytes, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(text::read_numbers, module)?)?;
     module.add_function(wrap_pyfunction!(text::splice_numbers, module)?)?;
     Ok(())
 }

@@ -25,6 +25,12 @@ pub enum TextError {
         /// The value.
         value: f64,
     },
+    /// A place that is said to be a number's.
+    #[error("no number begins at byte {start}")]
+    NoNumber {
+        /// The place.
+        start: i32,
+    },
     /// Columns of one table that differ in length.
     #[error("the columns of a table have {first} and {other} rows, they must have the same number")]
     Lengths {

@@ -25,7 +25,7 @@ const SHORT_DIGITS: u32 = 8;
 
 /// Write a number of at most eight digits as [`write_fixed`] does to the beginning of `out`, whose rest may be
 /// written over as well; its length, None for a longer number.
-#[inline]
+#[inline(always)]
 pub(crate) fn write_short(out: &mut [u8; ROOM], value: f64, decimals: u32, plus: bool) -> Option<usize> {
     let magnitude = value.abs();
     let scaled = magnitude * POWERS.get(decimals as usize).filter(|_| decimals < SHORT_DIGITS)?;
@@ -44,16 +44,19 @@ pub(crate) fn write_short(out: &mut [u8; ROOM], value: f64, decimals: u32, plus:
     if decimals == 0 {
         return Some(point);
     }
-    out[point] = b'.';
-    out[point + 1..point + 9].copy_from_slice(&(text >> (8 * (SHORT_DIGITS - decimals))).to_le_bytes());
+    // At most seven digits stand behind the point, so that they fit a word with it.
+    let behind = (text >> (8 * (SHORT_DIGITS - decimals))) << 8 | u64::from(b'.');
+    out[point..point + 8].copy_from_slice(&behind.to_le_bytes());
     Some(point + 1 + decimals as usize)
 }
 
 /// The nearest integer, away from zero between two, of a number from 0 to `EXACT`.
 #[inline]
 fn nearest(scaled: f64) -> u64 {
-    let whole = scaled as i64;
-    (whole + i64::from(scaled - whole as f64 >= 0.5)) as u64
+    // A float of this size has no digits behind the point; between two integers it takes the even one.
+    const UNIT: f64 = (1_u64 << 52) as f64;
+    let sum = scaled + UNIT;
+    sum.to_bits() - UNIT.to_bits() + u64::from(scaled - (sum - UNIT) >= 0.5)
 }
 
 /// The decimal digits of a number below 10^8, the first one in the lowest byte.

@@ -15,6 +15,10 @@ const EXACT: u64 = 1 << 53;
 const MOST_DECIMALS: i32 = 400;
 /// So many digits fit an integer, whatever they are.
 const MOST_DIGITS: usize = 18;
+/// Bytes of a machine word.
+const WORD: usize = 8;
+/// Bytes that a short number lies within, and the words that it is read by.
+const WINDOW: usize = 24;
 
 /// A number in a line, its sign included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,8 +87,8 @@ impl Digits {
     /// Take the digits at `at`; where they end.
     #[inline]
     fn take(&mut self, line: &[u8], mut at: usize) -> usize {
-        while let Some(bytes) = line.get(at..).and_then(<[u8]>::first_chunk) {
-            let (value, count) = leading_digits(u64::from_le_bytes(*bytes));
+        while let Some(bytes) = word_at(line, at) {
+            let (value, count) = leading_digits(bytes);
             self.whole = self.whole.wrapping_mul(TENS[count]).wrapping_add(value);
             self.count += count;
             at += count;
@@ -101,65 +105,134 @@ impl Digits {
     }
 }
 
-/// The value of the digits that eight bytes begin with, the first byte the lowest, and how many they are.
-///
-/// The word is shifted until zeros stand before the digits; then neighbours are joined to pairs, pairs to fours and these
-/// to eight, all parts of the word at once.
+/// In each byte.
+const EACH: u64 = 0x0101_0101_0101_0101;
+/// Differ from digits by what these say.
+const ZEROS: u64 = EACH * b'0' as u64;
+
+/// How many digits eight bytes begin with, the first byte the lowest.
 #[inline]
-fn leading_digits(bytes: u64) -> (u64, usize) {
-    const EACH: u64 = 0x0101_0101_0101_0101;
-    let digits = bytes ^ (EACH * u64::from(b'0'));
+fn digit_count(bytes: u64) -> usize {
+    let digits = bytes ^ ZEROS;
     // The high bit of each byte that is above nine, up to the first; behind it carries may set more.
     let others = (digits.wrapping_add(EACH * 0x76) | digits) & (EACH * 0x80);
-    let count = (others.trailing_zeros() / 8) as usize;
-    let aligned = digits.checked_shl(64 - 8 * count as u32).unwrap_or(0);
-    let pairs = (aligned.wrapping_mul(10).wrapping_add(aligned >> 8)) & 0x00ff_00ff_00ff_00ff;
+    (others.trailing_zeros() / 8) as usize
+}
+
+/// The value of eight digits, the first one the lowest byte.
+///
+/// Neighbours are joined to pairs, pairs to fours and these to eight, all parts of the word at once.
+#[inline]
+fn value_of(digits: u64) -> u64 {
+    let pairs = (digits.wrapping_mul(10).wrapping_add(digits >> 8)) & 0x00ff_00ff_00ff_00ff;
     let fours = (pairs.wrapping_mul(100).wrapping_add(pairs >> 16)) & 0x0000_ffff_0000_ffff;
-    let eight = (fours.wrapping_mul(10_000).wrapping_add(fours >> 32)) & 0xffff_ffff;
-    (eight, count)
+    (fours.wrapping_mul(10_000).wrapping_add(fours >> 32)) & 0xffff_ffff
+}
+
+/// The value of the digits that eight bytes begin with, and how many they are.
+///
+/// The word is shifted until zeros stand before the digits.
+#[inline]
+fn leading_digits(bytes: u64) -> (u64, usize) {
+    let count = digit_count(bytes);
+    let aligned = (bytes ^ ZEROS).checked_shl(64 - 8 * count as u32).unwrap_or(0);
+    (value_of(aligned), count)
 }
 
 /// The number whose first digit or point is at `at`; None where digits are part of something else.
 #[inline]
 pub(crate) fn number_at(line: &[u8], at: usize) -> Option<Number> {
-    let mut digits = Digits::default();
-    let mut decimals = 0;
-    let mut end = digits.take(line, at);
-    if line.get(end) == Some(&b'.') && line.get(end + 1) != Some(&b'.') {
-        let before = digits.count;
-        end = digits.take(line, end + 1);
-        decimals = i32::try_from(digits.count - before).unwrap_or(i32::MAX);
-    }
-    if digits.count == 0 {
-        return None;
-    }
-    let (end, exponent) = exponent_at(line, end);
-    if line.get(end).is_some_and(|&byte| in_name(byte) || byte == b'.') {
-        return None;
-    }
-    let start = sign_before(line, at).unwrap_or(at);
-    let shift = exponent.saturating_sub(decimals);
-    let magnitude = exact(&digits, shift).or_else(|| parsed(&line[at..end]))?;
-    let value = if line[start] == b'-' { -magnitude } else { magnitude };
-    let decimals = shift.saturating_neg().clamp(0, MOST_DECIMALS) as i16;
-    Some(Number { start, end, value, decimals })
+    number_from(line, sign_before(line, at).unwrap_or(at))
 }
 
 /// The number at `at`, sign included, where all before it is known to be read as in another line.
 ///
 /// None where it is not certain that reading from the line's start would find the same: behind what could be
 /// part of a name, of a number or of an exponent.
-#[inline]
+#[inline(always)]
 pub(crate) fn expected_number(line: &[u8], at: usize) -> Option<Number> {
     let before = at.checked_sub(1).map(|place| line[place]);
     if before.is_some_and(|byte| class(byte) != Class::Other || matches!(byte, b'+' | b'-')) {
         return None;
     }
-    let digits = if matches!(line.get(at), Some(b'+' | b'-')) { at + 1 } else { at };
-    if !matches!(class(*line.get(digits)?), Class::Digit | Class::Point) {
+    let digits = at + usize::from(is_sign(*line.get(at)?));
+    let begins = matches!(class(*line.get(digits)?), Class::Digit | Class::Point);
+    let own = digits == at || sign_before(line, digits).is_some();
+    if begins && own { number_from(line, at) } else { None }
+}
+
+/// The number that begins at `start` with its sign, if it has one; None where digits are part of something else.
+#[inline(always)]
+pub(crate) fn number_from(text: &[u8], start: usize) -> Option<Number> {
+    match short_number(text, start) {
+        None => any_number(text, start),
+        found => found,
+    }
+}
+
+#[inline]
+fn is_sign(byte: u8) -> bool {
+    matches!(byte, b'+' | b'-')
+}
+
+/// The same for a number of eight digits at most, some on either side of its point, as most are; None for others.
+#[inline(always)]
+fn short_number(text: &[u8], start: usize) -> Option<Number> {
+    let window: &[u8; WINDOW] = text.get(start..)?.first_chunk()?;
+    let first = usize::from(is_sign(window[0]));
+    let whole = word_at(window, first)?;
+    let before = digit_count(whole);
+    let point = first + before;
+    let rest = word_at(window, point + 1)?;
+    let decimals = digit_count(rest);
+    let length = point + 1 + decimals;
+    let short = before > 0 && decimals > 0 && before + decimals <= WORD;
+    if !short || window[point] != b'.' || class(window[length]) != Class::Other {
         return None;
     }
-    number_at(line, digits).filter(|number| number.start == at)
+    let (whole, rest) = ((whole ^ ZEROS) << (64 - 8 * before), (rest ^ ZEROS) << (64 - 8 * decimals));
+    let magnitude = to_float(value_of(whole >> (8 * decimals) | rest)) / POWERS[decimals];
+    let value = if window[0] == b'-' { -magnitude } else { magnitude };
+    Some(Number { start, end: start + length, value, decimals: decimals as i16 })
+}
+
+/// An integer below 2^52 as a float, without the processor's conversion: that waits for the float before in its register.
+#[inline]
+pub(crate) fn to_float(integer: u64) -> f64 {
+    const UNIT: f64 = (1_u64 << 52) as f64;
+    f64::from_bits(UNIT.to_bits() | integer) - UNIT
+}
+
+/// The eight bytes from `at` on, the first one the lowest.
+#[inline]
+fn word_at(line: &[u8], at: usize) -> Option<u64> {
+    line.get(at..)?.first_chunk().map(|bytes| u64::from_le_bytes(*bytes))
+}
+
+/// The same for any number.
+#[inline(never)]
+fn any_number(text: &[u8], start: usize) -> Option<Number> {
+    let first = start + usize::from(text.get(start).is_some_and(|&byte| is_sign(byte)));
+    let mut digits = Digits::default();
+    let mut decimals = 0;
+    let mut end = digits.take(text, first);
+    if text.get(end) == Some(&b'.') && text.get(end + 1) != Some(&b'.') {
+        let before = digits.count;
+        end = digits.take(text, end + 1);
+        decimals = i32::try_from(digits.count - before).unwrap_or(i32::MAX);
+    }
+    if digits.count == 0 {
+        return None;
+    }
+    let (end, exponent) = exponent_at(text, end);
+    if text.get(end).is_some_and(|&byte| in_name(byte) || byte == b'.') {
+        return None;
+    }
+    let shift = exponent.saturating_sub(decimals);
+    let magnitude = exact(&digits, shift).or_else(|| parsed(&text[first..end]))?;
+    let value = if text[start] == b'-' { -magnitude } else { magnitude };
+    let decimals = shift.saturating_neg().clamp(0, MOST_DECIMALS) as i16;
+    Some(Number { start, end, value, decimals })
 }
 
 /// The value of digits times a power of ten where both are exact, so that their quotient is the nearest number.

@@ -2,83 +2,16 @@
 
 use std::collections::HashMap;
 
+use memchr::memchr;
 use rayon::prelude::*;
 
 use crate::error::TextError;
-use crate::number::{Class, Number, class, expected_number, number_at};
+use crate::piece::Piece;
 
-/// Stands for a number in a skeleton. No text has it: readers refuse texts with this byte.
-const PLACEHOLDER: u8 = 0;
 /// Bytes of the longest text whose offsets the columns hold.
 const LONGEST: usize = i32::MAX as usize;
 /// Bytes that are scanned at a time; the result does not depend on it.
 const PIECE: usize = 1 << 18;
-
-/// Numbers of a text at places in the whole of it, in columns.
-#[derive(Clone, Debug, Default)]
-pub struct Found {
-    /// First byte of each.
-    pub starts: Vec<i32>,
-    /// Behind the last byte of each.
-    pub ends: Vec<i32>,
-    /// What they say.
-    pub values: Vec<f64>,
-    /// Digits behind the point, a negative exponent counted, as in [`Number`].
-    pub decimals: Vec<i16>,
-}
-
-impl Found {
-    /// How many there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.starts.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.starts.is_empty()
-    }
-
-    /// They, one by one.
-    pub fn iter(&self) -> impl Iterator<Item = Number> + '_ {
-        (0..self.len()).map(|row| Number {
-            start: self.starts[row] as usize,
-            end: self.ends[row] as usize,
-            value: self.values[row],
-            decimals: self.decimals[row],
-        })
-    }
-
-    fn truncate(&mut self, count: usize) {
-        self.starts.truncate(count);
-        self.ends.truncate(count);
-        self.values.truncate(count);
-        self.decimals.truncate(count);
-    }
-
-    fn reserve(&mut self, count: usize) {
-        self.starts.reserve(count);
-        self.ends.reserve(count);
-        self.values.reserve(count);
-        self.decimals.reserve(count);
-    }
-
-    #[inline]
-    fn push(&mut self, number: &Number, offset: usize) {
-        self.starts.push((number.start + offset) as i32);
-        self.ends.push((number.end + offset) as i32);
-        self.values.push(number.value);
-        self.decimals.push(number.decimals);
-    }
-
-    fn append(&mut self, other: &Self) {
-        self.starts.extend_from_slice(&other.starts);
-        self.ends.extend_from_slice(&other.ends);
-        self.values.extend_from_slice(&other.values);
-        self.decimals.extend_from_slice(&other.decimals);
-    }
-}
 
 /// The lines of a text and their numbers.
 #[derive(Clone, Debug, Default)]
@@ -91,8 +24,8 @@ pub struct Lines {
     pub representative: Vec<i32>,
     /// For each line, its first number; and how many numbers there are.
     pub first_number: Vec<i32>,
-    /// The numbers.
-    pub numbers: Found,
+    /// First byte of each number, its sign included.
+    pub numbers: Vec<i32>,
 }
 
 /// Find the lines and the numbers of a text.
@@ -127,7 +60,7 @@ fn scan_in_pieces(text: &[u8], threads: usize) -> Lines {
     let mut room: Vec<Piece> = (0..threads).map(|_| Piece::default()).collect();
     for batch in spans.chunks(room.len()) {
         room.par_iter_mut().zip(batch).for_each(|(piece, &(start, end))| piece.fill(text, start, end));
-        for piece in &mut room[..batch.len()] {
+        for piece in &room[..batch.len()] {
             lines.append(piece, &mut known);
         }
         if let Some(&(_, done)) = batch.last() {
@@ -138,22 +71,27 @@ fn scan_in_pieces(text: &[u8], threads: usize) -> Lines {
 }
 
 impl Lines {
-    fn clear(&mut self) {
-        for column in [&mut self.starts, &mut self.skeleton, &mut self.representative, &mut self.first_number]
-        {
+    pub(crate) fn clear(&mut self) {
+        for column in [
+            &mut self.starts,
+            &mut self.skeleton,
+            &mut self.representative,
+            &mut self.first_number,
+            &mut self.numbers,
+        ] {
             column.clear();
         }
-        self.numbers.truncate(0);
     }
 
     /// Add the lines of the next piece of the text.
-    fn append(&mut self, piece: &mut Piece, known: &mut HashMap<Vec<u8>, i32>) {
+    fn append(&mut self, piece: &Piece, known: &mut HashMap<Vec<u8>, i32>) {
         let (line, number) = (self.skeleton.len() as i32, self.numbers.len() as i32);
-        let mut ids = Vec::with_capacity(piece.skeletons.len());
-        for (skeleton, first) in piece.skeletons.drain(..).zip(&piece.lines.representative) {
+        let mut ids = Vec::with_capacity(piece.lines.representative.len());
+        for (skeleton, first) in piece.skeletons().zip(&piece.lines.representative) {
             let fresh = self.representative.len() as i32;
-            let id = *known.entry(skeleton).or_insert(fresh);
+            let id = known.get(skeleton).copied().unwrap_or(fresh);
             if id == fresh {
+                known.insert(skeleton.to_vec(), fresh);
                 self.representative.push(first + line);
             }
             ids.push(id);
@@ -161,11 +99,11 @@ impl Lines {
         self.starts.extend_from_slice(&piece.lines.starts);
         self.skeleton.extend(piece.lines.skeleton.iter().map(|&id| ids[id as usize]));
         self.first_number.extend(piece.lines.first_number.iter().map(|first| first + number));
-        self.numbers.append(&piece.lines.numbers);
+        self.numbers.extend_from_slice(&piece.lines.numbers);
     }
 
     /// Make room for the whole of a text of which `done` bytes were read, as if it went on alike.
-    fn reserve_for(&mut self, length: usize, done: usize) {
+    pub(crate) fn reserve_for(&mut self, length: usize, done: usize) {
         let more = |count: usize| (count as u128 * (length - done) as u128 / done.max(1) as u128) as usize;
         let (lines, numbers) = (more(self.skeleton.len()), more(self.numbers.len()));
         for column in [&mut self.starts, &mut self.skeleton, &mut self.first_number] {
@@ -181,127 +119,9 @@ fn pieces(text: &[u8]) -> Vec<(usize, usize)> {
     let mut start = 0;
     while start < text.len() {
         let near = (start + PIECE).min(text.len());
-        let rest = text[near..].iter().position(|&byte| byte == b'\n');
-        let end = rest.map_or(text.len(), |place| near + place + 1);
+        let end = memchr(b'\n', &text[near..]).map_or(text.len(), |place| near + place + 1);
         found.push((start, end));
         start = end;
     }
     found
-}
-
-/// The lines of a part of the text, and the different lines among them, numbers apart.
-#[derive(Default)]
-struct Piece {
-    lines: Lines,
-    skeletons: Vec<Vec<u8>>,
-    known: HashMap<Vec<u8>, i32>,
-    /// For each different line, which one came behind it last.
-    behind: Vec<usize>,
-    scratch: Vec<u8>,
-}
-
-impl Piece {
-    /// The lines from `start` to `end`, in place of what was here.
-    fn fill(&mut self, text: &[u8], start: usize, end: usize) {
-        self.lines.clear();
-        self.skeletons.clear();
-        self.known.clear();
-        self.behind.clear();
-        let (mut at, mut last, mut reserved) = (start, None, false);
-        while at < end {
-            self.lines.starts.push(at as i32);
-            self.lines.first_number.push(self.lines.numbers.len() as i32);
-            let guess = last.map(|last: usize| self.behind[last]);
-            let (kind, length) = self.expected(&text[at..end], at, guess).unwrap_or_else(|| {
-                let rest = &text[at..end];
-                let length =
-                    rest.iter().position(|&byte| byte == b'\n').map_or(rest.len(), |place| place + 1);
-                (self.scanned(&rest[..length], at), length)
-            });
-            self.lines.skeleton.push(kind as i32);
-            if let Some(last) = last {
-                self.behind[last] = kind;
-            }
-            last = Some(kind);
-            at += length;
-            if !reserved && at - start >= PIECE {
-                self.lines.reserve_for(end - start, at - start);
-                reserved = true;
-            }
-        }
-    }
-
-    /// The kind and the length of the line that `text` begins with, if it is of the kind that is guessed.
-    fn expected(&mut self, text: &[u8], offset: usize, guess: Option<usize>) -> Option<(usize, usize)> {
-        let kind = guess?;
-        let numbers = &mut self.lines.numbers;
-        let count = numbers.len();
-        let length = alike(text, &self.skeletons[kind], offset, numbers);
-        if length.is_none() {
-            numbers.truncate(count);
-        }
-        Some((kind, length?))
-    }
-
-    /// The kind of a line.
-    fn scanned(&mut self, line: &[u8], offset: usize) -> usize {
-        scan_line(line, offset, &mut self.scratch, &mut self.lines.numbers);
-        if let Some(&known) = self.known.get(&self.scratch) {
-            return known as usize;
-        }
-        let fresh = self.skeletons.len();
-        self.known.insert(self.scratch.clone(), fresh as i32);
-        self.lines.representative.push(self.lines.skeleton.len() as i32);
-        self.skeletons.push(self.scratch.clone());
-        self.behind.push(fresh);
-        fresh
-    }
-}
-
-/// The length of the line that `text` begins with, and its numbers, at `offset` more, behind `numbers`; None
-/// where reading it might find another skeleton than this one.
-fn alike(text: &[u8], skeleton: &[u8], offset: usize, numbers: &mut Found) -> Option<usize> {
-    let mut at = 0;
-    for &byte in skeleton {
-        if byte == PLACEHOLDER {
-            let number = expected_number(text, at)?;
-            numbers.push(&number, offset);
-            at = number.end;
-        } else if text.get(at) == Some(&byte) {
-            at += 1;
-        } else {
-            return None;
-        }
-    }
-    skeleton.ends_with(b"\n").then_some(at)
-}
-
-/// The skeleton of one line into `scratch`, its numbers, at `offset` more, behind `numbers`.
-fn scan_line(line: &[u8], offset: usize, scratch: &mut Vec<u8>, numbers: &mut Found) {
-    scratch.clear();
-    let (mut at, mut copied) = (0, 0);
-    while let Some(&byte) = line.get(at) {
-        match class(byte) {
-            Class::Other => at += 1,
-            Class::Name => at = end_of_name(line, at),
-            Class::Digit | Class::Point => {
-                let Some(number) = number_at(line, at) else {
-                    at = end_of_name(line, at);
-                    continue;
-                };
-                scratch.extend_from_slice(&line[copied..number.start]);
-                scratch.push(PLACEHOLDER);
-                at = number.end;
-                copied = at;
-                numbers.push(&number, offset);
-            }
-        }
-    }
-    scratch.extend_from_slice(&line[copied..]);
-}
-
-/// Behind the name, or the digits that are none of ours, at `at`.
-fn end_of_name(line: &[u8], at: usize) -> usize {
-    let rest = &line[at + 1..];
-    at + 1 + rest.iter().position(|&byte| class(byte) == Class::Other).unwrap_or(rest.len())
 }

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 use crate::error::TextError;
 use crate::room::Room;
 
-/// Bytes that a number grows by, usually less.
-const GROWTH: usize = 4;
 /// Numbers that are written at a time; the result does not depend on it.
-const PIECE: usize = 1 << 15;
+const PIECE: usize = 1 << 14;
+/// Bytes that a piece usually has at most.
+const ROOM: usize = 1 << 19;
 
 /// Numbers to write over spans of a text, in the order of the text; all columns have the same length.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +59,7 @@ pub fn splice_in_pieces(
     }
     let pieces: Vec<Result<Vec<u8>, TextError>> = (0..count.div_ceil(PIECE).max(1))
         .into_par_iter()
-        .map(|piece| spliced(text, numbers, words, piece))
+        .map_init(|| Room::with_capacity(ROOM), |room, piece| spliced(text, numbers, words, piece, room))
         .collect();
     pieces.into_iter().collect()
 }
@@ -70,40 +70,60 @@ fn spliced(
     numbers: Numbers<'_>,
     words: &[Words<'_>],
     piece: usize,
+    out: &mut Room,
 ) -> Result<Vec<u8>, TextError> {
     let (first, last) = (piece * PIECE, numbers.starts.len().min((piece + 1) * PIECE));
     let from = if first == 0 { 0 } else { behind(numbers.ends[first - 1], text) };
     let is_last = last == numbers.starts.len();
     let to = if is_last { text.len() } else { behind(numbers.ends[last - 1], text) };
     let skipped = words.iter().take_while(|word| first > 0 && word.start < from).count();
-    let mut waiting = words[skipped..].iter().take_while(|word| is_last || word.start < to).peekable();
-    let mut out = Room::with_capacity(to.saturating_sub(from) + (last - first) * GROWTH);
-    let mut copied = from;
-    for row in first..last {
-        let span = span(numbers.starts[row], numbers.ends[row], copied, text.len())?;
-        while let Some(word) = waiting.next_if(|word| word.start <= span.0) {
-            copied = put(&mut out, text, copied, word)?;
-        }
-        if span.0 < copied {
-            return Err(TextError::Span { start: span.0, end: span.1, after: copied, length: text.len() });
-        }
-        out.copy(text, copied, span.0);
-        let value = numbers.values[row];
-        if !value.is_finite() {
-            return Err(TextError::NotFinite { start: span.0, value });
-        }
-        let decimals = u32::try_from(numbers.decimals[row]).unwrap_or(0);
-        out.number(value, decimals, text[span.0] == b'+');
-        copied = span.1;
-    }
+    let waiting = words[skipped..].iter().take_while(|word| is_last || word.start < to);
+    let (mut copied, mut row) = (from, first);
     for word in waiting {
-        copied = put(&mut out, text, copied, word)?;
+        let before =
+            numbers.starts[row..last].iter().take_while(|&&start| (start as usize) < word.start).count();
+        copied = write_numbers(out, text, copied, numbers.rows(row, row + before))?;
+        row += before;
+        copied = put(out, text, copied, word)?;
     }
+    copied = write_numbers(out, text, copied, numbers.rows(row, last))?;
     if copied > to {
         return Err(TextError::Span { start: to, end: to, after: copied, length: text.len() });
     }
     out.copy(text, copied, to);
-    Ok(out.into_bytes())
+    Ok(out.take())
+}
+
+/// Numbers with the text before each, from `copied` on; where copying goes on.
+fn write_numbers(
+    out: &mut Room,
+    text: &[u8],
+    mut copied: usize,
+    numbers: Numbers<'_>,
+) -> Result<usize, TextError> {
+    let Numbers { starts, ends, values, decimals } = numbers;
+    for (((&start, &end), &value), &decimals) in starts.iter().zip(ends).zip(values).zip(decimals) {
+        let span = span(start, end, copied, text.len())?;
+        if !value.is_finite() {
+            return Err(TextError::NotFinite { start: span.0, value });
+        }
+        let decimals = u32::try_from(decimals).unwrap_or(0);
+        out.copy_with_number(text, (copied, span.0), (value, decimals, text[span.0] == b'+'));
+        copied = span.1;
+    }
+    Ok(copied)
+}
+
+impl Numbers<'_> {
+    /// Those from `first` to before `last`.
+    fn rows(&self, first: usize, last: usize) -> Self {
+        Self {
+            starts: &self.starts[first..last],
+            ends: &self.ends[first..last],
+            values: &self.values[first..last],
+            decimals: &self.decimals[first..last],
+        }
+    }
 }
 
 /// An offset within the text; one that is not is an error where its number is written.

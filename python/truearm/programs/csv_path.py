@@ -15,12 +15,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import scan_lines
 from truearm.columns import JOINT, QUATERNION, TARGET
 from truearm.programs.environment import IDENTITY, Environment, Environments
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
 from truearm.programs.program import LinearStep, Program
+from truearm.programs.scanning import Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
 from truearm.robot import Robot
@@ -96,9 +96,7 @@ class _Reader:
 
     def __init__(self, source: Source, robot: Robot) -> None:
         self._source = source
-        found = scan_lines(source.content)
-        self._starts, self._skeleton, self._examples, self._first_number = found[:4]
-        self._numbers = found[4:]
+        self._scan = Scan(source.content)
         self._header = self._find_header()
         fields = self._fields(self._header)
         fields[0] = fields[0][source.first if self._header == 0 else 0 :]
@@ -138,15 +136,15 @@ class _Reader:
         """Order in the text, and columns layout, offset and numbers of all targets, kind by kind of row."""
         width = max(self.layouts[part.layout].width for part in self._parts)
         found: list[list[NDArray[Any]]] = []
-        for kind, example in enumerate(self._examples):
-            lines = np.flatnonzero(self._skeleton == kind)
+        for kind, example in enumerate(self._scan.first_of):
+            lines = np.flatnonzero(self._scan.kind == kind)
             lines = lines[lines > self._header]
             if len(lines) == 0 or self._is_remark(int(example)):
                 continue
             places = self._places(int(lines[0]))
             found += [one for part in self._parts if (one := self._columns(part, places, lines, width))]
         if not found:
-            self._source.fail(int(self._starts[self._header]), "there are no rows below the header")
+            self._source.fail(int(self._scan.starts[self._header]), "there are no rows below the header")
         columns = [np.concatenate(parts) for parts in zip(*found, strict=True)]
         order = np.lexsort((columns[0], columns[1]))
         return order, columns
@@ -161,18 +159,17 @@ class _Reader:
             self._fail_cell(int(lines[0]), empty[0])
         if empty:
             return []
-        where = self._first_number[lines][:, None] + np.array(chosen, dtype=np.int64)
-        starts, ends, values, decimals = (_padded(column[where], width) for column in self._numbers)
-        factors = _padded(np.broadcast_to(part.factors, where.shape), width)
+        numbers = self._scan.columns(lines, [place for place in chosen if place is not None])
+        factors = np.broadcast_to(part.factors, numbers.values.shape)
         layout = np.full(len(lines), part.layout)
-        return [layout, self._starts[lines], starts, ends, values, decimals, factors]
+        return [layout, self._scan.starts[lines], *(_padded(column, width) for column in (*numbers, factors))]
 
     def _is_remark(self, line: int) -> bool:
         text = self._line(line).strip()
         return not text or text.startswith("#")
 
     def _line(self, line: int) -> str:
-        return self._source.part(int(self._starts[line]), int(self._starts[line + 1]))
+        return self._source.part(int(self._scan.starts[line]), int(self._scan.starts[line + 1]))
 
     def _fields(self, line: int) -> list[str]:
         """The fields of a line."""
@@ -186,7 +183,7 @@ class _Reader:
         return fields
 
     def _find_header(self) -> int:
-        for line in range(len(self._starts) - 1):
+        for line in range(len(self._scan.kind)):
             if not self._is_remark(line):
                 return line
         return self._source.fail(0, "the file is empty", rule="A header and rows are needed")
@@ -194,12 +191,12 @@ class _Reader:
     def _places(self, line: int) -> list[int | None]:
         """Which number of the line each field is; None for an empty field, or one of text."""
         fields = self._fields(line)
-        start = int(self._starts[line])
+        start = int(self._scan.starts[line])
         if len(fields) != len(self._names):
             self._source.fail(start, f"there are {len(fields)} fields, and {len(self._names)} in the header")
-        numbers = slice(int(self._first_number[line]), int(self._first_number[line + 1]))
-        known = {int(at): place for place, at in enumerate(self._numbers[0][numbers])}
-        ends = self._numbers[1][numbers]
+        numbers = self._scan.numbers(line)
+        known = {int(at): place for place, at in enumerate(numbers.starts[0])}
+        ends = numbers.ends[0]
         places: list[int | None] = []
         for name, text in zip(self._names, fields, strict=True):
             at = start + len(text) - len(text.lstrip())
@@ -216,7 +213,7 @@ class _Reader:
 
     def _fail_cell(self, line: int, column: int) -> None:
         self._source.fail(
-            int(self._starts[line]),
+            int(self._scan.starts[line]),
             f'there is nothing in column "{self._names[column]}"',
             rule="A waypoint needs all of its numbers; joints beside a pose may be left out together",
         )
@@ -270,7 +267,7 @@ class _Reader:
 
     def _fail_header(self, what: str) -> None:
         self._source.fail(
-            int(self._starts[self._header]),
+            int(self._scan.starts[self._header]),
             what,
             rule="Columns are q1 ... qN, or x, y, z with qw, qx, qy, qz or rx, ry, rz, or both",
             way_out="docs/reference/programs.md has the units that names may carry",

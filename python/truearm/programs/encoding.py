@@ -13,7 +13,7 @@ from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program
 from truearm.programs.solving import AT_ONCE, are_singular, numbers_of
-from truearm.programs.tables import run_of
+from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -165,7 +165,7 @@ class Encoder:
         """Numbers in the text's units, and the decimals to write them with."""
         targets, factors = self.program.targets, self._factors(which, layout)
         least = np.array(layout.least_decimals, dtype=np.int16)
-        if (factors != 1.0).any():
+        if not all_ones(factors):
             lost = np.ceil(np.log10(np.abs(factors)) - ALMOST).astype(np.int64)
             values, least = values / factors, np.maximum(least + lost, 0).astype(np.int16)
         return values, np.maximum(targets.of(targets.decimals, which, layout.width), least)

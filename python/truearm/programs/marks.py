@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from truearm._core import find_bytes
 from truearm.errors import WorkError
 from truearm.programs.program import Program
 
@@ -20,8 +21,8 @@ def refuse_marked(program: Program) -> None:
         WorkError: If it does; names file and line.
     """
     for source in program.sources:
-        at = source.content.find(MARK.encode())
-        if at >= 0:
+        at = find_bytes(source.content, MARK.encode())
+        if at is not None:
             line, _ = source.place(at)
             raise WorkError(
                 "this program was compensated already",

@@ -221,7 +221,7 @@ def rewrite(
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
     )
-    known: Bools = np.isfinite(np.einsum("ij->i", solved.q))
+    known: Bools = np.isfinite(solved.q @ np.ones(solved.q.shape[1]))
     known[list(solved.reasons)] = False
     known &= uses.moved
     state = _State(program, uses, models, solved.q, known)

@@ -12,6 +12,7 @@ from truearm.programs.configuration import ANY, meant, nearest_turns, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight
+from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -70,7 +71,7 @@ def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayo
     targets, width = program.targets, layout.width
     numbers: Floats = targets.of(targets.values, which, width)
     factors = targets.of(targets.factors, which, width)
-    return numbers if (factors == 1.0).all() else numbers * factors
+    return numbers if all_ones(factors) else numbers * factors
 
 
 def flange_poses(stored: Floats, environment: Environment) -> Floats:
@@ -109,7 +110,7 @@ class _Solver:
         for number, layout in enumerate(self.program.layouts):
             which = np.flatnonzero(self.program.targets.layout == number)
             if of_joints(layout):
-                self.q[which] = layout.to_readings(numbers_of(self.program, which, layout))
+                self.q[run_of(which)] = layout.to_readings(numbers_of(self.program, which, layout))
         self.reasons.update(self.program.fixed)
         for target in np.flatnonzero(~self.uses.mentioned):
             self.reasons.setdefault(int(target), UNUSED)

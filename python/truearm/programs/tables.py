@@ -27,6 +27,12 @@ def run_of(rows: Integers) -> slice | Integers:
     return rows
 
 
+def all_ones(factors: Floats) -> bool:
+    """Whether all factors are one; where one stands for them all only that is looked at."""
+    looked_at = factors if any(factors.strides) else factors.reshape(-1)[:1]
+    return bool((looked_at == 1.0).all())
+
+
 class Motion(IntEnum):
     """How a move reaches its target."""
 

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import scan_lines
+from truearm.programs.scanning import Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion
 from truearm.programs.urscript_constants import AXES, RunTime
@@ -81,65 +81,46 @@ class Lines:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        found = scan_lines(source.content)
-        self._starts, self._skeleton, self._first_of, self._first_number = found[:4]
-        self._numbers = found[4:]
-        counts = np.bincount(self._skeleton, minlength=len(self._first_of))
+        self._scan = scan = Scan(source.content)
+        counts = np.bincount(scan.kind, minlength=len(scan.first_of))
         self._templates = {
             number: template
             for number in np.flatnonzero(counts >= FEW)
-            if (template := self._template(int(self._first_of[number]))) is not None
+            if (template := self._template(int(scan.first_of[number]))) is not None
         }
-        taken = np.zeros(len(self._first_of), dtype=bool)
+        taken = np.zeros(len(scan.first_of), dtype=bool)
         taken[list(self._templates)] = True
-        self._taken = taken[self._skeleton]
+        self._taken = taken[scan.kind]
 
     def rest(self) -> Iterator[tuple[int, int]]:
         """Where text begins and ends that is to be read statement by statement."""
         edges = np.flatnonzero(np.diff(self._taken, prepend=True, append=True))
         for first, last in edges.reshape(-1, 2):
-            yield int(self._starts[first]), int(self._starts[last])
+            yield int(self._scan.starts[first]), int(self._scan.starts[last])
 
     def columns(self) -> Iterator[Columns]:
         """The motions that fill their lines, kind by kind."""
         for number, template in self._templates.items():
-            yield self._columns(template, np.flatnonzero(self._skeleton == number))
+            yield self._columns(template, np.flatnonzero(self._scan.kind == number))
 
     def _columns(self, template: _Template, lines: Integers) -> Columns:
-        starts, ends, values, decimals = self._picked(template, lines)
+        numbers = self._scan.columns(lines, template.places)
         blended = np.full(len(lines), template.blended)
         if template.radius is not None:
-            blended |= self._numbers[2][self._first_number[lines] + template.radius] != 0.0
+            blended |= self._scan.columns(lines, [template.radius]).values[:, 0] != 0.0
         return Columns(
-            self._starts[lines] + template.at,
-            starts[:, 0] - template.before_leaf,
+            self._scan.starts[lines] + template.at,
+            numbers.starts[:, 0] - template.before_leaf,
             np.full(len(lines), template.layout),
             np.full(len(lines), int(template.motion)),
             blended,
-            starts,
-            ends,
-            values,
-            decimals,
-            np.broadcast_to(template.factors, values.shape),
+            *numbers,
+            np.broadcast_to(template.factors, numbers.values.shape),
         )
-
-    def _picked(self, template: _Template, lines: Integers) -> Iterator[NDArray[Any]]:
-        """The targets' numbers in lines, (n, 6) each; views where lines and places follow one another."""
-        first, last = int(lines[0]), int(lines[-1]) + 1
-        numbers = slice(int(self._first_number[first]), int(self._first_number[last]))
-        start = template.places[0]
-        if last - first == len(lines) and template.places == tuple(range(start, start + AXES)):
-            for column in self._numbers:
-                yield column[numbers].reshape(len(lines), -1)[:, start : start + AXES]
-            return
-        places = self._first_number[lines][:, None] + np.array(template.places)
-        for column in self._numbers:
-            yield column[places]
 
     def _template(self, line: int) -> _Template | None:
         """What line number `line` is; None if it is not one whole motion with its numbers in it."""
-        start, end = int(self._starts[line]), int(self._starts[line + 1])
-        numbers = slice(int(self._first_number[line]), int(self._first_number[line + 1]))
+        start, end = int(self._scan.starts[line]), int(self._scan.starts[line + 1])
         found = list(statements(self._source, start, end))
         if len(found) != 1 or found[0].word not in MOTIONS:
             return None
@@ -151,7 +132,7 @@ class Lines:
             written = numbers_of(leaf)
         except (NotReadable, RunTime):
             return None
-        places = {int(at): place for place, at in enumerate(self._numbers[0][numbers])}
+        places = {int(at): place for place, at in enumerate(self._scan.numbers(line).starts[0])}
         if len(written) != AXES or any(number.start not in places for number in written):
             return None
         radius = blend_radius(call)
