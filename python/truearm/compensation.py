@@ -225,7 +225,8 @@ class Compensator:
         except CoreError as error:
             raise InputError(str(error)) from None
         q, numbers, refused = corrector.path(rows, self._features)
-        residual, turned, shift, turn, std = (numbers * TO_SHOWN).T
+        numbers *= TO_SHOWN
+        residual, turned, shift, turn, std = numbers.T
         refusals = (
             unsolved.get(place) or Refusal(place + 1, reason, code) for place, code, reason in refused
         )

@@ -20,7 +20,7 @@ from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.program import Language, Listed, Program
 from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, run_of
+from truearm.programs.tables import Motion, placed, run_of
 from truearm.programs.uses import Uses, target_count
 from truearm.robot import Robot
 
@@ -245,9 +245,9 @@ class _State:
     codes: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self.corrected = np.array(self.nominal)
+        self.corrected = np.broadcast_to(self.nominal, self.nominal.shape)
         self.correction_mm, self.correction_mrad, self.std_mm = (
-            np.full(len(self.nominal), np.nan) for _ in range(3)
+            np.broadcast_to(np.nan, len(self.nominal)) for _ in range(3)
         )
 
     def compensate(self) -> None:
@@ -266,13 +266,11 @@ class _State:
             found = self.models.compensator.joints(
                 np.ascontiguousarray(self.nominal[rows]), tool=None if tool.unknown else tool.true
             )
-            self.corrected[rows] = found.q
-            self.correction_mm[rows], self.correction_mrad[rows] = (
-                found.correction_mm,
-                found.correction_mrad,
-            )
+            self.corrected = placed(self.corrected, rows, found.q)
+            self.correction_mm = placed(self.correction_mm, rows, found.correction_mm)
+            self.correction_mrad = placed(self.correction_mrad, rows, found.correction_mrad)
             if found.std_mm is not None:
-                self.std_mm[rows] = found.std_mm
+                self.std_mm = placed(self.std_mm, rows, found.std_mm)
             for refusal in found.refusals:
                 self.refused[int(which[refusal.number - 1])] = refusal.reason
             self.codes |= {refusal.code for refusal in found.refusals}
@@ -388,9 +386,11 @@ class _State:
     def _forget(self, unchanged: Bools) -> None:
         if not unchanged.any():
             return
-        self.corrected[unchanged] = self.nominal[unchanged]
-        for column in (self.correction_mm, self.correction_mrad, self.std_mm):
-            column[unchanged] = np.nan
+        rows, nothing = np.flatnonzero(unchanged), np.full(int(unchanged.sum()), np.nan)
+        self.corrected = placed(self.corrected, rows, self.nominal[rows])
+        self.correction_mm = placed(self.correction_mm, rows, nothing)
+        self.correction_mrad = placed(self.correction_mrad, rows, nothing)
+        self.std_mm = placed(self.std_mm, rows, nothing)
 
     def _notices(self, changed: Bools) -> tuple[Notice, ...]:
         along = self.uses.moved & (self.uses.straight | self.uses.blended)

@@ -1,4 +1,4 @@
-"""The lines of a text, those that are equal but for their numbers as one kind, and their numbers in columns."""
+"""The lines of a text, those that are equal but for their numbers as one kind, and numbers in columns."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -12,7 +12,7 @@ from truearm.programs.configuration import ANY, meant, nearest_turns, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight
-from truearm.programs.tables import all_ones, run_of
+from truearm.programs.tables import all_ones, placed, run_of
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -102,7 +102,7 @@ class _Solver:
 
     def __init__(self, program: Program, uses: Uses, robot: Robot, inverse: Inverse) -> None:
         self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
-        self.q = np.full((len(program.targets), robot.joint_count), np.nan)
+        self.q: Floats = np.broadcast_to(np.nan, (len(program.targets), robot.joint_count))
         self.reasons: dict[int, str] = {}
 
     def take_joints(self) -> None:
@@ -110,7 +110,8 @@ class _Solver:
         for number, layout in enumerate(self.program.layouts):
             which = np.flatnonzero(self.program.targets.layout == number)
             if of_joints(layout):
-                self.q[run_of(which)] = layout.to_readings(numbers_of(self.program, which, layout))
+                readings = layout.to_readings(numbers_of(self.program, which, layout))
+                self.q = placed(self.q, run_of(which), readings)
         self.reasons.update(self.program.fixed)
         for target in np.flatnonzero(~self.uses.mentioned):
             self.reasons.setdefault(int(target), UNUSED)
@@ -131,6 +132,7 @@ class _Solver:
         possible = self._possible(tell)
         if not possible:
             return
+        self.q = np.require(self.q, requirements="W")
         before: Floats | None = None
         moves = self.program.moves
         columns = (moves.target.tolist(), moves.follows.tolist(), moves.motion.tolist())

@@ -27,6 +27,16 @@ def run_of(rows: Integers) -> slice | Integers:
     return rows
 
 
+def placed(column: Floats, rows: slice | Integers, values: Floats) -> Floats:
+    """A column with `values` in some rows: changed in place unless it may not be, or has no other rows."""
+    if isinstance(rows, slice) and rows == slice(0, len(column)):
+        return values
+    if not column.flags.writeable:
+        column = np.array(column)
+    column[rows] = values
+    return column
+
+
 def all_ones(factors: Floats) -> bool:
     """Whether all factors are one; where one stands for them all only that is looked at."""
     looked_at = factors if any(factors.strides) else factors.reshape(-1)[:1]

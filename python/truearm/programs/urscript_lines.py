@@ -111,8 +111,8 @@ class Lines:
         return Columns(
             self._scan.starts[lines] + template.at,
             numbers.starts[:, 0] - template.before_leaf,
-            np.full(len(lines), template.layout),
-            np.full(len(lines), int(template.motion)),
+            np.broadcast_to(template.layout, len(lines)),
+            np.broadcast_to(int(template.motion), len(lines)),
             blended,
             *numbers,
             np.broadcast_to(template.factors, numbers.values.shape),

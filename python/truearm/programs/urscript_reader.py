@@ -98,16 +98,16 @@ class Reader:
         leaves, rows = self._leaves, self._rows.columns
         leaf = _joined([c.leaf for c in lines], leaves.at)
         order = _order(leaf)
-        rank = np.empty(len(leaf), dtype=np.int64)
+        rank = np.arange(len(leaf))
         rank[order] = np.arange(len(leaf))
         starts, ends, values, decimals = (
             _rows_joined([column[place] for column in lines], own)[order].reshape(-1)
             for place, own in enumerate(leaves.numbers[:-1], start=Columns._fields.index("starts"))
         )
         targets = Targets(
-            source=np.zeros(len(leaf), dtype=np.int64),
+            source=np.broadcast_to(0, len(leaf)),
             at=leaf[order],
-            layout=_joined([c.layout for c in lines], leaves.layout)[order].astype(np.int64),
+            layout=_joined([c.layout for c in lines], leaves.layout)[order].astype(np.int64, copy=False),
             first=AXES * np.arange(len(leaf) + 1),
             starts=starts,
             ends=ends,
@@ -116,8 +116,8 @@ class Reader:
             factors=_factors([c.factors for c in lines], leaves.numbers[-1], order),
             names={int(rank[count + number]): name for number, name in leaves.names.items()},
         )
-        target = rank[np.concatenate([np.arange(count), count + np.array(rows[0], dtype=np.int64)])]
-        return targets, self._moves(lines, target)
+        own = rank[count + np.array(rows[0], dtype=np.int64)]
+        return targets, self._moves(lines, _joined([rank[:count]], own))
 
     def _moves(self, lines: list[Columns], target: Integers) -> Moves:
         rows = self._rows.columns
@@ -126,20 +126,20 @@ class Reader:
             _joined([c[place] for c in lines], rows[own])
             for place, own in ((Columns._fields.index("motion"), 2), (Columns._fields.index("blended"), 3))
         )
-        own = np.array(rows[4], dtype=np.int64)
-        environment = np.concatenate([self._plain_environments(at[: len(at) - len(own)]), own])
-        alone = _joined([np.zeros(len(c.at), dtype=np.int64) for c in lines], rows[5]).astype(bool)
+        environment = _joined([self._plain_environments(at[: len(at) - len(rows[4])])], rows[4])
+        alone = _joined([np.broadcast_to(0, len(c.at)) for c in lines], rows[5]).astype(bool)
         order = _order(at)
-        region = _counted(at[order], np.sort(np.array(self._found.breaks, dtype=np.int64)))
-        follows = np.diff(region, prepend=-1) == 0
-        follows &= ~alone[order]
+        follows = ~alone[order]
         follows[1:] &= ~alone[order][:-1]
+        behind = np.searchsorted(at[order], np.array(self._found.breaks, dtype=np.int64))
+        follows[behind[behind < len(at)]] = False
+        follows[:1] = False
         return Moves(
             target[order],
-            np.zeros(len(at), dtype=np.int64),
+            np.broadcast_to(0, len(at)),
             at[order],
-            motion[order].astype(np.int64),
-            blended[order].astype(bool),
+            motion[order].astype(np.int64, copy=False),
+            blended[order].astype(bool, copy=False),
             environment[order],
             follows,
         )
@@ -216,10 +216,10 @@ def _row(number: Number) -> tuple[float, ...]:
     return (number.start, number.end, number.value, number.decimals, number.factor)
 
 
-def _joined(columns: list[NDArray[Any]], own: "array[int] | array[float]") -> NDArray[Any]:
+def _joined(columns: list[NDArray[Any]], own: "array[int] | array[float] | Integers") -> NDArray[Any]:
     """Columns of lines, then our own, in one, the rows' numbers in order."""
     flat = [np.asarray(column).reshape(-1) for column in columns]
-    return flat[0] if len(flat) == 1 and not own else np.concatenate([*flat, np.array(own)])
+    return flat[0] if len(flat) == 1 and len(own) == 0 else np.concatenate([*flat, np.array(own)])
 
 
 def _rows_joined(columns: list[NDArray[Any]], own: "array[int] | array[float]") -> NDArray[Any]:
@@ -243,9 +243,3 @@ def _factors(
 def _order(at: Integers) -> slice | Integers:
     """What sorts offsets: all of them as a slice where they are sorted."""
     return slice(None) if (at[1:] > at[:-1]).all() else np.argsort(at, kind="stable")
-
-
-def _counted(at: Integers, edges: Integers) -> Integers:
-    """How many of the sorted `edges` are not behind each of the sorted offsets."""
-    counts = np.bincount(np.searchsorted(at, edges), minlength=len(at) + 1)
-    return np.cumsum(counts)[: len(at)]

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.programs.layouts import of_joints
-from truearm.programs.program import Program
-from truearm.programs.tables import Motion
+from truearm.programs.program import Program, motion_is_straight
+from truearm.programs.tables import Motion, run_of
 
 Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 UNUSED: Final = "no motion goes there"
+CURVED: Final = np.array([motion_is_straight(motion) for motion in Motion])
 SEVERAL: Final = "it is used with several tools, objects or offsets, and one change cannot suit them all"
 
 
@@ -50,13 +51,14 @@ class Uses:
         joints = np.array([of_joints(layout) for layout in program.layouts], dtype=bool)
         joint_targets = joints[targets.layout] if len(targets) else np.zeros(0, dtype=bool)
         real = _all_or(moves.motion != Motion.NONE)
+        target = run_of(moves.target[real])
         moved = np.zeros(len(targets), dtype=bool)
-        moved[moves.target[real]] = True
-        mentioned = np.zeros(len(targets), dtype=bool)
-        mentioned[moves.target] = True
+        moved[target] = True
+        mentioned = np.array(moved)
+        mentioned[run_of(moves.target)] = True
         tool_of, tools = _tools(program)
-        environment, several = _single(moves.environment[real], moves.target[real], len(targets))
-        tool, several_tools = _single(tool_of[moves.environment[real]], moves.target[real], len(targets))
+        environment, several = _single(moves.environment[real], target, len(targets))
+        tool, several_tools = _single(tool_of[moves.environment[real]], target, len(targets))
         straight, blended = _along(program, real)
         return cls(
             moved,
@@ -97,12 +99,13 @@ def _tools(program: Program) -> tuple[Integers, tuple[int, ...]]:
     return np.array(numbers, dtype=np.int64), tuple(examples)
 
 
-def _single(values: Integers, targets: Integers, count: int) -> tuple[Integers, Bools]:
+def _single(values: Integers, targets: slice | Integers, count: int) -> tuple[Integers, Bools]:
     """For each target the value of its uses, -1 without any, and whether they differ."""
     last = np.full(count, -1, dtype=np.int64)
     last[targets] = values
     several = np.zeros(count, dtype=bool)
-    several[targets[last[targets] != values]] = True
+    if not isinstance(targets, slice):
+        several[targets[last[targets] != values]] = True
     return last, several
 
 
@@ -110,7 +113,7 @@ def _along(program: Program, real: slice | Bools) -> tuple[Bools, Bools]:
     """Targets at either end of a straight move, and targets at or next to one that is passed."""
     moves, count = program.moves, len(program.targets)
     target = moves.target[real]
-    curved = np.isin(moves.motion[real], (Motion.LINEAR, Motion.VIA, Motion.CIRCULAR))
+    curved = CURVED[moves.motion[real]]
     passed = moves.blended[real]
     straight, blended = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
     straight[target[curved]] = True
