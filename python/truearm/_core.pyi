@@ -689,7 +689,7 @@ def read_numbers(
     """What numbers say that begin at `starts` (n, k), as `scan_lines` finds them.
 
     Returns:
-        Of each the byte behind the last, the value, and the digits behind the point, at most 400, (n, k) each.
+        Of each the byte behind the last, the value, and the digits behind the point, at most 400; (n, k).
 
     Raises:
         CoreError: At one of the places no number begins.

@@ -15,6 +15,8 @@ const EXACT: u64 = 1 << 53;
 const MOST_DECIMALS: i32 = 400;
 /// So many digits fit an integer, whatever they are.
 const MOST_DIGITS: usize = 18;
+/// Numbers below this power of ten are finite.
+const SURELY_FINITE: i32 = 300;
 /// Bytes of a machine word.
 const WORD: usize = 8;
 /// Bytes that a short number lies within, and the words that it is read by.
@@ -139,18 +141,19 @@ fn leading_digits(bytes: u64) -> (u64, usize) {
     (value_of(aligned), count)
 }
 
-/// The number whose first digit or point is at `at`; None where digits are part of something else.
+/// Where the number begins and ends whose first digit or point is at `at`; None where digits are of something else.
 #[inline]
-pub(crate) fn number_at(line: &[u8], at: usize) -> Option<Number> {
-    number_from(line, sign_before(line, at).unwrap_or(at))
+pub(crate) fn number_at(line: &[u8], at: usize) -> Option<(usize, usize)> {
+    let start = sign_before(line, at).unwrap_or(at);
+    Some((start, end_from(line, start)?))
 }
 
-/// The number at `at`, sign included, where all before it is known to be read as in another line.
+/// Where the number at `at` ends, sign included, where all before it is known to be read as in another line.
 ///
 /// None where it is not certain that reading from the line's start would find the same: behind what could be
 /// part of a name, of a number or of an exponent.
 #[inline(always)]
-pub(crate) fn expected_number(line: &[u8], at: usize) -> Option<Number> {
+pub(crate) fn expected_end(line: &[u8], at: usize) -> Option<usize> {
     let before = at.checked_sub(1).map(|place| line[place]);
     if before.is_some_and(|byte| class(byte) != Class::Other || matches!(byte, b'+' | b'-')) {
         return None;
@@ -158,15 +161,27 @@ pub(crate) fn expected_number(line: &[u8], at: usize) -> Option<Number> {
     let digits = at + usize::from(is_sign(*line.get(at)?));
     let begins = matches!(class(*line.get(digits)?), Class::Digit | Class::Point);
     let own = digits == at || sign_before(line, digits).is_some();
-    if begins && own { number_from(line, at) } else { None }
+    if begins && own { end_from(line, at) } else { None }
 }
 
 /// The number that begins at `start` with its sign, if it has one; None where digits are part of something else.
 #[inline(always)]
 pub(crate) fn number_from(text: &[u8], start: usize) -> Option<Number> {
-    match short_number(text, start) {
-        None => any_number(text, start),
-        found => found,
+    let Some(Short { whole, rest, before, decimals, length }) = short_from(text, start) else {
+        return any_number(text, start);
+    };
+    let (whole, rest) = ((whole ^ ZEROS) << (64 - 8 * before), (rest ^ ZEROS) << (64 - 8 * decimals));
+    let magnitude = to_float(value_of(whole >> (8 * decimals) | rest)) / POWERS[decimals];
+    let value = if text[start] == b'-' { -magnitude } else { magnitude };
+    Some(Number { start, end: start + length, value, decimals: decimals as i16 })
+}
+
+/// Where it ends.
+#[inline(always)]
+fn end_from(text: &[u8], start: usize) -> Option<usize> {
+    match short_from(text, start) {
+        Some(short) => Some(start + short.length),
+        None => end_of_any(text, start),
     }
 }
 
@@ -175,9 +190,21 @@ fn is_sign(byte: u8) -> bool {
     matches!(byte, b'+' | b'-')
 }
 
-/// The same for a number of eight digits at most, some on either side of its point, as most are; None for others.
+/// A number of eight digits at most with some on either side of its point, as most are.
+struct Short {
+    /// Eight bytes from its first digit on, and from behind its point on.
+    whole: u64,
+    rest: u64,
+    /// Digits before and behind the point.
+    before: usize,
+    decimals: usize,
+    /// Bytes of it, its sign included.
+    length: usize,
+}
+
+/// The number that begins at `start`, if it is such a one.
 #[inline(always)]
-fn short_number(text: &[u8], start: usize) -> Option<Number> {
+fn short_from(text: &[u8], start: usize) -> Option<Short> {
     let window: &[u8; WINDOW] = text.get(start..)?.first_chunk()?;
     let first = usize::from(is_sign(window[0]));
     let whole = word_at(window, first)?;
@@ -187,16 +214,11 @@ fn short_number(text: &[u8], start: usize) -> Option<Number> {
     let decimals = digit_count(rest);
     let length = point + 1 + decimals;
     let short = before > 0 && decimals > 0 && before + decimals <= WORD;
-    if !short || window[point] != b'.' || class(window[length]) != Class::Other {
-        return None;
-    }
-    let (whole, rest) = ((whole ^ ZEROS) << (64 - 8 * before), (rest ^ ZEROS) << (64 - 8 * decimals));
-    let magnitude = to_float(value_of(whole >> (8 * decimals) | rest)) / POWERS[decimals];
-    let value = if window[0] == b'-' { -magnitude } else { magnitude };
-    Some(Number { start, end: start + length, value, decimals: decimals as i16 })
+    let whole_number = short && window[point] == b'.' && class(window[length]) == Class::Other;
+    whole_number.then_some(Short { whole, rest, before, decimals, length })
 }
 
-/// An integer below 2^52 as a float, without the processor's conversion: that waits for the float before in its register.
+/// An integer below 2^52 as a float; the conversion of processors waits for what was in the register before.
 #[inline]
 pub(crate) fn to_float(integer: u64) -> f64 {
     const UNIT: f64 = (1_u64 << 52) as f64;
@@ -209,9 +231,17 @@ fn word_at(line: &[u8], at: usize) -> Option<u64> {
     line.get(at..)?.first_chunk().map(|bytes| u64::from_le_bytes(*bytes))
 }
 
-/// The same for any number.
-#[inline(never)]
-fn any_number(text: &[u8], start: usize) -> Option<Number> {
+/// A number as it is written, whatever its length.
+struct Spelled {
+    digits: Digits,
+    /// Power of ten that its digits are to be taken times.
+    shift: i32,
+    /// Its first digit or point.
+    first: usize,
+    end: usize,
+}
+
+fn spelled_from(text: &[u8], start: usize) -> Option<Spelled> {
     let first = start + usize::from(text.get(start).is_some_and(|&byte| is_sign(byte)));
     let mut digits = Digits::default();
     let mut decimals = 0;
@@ -228,11 +258,28 @@ fn any_number(text: &[u8], start: usize) -> Option<Number> {
     if text.get(end).is_some_and(|&byte| in_name(byte) || byte == b'.') {
         return None;
     }
-    let shift = exponent.saturating_sub(decimals);
+    Some(Spelled { digits, shift: exponent.saturating_sub(decimals), first, end })
+}
+
+/// As [`number_from`].
+#[inline(never)]
+fn any_number(text: &[u8], start: usize) -> Option<Number> {
+    let Spelled { digits, shift, first, end } = spelled_from(text, start)?;
     let magnitude = exact(&digits, shift).or_else(|| parsed(&text[first..end]))?;
     let value = if text[start] == b'-' { -magnitude } else { magnitude };
     let decimals = shift.saturating_neg().clamp(0, MOST_DECIMALS) as i16;
     Some(Number { start, end, value, decimals })
+}
+
+/// As [`end_from`]: the value matters only where it may be out of range.
+#[inline(never)]
+fn end_of_any(text: &[u8], start: usize) -> Option<usize> {
+    let Spelled { digits, shift, first, end } = spelled_from(text, start)?;
+    let power = i32::try_from(digits.count).unwrap_or(i32::MAX).saturating_add(shift);
+    if power > SURELY_FINITE {
+        parsed(&text[first..end])?;
+    }
+    Some(end)
 }
 
 /// The value of digits times a power of ten where both are exact, so that their quotient is the nearest number.

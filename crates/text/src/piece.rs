@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use memchr::memchr;
 
-use crate::number::{Class, class, expected_number, number_at};
+use crate::number::{Class, class, expected_end, number_at};
 use crate::scan::Lines;
 use crate::shape::Shape;
 
@@ -119,9 +119,9 @@ fn alike(text: &[u8], skeleton: &[u8], spans: &mut Vec<(i32, i32)>) -> Option<us
     let mut at = 0;
     for &byte in skeleton {
         if byte == PLACEHOLDER {
-            let number = expected_number(text, at)?;
-            spans.push((number.start as i32, number.end as i32));
-            at = number.end;
+            let end = expected_end(text, at)?;
+            spans.push((at as i32, end as i32));
+            at = end;
         } else if text.get(at) == Some(&byte) {
             at += 1;
         } else {
@@ -141,15 +141,14 @@ fn scan_line(line: &[u8], scratch: &mut Vec<u8>, spans: &mut Vec<(i32, i32)>) {
             Class::Other => at += 1,
             Class::Name => at = end_of_name(line, at),
             Class::Digit | Class::Point => {
-                let Some(number) = number_at(line, at) else {
+                let Some((start, end)) = number_at(line, at) else {
                     at = end_of_name(line, at);
                     continue;
                 };
-                scratch.extend_from_slice(&line[copied..number.start]);
+                scratch.extend_from_slice(&line[copied..start]);
                 scratch.push(PLACEHOLDER);
-                at = number.end;
-                copied = at;
-                spans.push((number.start as i32, number.end as i32));
+                (at, copied) = (end, end);
+                spans.push((start as i32, end as i32));
             }
         }
     }

@@ -12,12 +12,12 @@ fn fixed(value: f64, decimals: u32, plus: bool) -> String {
 }
 
 /// A line with its numbers taken out.
-fn skeleton(line: &[u8]) -> Vec<u8> {
+fn skeleton(line: &[u8]) -> Result<Vec<u8>, TextError> {
     let mut rest = line.to_vec();
-    for number in scanned(line).unwrap().1.iter().rev() {
+    for number in scanned(line)?.1.iter().rev() {
         rest.splice(number.start..number.end, [0]);
     }
-    rest
+    Ok(rest)
 }
 
 /// The lines of a text and what their numbers say.
