@@ -46,6 +46,7 @@ impl Aimed {
             parameters: vec![Lane::ZERO; lane_room(width)],
             one: OnePose::new(&self.model.shared),
             screws: vec![Screw::ZERO; joints.max(spread)],
+            slopes: vec![Lane::ZERO; joints],
             field: self.model.field.as_ref().map(|field| field.scratch()),
             bounds: self.model.spread.as_ref().and_then(Spread::scratch),
         }
@@ -61,6 +62,7 @@ pub(crate) struct AimedScratch {
     parameters: Vec<Lane>,
     one: OnePose,
     pub screws: Vec<Screw>,
+    slopes: Vec<Lane>,
     field: Option<FieldScratch>,
     pub bounds: Option<FieldScratch>,
 }
@@ -83,13 +85,26 @@ impl Aimed {
 
     /// The tool's frame of N readings, and its motions by the joint values in `scratch.screws`.
     ///
-    /// `alone`: all lanes hold the same pose.
+    /// Of a field what a joint's own lines add to its angle takes part in them: nearly all of what a field changes over
+    /// a correction. `alone`: all lanes hold the same pose.
     #[inline(always)]
     pub fn sweep<I: Isa>(&self, readings: &[Lane], alone: bool, scratch: &mut AimedScratch) -> LaneFrame {
-        self.sweep_columns::<I>(readings, alone, self.chain.joint_columns(), scratch)
+        let frame = self.sweep_columns::<I>(readings, alone, self.chain.joint_columns(), scratch);
+        let AimedScratch { screws, slopes, field, .. } = scratch;
+        if let (Some(bank), Some(room)) = (&self.model.field, field) {
+            let poses = if alone { 1 } else { LANES };
+            bank.own_slopes::<I>(self.chain.joint_columns(), poses, room, slopes);
+            for (screw, slope) in screws.iter_mut().zip(slopes) {
+                for i in 0..3 {
+                    screw.angular[i] = I::mul_add(screw.angular[i], *slope, screw.angular[i]);
+                    screw.linear[i] = I::mul_add(screw.linear[i], *slope, screw.linear[i]);
+                }
+            }
+        }
+        frame
     }
 
-    /// The same by the parameters of the given columns.
+    /// The same by the parameters of the given columns alone.
     #[inline(always)]
     pub fn sweep_columns<I: Isa>(
         &self,

@@ -21,6 +21,8 @@ const LONGEST_STEP: f64 = 0.5;
 const SHORT_STEP: f64 = 0.05;
 /// Errors that fall by less than a thousandth with each step are all but the same after the last one.
 const HOPELESS: f64 = 0.999;
+/// Errors of a field fall less steadily: so much less has to be foreseen for a search to end.
+const UNSTEADY: f64 = 0.1;
 /// With fewer joints than the task has numbers, turns weigh so much less that the position is met first.
 const POSITION_FIRST: f64 = 1e-4;
 
@@ -267,8 +269,7 @@ fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let plan = Plan::new(model, options.task, options.moving.as_deref(), STEPS, longest)?;
     // The turn that five axes leave is no failure: its least value is searched for to the end.
     let hopeless = if plan.position_first() { plan.hopeless } else { HOPELESS };
-    // Where parameters vary errors do not fall steadily enough to foresee them.
-    let foreseen = if plan.varied { 0.0 } else { plan.enough() };
+    let foreseen = plan.enough() * if plan.varied { UNSTEADY } else { 1.0 };
     Ok(Plan { hopeless, foreseen, ..plan })
 }
 

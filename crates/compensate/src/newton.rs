@@ -107,6 +107,8 @@ struct Progress {
     left: [Lane; 2],
     /// Squared ratio of the last error to the smallest before it; zero where there was none.
     rate: Lane,
+    /// The same of the error before.
+    rate_before: Lane,
     /// Flag: the search goes on.
     open: Lane,
     /// Flag: the last trial was better than those before.
@@ -193,7 +195,7 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
         };
         let error = weighted::<I, G, M>(&frame, target, plan.turn_weight);
         let norm = progress.take::<I, M>(&error, plan, search);
-        if step == plan.steps || !NO.any_below(progress.open) {
+        if step == plan.steps || !progress.any_open() {
             break;
         }
         if stale {
@@ -202,7 +204,10 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
         }
         progress.find_step::<I, M>(plan, &mut factor, (&error, norm), search);
         search.advance(plan, &progress);
-        progress.foresee(norm, plan.foreseen, search);
+        progress.foresee(norm, plan, search);
+        if !progress.any_open() {
+            break;
+        }
         progress.settle(norm, plan.varied);
     }
     [progress.left[0].sqrt(), progress.left[1].sqrt() * (1.0 / plan.turn_weight)]
@@ -218,11 +223,17 @@ impl Progress {
             older: infinite,
             left: [infinite; 2],
             rate: NO,
+            rate_before: NO,
             open: YES,
             better: NO,
             stale: YES,
             damping: Lane::splat(FLOOR),
         }
+    }
+
+    #[inline(always)]
+    fn any_open(&self) -> bool {
+        NO.any_below(self.open)
     }
 
     #[inline(always)]
@@ -236,6 +247,7 @@ impl Progress {
         let before = self.least;
         let infinite = Lane::splat(f64::INFINITY);
         let norm = NO.where_below(self.open, squared::<I>(error), infinite);
+        self.rate_before = self.rate;
         self.rate = before.where_below(infinite, norm / before, NO);
         let left = [squared::<I>(&error[..3]), squared::<I>(&error[3..])];
         for (kept, found) in self.left.iter_mut().zip(left) {
@@ -304,16 +316,23 @@ impl Progress {
     }
 
     /// Takes over the next trials where they will be near enough, and ends their searches.
+    ///
+    /// Where the parameters vary errors fall by turns more and less: the lesser of the last two falls counts.
     #[inline(always)]
-    fn foresee(&mut self, norm: Lane, foreseen: f64, search: &mut Search) {
-        let near = (norm * self.rate).where_below(Lane::splat(foreseen * foreseen), self.open, NO);
-        let near = self.rate.where_below(Lane::splat(STEADY * STEADY), near, NO);
+    fn foresee(&mut self, norm: Lane, plan: &Plan, search: &mut Search) {
+        let mut rate = self.rate;
+        if plan.varied {
+            rate = rate.where_below(self.rate_before, self.rate_before, rate);
+        }
+        let enough = Lane::splat(plan.foreseen * plan.foreseen);
+        let near = (norm * rate).where_below(enough, self.open, NO);
+        let near = rate.where_below(Lane::splat(STEADY * STEADY), near, NO);
         let near = NO.where_below(self.rate, near, NO);
         for (best, trial) in search.best.iter_mut().zip(&search.trial) {
             *best = NO.where_below(near, *trial, *best);
         }
         for left in &mut self.left {
-            *left = NO.where_below(near, *left * self.rate, *left);
+            *left = NO.where_below(near, *left * rate, *left);
         }
         self.open = NO.where_below(near, NO, self.open);
     }

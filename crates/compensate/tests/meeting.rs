@@ -9,6 +9,8 @@ use truearm_compensate::Options;
 /// What the calibrated model may be off at corrected readings, m and rad.
 const MET: f64 = 1e-9;
 const WAYPOINTS: usize = 500;
+/// What a reported residual may differ from it, m: with constants, and with parameters that vary.
+const TOLD: [f64; 2] = [1e-12, 1e-10];
 /// Part of random waypoints that may be refused: those near singular configurations.
 const SINGULAR: f64 = 0.05;
 
@@ -19,10 +21,12 @@ fn check_pose(scene: &Scene) {
     let found = correct(&corrector, &q, 1);
     assert!((found.refused.len() as f64) < SINGULAR * WAYPOINTS as f64, "{} refused", found.refused.len());
     let (meant, real) = (scene.meant(&q), scene.real(&found.readings));
+    let told = TOLD[usize::from(scene.bank.is_some())];
     for i in (0..WAYPOINTS).filter(|i| found.readings[i * n].is_finite()) {
         let (distance, angle) = apart(&meant[i], &real[i]);
         assert!(distance < MET && angle < MET, "waypoint {i}: {distance:e} m, {angle:e} rad");
-        assert!((distance - found.numbers[i][0]).abs() < 1e-12, "waypoint {i} reports another residual");
+        let reported = found.numbers[i][0];
+        assert!((distance - reported).abs() < told, "waypoint {i}: {distance:e} m, reported {reported:e}");
     }
 }
 

@@ -213,6 +213,42 @@ impl Compiled {
         }
     }
 
+    /// How fast the joints' own lines turn or shift them: for each joint j the derivative by its value of what lines over it
+    /// add to the parameter `columns[j]`, at the group that [`Self::excite_and_add`] took last.
+    #[inline(always)]
+    pub fn own_slopes<I: Isa>(
+        &self,
+        columns: &[usize],
+        poses: usize,
+        scratch: &FieldScratch,
+        slopes: &mut [Lane],
+    ) {
+        if self.active == MOST_ACTIVE {
+            self.slopes::<I, MOST_ACTIVE>(columns, poses, &scratch.four, slopes);
+        } else {
+            self.slopes::<I, 3>(columns, poses, &scratch.three, slopes);
+        }
+    }
+
+    #[inline(always)]
+    fn slopes<I: Isa, const K: usize>(
+        &self,
+        columns: &[usize],
+        poses: usize,
+        excited: &[Excited<K>],
+        slopes: &mut [Lane],
+    ) {
+        slopes.fill(Lane::ZERO);
+        for line in &self.lines {
+            let axis = &self.axes[line.axis];
+            if columns.get(axis.input) == Some(&self.singles[line.single]) {
+                let excited = &excited[line.axis];
+                let slope = &mut slopes[axis.input];
+                *slope = line.sum::<I, K>(excited, &axis.slopes::<I, K>(excited), poses, *slope);
+            }
+        }
+    }
+
     #[inline(always)]
     fn group<I: Isa, const K: usize>(
         &self,

@@ -6,7 +6,7 @@ use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::cells::{Axis, MOST_ACTIVE};
 use crate::kernel::InputKind;
-use crate::spline::{cubic, quadratic};
+use crate::spline::{cubic, cubic_slopes, quadratic, quadratic_slopes};
 
 /// Added and taken away it rounds to a whole number.
 const ROUNDING: f64 = 1.5 * (1_u64 << 52) as f64;
@@ -143,6 +143,25 @@ impl CompiledAxis {
             middle
         };
         self.cells(centre, &mut excited.cell);
+    }
+
+    /// Derivatives of the grades by the raw values.
+    #[inline(always)]
+    pub fn slopes<I: Isa, const K: usize>(&self, excited: &Excited<K>) -> [Lane; K] {
+        let mut grade = [Lane::ZERO; MOST_ACTIVE];
+        grade[..K].copy_from_slice(&excited.grade);
+        let [first, second, third, last] = grade;
+        let slopes = if self.cubic {
+            cubic_slopes::<I, Lane>([first, second, third, last])
+        } else {
+            let [low, mid, high] = quadratic_slopes::<I, Lane>([first, second, third]);
+            [low, mid, high, Lane::ZERO]
+        };
+        let mut found = [Lane::ZERO; K];
+        for k in 0..K {
+            found[k] = slopes[k] * (self.scale * self.per_spacing);
+        }
+        found
     }
 
     /// Indices of the cells around a centre, in the tables.

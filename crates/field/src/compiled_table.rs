@@ -15,9 +15,9 @@ pub type Numbered<'a> = (usize, &'a CompiledAxis);
 /// One output over one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    axis: usize,
+    pub axis: usize,
     /// Which of the single sums it adds to.
-    single: usize,
+    pub single: usize,
     /// (cells,), with those that a turn repeats.
     weights: Vec<f64>,
 }
@@ -35,22 +35,40 @@ impl Line {
     /// Adds to the single sums of up to 8 poses.
     #[inline(always)]
     pub fn add<I: Isa, const K: usize>(&self, excited: &[Excited<K>], poses: usize, singles: &mut [Lane]) {
-        let Excited { cell, grade } = &excited[self.axis];
+        let excited = &excited[self.axis];
+        let sum = &mut singles[self.single];
+        *sum = self.sum::<I, K>(excited, &excited.grade, poses, *sum);
+    }
+
+    /// `start` and the weights that up to 8 poses excite, each times its factor; a single pose's in all lanes.
+    #[inline(always)]
+    pub fn sum<I: Isa, const K: usize>(
+        &self,
+        excited: &Excited<K>,
+        factors: &[Lane; K],
+        poses: usize,
+        start: Lane,
+    ) -> Lane {
         let mut weights = [Lane::ZERO; K];
         if poses == LANES {
             for p in 0..LANES {
-                self.take(cell[0][p], p, &mut weights);
+                self.take(excited.cell[0][p], p, &mut weights);
+            }
+        } else if poses == 1 {
+            let first = excited.cell[0][0] as usize;
+            for (lane, weight) in weights.iter_mut().zip(&self.weights[first..first + K]) {
+                *lane = Lane::splat(*weight);
             }
         } else {
             for p in 0..poses.min(LANES) {
-                self.take(cell[0][p], p, &mut weights);
+                self.take(excited.cell[0][p], p, &mut weights);
             }
         }
-        let mut sum = singles[self.single];
+        let mut sum = start;
         for k in 0..K {
-            sum = I::mul_add(grade[k], weights[k], sum);
+            sum = I::mul_add(factors[k], weights[k], sum);
         }
-        singles[self.single] = sum;
+        sum
     }
 
     #[inline(always)]

@@ -60,6 +60,22 @@ pub fn quadratic<I, N: Number<I>>(t: N) -> [N; 3] {
     [low * low * 0.5, N::mul_add(-t, t, N::of(0.75)), high * high * 0.5]
 }
 
+/// Derivatives of the quadratic grades by t, from the grades: the outer ones differ by t.
+#[inline(always)]
+pub fn quadratic_slopes<I, N: Number<I>>([low, _, high]: [N; 3]) -> [N; 3] {
+    let t = high - low;
+    [t - N::of(0.5), t * -2.0, t + N::of(0.5)]
+}
+
+/// Derivatives of the cubic grades by t, from the grades: the mean of their cells lies at t.
+#[inline(always)]
+pub fn cubic_slopes<I, N: Number<I>>([before, _, next, last]: [N; 4]) -> [N; 4] {
+    let t = N::mul_add(last, N::of(2.0), next - before);
+    let s = N::of(1.0) - t;
+    let (two, inner) = (N::of(2.0), N::of(1.5));
+    [s * s * -0.5, t * N::mul_add(t, inner, -two), -(s * N::mul_add(s, inner, -two)), t * t * 0.5]
+}
+
 /// Cubic, t from the second of four cells.
 #[inline(always)]
 pub fn cubic<I, N: Number<I>>(t: N) -> [N; 4] {

@@ -4,7 +4,8 @@
 mod common;
 
 use common::{Random, with_threads};
-use truearm_field::{Axis, Bank, Block, FieldError, Grid, Input};
+use truearm_field::{Axis, Bank, Block, Compiled, FieldError, Grid, Input};
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
 const INPUTS: usize = 3;
 const PARAMETERS: usize = 10;
@@ -188,4 +189,62 @@ fn arrays_that_do_not_fit_are_refused() {
     let bank = bank(2);
     assert!(bank.add(&[0.0; 4], &mut [0.0; PARAMETERS]).is_err());
     assert!(bank.add(&[0.0; 3], &mut [0.0; PARAMETERS + 1]).is_err());
+}
+
+/// Slopes of a group of eight, or of its first pose alone, by each input of the parameter that is its own.
+struct Slopes<'a> {
+    bank: &'a Compiled,
+    inputs: &'a [Lane],
+    poses: usize,
+}
+
+const OWN: [usize; INPUTS] = [0, 5, 6];
+
+impl Kernel for Slopes<'_> {
+    type Output = Vec<Lane>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Vec<Lane> {
+        let (mut scratch, mut slopes) = (self.bank.scratch(), vec![Lane::splat(7.0); INPUTS]);
+        let mut rows = vec![0.0; self.poses * PARAMETERS];
+        self.bank.excite_and_add::<I>(self.inputs, &mut scratch, &mut rows);
+        self.bank.own_slopes::<I>(&OWN, self.poses, &scratch, &mut slopes);
+        slopes
+    }
+}
+
+#[test]
+fn slopes_are_derivatives_of_what_inputs_add_to_their_own_parameters() {
+    for degree in [2, 3] {
+        let mut random = Random::new(5);
+        let blocks = [(0, 0), (1, 5), (1, 5), (2, 6), (0, 5), (2, 0)]
+            .map(|(input, output)| block("own", &[input], &[output], degree, &mut random));
+        let mut bank = Bank { blocks: blocks.to_vec(), ..Bank::empty(INPUTS, PARAMETERS) };
+        bank.blocks.push(block("smooth", &[1], &[1, 2, 9], degree, &mut random));
+        let compiled = bank.compiled();
+        let group = values(LANES);
+        let mut inputs = [Lane::ZERO; INPUTS];
+        for (k, value) in group.iter().enumerate() {
+            inputs[k % INPUTS].0[k / INPUTS] = *value;
+        }
+        let slopes = dispatch(Slopes { bank: &compiled, inputs: &inputs, poses: LANES });
+        let same = inputs.map(|lane| Lane::splat(lane.0[0]));
+        let alone = dispatch(Slopes { bank: &compiled, inputs: &same, poses: 1 });
+        let step = 1e-6;
+        for (k, &value) in group.iter().enumerate() {
+            let (input, pose) = (k % INPUTS, k / INPUTS);
+            let added = |value: f64| {
+                let mut moved = group.clone();
+                moved[k] = value;
+                evaluate(&bank, &moved)[pose * PARAMETERS + OWN[input]]
+            };
+            let expected = (added(value + step) - added(value - step)) / (2.0 * step);
+            let found = slopes[input].0[pose];
+            assert!((found - expected).abs() < 1e-6, "degree {degree}, {input}, {pose}: {found} {expected}");
+            if pose == 0 {
+                assert_eq!(alone[input].0, [found; LANES]);
+            }
+        }
+        assert!(slopes.iter().all(|slope| slope.0.iter().any(|value| value.abs() > 0.1)));
+    }
 }
