@@ -105,7 +105,9 @@ def test_an_interrupted_fleet_ends_at_once_and_continues(folder, tmp_path):
         _, said = process.communicate(timeout=LONG_S)
         assert time.monotonic() - began < ENDS_WITHIN_S
     assert process.returncode == 130
-    assert said.endswith(b"Interrupted.\n")
+    assert said.endswith(
+        b"Finished arms are in out; the same command goes on with the others.\nInterrupted.\n"
+    )
     assert b"Traceback" not in said
     finished = len(list(tmp_path.glob("out/*/arm.json")))
     assert 0 < finished < MANY

@@ -45,7 +45,7 @@ def command(
 
     known = Fleet.load(fleet)
     check_directory(output)
-    with ends_promptly():
+    with ends_promptly(f"Finished arms are in {output}; the same command goes on with the others."):
         run = run_fleet(known, output, scheduler=scheduler, workers=workers, stages=told_stages())
     for arm, trace in run.traces.items():
         tell(f"{arm}: this is a defect of truearm, please report it:\n{trace}")

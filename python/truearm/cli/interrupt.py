@@ -16,10 +16,11 @@ GRACE_S: Final = 0.6
 
 
 @contextmanager
-def ends_promptly() -> Iterator[None]:
+def ends_promptly(kept: str = "") -> Iterator[None]:
     """Around long work: Ctrl-C raises KeyboardInterrupt, and ends the process if that takes too long.
 
-    Files are written whole or not at all, so that ending at any moment leaves no half-written one.
+    Files are written whole or not at all, so that ending at any moment leaves no half-written one. `kept`
+    is told then: what is there already, and how to go on.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -27,12 +28,18 @@ def ends_promptly() -> Iterator[None]:
     ended = threading.Event()
 
     def interrupted(_number: int, _frame: FrameType | None) -> None:
-        threading.Thread(target=_end_unless, args=(ended,), daemon=True).start()
+        threading.Thread(target=_end_unless, args=(ended, kept), daemon=True).start()
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGINT, interrupted)
     try:
         yield
+    except KeyboardInterrupt:
+        ended.set()
+        if kept:
+            put_away()
+            tell(kept)
+        raise
     finally:
         ended.set()
         signal.signal(signal.SIGINT, before)
@@ -47,8 +54,10 @@ def end_at_once() -> NoReturn:
     os._exit(INTERRUPTED)
 
 
-def _end_unless(ended: threading.Event) -> None:
+def _end_unless(ended: threading.Event, kept: str) -> None:
     if not ended.wait(GRACE_S):
         put_away()
+        if kept:
+            tell(kept)
         tell("Interrupted.")
         os._exit(INTERRUPTED)
