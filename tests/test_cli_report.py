@@ -36,9 +36,18 @@ def test_a_report_as_people_run_it(folder):
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("On 28 held-out poses the mean position error is")
     assert "What would help most next:" in done.stdout
-    assert "\nReport: report.html\n" in done.stdout
+    assert "\nReport: arm.html\n" in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 80
-    assert (folder / "report.html").read_text().startswith("<!DOCTYPE html>")
+    assert (folder / "arm.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_the_report_of_a_calibration_stays_beside_it_as_others_are_written(folder, capsys):
+    made = folder / "calibration.calib"
+    made.write_bytes((folder / "arm.calib").read_bytes())
+    for file, page in ((made.name, "report.html"), ("arm.calib", "arm.html")):
+        assert main(["report", file, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["report"] == page
+    made.unlink()
 
 
 def test_json_alone_on_stdout(folder, capsys):
@@ -59,7 +68,7 @@ def test_other_measurements_get_their_chapter(folder, capsys):
     capsys.readouterr()
     assert main(["evaluate", "arm.calib", "later.csv", "--json"]) == 0
     judged = json.loads(capsys.readouterr().out)
-    page = words_of((folder / "report.html").read_text())
+    page = words_of((folder / "arm.html").read_text())
     assert "On other measurements" in page
     assert f"later.csv: {judged['n_judged']} rows judged" in page
     for key in ("mean_mm", "p95_mm", "max_mm"):

@@ -133,7 +133,25 @@ def test_row_selection() -> None:
     assert by_mask.rows.tolist() == [1, 3, 5, 7]
     assert by_mask.features.index.tolist() == [0, 1, 2, 3]
     assert by_mask.features["temperature_C"].tolist() == [0, 2, 4, 6]
-    assert len(data.select(np.zeros(8, dtype=bool))) == 0
+    assert len(data.select(np.zeros(8, dtype=bool))) == len(data.select([])) == 0
+    assert data.select([-1, 0]).rows.tolist() == [8, 1]
+
+
+@pytest.mark.parametrize(
+    ("index", "words"),
+    [
+        ([0, 8], "there is no row 8. Rows are counted from 0 to 7"),
+        ([-9], "there is no row -9"),
+        ([True, False], r"bool of shape \(2,\) says no rows. Rows are said by a boolean mask of 8"),
+        ([0.0, 1.0], "float64 of shape"),
+        (slice(0, 3), "object of shape"),
+        (3, r"int64 of shape \(\)"),
+    ],
+)
+def test_rows_that_cannot_be_selected_are_named(index, words):
+    data = Measurements.from_dataframe(frame(8))
+    with pytest.raises(InputError, match=words):
+        data.select(index)
 
 
 def test_putting_parts_together(tmp_path: Path) -> None:

@@ -77,6 +77,10 @@ def test_an_interrupted_study_goes_on(file, tmp_path, here, capsys):
     (out / "results.jsonl").write_text("".join(lines[:5]) + lines[5][:40])
     assert study(file, out, *FAST, "--splits", "random", "--so-far") == 0
     assert "5 of 12 results are there, 0 of them found now" in capsys.readouterr().out
+    page = (out / "accuracy.md").read_text()
+    assert study(file, out, *FAST, "--sizes", "40", "--splits", "random", "--so-far") == 1
+    assert "Give --so-far the files and options of the study" in capsys.readouterr().err
+    assert (out / "accuracy.md").read_text() == page
     assert study(file, out, *FAST, "--splits", "random") == 0
     assert len(here) - done == done - 5
     again = [json.loads(line) for line in (out / "results.jsonl").read_text().splitlines()]

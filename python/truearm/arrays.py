@@ -97,3 +97,25 @@ def as_transforms(values: ArrayLike, *, what: str) -> tuple[NDArray[np.float64],
             rule="A rotation must be orthonormal without a mirror, and the last row 0 0 0 1",
         )
     return rows, len(shape) == 2
+
+
+def as_row_numbers(index: ArrayLike, count: int) -> NDArray[np.int64]:
+    """Row numbers from 0 of a boolean mask (count,) or of row numbers (m,), negative ones from the end.
+
+    Raises:
+        InputError: If it is neither, or a number is beyond the rows.
+    """
+    given = np.asarray(index)
+    whole = given.dtype.kind in "iub" or given.size == 0
+    if given.ndim != 1 or not whole or (given.dtype.kind == "b" and len(given) != count):
+        raise InputError(
+            f"{given.dtype} of shape {given.shape} says no rows",
+            rule=f"Rows are said by a boolean mask of {count}, or by row numbers from 0 to {count - 1}",
+        )
+    if given.dtype.kind == "b":
+        return np.flatnonzero(given)
+    rows = given.astype(np.int64)
+    strange = rows[(rows < -count) | (rows >= count)]
+    if strange.size:
+        raise InputError(f"there is no row {strange[0]}", rule=f"Rows are counted from 0 to {count - 1}")
+    return np.where(rows < 0, rows + count, rows)

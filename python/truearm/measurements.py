@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from truearm.arrays import as_row_numbers
 from truearm.columns import StatedUnits
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
 from truearm.kinds import required
@@ -250,8 +251,12 @@ class Measurements:
         return found[0] if len(found) == 1 else _concatenate(found)
 
     def select(self, index: ArrayLike) -> "Measurements":
-        """The rows of a boolean mask (n,) or of row indices (m,), counted from 0."""
-        chosen = np.arange(len(self))[np.asarray(index)]
+        """The rows of a boolean mask (n,) or of row indices (m,), counted from 0, negative ones from the end.
+
+        Raises:
+            InputError: If it is neither, or a row is none of these measurements.
+        """
+        chosen = as_row_numbers(index, len(self))
         changes = {name: getattr(self, name)[chosen] for name in PER_ROW if getattr(self, name) is not None}
         return replace(self, **changes, features=self.features.iloc[chosen].reset_index(drop=True))
 

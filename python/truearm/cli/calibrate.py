@@ -18,7 +18,7 @@ from truearm.cli.arguments import (
 from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import Stages, told_stages
-from truearm.cli.report import REPORT_NAME, make_report
+from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
 from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError, count_of, typed
 from truearm.files import write_whole
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from truearm.robot import Robot
 
 SCHEME = SchemeOptions()
-CALIBRATION_NAME = "calibration.calib"
 SUMMARY_NAME = "summary.json"
 OUTLIERS_NAMED = 5
 

@@ -7,7 +7,6 @@ import typer
 
 from truearm.cli.arguments import AsJson, OutputDirectory
 from truearm.cli.calibrate import (
-    CALIBRATION_NAME,
     check_directory,
     print_places,
     print_results,
@@ -17,6 +16,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, war
 from truearm.cli.interrupt import end_at_once, ends_promptly
 from truearm.cli.measure_progress import Teller
 from truearm.cli.progress import told_stages
+from truearm.cli.report import CALIBRATION_NAME
 from truearm.errors import typed
 from truearm.files import write_whole
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from truearm.evaluation import Evaluation
     from truearm.reporting.report import Report
 
+CALIBRATION_NAME: Final = "calibration.calib"
 REPORT_NAME: Final = "report.html"
 PAGE: Final = ".html"
 PRINT: Final = ".pdf"
@@ -35,7 +36,10 @@ def command(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="A page or a PDF.  [default: report.html beside CALIB]"
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="A page or a PDF.  [default: report.html; NAME.html beside another NAME.calib]",
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the draw of frame rows.")] = SEED,
@@ -59,7 +63,7 @@ def command(
     from truearm.calibration import Calibration
     from truearm.reporting.pdf import browser
 
-    target = calibration.parent / REPORT_NAME if output is None else output
+    target = _beside(calibration) if output is None else output
     if target.suffix.lower() not in (PAGE, PRINT):
         raise UsageError(f"{target}", where="-o", rule=f"A report is a page ({PAGE}) or a PDF ({PRINT})")
     if target.suffix.lower() == PRINT:
@@ -79,6 +83,13 @@ def command(
     say(f"Report: {target}")
     if other is None:
         suggest(f"truearm report {typed(calibration)} OTHER.csv -o {typed(target.with_stem(OTHER))}")
+
+
+def _beside(calibration: Path) -> Path:
+    """Where the report of a file goes: several calibrations may lie in one directory."""
+    if calibration.name == CALIBRATION_NAME:
+        return calibration.with_name(REPORT_NAME)
+    return calibration.with_suffix(PAGE)
 
 
 def _judged(

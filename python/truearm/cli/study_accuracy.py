@@ -11,7 +11,7 @@ from truearm.cli.arguments import AngleUnit, AsJson, LengthUnit, OutputDirectory
 from truearm.cli.console import print_json, print_table, say, suggest, tell, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress
-from truearm.errors import UsageError, WorkError
+from truearm.errors import InputError, UsageError, WorkError
 from truearm.files import write_whole
 
 if TYPE_CHECKING:
@@ -92,6 +92,13 @@ def command(
         _warn_of(study)
         output.mkdir(parents=True, exist_ok=True)
         outcome = gather(study, output) if so_far else conduct(study, output, where, told_progress())
+        if so_far and not outcome.records:
+            raise InputError(
+                "there is no result of what is asked",
+                where=str(output),
+                rule="Results are known by set, split, size, seed and method",
+                way_out="Give --so-far the files and options of the study that it is to tell of",
+            )
         summary = summarise(study, outcome)
         files = _write(summary, output)
     if as_json:

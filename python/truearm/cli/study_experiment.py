@@ -7,7 +7,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, OutputDirectory
 from truearm.cli.calibrate import check_directory
-from truearm.cli.console import print_json, print_table, say, suggest, tell
+from truearm.cli.console import print_json, print_table, say, suggest
 from truearm.cli.interrupt import end_at_once, ends_promptly
 from truearm.cli.measure_progress import Teller
 from truearm.cli.progress import told_stages
@@ -53,11 +53,11 @@ def command(
     output.mkdir(parents=True, exist_ok=True)
     setting = Setting(regions=regions, poses=poses, speed=speed)
     write_whole(output / CELL_NAME, cell_text(setting))
+    kept = f"The session is in {output}; the same command goes on with it."
     try:
-        with Teller() as teller, ends_promptly():
+        with Teller() as teller, ends_promptly(kept):
             result, drawn = conduct_experiment(setting, output, teller.tell, told_stages())
     except KeyboardInterrupt:
-        tell(f"The session is in {output}; the same command goes on with it.")
         end_at_once()
     result |= judged(result)
     files = save_panels({"figure10": drawn}, output)

@@ -9,6 +9,7 @@ from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, Use
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
+from truearm.cli.report import CALIBRATION_NAME
 from truearm.errors import UsageError, typed
 
 if TYPE_CHECKING:
@@ -17,8 +18,7 @@ if TYPE_CHECKING:
     from truearm.updating import Update, UpdateOptions
     from truearm.updating.moved import Motion, Offset
 
-CALIBRATION_NAME: Final = "calibration.calib"
-REPORT_NAME: Final = "update.json"
+UPDATE_NAME: Final = "update.json"
 SUFFIX: Final = ".calib"
 
 
@@ -136,7 +136,7 @@ def _write(found: "Update", place: Path) -> None:
     found.calibration.save(place)
     if place.name == CALIBRATION_NAME:
         text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
-        write_whole(place.parent / REPORT_NAME, text + "\n")
+        write_whole(place.parent / UPDATE_NAME, text + "\n")
 
 
 def _suggest(found: "Update", old: Path, place: Path | None) -> None:
