@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
 MRAD_PER_RAD: Final = 1e3
+WAVE: Final = "wave"
 AMPLITUDES: Final = (
     ("theta_mrad", MRAD_PER_RAD),
     ("other_angles_mrad", MRAD_PER_RAD),
@@ -54,7 +55,8 @@ def noise_mm(calibration: "Calibration") -> float:
 def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:
     """Name, joints (from 1), features, length scales, amplitudes and number of cells of each block.
 
-    Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units.
+    Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units; a wave
+    has cycles a turn of its joint instead.
     """
     field, details = calibration.model.field, calibration.variable
     if field is None or details is None:
@@ -68,15 +70,17 @@ def _describe(
     joints, name = calibration.robot.joint_count, block["name"]
     lengths = _lengths(block, hyper)
     scales = [axis[1] for axis in block["axes"]]
+    found: dict[str, Any] = {"name": name}
+    if name == WAVE:
+        found["cycles"], scales = scales[0], []
     cells = 1
     for axis in block["axes"]:
         cells *= axis[4]
-    return {
-        "name": name,
+    return found | {
         "joints": [k + 1 for k in block["inputs"] if k < joints],
         "features": [calibration.options.features[k - joints] for k in block["inputs"] if k >= joints],
         "lengths": [length / scale for length, scale in zip(lengths, scales, strict=True)],
-        "amplitudes": _amplitudes(name, hyper),
+        "amplitudes": _amplitudes(block, hyper),
         "cells": cells,
         "parameters": len(block["outputs"]),
     }
@@ -85,12 +89,19 @@ def _describe(
 def _lengths(block: dict[str, Any], hyper: dict[str, list[float]]) -> list[float]:
     """Length scales of a block's axes; none where it has no cells."""
     name, axes = block["name"], len(block["axes"])
-    if not axes:
+    if not axes or name == WAVE:
         return []
     return hyper.get(f"{name}_lengths") or hyper[f"{name}_length"] * axes
 
 
-def _amplitudes(name: str, hyper: dict[str, list[float]]) -> dict[str, float]:
+def _amplitudes(block: dict[str, Any], hyper: dict[str, list[float]]) -> dict[str, float]:
+    name = block["name"]
+    if name == WAVE:
+        this = [float(block["inputs"][0]), block["axes"][0][1]]
+        stored = hyper["waves"]
+        waves = zip(stored[::3], stored[1::3], stored[2::3], strict=True)
+        amplitude = next(size for *wave, size in waves if wave == this)
+        return {"theta_mrad": amplitude * MRAD_PER_RAD}
     if name == "sag":
         return {"theta_mrad_per_m": hyper["sag"][0] * MRAD_PER_RAD}
     values = hyper.get(f"{name}_amplitudes") or hyper[name]

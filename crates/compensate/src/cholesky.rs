@@ -43,9 +43,6 @@ pub(crate) struct Factor<const M: usize> {
 }
 
 impl<const M: usize> Factor<M> {
-    /// Of nothing yet.
-    pub const NONE: Self = Self { lower: [[Lane::ZERO; M]; M], inverse: [Lane::ZERO; M] };
-
     /// Of A + damping; `a` holds the lower triangle.
     #[inline(always)]
     pub fn new<I: Isa>(a: &[[Lane; M]; M], damping: Lane) -> Self {

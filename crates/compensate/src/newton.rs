@@ -182,7 +182,7 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
     search: &mut Search,
 ) -> [Lane; 2] {
     let mut progress = Progress::new();
-    let mut factor = Factor::<M>::NONE;
+    let mut factor = None;
     search.trial.copy_from_slice(&search.best);
     search.last.fill(NO);
     search.older.fill(NO);
@@ -200,9 +200,11 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
         }
         if stale {
             fill_columns::<I, G, M>(aimed, plan, &frame, progress.stale, search);
-            factor = progress.factor::<I, M>(plan, search);
+            factor = Some(progress.factor::<I, M>(plan, search));
         }
-        progress.find_step::<I, M>(plan, &mut factor, (&error, norm), search);
+        // Every search begins without a Jacobian.
+        let Some(factor) = &mut factor else { break };
+        progress.find_step::<I, M>(plan, factor, (&error, norm), search);
         search.advance(plan, &progress);
         progress.foresee(norm, plan, search);
         if !progress.any_open() {

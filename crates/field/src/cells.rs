@@ -46,6 +46,8 @@ const MARGIN: f64 = 3.0;
 const WIDEST: f64 = 0.6;
 /// More cells than this along one input are no calibration of ours.
 const MOST_CELLS: usize = 100_000;
+/// Cells of one cycle of a wave: they bend a thousandth of it at most.
+const CELLS_OF_CYCLE: usize = 16;
 /// Finest spacing: more cells than this on a turn are beyond any data set.
 const FINEST: f64 = 0.004;
 
@@ -74,6 +76,13 @@ impl Axis {
         let middle = 0.5 * (low + high);
         let origin = middle - 0.5 * spacing * (count - 1) as f64;
         Self { input, origin, spacing, count, closed: false, degree }
+    }
+
+    /// An axis for waves of so many cycles a turn: cells over one cycle.
+    pub fn over_cycle(cycles: f64, degree: usize) -> Self {
+        let input = Input { kind: InputKind::Angle, scale: cycles };
+        let spacing = TAU / CELLS_OF_CYCLE as f64;
+        Self { input, origin: 0.0, spacing, count: CELLS_OF_CYCLE, closed: true, degree }
     }
 
     /// The axis that is stored so; not yet checked.

@@ -11,7 +11,7 @@ use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, lane_room, load_lan
 use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::cells::MOST_ACTIVE;
-use crate::compiled_axis::{CompiledAxis, Excited};
+use crate::compiled_axis::{Abreast, CompiledAxis, Excited};
 use crate::compiled_table::{Line, MOST_LANES, Numbered, Row, Sheet};
 use crate::sag::{Loads, SagScratch};
 
@@ -28,6 +28,8 @@ pub struct Compiled {
     /// Cells that a value excites, 3 or 4.
     active: usize,
     axes: Vec<CompiledAxis>,
+    /// The same for a single pose.
+    abreast: Vec<Abreast>,
     lines: Vec<Line>,
     sheets: Vec<Sheet>,
     sag: Option<Loads>,
@@ -47,6 +49,7 @@ impl Compiled {
             parameter_count: bank.parameter_count,
             active: degrees.max().map_or(MOST_ACTIVE, |degree| degree + 1),
             axes: Vec::new(),
+            abreast: Vec::new(),
             lines: Vec::new(),
             sheets: Vec::new(),
             sag: bank.sag.as_ref().map(Loads::new),
@@ -57,6 +60,7 @@ impl Compiled {
         let mut blocks: Vec<&Block> = bank.blocks.iter().collect();
         blocks.sort_by_key(|block| Reverse(block.grid.axes.len()));
         blocks.into_iter().for_each(|block| compiled.push(block));
+        compiled.abreast = Abreast::of(&compiled.axes);
         let loaded = compiled.sag.as_ref().map_or(Vec::new(), |sag| sag.outputs.clone());
         compiled.sag_singles = loaded.into_iter().map(|output| compiled.single(output)).collect();
         let Self { sheets, singles, .. } = &mut compiled;
@@ -111,11 +115,19 @@ impl Compiled {
             let tasks = values.par_chunks(POSES_PER_TASK * self.input_count);
             tasks
                 .zip(out.par_chunks_mut(POSES_PER_TASK * self.parameter_count))
-                .for_each(|(values, out)| dispatch(Evaluate { bank: self, values, out }));
+                .for_each_init(|| self.room(), |room, (values, out)| self.add_to(values, room, out));
         } else {
-            dispatch(Evaluate { bank: self, values, out });
+            self.add_to(values, &mut self.room(), out);
         }
         Ok(())
+    }
+
+    fn add_to(&self, values: &[f64], room: &mut Room, out: &mut [f64]) {
+        dispatch(Evaluate { bank: self, values, room, out });
+    }
+
+    fn room(&self) -> Room {
+        Room { inputs: vec![Lane::ZERO; lane_room(self.input_count)], field: self.scratch() }
     }
 
     /// Constants (5 L) plus the CEPs of the given inputs (n, I): (n, 5 L).
@@ -130,13 +142,21 @@ impl Compiled {
         }
         let mut out = Vec::with_capacity(poses * self.parameter_count);
         let group = constants.repeat(LANES);
-        let chunk = if self.threaded(values) { poses } else { POSES_PER_TASK };
-        for first in (0..poses).step_by(chunk.max(1)) {
-            let (from, last) = (out.len(), poses.min(first + chunk));
-            let length = from + (last - first) * self.parameter_count;
-            (0..(last - first) / LANES).for_each(|_| out.extend_from_slice(&group));
+        let begin = |poses: usize, out: &mut Vec<f64>| {
+            let length = out.len() + poses * self.parameter_count;
+            (0..poses / LANES).for_each(|_| out.extend_from_slice(&group));
             out.extend_from_slice(&group[..length - out.len()]);
-            self.add(&values[first * self.input_count..last * self.input_count], &mut out[from..])?;
+        };
+        if self.threaded(values) {
+            begin(poses, &mut out);
+            self.add(values, &mut out)?;
+            return Ok(out);
+        }
+        let mut room = self.room();
+        for values in values.chunks((POSES_PER_TASK * self.input_count).max(1)) {
+            let from = out.len();
+            begin(values.len() / self.input_count, &mut out);
+            self.add_to(values, &mut room, &mut out[from..]);
         }
         Ok(out)
     }
@@ -153,6 +173,12 @@ impl Compiled {
     fn threaded(&self, values: &[f64]) -> bool {
         values.len() >= THREADED_POSES * self.input_count.max(1) && rayon::current_num_threads() > 1
     }
+}
+
+/// What an evaluation writes to.
+struct Room {
+    inputs: Vec<Lane>,
+    field: FieldScratch,
 }
 
 /// What [`Compiled::excite_and_add`] writes to, made once for many groups of poses.
@@ -259,8 +285,14 @@ impl Compiled {
     ) {
         let (width, SumScratch { rows, singles, sag: room }) = (self.parameter_count, sums);
         let poses = LANES.min(out.len() / width);
-        for (axis, excited) in self.axes.iter().zip(excited.iter_mut()) {
-            axis.excite::<I, K>(input(axis.input), excited);
+        if poses == 1 {
+            for axes in &self.abreast {
+                axes.excite::<I, K>(&input, excited);
+            }
+        } else {
+            for (axis, excited) in self.axes.iter().zip(excited.iter_mut()) {
+                axis.excite::<I, K>(input(axis.input), excited);
+            }
         }
         singles.fill(Lane::ZERO);
         for line in &self.lines {
@@ -291,6 +323,7 @@ impl Compiled {
 struct Evaluate<'a> {
     bank: &'a Compiled,
     values: &'a [f64],
+    room: &'a mut Room,
     out: &'a mut [f64],
 }
 
@@ -299,23 +332,13 @@ impl Kernel for Evaluate<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        if self.bank.active == MOST_ACTIVE { self.all::<I, 4>() } else { self.all::<I, 3>() }
-    }
-}
-
-impl Evaluate<'_> {
-    #[inline(always)]
-    fn all<I: Isa, const K: usize>(self) {
-        let Self { bank, values, out } = self;
+        let Self { bank, values, room: Room { inputs, field }, out } = self;
         if bank.axes.is_empty() && bank.sag.is_none() {
             return;
         }
-        let mut sums = bank.sum_scratch();
-        let mut excited = vec![Excited::<K>::NONE; bank.axes.len()];
-        let mut inputs = vec![Lane::ZERO; lane_room(bank.input_count)];
         for (group, out) in out.chunks_mut(bank.parameter_count * LANES).enumerate() {
-            load_lanes::<I>(values, bank.input_count, group * LANES, &mut inputs);
-            bank.group::<I, K>(|input| inputs[input], &mut excited, &mut sums, out);
+            load_lanes::<I>(values, bank.input_count, group * LANES, inputs);
+            bank.excite_and_add::<I>(inputs, field, out);
         }
     }
 }

@@ -126,23 +126,23 @@ impl CompiledAxis {
     /// Cells and grades of eight raw values.
     #[inline(always)]
     pub fn excite<I: Isa, const K: usize>(&self, values: Lane, excited: &mut Excited<K>) {
-        let mut offset = I::mul_add(values, Lane::splat(self.scale), Lane::splat(-self.origin));
-        if let Some(turn) = &self.turn {
-            let turns = I::mul_add(offset, Lane::splat(turn.per_period), Lane::splat(-turn.middle));
-            offset = I::mul_add(nearest(turns), Lane::splat(-turn.period), offset);
+        *excited = self.rule().excite::<I, K>(values);
+    }
+
+    #[inline(always)]
+    fn rule(&self) -> Rule {
+        let Self { scale, origin, per_spacing, lowest, highest, whole, .. } = *self;
+        let turn = self.turn.as_ref().map(|turn| [turn.period, turn.per_period, turn.middle]);
+        Rule {
+            scale: Lane::splat(scale),
+            origin: Lane::splat(origin),
+            per_spacing: Lane::splat(per_spacing),
+            turn: turn.map(|turn| Lane::splat_all(&turn)),
+            bounds: Lane::splat_all(&[lowest, highest]),
+            whole: Lane::splat(whole),
+            wrap: [self.wrap; LANES],
+            cubic: self.cubic,
         }
-        let position = offset * self.per_spacing;
-        let centre = if self.cubic {
-            let below = nearest(position - Lane::splat(0.5));
-            excited.grade.copy_from_slice(&cubic::<I, Lane>(position - below)[..K]);
-            below
-        } else {
-            let middle = nearest(position);
-            let [low, mid, high] = quadratic::<I, Lane>(position - middle);
-            excited.grade.copy_from_slice(&[low, mid, high, Lane::ZERO][..K]);
-            middle
-        };
-        self.cells(centre, &mut excited.cell);
     }
 
     /// Derivatives of the grades by the raw values.
@@ -163,20 +163,120 @@ impl CompiledAxis {
         }
         found
     }
+}
+
+/// How values become cells and grades, lane by lane: eight poses along one axis, or one along eight.
+#[derive(Debug, Clone, PartialEq)]
+struct Rule {
+    scale: Lane,
+    origin: Lane,
+    per_spacing: Lane,
+    /// Period, its inverse, and the middle of the axis in turns from its origin; zeros in the lanes of open lines.
+    turn: Option<[Lane; 3]>,
+    /// Lowest and highest centre.
+    bounds: [Lane; 2],
+    whole: Lane,
+    wrap: [i64; LANES],
+    cubic: bool,
+}
+
+impl Rule {
+    #[inline(always)]
+    fn excite<I: Isa, const K: usize>(&self, values: Lane) -> Excited<K> {
+        let mut offset = I::mul_add(values, self.scale, -self.origin);
+        if let Some([period, per_period, middle]) = self.turn {
+            let turns = I::mul_add(offset, per_period, -middle);
+            offset = I::mul_add(nearest(turns), -period, offset);
+        }
+        let position = offset * self.per_spacing;
+        let mut excited = Excited::NONE;
+        let centre = if self.cubic {
+            let below = nearest(position - Lane::splat(0.5));
+            excited.grade.copy_from_slice(&cubic::<I, Lane>(position - below)[..K]);
+            below
+        } else {
+            let middle = nearest(position);
+            let [low, mid, high] = quadratic::<I, Lane>(position - middle);
+            excited.grade.copy_from_slice(&[low, mid, high, Lane::ZERO][..K]);
+            middle
+        };
+        self.cells(centre, &mut excited.cell);
+        excited
+    }
 
     /// Indices of the cells around a centre, in the tables.
     #[inline(always)]
     fn cells<const K: usize>(&self, centre: Lane, cell: &mut [[u64; LANES]; K]) {
+        let [lowest, highest] = &self.bounds;
+        let high = centre.where_below(*lowest, *lowest, centre);
+        let inside = high.where_below(*highest, high, *highest);
         let mut first = [0_i64; LANES];
-        for (first, &centre) in first.iter_mut().zip(&centre.0) {
-            let high = if centre > self.lowest { centre } else { self.lowest };
-            let inside = if high < self.highest { high } else { self.highest };
-            let index = (inside + self.whole).to_bits() as i64 - WHOLE.to_bits() as i64;
-            *first = once_around(index, self.wrap);
+        for (i, first) in first.iter_mut().enumerate() {
+            let index = (inside.0[i] + self.whole.0[i]).to_bits() as i64 - WHOLE.to_bits() as i64;
+            *first = once_around(index, self.wrap[i]);
         }
         for (k, cell) in cell.iter_mut().enumerate() {
-            for (cell, first) in cell.iter_mut().zip(&first) {
-                *cell = once_around(first + k as i64, self.wrap) as u64;
+            for (i, cell) in cell.iter_mut().enumerate() {
+                *cell = once_around(first[i] + k as i64, self.wrap[i]) as u64;
+            }
+        }
+    }
+}
+
+/// Up to eight axes of one degree side by side, for a single pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Abreast {
+    /// Indices of the axes.
+    axes: Vec<usize>,
+    /// Index of each one's input; lanes without an axis repeat the first one.
+    inputs: [usize; LANES],
+    rule: Rule,
+}
+
+impl Abreast {
+    /// All axes, eight at a time.
+    pub fn of(axes: &[CompiledAxis]) -> Vec<Self> {
+        let alike = |cubic| axes.iter().enumerate().filter(move |axis| axis.1.cubic == cubic).collect();
+        let kinds: [Vec<(usize, &CompiledAxis)>; 2] = [alike(false), alike(true)];
+        kinds.iter().flat_map(|axes| axes.chunks(LANES)).map(Self::new).collect()
+    }
+
+    fn new(axes: &[(usize, &CompiledAxis)]) -> Self {
+        let lanes: [&CompiledAxis; LANES] = std::array::from_fn(|i| axes.get(i).unwrap_or(&axes[0]).1);
+        let rules = lanes.map(CompiledAxis::rule);
+        let each = |value: fn(&Rule) -> Lane| Lane::from_fn(|i| value(&rules[i]).0[i]);
+        let still = [Lane::ZERO; 3];
+        let turn: [Lane; 3] =
+            std::array::from_fn(|k| Lane::from_fn(|i| rules[i].turn.unwrap_or(still)[k].0[i]));
+        Self {
+            axes: axes.iter().map(|axis| axis.0).collect(),
+            inputs: lanes.map(|axis| axis.input),
+            rule: Rule {
+                scale: each(|rule| rule.scale),
+                origin: each(|rule| rule.origin),
+                per_spacing: each(|rule| rule.per_spacing),
+                turn: rules.iter().any(|rule| rule.turn.is_some()).then_some(turn),
+                bounds: [each(|rule| rule.bounds[0]), each(|rule| rule.bounds[1])],
+                whole: each(|rule| rule.whole),
+                wrap: std::array::from_fn(|i| rules[i].wrap[i]),
+                cubic: rules[0].cubic,
+            },
+        }
+    }
+
+    /// Cells and grades of a pose, whose raw values are in the first lane of each input, into all lanes of `excited`.
+    #[inline(always)]
+    pub fn excite<I: Isa, const K: usize>(&self, input: &impl Fn(usize) -> Lane, excited: &mut [Excited<K>]) {
+        let mut values = Lane::ZERO;
+        for i in 0..LANES {
+            values.0[i] = input(self.inputs[i]).0[0];
+        }
+        let found = self.rule.excite::<I, K>(values);
+        for (i, axis) in self.axes.iter().enumerate() {
+            let excited = &mut excited[*axis];
+            for k in 0..K {
+                excited.cell[k] = [found.cell[k][i]; LANES];
+                excited.grade[k] = Lane::splat(found.grade[k].0[i]);
             }
         }
     }

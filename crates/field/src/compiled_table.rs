@@ -242,14 +242,17 @@ impl Sheet {
             }
             let mut rows = rows.iter();
             for table in &self.tables {
-                let last = &excited[table.last].grade;
+                let mut grades = [Lane::ZERO; K];
+                for (grade, along) in grades.iter_mut().zip(&excited[table.last].grade) {
+                    *grade = Lane::splat(along.0[pose]);
+                }
                 for row in rows.by_ref().take(table.row_count(K)) {
                     let first = row.cell[pose] as usize;
                     let mut part = [Lane::ZERO; W];
-                    for (grade, weights) in last.iter().zip(&cells[first..first + K]) {
-                        weigh::<I, W>(grade.0[pose], weights, &mut part);
+                    for (grade, weights) in grades.iter().zip(&cells[first..first + K]) {
+                        weigh::<I, W>(*grade, weights, &mut part);
                     }
-                    weigh::<I, W>(row.grade.0[pose], &part, &mut sums);
+                    weigh::<I, W>(Lane::splat(row.grade.0[pose]), &part, &mut sums);
                 }
             }
             let mut found = [Lane::ZERO; MOST_LANES + 1];
@@ -373,8 +376,8 @@ fn beyond(start: &[u64; LANES], steps: &[u64; LANES], cells: u64) -> [u64; LANES
 }
 
 #[inline(always)]
-fn weigh<I: Isa, const W: usize>(grade: f64, weights: &[Lane; W], sums: &mut [Lane; W]) {
+fn weigh<I: Isa, const W: usize>(grade: Lane, weights: &[Lane; W], sums: &mut [Lane; W]) {
     for w in 0..W {
-        sums[w] = I::mul_add(Lane::splat(grade), weights[w], sums[w]);
+        sums[w] = I::mul_add(grade, weights[w], sums[w]);
     }
 }

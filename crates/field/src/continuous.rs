@@ -40,6 +40,8 @@ pub struct Slopes {
 
 /// The kernels of all poses.
 pub struct Continuous<'a> {
+    training: &'a Training,
+    hyper: &'a Hyper,
     pairings: &'a [Pairing],
     pub poses: Vec<PoseKernels>,
 }
@@ -75,16 +77,17 @@ impl Pairing {
 
 impl<'a> Continuous<'a> {
     /// Under given hyper-parameters.
-    pub fn new(pairings: &'a [Pairing], hyper: &Hyper) -> Self {
+    pub fn new(training: &'a Training, pairings: &'a [Pairing], hyper: &'a Hyper) -> Self {
         let poses = pairings.par_iter().map(|pairing| dispatch(Fill { pairing, hyper })).collect();
-        Self { pairings, poses }
+        Self { training, hyper, pairings, poses }
     }
 }
 
 impl PairKernels for Continuous<'_> {
     fn fill(&self, j: usize, table: &mut PairTable) {
         let (pairing, kernels) = (&self.pairings[j], &self.poses[j]);
-        table.clear(kernels.own.len(), kernels.products.len(), pairing.count);
+        let waves = &self.hyper.waves;
+        table.clear(kernels.own.len(), kernels.products.len(), waves.len(), pairing.count);
         let copy = |column: &mut Vec<f64>, values: &Vec<f64>| {
             column.copy_from_slice(&values[..pairing.count]);
         };
@@ -92,6 +95,12 @@ impl PairKernels for Continuous<'_> {
         table.sag.iter_mut().zip(&pairing.loads).for_each(|(column, loads)| copy(column, loads));
         table.products.iter_mut().zip(&kernels.products).for_each(|(column, values)| copy(column, values));
         copy(&mut table.smooth, &kernels.smooth.kernel);
+        for (column, wave) in table.waves.iter_mut().zip(waves) {
+            let value = |pose: usize| self.training.values_of(pose)[wave.joint];
+            for (i, out) in column.iter_mut().enumerate() {
+                *out = (wave.cycles * (value(j + i) - value(j))).cos();
+            }
+        }
     }
 }
 

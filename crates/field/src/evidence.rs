@@ -66,7 +66,7 @@ impl<'a> Evidence<'a> {
     /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn score(&self, hyper: &Hyper) -> Result<Score, FieldError> {
         self.cancel.check()?;
-        let kernels = Continuous::new(&self.pairings, hyper);
+        let kernels = Continuous::new(self.training, &self.pairings, hyper);
         let [mut covariance, projected] = self.room().take().unwrap_or_else(|| self.empty());
         write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
         let restricted = self.restricted(covariance, projected)?;
@@ -81,6 +81,19 @@ impl<'a> Evidence<'a> {
             }
         }
         Ok(Score { value, gradient })
+    }
+
+    /// What pulls at the rows, P r (R,): their residual over the covariance that it has under the hyper-parameters.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
+    pub fn pull(&self, hyper: &Hyper) -> Result<Vec<f64>, FieldError> {
+        self.cancel.check()?;
+        let kernels = Continuous::new(self.training, &self.pairings, hyper);
+        let [mut covariance, _] = self.room().take().unwrap_or_else(|| self.empty());
+        write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
+        let projection = Projection::new(self.training, covariance)?;
+        Ok(pulled(&projection.factor, &projection.root(), &self.training.residual))
     }
 
     fn room(&self) -> MutexGuard<'_, Option<Room>> {
@@ -109,10 +122,7 @@ impl<'a> Evidence<'a> {
             -1.0,
             parallelism(),
         );
-        let mut alpha = factor.solve_vector(&self.training.residual);
-        let common = times(root.as_ref(), &self.training.residual);
-        let common = times(root.transpose(), &common);
-        alpha.iter_mut().zip(&common).for_each(|(value, part)| *value -= part);
+        let alpha = pulled(&factor, &root, &self.training.residual);
         let fit: f64 = alpha.iter().zip(&self.training.residual).map(|(a, r)| a * r).sum();
         let value = -0.5 * (factor.log_determinant() + inner.log_determinant() + fit);
         Ok(Restricted { factor, projected, alpha, value })
@@ -138,6 +148,15 @@ impl<'a> Evidence<'a> {
         }
         gradient
     }
+}
+
+/// P r, from the factor of K and Q.
+fn pulled(factor: &Cholesky, root: &Mat<f64>, residual: &[f64]) -> Vec<f64> {
+    let mut alpha = factor.solve_vector(residual);
+    let common = times(root.as_ref(), residual);
+    let common = times(root.transpose(), &common);
+    alpha.iter_mut().zip(&common).for_each(|(value, part)| *value -= part);
+    alpha
 }
 
 /// The columns of one pose's share of the gradient.

@@ -16,6 +16,7 @@ use crate::refine::relinearised;
 use crate::select::{Found, contest_major, prune_major, refine, select_major};
 use crate::training::Training;
 use crate::upright::contest_up;
+use crate::waves::find_waves;
 use crate::widening::with_widenings;
 
 /// How the field is fitted.
@@ -165,12 +166,22 @@ impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         let mut hyper = self.searched(training, noise)?;
         if self.options.hyper.is_none() {
+            hyper = self.with_waves(training, hyper)?;
             let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION, 0));
             let large = large.lifted(hyper.up)?;
             hyper.extrapolation =
                 extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         }
         Ok(hyper)
+    }
+
+    /// The hyper-parameters with the waves of single joints, and what else they are then.
+    fn with_waves(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
+        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
+        match find_waves(&large, &hyper, &self.options.cancel)? {
+            Some(waved) => self.again(training, waved),
+            None => Ok(hyper),
+        }
     }
 
     fn searched(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {

@@ -20,6 +20,17 @@ pub struct Product {
     pub widening: [f64; 3],
 }
 
+/// A wave of one joint's angle, as gears and encoders leave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wave {
+    /// The joint, from 0.
+    pub joint: usize,
+    /// Cycles a turn of the joint.
+    pub cycles: f64,
+    /// Prior standard deviation of the weights of its cosine and its sine, rad.
+    pub amplitude: f64,
+}
+
 /// Hyper-parameters; amplitudes in rad or m, lengths in scaled input units (rad).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hyper {
@@ -41,6 +52,8 @@ pub struct Hyper {
     pub up: [f64; 3],
     /// Blocks over several joints together.
     pub products: Vec<Product>,
+    /// Waves of single joints; they are found by a scan and not by the optimiser.
+    pub waves: Vec<Wave>,
     /// Noise of positions (m) and of orientations (rad).
     pub noise: [f64; 2],
     /// Root mean square under the posterior of the `own` amplitude, over the amplitude itself.
@@ -99,6 +112,8 @@ pub const AT_PRODUCTS: usize = 9;
 
 /// Name of the block whose joints the evidence chooses.
 pub const MAJOR_NAME: &str = "major";
+/// Name of blocks that hold a wave each.
+pub const WAVE_NAME: &str = "wave";
 /// Name of the block over the last three joints.
 pub const WRIST_NAME: &str = "wrist";
 
@@ -144,6 +159,7 @@ impl Hyper {
             sag: SAG.start,
             up: UPRIGHT,
             products,
+            waves: Vec::new(),
             noise,
             own_widening: 1.0,
             smooth_widening: [1.0; 3],

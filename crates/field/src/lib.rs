@@ -6,7 +6,8 @@
 //! (a kernel on its cells), so that fit, evidence and standard deviation are those of exact Gaussian inference.
 //!
 //! Blocks: `constant` (the constants, kernel one), `own` (theta of a revolute joint, d of a prismatic one, over that
-//! joint), `sag` (the same parameter in proportion to the levers of the links behind the joint),
+//! joint), `sag` (the same parameter in proportion to the levers of the links behind the joint), `wave` (the angle of a
+//! joint by a cosine and a sine of some hundred cycles a turn, where gears or encoders leave one),
 //! `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
 //! together: those that the evidence chooses, and the last three).
 
@@ -50,6 +51,7 @@ mod tests;
 mod training;
 mod unknowns;
 mod upright;
+mod waves;
 mod weight_space;
 mod widening;
 
@@ -61,7 +63,7 @@ pub use conservative_fit::{ConservativePlan, Samples};
 pub use error::FieldError;
 pub use fit::{FieldFit, FieldOptions, fit_field, restore};
 pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};
-pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME};
+pub use hyper::{Hyper, MAJOR_NAME, Product, WRIST_NAME, Wave};
 pub use kernel::{Input, InputKind};
 pub use outliers::{Judgement, QUANTILE_95};
 pub use posterior::Posterior;

@@ -1,7 +1,7 @@
 //! The prior model of one training set: cells, what they drive, and how alike configurations are under it.
 
 use crate::cells::{Active, Axis, CellKernel, Grid};
-use crate::hyper::{Hyper, Product};
+use crate::hyper::{Hyper, Product, WAVE_NAME, Wave};
 use crate::kernel::Shape;
 use crate::pairs::{ByColumn, PairKernels, PairTable};
 use crate::sag::{Levers, Sag, alike};
@@ -20,6 +20,8 @@ pub struct Cells {
     pub smooth: Vec<CellKernel>,
     /// Inputs and cells of each product.
     pub products: Vec<Vec<(usize, CellKernel)>>,
+    /// Input and cells of each wave.
+    pub waves: Vec<(usize, CellKernel)>,
     /// What the joints carry.
     pub geometry: Levers,
 }
@@ -42,10 +44,15 @@ impl Cells {
             let joints = product.joints.iter().zip(&product.lengths);
             joints.map(|(&k, &length)| (k, smooth(k, length))).collect()
         };
+        // The kernel of a cosine and a sine with weights of the same variance is the cosine of the distance.
+        let wave = |wave: &Wave| {
+            (wave.joint, CellKernel::new(Axis::over_cycle(wave.cycles, degree), |distance| 1.0 - distance))
+        };
         Self {
             own: (0..training.inputs.len()).map(own).collect(),
             smooth: (0..training.inputs.len()).map(|k| smooth(k, hyper.smooth_length)).collect(),
             products: hyper.products.iter().map(product).collect(),
+            waves: hyper.waves.iter().map(wave).collect(),
             geometry: training.geometry.clone(),
         }
     }
@@ -65,13 +72,14 @@ impl Cells {
                 .iter()
                 .map(|axes| axes.iter().map(|(k, cells)| cells.axis.active(values[*k])).collect())
                 .collect(),
+            waves: self.waves.iter().map(|(k, cells)| cells.axis.active(values[*k])).collect(),
             levers: self.geometry.at(values),
         }
     }
 
     /// Prior correlations of one configuration with others.
     pub fn fill(&self, here: &Excited, others: &[Excited], table: &mut PairTable) {
-        table.clear(self.own.len(), self.products.len(), others.len());
+        table.clear(self.own.len(), self.products.len(), self.waves.len(), others.len());
         for (k, column) in table.own.iter_mut().enumerate() {
             if let (Some(cells), Some(active)) = (&self.own[k], &here.own[k]) {
                 let line = cells.line(active);
@@ -92,6 +100,11 @@ impl Cells {
                 column.iter_mut().zip(values).for_each(|(product, value)| *product *= value);
             }
         }
+        for (index, (column, (_, cells))) in table.waves.iter_mut().zip(&self.waves).enumerate() {
+            let line = cells.line(&here.waves[index]);
+            let values = others.iter().map(|other| other.waves[index].weigh(&line));
+            column.iter_mut().zip(values).for_each(|(out, value)| *out = value);
+        }
         for (i, other) in others.iter().enumerate() {
             self.fill_loads(&here.levers, &other.levers, table, i);
         }
@@ -107,13 +120,16 @@ impl Cells {
     /// Prior variances of the blocks at one configuration, cells beyond the axes included.
     fn unbounded(&self, values: &[f64]) -> PairTable {
         let mut table = PairTable::default();
-        table.clear(self.own.len(), self.products.len(), 1);
+        table.clear(self.own.len(), self.products.len(), self.waves.len(), 1);
         for (k, (column, cells)) in table.own.iter_mut().zip(&self.own).enumerate() {
             column[0] = cells.as_ref().map_or(0.0, |cells| cells.variance(values[k]));
         }
         table.smooth[0] = self.smooth.iter().zip(values).map(|(cells, &value)| cells.variance(value)).sum();
         for (column, axes) in table.products.iter_mut().zip(&self.products) {
             column[0] = axes.iter().map(|(k, cells)| cells.variance(values[*k])).product();
+        }
+        for (column, (k, cells)) in table.waves.iter_mut().zip(&self.waves) {
+            column[0] = cells.variance(values[*k]);
         }
         let levers = self.geometry.at(values);
         self.fill_loads(&levers, &levers, &mut table, 0);
@@ -127,6 +143,7 @@ pub struct Excited {
     own: Vec<Option<Active>>,
     smooth: Vec<Active>,
     products: Vec<Vec<Active>>,
+    waves: Vec<Active>,
     levers: Vec<f64>,
 }
 
@@ -182,7 +199,7 @@ impl Model {
         self.hyper.constant * self.training.columns[p].constant
     }
 
-    /// All blocks, `own` of each input first, then `smooth`, then the products.
+    /// All blocks, `own` of each input first, then `smooth`, then the products, then waves.
     pub fn plans(&self) -> Vec<BlockPlan<'_>> {
         let mut plans = Vec::new();
         for (k, own) in self.by_column.own.iter().enumerate() {
@@ -201,6 +218,12 @@ impl Model {
         for (axes, product) in self.cells.products.iter().zip(&self.hyper.products) {
             let axes = axes.iter().map(|(k, cells)| (*k, cells)).collect();
             plans.push(BlockPlan { name: &product.name, axes, driven: self.driven(&product.amplitudes) });
+        }
+        for ((k, cells), wave) in self.cells.waves.iter().zip(&self.hyper.waves) {
+            if let Some((p, lever)) = self.by_column.own[*k] {
+                let driven = vec![(p, (wave.amplitude * lever).powi(2))];
+                plans.push(BlockPlan { name: WAVE_NAME, axes: vec![(*k, cells)], driven });
+            }
         }
         plans
     }
@@ -267,6 +290,11 @@ impl Model {
                 if let Some((p, lever)) = entry {
                     variances[*p] += (self.hyper.own * lever).powi(2) * table.own[k][i];
                     variances[*p] += (self.hyper.sag * lever).powi(2) * table.sag[k][i];
+                }
+            }
+            for (wave, kernels) in self.hyper.waves.iter().zip(&table.waves) {
+                if let Some((p, lever)) = self.by_column.own[wave.joint] {
+                    variances[p] += (wave.amplitude * lever).powi(2) * kernels[i];
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Covariance of measured rows, column by column, from kernels between poses.
 //!
 //! For rows r of pose i and c of pose j,
-//! `K[r, c] = sum_p J[r, p] J[c, p] (constant_p^2 + own^2 k_own + sag^2 k_sag + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
+//! `K[r, c] = sum_p J[r, p] J[c, p] (constant_p^2 + own^2 k_own + sag^2 k_sag + sum wave^2 k_wave + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
 //! and within one pose what its joints do not repeat.
 //! The sums over the parameters of a class are formed first, for all rows at once, so that the inner loops run over
 //! contiguous rows; nothing of the size of the matrix is kept but the matrix.
@@ -25,16 +25,19 @@ pub struct PairTable {
     pub sag: Vec<Vec<f64>>,
     /// One for each product.
     pub products: Vec<Vec<f64>>,
+    /// One for each wave.
+    pub waves: Vec<Vec<f64>>,
 }
 
 impl PairTable {
     /// Makes room for one pose with `count` others, all zero.
-    pub fn clear(&mut self, joints: usize, products: usize, count: usize) {
+    pub fn clear(&mut self, joints: usize, products: usize, waves: usize, count: usize) {
         self.own.resize(joints, Vec::new());
         self.sag.resize(joints, Vec::new());
         self.products.resize(products, Vec::new());
+        self.waves.resize(waves, Vec::new());
         let columns = self.own.iter_mut().chain(&mut self.sag).chain(&mut self.products);
-        for column in columns.chain([&mut self.smooth]) {
+        for column in columns.chain(&mut self.waves).chain([&mut self.smooth]) {
             column.clear();
             column.resize(count, 0.0);
         }
@@ -223,12 +226,18 @@ impl RowFactors {
         }
         self.own.resize(by_column.own.len(), Vec::new());
         let tables = table.own.iter().zip(&table.sag);
-        for ((factors, (kernels, loads)), own) in self.own.iter_mut().zip(tables).zip(&by_column.own) {
+        let joints = self.own.iter_mut().zip(tables).zip(&by_column.own).enumerate();
+        for (joint, ((factors, (kernels, loads)), own)) in joints {
             let Some((_, lever)) = own else { continue };
             let (variance, sag) = ((hyper.own * lever).powi(2), (hyper.sag * lever).powi(2));
             by_pose.clear();
             by_pose.extend(kernels.iter().zip(loads).map(|(kernel, load)| variance * kernel + sag * load));
             by_pose[0] += (hyper.repeatability * lever).powi(2);
+            let waves = hyper.waves.iter().zip(&table.waves).filter(|(wave, _)| wave.joint == joint);
+            for (wave, kernels) in waves {
+                let variance = (wave.amplitude * lever).powi(2);
+                by_pose.iter_mut().zip(kernels).for_each(|(sum, kernel)| *sum += variance * kernel);
+            }
             repeat(by_pose, poses, pose, factors);
         }
     }

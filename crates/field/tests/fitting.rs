@@ -53,6 +53,31 @@ fn joints_that_act_together_are_the_major_ones() {
     assert!(found.contains(&2) && found.contains(&4), "{found:?}");
 }
 
+#[test]
+fn a_wave_that_is_too_fine_for_a_curve_is_found_and_taken_away() {
+    for (cycles, joint) in [(202.0, 1), (77.3, 2)] {
+        let arm = six_axes(Truth { wave: (8e-5, cycles, joint), ..Truth::BENDING });
+        let fit = fit(&arm, &Measure::poses(250).of(&arm)).unwrap();
+        let waves = &fit.field.hyper.waves;
+        assert!(!waves.is_empty() && waves.iter().all(|wave| wave.joint == joint), "{waves:?}");
+        assert!(waves.iter().any(|wave| (wave.cycles - cycles).abs() < 0.2), "{waves:?}");
+        let (_, field) = deviations(&arm, &fit, &held_out(200).of(&arm));
+        let field = root_mean_square(&field);
+        assert!(field < 1.7 * NOISE, "the field leaves {field}");
+        let share = coverage(&arm, &fit, &held_out(200));
+        assert!((0.90..=0.99).contains(&share), "{share} of the components lie within their 95 % intervals");
+    }
+}
+
+#[test]
+fn where_there_is_no_wave_none_is_found() {
+    for seed in 1..6 {
+        let arm = six_axes(Truth::BENDING);
+        let fit = fit(&arm, &Measure { seed, ..Measure::poses(120) }.of(&arm)).unwrap();
+        assert!(fit.field.hyper.waves.is_empty(), "seed {seed}: {:?}", fit.field.hyper.waves);
+    }
+}
+
 /// Held-out error with the field over that without, mean of three draws.
 fn cost_of_varying(arm: &Arm, poses: usize) -> f64 {
     let of = |seed: u64| {

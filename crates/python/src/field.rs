@@ -15,7 +15,7 @@ use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
     Bank, Compiled, FieldFit as CoreFit, FieldOptions, Hyper, Input, Levers, MAJOR_NAME,
-    Posterior as CorePosterior, Product, UPRIGHT, WRIST_NAME, fit_field as fit, measurement_covariance,
+    Posterior as CorePosterior, Product, UPRIGHT, WRIST_NAME, Wave, fit_field as fit, measurement_covariance,
     restore,
 };
 
@@ -94,6 +94,7 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         smooth_length: one("smooth_length")?,
         repeatability: one("repeatability")?,
         products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
+        waves: values.get("waves").map_or_else(Vec::new, |stored| waves_from(stored)),
         noise: [one("noise_position")?, one("noise_orientation")?],
         own_widening: one("own_widening")?,
         smooth_widening: three("smooth_widening")?,
@@ -102,6 +103,12 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         sag_widening: values.get("sag_widening").map_or(Ok(1.0), |_| one("sag_widening"))?,
         extrapolation: one("extrapolation")?,
     })
+}
+
+/// Of each wave its joint, its cycles a turn and its amplitude.
+fn waves_from(stored: &[f64]) -> Vec<Wave> {
+    let waves = stored.as_chunks().0.iter();
+    waves.map(|&[joint, cycles, amplitude]| Wave { joint: joint as usize, cycles, amplitude }).collect()
 }
 
 fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
@@ -121,6 +128,8 @@ fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         ("up".to_owned(), hyper.up.to_vec()),
         ("extrapolation".to_owned(), vec![hyper.extrapolation]),
     ]);
+    let waves = hyper.waves.iter().flat_map(|wave| [wave.joint as f64, wave.cycles, wave.amplitude]);
+    values.insert("waves".to_owned(), waves.collect());
     for product in &hyper.products {
         let name = &product.name;
         let joints = product.joints.iter().map(|&joint| joint as f64).collect();

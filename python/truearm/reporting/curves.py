@@ -78,6 +78,7 @@ def along(facts: Facts, joint: int, effects: Floats) -> Figure:
             says = _says(
                 name, unit_of(column), q, values, facts.unit(joint), _surely(spread, k, per_unit(column))
             )
+    says += _fine_waves(facts, joint)
     first = candidates.column(names[0])
     return Figure(
         f"Variation along joint {joint + 1}",
@@ -133,6 +134,15 @@ def _wave(q: Floats, values: Floats, joint_unit: str, unit: str) -> str:
         f"{_four(wave.amplitude)} {unit} accounts for {100 * wave.share:.0f} % of the variance about a "
         "parabola."
     )
+
+
+def _fine_waves(facts: Facts, joint: int) -> str:
+    """What the field holds besides, too fine to be drawn."""
+    cycles = sorted(wave["cycles"] for wave in facts.waves(joint))
+    if not cycles:
+        return ""
+    words = ", ".join(f"{each:.4g}" for each in cycles)
+    return f" Not drawn: waves with {words} cycles a turn, as gears and encoders leave them."
 
 
 def _four(value: float) -> str:

@@ -1,18 +1,21 @@
 """What a report is made from: the calibration, and what several of its chapters work out of it once."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm._core import Field
 from truearm.calibration import Calibration
 from truearm.errors import count_of
 from truearm.evaluation import Evaluation
 from truearm.held_rows import HeldRows
+from truearm.models import ArmModel
 from truearm.reporting.numbers import shown_readings, unit_of
+from truearm.summary import WAVE
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -72,6 +75,21 @@ class Facts:
     def point_name(self) -> str:
         """What `point` is called in sentences."""
         return "robot file's tool" if self.calibration.selection.distances else "measured point"
+
+    @cached_property
+    def without_waves(self) -> ArmModel:
+        """The model that predicts, but for waves: they are finer than a curve over a joint can show."""
+        model = self.calibration.model
+        if model.field is None:
+            return model
+        blocks = [block for block in model.field.blocks() if block["name"] != WAVE]
+        inputs, parameters = model.field.input_count, model.field.parameter_count
+        return replace(model, field=Field(inputs, parameters, blocks, self.calibration.arm.flange_chain))
+
+    def waves(self, joint: int) -> list[dict[str, Any]]:
+        """The blocks of the summary that are waves of a joint, from 0."""
+        blocks = self.summary["blocks"]
+        return [block for block in blocks if block["name"] == WAVE and block["joints"] == [joint + 1]]
 
     @property
     def models(self) -> list[str]:

@@ -48,10 +48,9 @@ def sweep(facts: Facts, joint: int, steps: int = STEPS, base: Floats | None = No
 
 
 def corrections(facts: Facts, readings: Floats) -> Floats:
-    """Corrections (n, 5 L) of all parameters at readings (n, N), SI."""
-    calibration = facts.calibration
-    found = calibration.model.parameters(facts.inputs(readings))
-    return np.asarray((found - calibration.arm.table).reshape(len(readings), -1))
+    """Corrections (n, 5 L) of all parameters at readings (n, N), waves left out, SI."""
+    found = facts.without_waves.parameters(facts.inputs(readings))
+    return np.asarray((found - facts.calibration.arm.table).reshape(len(readings), -1))
 
 
 def influence_mm(facts: Facts) -> Floats:

@@ -44,6 +44,8 @@ def _blocks(facts: Facts) -> Table:
     for block in blocks:
         amplitudes = block["amplitudes"]
         inputs = [f"joint {joint}" for joint in block["joints"]] + list(block["features"])
+        if "cycles" in block:
+            inputs.append(f"{block['cycles']:.4g} cycles a turn")
         rows.append(
             [
                 block["name"],

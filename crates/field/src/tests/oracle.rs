@@ -18,6 +18,7 @@ pub trait Kernels {
     fn smooth(&self, input: usize, a: f64, b: f64) -> f64;
     /// Of axis `axis` of product `product`, which varies with `input`.
     fn product(&self, product: usize, axis: usize, input: usize, a: f64, b: f64) -> f64;
+    fn wave(&self, wave: usize, a: f64, b: f64) -> f64;
 }
 
 /// The formulas.
@@ -50,6 +51,10 @@ impl Kernels for Exact<'_> {
 
     fn product(&self, product: usize, axis: usize, input: usize, a: f64, b: f64) -> f64 {
         self.squared_exponential(input, a, b, self.1.products[product].lengths[axis])
+    }
+
+    fn wave(&self, wave: usize, a: f64, b: f64) -> f64 {
+        (self.1.waves[wave].cycles * (a - b)).cos()
     }
 }
 
@@ -93,6 +98,10 @@ impl Kernels for OfCells<'_> {
         assert_eq!(*found, input);
         implied(cells, a, b)
     }
+
+    fn wave(&self, wave: usize, a: f64, b: f64) -> f64 {
+        implied(&self.0.cells.waves[wave].1, a, b)
+    }
 }
 
 /// Gaussian inference written out.
@@ -135,6 +144,9 @@ impl<'a, K: Kernels> Oracle<'a, K> {
             if let Some(k) = column.own {
                 sum += (hyper.own * self.lever(k)).powi(2) * self.kernels.own(k, a[k], b[k]);
                 sum += (hyper.sag * self.lever(k)).powi(2) * self.loads(k, a, b);
+                for (index, wave) in hyper.waves.iter().enumerate().filter(|(_, wave)| wave.joint == k) {
+                    sum += (wave.amplitude * self.lever(k)).powi(2) * self.kernels.wave(index, a[k], b[k]);
+                }
             }
             sum
         };

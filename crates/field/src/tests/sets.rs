@@ -4,7 +4,7 @@ use truearm_estimate::{MeasurementSet, Point, Setup};
 
 use super::common::{Arm, Measure, Truth, options, problem, scara, six_axes};
 use crate::fit::FieldOptions;
-use crate::hyper::Hyper;
+use crate::hyper::{Hyper, Wave};
 use crate::kernel::Input;
 use crate::linear::training;
 use crate::training::Training;
@@ -57,7 +57,12 @@ pub fn line_inputs(poses: usize) -> Training {
 
 /// Hyper-parameters away from the centre of their priors.
 pub fn hyper(training: &Training, joints: usize) -> Hyper {
-    let start = Hyper::start(&[1, 2], joints, [4e-5, 1.2e-4]);
+    let mut start = Hyper::start(&[1, 2], joints, [4e-5, 1.2e-4]);
+    start.waves = vec![
+        Wave { joint: 1, cycles: 31.0, amplitude: 6e-5 },
+        Wave { joint: 0, cycles: 12.4, amplitude: 3e-5 },
+        Wave { joint: 1, cycles: 62.0, amplitude: 2e-5 },
+    ];
     let mut logs = start.to_logs();
     logs.iter_mut().enumerate().for_each(|(k, log)| *log += 0.3 * (k as f64 * 1.7).sin());
     assert!(training.row_count() > 0);

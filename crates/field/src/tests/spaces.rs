@@ -7,7 +7,7 @@ use truearm_estimate::Cancel;
 use super::common::{Measure, Truth, scara};
 use super::sets::{few_driven, hyper, positions, rows_of};
 use crate::data_space::DataSpace;
-use crate::hyper::Hyper;
+use crate::hyper::{Hyper, WAVE_NAME};
 use crate::model::Model;
 use crate::posterior::Posterior;
 use crate::training::Training;
@@ -69,13 +69,16 @@ fn covariance_grows_away_from_the_data_up_to_the_prior() {
 }
 
 #[test]
-fn beyond_the_cells_nothing_is_left_but_constants_and_sag() {
+fn beyond_the_cells_nothing_is_left_but_constants_sag_and_waves() {
     let mut training = few_driven(40);
     training.values.iter_mut().for_each(|value| *value *= 0.2);
     let hyper = short(&training);
     for posterior in both(&training, &hyper) {
         let mut solution = posterior.solve(&training.residual).unwrap();
         assert!(solution.bank.sag.take().is_some());
+        let blocks = solution.bank.blocks.len();
+        solution.bank.blocks.retain(|block| block.name != WAVE_NAME);
+        assert_eq!(solution.bank.blocks.len() + hyper.waves.len(), blocks);
         let far: Vec<f64> = (0..6).map(|k| training.values[k] + std::f64::consts::PI).collect();
         let mut ceps = vec![0.0; training.parameter_count];
         solution.bank.add(&far, &mut ceps).unwrap();

@@ -17,11 +17,14 @@ pub struct Truth {
     pub gravity: f64,
     /// Amplitude of a twist that two joints bring together, rad, and the two.
     pub coupled: (f64, [usize; 2]),
+    /// Amplitude of a wave of a joint's angle, rad, its cycles a turn, and the joint.
+    pub wave: (f64, f64, usize),
 }
 
 impl Truth {
     /// Constants alone.
-    pub const RIGID: Truth = Truth { constant: 5e-4, own: 0.0, gravity: 0.0, coupled: (0.0, [0, 1]) };
+    pub const RIGID: Truth =
+        Truth { constant: 5e-4, own: 0.0, gravity: 0.0, coupled: (0.0, [0, 1]), wave: (0.0, 100.0, 0) };
     /// Own curves and gravity.
     pub const BENDING: Truth = Truth { own: 1.5e-4, gravity: 5e-4, ..Truth::RIGID };
 }
@@ -96,6 +99,8 @@ impl Arm {
             parameters[column] +=
                 lever * self.truth.own * ((phase + shift).sin() + 0.5 * (2.0 * phase).cos());
         }
+        let (amplitude, cycles, joint) = self.truth.wave;
+        parameters[self.chain.joint_columns()[joint]] += amplitude * (cycles * q[joint] + 0.4).cos();
         if self.truth.gravity != 0.0 {
             let sag = self.truth.gravity * (q[1] + q[2]).cos();
             parameters[5] += self.truth.gravity * q[1].cos() + 0.5 * sag;

@@ -1,0 +1,76 @@
+"""Waves of gears and encoders: found in measurements, told in summary and report, kept in the file."""
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.reporting.facts import Facts
+from truearm.reporting.varying import varying
+from truearm.simulation import VirtualArm
+from truearm.simulation.imperfections import Harmonic, Imperfections, JointError
+
+JOINT, CYCLES, AMPLITUDE_DEG = 2, 202, 0.01
+
+
+def calibrated(amplitude_deg):
+    """A UR10 whose second drive leaves a wave, by 300 poses."""
+    errors = (JointError(JOINT, harmonics=(Harmonic(CYCLES, amplitude_deg, 50.0),)),)
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(joint_errors=errors))
+    return ta.calibrate(arm.robot, arm.measure(arm.poses(430)), use="position", refit=False)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return calibrated(AMPLITUDE_DEG)
+
+
+def waves_of(calibration):
+    return [block for block in calibration.summary["blocks"] if block["name"] == "wave"]
+
+
+def test_a_wave_is_found_and_taken_away(found):
+    plain = calibrated(0.0)
+    assert waves_of(plain) == []
+    (wave,) = waves_of(found)
+    assert wave["joints"] == [JOINT]
+    assert wave["cycles"] == CYCLES
+    mean, free = (one.validation.holdout["variable"].position.mean for one in (found, plain))
+    assert mean < 1.15 * free, "an arm with a wave is as good as one without"
+    assert 0.9 < found.summary["coverage_95"] < 0.99
+
+
+def test_what_the_arm_does_over_a_cycle_is_predicted(found):
+    q = np.repeat([[0.3, -1.2, 0.9, 0.2, 0.7, 0.1]], 60, axis=0)
+    q[:, JOINT - 1] += np.linspace(0.0, 2.0 * np.pi / CYCLES, 60)
+    slow = Facts(found).without_waves.parameters(q)
+    wave = (found.parameters(q) - slow)[:, JOINT - 1, 0]
+    assert 0.5 * np.ptp(wave) == pytest.approx(np.radians(AMPLITUDE_DEG), rel=0.15)
+    assert abs(wave[0] - wave[-1]) < 1e-9
+
+
+def test_a_file_keeps_the_wave_and_its_standard_deviation(found, tmp_path):
+    found.save(tmp_path / "arm.calib")
+    again = ta.Calibration.load(tmp_path / "arm.calib")
+    q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+    assert np.array_equal(again.parameters(q), found.parameters(q))
+    assert np.allclose(again.position_std(q), found.position_std(q), rtol=1e-9)
+    assert waves_of(again) == waves_of(found)
+
+
+def test_reports_name_waves_and_draw_curves_without_them(found):
+    facts = Facts(found)
+    figures = {part.title: part for part in varying(facts).parts if hasattr(part, "says")}
+    assert "Not drawn: waves with 202 cycles a turn" in figures[f"Variation along joint {JOINT}"].says
+    assert "Not drawn" not in figures["Variation along joint 1"].says
+    q = np.repeat([[0.3, -1.2, 0.9, 0.2, 0.7, 0.1]], 2, axis=0)
+    q[1, JOINT - 1] += np.pi / CYCLES
+    drawn = np.ptp(facts.without_waves.parameters(q)[:, JOINT - 1, 0])
+    assert drawn < 0.2 * np.ptp(found.parameters(q)[:, JOINT - 1, 0])
+
+
+def test_corrections_reach_their_targets_where_a_wave_is_steep(found):
+    limits = ta.Limits(largest_mm=20.0, largest_joint_deg=10.0, largest_std_mm=None)
+    q = np.linspace([0.3, -1.2, 1.5, -0.8, 1.1, 0.4], [0.8, -1.0, 1.3, -0.9, 1.2, 0.2], 60)
+    corrected = ta.Compensator(found, limits=limits).joints(q)
+    assert corrected.refusals == ()
+    assert np.abs(found.pose(corrected.q) - found.robot.pose(q)).max() < 1e-9
