@@ -52,6 +52,16 @@ def test_the_library_is_listed(capsys):
     assert "RRPR" in printed
 
 
+def test_the_commands_run_as_a_module():
+    done = subprocess.run(
+        [sys.executable, "-m", "truearm", "robots", "ur10", "--json"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert json.loads(done.stdout)["name"] == "UR10"
+
+
 def test_the_library_as_json(capsys):
     assert main(["robots", "--json"]) == 0
     printed = capsys.readouterr()

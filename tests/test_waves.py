@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.exporting.field_grid import grid_axes, grid_table, grid_text
 from truearm.reporting.facts import Facts
+from truearm.reporting.parts import Figure
 from truearm.reporting.varying import varying
 from truearm.simulation import VirtualArm
 from truearm.simulation.imperfections import Harmonic, Imperfections, JointError
@@ -59,13 +61,19 @@ def test_a_file_keeps_the_wave_and_its_standard_deviation(found, tmp_path):
 
 def test_reports_name_waves_and_draw_curves_without_them(found):
     facts = Facts(found)
-    figures = {part.title: part for part in varying(facts).parts if hasattr(part, "says")}
+    figures = {part.title: part for part in varying(facts).parts if isinstance(part, Figure)}
     assert "Not drawn: waves with 202 cycles a turn" in figures[f"Variation along joint {JOINT}"].says
     assert "Not drawn" not in figures["Variation along joint 1"].says
     q = np.repeat([[0.3, -1.2, 0.9, 0.2, 0.7, 0.1]], 2, axis=0)
     q[1, JOINT - 1] += np.pi / CYCLES
     drawn = np.ptp(facts.without_waves.parameters(q)[:, JOINT - 1, 0])
     assert drawn < 0.2 * np.ptp(found.parameters(q)[:, JOINT - 1, 0])
+
+
+def test_a_table_says_which_waves_it_cannot_follow(found):
+    axes = grid_axes(found, "q1=-30:30:2")
+    text = grid_text(grid_table(found, axes), found, axes)
+    assert "# Samples hold waves of joint 2 with 202 cycles a turn, lost between them." in text
 
 
 def test_corrections_reach_their_targets_where_a_wave_is_steep(found):

@@ -16,6 +16,7 @@ from truearm.errors import InputError, UsageError, WorkError
 from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import UNLIMITED, flange_poses
 from truearm.parameters import KINDS
+from truearm.summary import WAVE, describe_blocks
 from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
@@ -122,8 +123,21 @@ def grid_text(
         *([f"Features: {', '.join(stated)}"] if stated else []),
         *_columns_in_words(list(table.columns), calibration),
         "Between samples the field is not linear; beyond the readings it was learnt at it is a guess",
+        *_waves_in_words(calibration),
     ]
     return as_comments(notes) + table.to_csv(index=False, float_format=DIGITS, lineterminator="\n")
+
+
+def _waves_in_words(calibration: Calibration) -> list[str]:
+    """Of each joint with waves that the samples hold, and that no table between them can follow."""
+    cycles: dict[int, list[str]] = {}
+    for block in describe_blocks(calibration):
+        if block["name"] == WAVE:
+            cycles.setdefault(block["joints"][0], []).append(f"{block['cycles']:{SHOWN}}")
+    return [
+        f"Samples hold waves of joint {joint} with {', '.join(found)} cycles a turn, lost between them"
+        for joint, found in sorted(cycles.items())
+    ]
 
 
 def _in_words(calibration: Calibration, axes: Sequence[Axis]) -> list[str]:
