@@ -20,7 +20,7 @@ NUMBER = re.compile(r"(?<![\w.])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.
 class Shift:
     """A compensator whose correction is the same everywhere."""
 
-    by: np.ndarray | float = 0.0
+    by: object = 0.0
     tools: list = field(default_factory=list)
 
     def joints(self, q, *, tool=None):
@@ -43,12 +43,21 @@ def read(language, text, robot, frames=""):
     return language.read([source], robot, Frames.parse(frames))
 
 
-def rewritten(language, text, robot, *, by=0.0, frames="", mark=""):
+class Bend:
+    """A correction that varies with joint 1, added to an array of readings."""
+
+    def __radd__(self, q):
+        return q + 4e-3 * np.sin(6.0 * q[:, :1]) * np.eye(q.shape[1])[0]
+
+    __array_ufunc__ = None
+
+
+def rewritten(language, text, robot, *, by=0.0, frames="", mark="", spacing=None):
     """What rewriting gives, with every joint shifted by `by`, rad."""
     program = read(language, text, robot, frames)
     controller = Controller.nominal(robot)
     models = Models(robot, controller.inverse, controller, Shift(by))
-    return rewrite(program, models, Choices(), mark=mark)
+    return rewrite(program, models, Choices(spacing=spacing), mark=mark)
 
 
 def skeleton(text):
@@ -74,10 +83,10 @@ def says(language, content, robot, frames=""):
     return rewritten(language, content, robot, frames=frames).nominal
 
 
-def survives(language, text, robot, frames=""):
+def survives(language, text, robot, frames="", **options):
     """Whether a text ends in a program or in an error with a place, and nothing else."""
     try:
-        rewritten(language, text, robot, frames=frames)
+        rewritten(language, text, robot, frames=frames, **options)
     except InputError as error:
         return bool(error.where)
     return True

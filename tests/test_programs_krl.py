@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.program_tools import Bend
 from tests.programs_rig import KUKA, again, models, obeyed, read, rewritten
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
@@ -359,15 +360,6 @@ def test_waypoints_on_a_line_are_passed():
     assert lines.index(inserted[-1]) + 1 == lines.index(last)
     folded = src.replace("  LIN", ";FOLD LIN P2\nLIN").replace("\nEND", "\n;ENDFOLD\nEND")
     assert rewritten(read("a.src", folded, KUKA), bent, spacing=Spacing.of(0.05, 20.0)).inserted == 0
-
-
-class Bend:
-    """A correction that varies with axis 1, added to an array of readings."""
-
-    def __radd__(self, q):
-        return q + 4e-3 * np.sin(6.0 * q[:, :1]) * np.eye(6)[0]
-
-    __array_ufunc__ = None
 
 
 def test_frames_of_the_world_and_of_the_start():

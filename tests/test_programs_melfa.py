@@ -5,9 +5,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.program_tools import names_changed, read, reasons, rewritten, says, skeleton, survives
+from tests.program_tools import (
+    Bend,
+    names_changed,
+    read,
+    reasons,
+    rewritten,
+    says,
+    skeleton,
+    survives,
+)
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
+from truearm.programs.densify import Spacing
 from truearm.programs.layouts import EulerPose
 from truearm.programs.melfa import MelfaBasic
 from truearm.programs.melfa_configuration import StructureFlags
@@ -267,3 +277,85 @@ def test_the_mark_keeps_line_numbers(robot, sample):
         rewritten(MELFA, marked, robot)
     plain = f"Tool P_NTool\nMov P1\nP1={position(robot, Q[0])}\n"
     assert rewritten(MELFA, plain, robot, mark=text).contents[0].decode().startswith(f"' {text}\nTool")
+
+
+FINE_STEPS = Spacing.of(0.05, 20.0)
+FLANGE = "[tool.tool]\nxyz = [0, 0, 0]\n"
+LONG = np.deg2rad([[-30, 20, 80, 5, 70, 15], [30, 20, 80, 5, 70, 15]])
+
+
+def long_line(robot, lines):
+    ends = [position(robot, q) for q in LONG]
+    return "\n".join([*lines, f"P1={ends[0]} ' start", f"P3={ends[1]}", ""])
+
+
+def motions(content):
+    return [line for line in content.decode("latin-1").splitlines() if "Mvs" in line]
+
+
+def line_numbers(content):
+    return [int(line.split()[0]) for line in content.decode("latin-1").splitlines() if line[0].isdigit()]
+
+
+@pytest.mark.parametrize("step", [1, 10, 1000])
+def test_waypoints_are_motions_to_variables_of_their_own(robot, step):
+    lines = ["Mov P1", "  Mvs P3 ' slowly", "*L1", "GoTo *L1", "End"]
+    text = long_line(robot, [f"{step * (n + 1)} {line}" for n, line in enumerate(lines)]).rstrip("\n")
+    plain = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE)
+    done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
+    assert done.inserted >= 2
+    assert done.notices == ()
+    names = [line.split()[2] for line in motions(done.contents[0])]
+    assert names == ["P2", *(f"P{number + 3}" for number in range(1, done.inserted)), "P3"]
+    numbers = line_numbers(done.contents[0])
+    assert numbers == sorted(set(numbers))
+    assert len(numbers) == len(lines) + done.inserted
+    assert numbers[0] == line_numbers(plain.contents[0])[0]
+    again = read(MELFA, done.contents[0], robot, FLANGE)
+    said = says(MELFA, done.contents[0], robot, FLANGE)[again.moves.target]
+    assert (np.diff(said[:, 0]) > 0.0).all(), "in the order of the way"
+    assert reasons(rewritten(MELFA, done.contents[0], robot, frames=FLANGE)) == []
+    assert b"Mvs P3 ' slowly" in done.contents[0]
+
+
+def test_lines_keep_their_numbers_where_there_is_room(robot):
+    text = long_line(robot, ["100 Mov P1", "200 Mvs P3", "210 GoTo 100", "220 End"])
+    done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
+    numbers = line_numbers(done.contents[0])
+    assert numbers[0] == 100
+    assert numbers[-3:] == [200, 210, 220]
+    assert done.inserted == len(numbers) - 4 > 0
+
+
+def test_lines_that_are_jumped_to_by_number_are_not_numbered_anew(robot):
+    text = long_line(robot, ["1 Mov P1", "2 Mvs P3", "3 If M1=1 Then 1 Else 2", "4 End"])
+    done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
+    assert done.inserted == 0
+    assert line_numbers(done.contents[0]) == [1, 2, 3, 4]
+    assert [notice.kind for notice in done.notices] == ["deviation"]
+
+
+def test_lines_without_numbers_get_none(robot):
+    text = long_line(robot, ["Mov P1", "Mvs P3", "End"])
+    done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
+    assert motions(done.contents[0])[0] == "Mvs P2"
+    assert line_numbers(done.contents[0]) == []
+    assert done.inserted >= 2
+
+
+@pytest.mark.parametrize("motion", ["Mvs P3 Wth M_Out(1)=1", "Mvs P3 Type 0,0", "*L1:Mvs P3"])
+def test_a_motion_that_does_more_gets_no_waypoints(robot, motion):
+    text = long_line(robot, ["Mov P1", motion, "End"])
+    done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
+    assert done.inserted == 0
+
+
+@settings(max_examples=25)
+@given(st.data())
+def test_waypoints_of_mutilated_programs_end_in_a_listing_or_an_error(robot, data):
+    text = long_line(robot, ["1 Mov P1", "2 Mvs P3", "*L1", "3 End"])
+    start = data.draw(st.integers(0, len(text)))
+    end = data.draw(st.integers(start, min(len(text), start + 20)))
+    put = data.draw(st.text(st.sampled_from("()=,;'\" \n0.5-*+PJMov&H"), max_size=12))
+    mutilated = text[:start] + put + text[end:]
+    assert survives(MELFA, mutilated, robot, FLANGE, by=Bend(), spacing=FINE_STEPS)

@@ -6,9 +6,21 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
 
-from tests.program_tools import names_changed, read, reasons, rewritten, says, skeleton, survives
+from tests.program_tools import (
+    Bend,
+    names_changed,
+    read,
+    reasons,
+    rewritten,
+    says,
+    skeleton,
+    survives,
+)
+from truearm.controller import Controller
 from truearm.errors import InputError
+from truearm.programs.densify import Spacing
 from truearm.programs.layouts import EulerPose
 from truearm.programs.tables import Motion
 from truearm.programs.tp import FanucTp
@@ -321,3 +333,96 @@ def test_the_mark_is_remarks_that_are_not_too_long(robot, sample):
     assert max(len(line) - 10 for line in remarks) <= 32
     with pytest.raises(InputError, match="compensated already"):
         rewritten(TP, marked, robot, frames=FRAMES)
+
+
+FINE_STEPS = Spacing.of(0.05, 20.0)
+LONG = np.deg2rad([[-30, 20, -10, 5, -80, 15], [30, 20, -10, 5, -80, 15]])
+
+
+def long_line(robot, motion, second=lambda text: text):
+    """A listing with one long straight line, whose end is P[4]."""
+    positions = [pose(robot, 2, LONG[0]), second(pose(robot, 4, LONG[1]).replace("[4]", '[4:"END"]'))]
+    return program(["J P[2] 100% FINE", motion, "R[1]=P[9,1]"], positions)
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_waypoints_are_lines_and_positions_of_their_own(robot, ending):
+    text = long_line(robot, "L P[4:END] 250mm/sec FINE ACC50    ").replace("\n", ending)
+    plain = rewritten(TP, text, robot, by=Bend())
+    done = rewritten(TP, text, robot, by=Bend(), spacing=FINE_STEPS)
+    content = done.contents[0].decode("latin-1")
+    assert done.inserted >= 2
+    assert done.notices == ()
+    again = read(TP, content, robot)
+    numbers = [int(again.targets.names[int(target)][2:-1]) for target in again.moves.target]
+    free = [number for number in range(1, done.inserted + 5) if number not in (1, 2, 4, 9)]
+    assert numbers == [2, *free[: done.inserted], 4]
+    lines = content.split(ending)
+    inserted = [line for line in lines if "CNT100" in line]
+    assert inserted == [f"    :L P[{number}] 250mm/sec CNT100 ACC50     ;" for number in numbers[1:-1]]
+    kept = [line for line in lines if line not in inserted]
+    whole = ending.join(kept)
+    assert whole.startswith(plain.contents[0].decode("latin-1").removesuffix(f"/END{ending}"))
+    said = says(TP, content, robot)[again.moves.target]
+    assert (np.diff(said[:, 0]) > 0.0).all(), "in the order of the way"
+    assert reasons(rewritten(TP, content, robot)) == []
+
+
+def off(points, corners):
+    """How far points are from straight lines between corners, at the most."""
+    starts, ways = corners[:-1], np.diff(corners, axis=0)
+    share = ((points[:, None] - starts) * ways).sum(axis=2) / (ways**2).sum(axis=1)
+    nearest = starts + np.clip(share, 0.0, 1.0)[:, :, None] * ways
+    return np.linalg.norm(points[:, None] - nearest, axis=2).min(axis=1).max()
+
+
+def test_waypoints_keep_the_line_straight(robot):
+    text = long_line(robot, "L P[4] 250mm/sec CNT50")
+    done = rewritten(TP, text, robot, by=Bend(), spacing=FINE_STEPS)
+    assert b"mm/sec CNT50 ;" in done.contents[0]
+    again = read(TP, done.contents[0], robot)
+    stored = says(TP, done.contents[0], robot)[again.moves.target]
+    places = robot.flange_chain.pose(robot.joints_from_readings(stored))[:, :3, 3]
+    ends = robot.flange_chain.pose(robot.joints_from_readings(LONG))
+    along = np.linspace(0.0, 1.0, 400)
+    line = np.tile(ends[0], (400, 1, 1))
+    line[:, :3, 3] += along[:, None] * (ends[1] - ends[0])[:3, 3]
+    line[:, :3, :3] = Slerp([0.0, 1.0], Rotation.from_matrix(ends[:, :3, :3]))(along).as_matrix()
+    seeds = LONG[0] + along[:, None] * (LONG[1] - LONG[0])
+    q = Controller.nominal(robot).inverse.near_or_nan(line, seeds) + Bend()
+    wanted = robot.flange_chain.pose(robot.joints_from_readings(q))[:, :3, 3]
+    assert off(wanted, places[[0, -1]]) > 2.0 * FINE_STEPS.deviation_m
+    assert off(wanted, places) < 1.1 * FINE_STEPS.deviation_m
+
+
+@pytest.mark.parametrize(
+    "motion",
+    ["L P[4] 2.5sec FINE", "L P[4] 250mm/sec FINE TB .5sec,CALL GRIP", "L P[4] R[2]sec CNT50",
+     "L P[4] 250mm/sec CNT R[1]", "L P[4]\n    :  250mm/sec FINE", "A P[4] 250mm/sec FINE"],
+)  # fmt: skip
+def test_a_motion_that_cannot_be_repeated_gets_no_waypoints(robot, motion):
+    done = rewritten(TP, long_line(robot, motion), robot, by=Bend(), spacing=FINE_STEPS)
+    assert done.inserted == 0
+    assert done.contents[0].count(b"P[") == long_line(robot, motion).count("P[")
+
+
+def test_a_position_of_two_groups_gets_no_waypoints(robot):
+    def grouped(text):
+        return text.replace("\n};", "\n   GP2:\n\tUF : 0, UT : 0,\n\tJ1=     1.000 deg\n};")
+
+    done = rewritten(
+        TP, long_line(robot, "L P[4] 250mm/sec FINE", grouped), robot, by=Bend(), spacing=FINE_STEPS
+    )
+    assert done.inserted == 0
+    assert [notice.kind for notice in done.notices] == ["deviation"]
+
+
+@settings(max_examples=25)
+@given(st.data())
+def test_waypoints_of_mutilated_programs_end_in_a_listing_or_an_error(robot, data):
+    text = long_line(robot, "L P[4:END] 250mm/sec FINE")
+    start = data.draw(st.integers(0, len(text)))
+    end = data.draw(st.integers(start, min(len(text), start + 20)))
+    put = data.draw(st.text(st.sampled_from("/POSMNJLP[]{}:;,='\n 0.5-*UFTN"), max_size=12))
+    mutilated = text[:start] + put + text[end:]
+    assert survives(TP, mutilated, robot, by=Bend(), spacing=FINE_STEPS)

@@ -321,14 +321,17 @@ def test_a_step_is_a_copy_of_its_motion(robot, sample):
     program = read(UR, sample, robot)
     values, decimals = (0.1, -0.2, 0.3, 1.0, -0.5, 0.25), (6,) * 6
 
-    def step(line):
-        return UR.linear_step(program, LinearStep(line, 0, 0, values, decimals))
+    def step(line, program=program):
+        return UR.linear_steps(program, [[LinearStep(line, 0, 0, values, decimals)]])
 
     numbers = "p[0.100000, -0.200000, 0.300000, 1.000000, -0.500000, 0.250000]"
-    assert step(16) == f"  movel({numbers}, a=1.2, v=0.25)\n"
-    assert step(11) is None
+    (only,) = step(16).insertions
+    assert only.text == f"  movel({numbers}, a=1.2, v=0.25)\n"
+    assert only.start == only.end == program.sources[0].line_starts[15]
+    assert step(11).impossible == (0,)
     timed = read(UR, "movel(p[0.1, 0.2, 0.3, 0, 0, 0], t=2)\n", robot)
-    assert UR.linear_step(timed, LinearStep(1, 0, 0, values, decimals)) is None
+    assert step(1, timed).insertions == ()
+    assert step(1, timed).impossible == (0,)
 
 
 @settings(max_examples=60)

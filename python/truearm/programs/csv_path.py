@@ -19,7 +19,7 @@ from truearm.columns import JOINT, QUATERNION, TARGET
 from truearm.programs.environment import IDENTITY, Environment, Environments
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
-from truearm.programs.program import LinearStep, Program
+from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.scanning import Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
@@ -80,9 +80,9 @@ class CsvPath:
         """A remark before the header."""
         return source.first, f"# {text}{source.newline}"
 
-    def linear_step(self, program: Program, step: LinearStep) -> str | None:
-        """None: a path says itself how densely it is sampled."""
-        return None
+    def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
+        """Nothing: a path says itself how densely it is sampled, and has no linear moves."""
+        return StepTexts(impossible=tuple(steps[0].move for steps in moves))
 
 
 class _Reader:

@@ -12,7 +12,7 @@ from truearm.inverse import Inverse
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import of_joints, of_pose
-from truearm.programs.program import LinearStep, Program
+from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.tables import Motion
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -55,13 +55,11 @@ class Inserted:
     """What densification found.
 
     Attributes:
-        lines: File, offset and text of what is inserted.
-        waypoints: How many waypoints that is.
-        impossible: Moves, by number, that deviate by more and got no waypoints, or too few.
+        texts: What is inserted, and moves that their language cannot say with waypoints.
+        impossible: Moves, by number, that deviate by more and got no waypoints, those included.
     """
 
-    lines: tuple[tuple[int, int, str], ...]
-    waypoints: int
+    texts: StepTexts
     impossible: tuple[int, ...]
 
 
@@ -81,7 +79,7 @@ class Densifier:
     def insert(self, nominal: Floats, changed: Bools) -> Inserted:
         """Waypoints for every linear move between two changed targets, (t, N) readings and (t,)."""
         moves = self._program.moves
-        lines: list[tuple[int, int, str]] = []
+        stepped: list[list[LinearStep]] = []
         impossible: list[int] = []
         for move in np.flatnonzero((moves.motion == Motion.LINEAR) & moves.follows):
             ends = moves.target[move - 1 : move + 1]
@@ -90,12 +88,13 @@ class Densifier:
             found = self._between(int(move), nominal[ends])
             if found is None:
                 impossible.append(int(move))
-            else:
-                lines.extend(found)
-        return Inserted(tuple(lines), len(lines), tuple(impossible))
+            elif found:
+                stepped.append(found)
+        texts = self._program.language.linear_steps(self._program, stepped) if stepped else StepTexts()
+        return Inserted(texts, tuple(sorted([*impossible, *texts.impossible])))
 
-    def _between(self, move: int, ends: Floats) -> list[tuple[int, int, str]] | None:
-        """Lines to insert before a move; None where it deviates by more and that cannot be helped."""
+    def _between(self, move: int, ends: Floats) -> list[LinearStep] | None:
+        """Waypoints before a move; None where it deviates by more and that cannot be helped."""
         environment = self._program.environments[int(self._program.moves.environment[move])]
         tool = environment.tool.true
         poses = self._robot.flange_chain.pose(np.ascontiguousarray(self._robot.joints_from_readings(ends)))
@@ -113,7 +112,7 @@ class Densifier:
         chosen, enough = _needed(self._written(found.q, environment), self._spacing.deviation_m)
         if not enough:
             return None
-        return self._lines(move, environment, found.q[chosen]) if chosen else []
+        return self._steps(move, environment, found.q[chosen]) if chosen else []
 
     def _written(self, q: Floats, environment: Environment) -> Floats:
         """Where the controller believes the tool, (n, 3)."""
@@ -122,8 +121,8 @@ class Densifier:
         points: Floats = (poses @ environment.tool.controller)[:, :3, 3]
         return points
 
-    def _lines(self, move: int, environment: Environment, q: Floats) -> list[tuple[int, int, str]] | None:
-        """Lines that say readings (n, N); None where a waypoint cannot be said with certainty.
+    def _steps(self, move: int, environment: Environment, q: Floats) -> list[LinearStep] | None:
+        """Waypoints that say readings (n, N); None where one cannot be said with certainty.
 
         A waypoint is written out in numbers, without the offsets that the move's own target has.
         """
@@ -139,17 +138,11 @@ class Densifier:
             values, decimals = self._encoder.joint_numbers(which, layout, q)
         if self._encoder.reasons.pop(target, None) is not None:
             return None
-        source = program.sources[file]
-        line, _ = source.place(int(moves.at[move]))
-        offset = source.line_starts[line - 1]
-        lines = []
-        for row, digits in zip(values, decimals, strict=True):
-            step = LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()))
-            text = program.language.linear_step(program, step)
-            if text is None:
-                return None
-            lines.append((file, offset, text))
-        return lines
+        line, _ = program.sources[file].place(int(moves.at[move]))
+        return [
+            LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()))
+            for row, digits in zip(values, decimals, strict=True)
+        ]
 
 
 def _line(ends: Floats, least_m: float) -> Floats | None:

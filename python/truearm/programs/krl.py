@@ -7,8 +7,9 @@ from typing import Final
 from truearm.programs.frames import Frames
 from truearm.programs.krl_reading import KrlReading
 from truearm.programs.layouts import DECIMALS_DEG, DECIMALS_MM
-from truearm.programs.program import LinearStep, Program
+from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
+from truearm.programs.stepping import lines_before
 from truearm.robot import Robot
 
 ENDINGS: Final = (".src", ".dat")
@@ -52,8 +53,12 @@ class KRL:
                 return start, comment
         return 0, comment
 
-    def linear_step(self, program: Program, step: LinearStep) -> str | None:
-        """A LIN to a written-out pose, passed with C_DIS; None within an inline form."""
+    def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
+        """A LIN to a written-out pose for each, passed with C_DIS; none within an inline form."""
+        return lines_before(program, moves, self._step)
+
+    @staticmethod
+    def _step(program: Program, step: LinearStep) -> str | None:
         source = program.sources[step.file]
         line = source.line_text(step.line)
         word = line.split(maxsplit=1)[0].upper()

@@ -14,7 +14,8 @@ from typing import Final
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints
 from truearm.programs.melfa_reader import FLAGGED, Reader
-from truearm.programs.program import LinearStep, Program
+from truearm.programs.melfa_steps import inserted
+from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.robot import Robot
 
@@ -55,6 +56,6 @@ class MelfaBasic:
             return numbered.end(), f" ' {text}"
         return 0, f"' {text}{source.newline}"
 
-    def linear_step(self, program: Program, step: LinearStep) -> str | None:
-        """None: a step would need a line number and a variable of its own."""
-        return None
+    def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
+        """A Mvs to a variable of its own for each; lines are numbered anew where there is no number left."""
+        return inserted(program, moves)

@@ -51,9 +51,14 @@ def statements(source: Source) -> Iterator[Statement]:
         line = found.group().rstrip("\r\n")
         numbered = _NUMBERED.match(line)
         start = numbered.end() if numbered is not None else 0
-        text = _STRING_OR_REMARK.sub(lambda one: " " * len(one.group()), line[start:])
+        text = without_remark(line[start:])
         if text.strip():
             yield Statement(found.start() + start, text)
+
+
+def without_remark(line: str) -> str:
+    """A line with strings and remarks blanked out."""
+    return _STRING_OR_REMARK.sub(lambda one: " " * len(one.group()), line)
 
 
 def assignment(statement: Statement) -> tuple[str, int, str] | None:

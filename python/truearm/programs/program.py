@@ -81,6 +81,38 @@ class LinearStep:
     decimals: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Insertion:
+    """Text that waypoints need.
+
+    Attributes:
+        file: Number of its file.
+        start: Offset of the first character that it replaces.
+        end: Offset behind the last one; `start` where it replaces none.
+        text: What stands there.
+    """
+
+    file: int
+    start: int
+    end: int
+    text: str
+
+
+@dataclass(frozen=True)
+class StepTexts:
+    """How a language says waypoints.
+
+    Attributes:
+        insertions: Texts; those for one place follow each other.
+        waypoints: How many waypoints they say.
+        impossible: Numbers of moves whose waypoints it cannot say.
+    """
+
+    insertions: tuple[Insertion, ...] = ()
+    waypoints: int = 0
+    impossible: tuple[int, ...] = ()
+
+
 class Language(Protocol):
     """A reader and writer of programs in one language."""
 
@@ -122,8 +154,8 @@ class Language(Protocol):
         """Where a comment with `text` goes, and the whole line(s) to insert there, line end included."""
         ...
 
-    def linear_step(self, program: Program, step: LinearStep) -> str | None:
-        """The line to insert before the line of a linear move, line end included; None if it cannot be."""
+    def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
+        """What to insert so that linear moves pass waypoints: one or more for each move, in their order."""
         ...
 
 

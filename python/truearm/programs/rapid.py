@@ -7,10 +7,11 @@ from typing import Final
 
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import DECIMALS_MM, DECIMALS_QUATERNION
-from truearm.programs.program import LinearStep, Program
+from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.rapid_reading import RapidReading
 from truearm.programs.rapid_values import arguments, statement_reader
 from truearm.programs.source import Source
+from truearm.programs.stepping import lines_before
 from truearm.robot import Robot
 
 MODULE: Final = re.compile(r"^[ \t]*MODULE\b[^\r\n]*(?:\r\n|\n|\r|$)", re.IGNORECASE | re.MULTILINE)
@@ -40,8 +41,12 @@ class RAPID:
         found = MODULE.search(source.text)
         return (found.end() if found else 0), f"! {text}{source.newline}"
 
-    def linear_step(self, program: Program, step: LinearStep) -> str | None:
-        """The same instruction with a written-out target, passed in a zone; None if it is not on one line."""
+    def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
+        """The same instruction with a written-out target, passed in a zone; none if it is not on one line."""
+        return lines_before(program, moves, self._step)
+
+    @staticmethod
+    def _step(program: Program, step: LinearStep) -> str | None:
         source = program.sources[step.file]
         start = source.line_starts[step.line - 1]
         line = source.line_text(step.line)

@@ -17,7 +17,7 @@ from truearm.programs.encoding import Encoder, encode_targets
 from truearm.programs.frames import Frames
 from truearm.programs.marks import refuse_marked
 from truearm.programs.outputs import output_paths, write_outputs
-from truearm.programs.program import Language, Listed, Program
+from truearm.programs.program import Language, Listed, Program, StepTexts
 from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, placed, run_of
@@ -335,8 +335,8 @@ class _State:
         changed[list(written.reasons)] = False
         steps = self._inserted(changed, choices.spacing)
         words: dict[int, list[Words]] = {}
-        for file, offset, line in steps.lines:
-            words.setdefault(file, []).append((offset, offset, line.encode("latin-1")))
+        for new in steps.texts.insertions:
+            words.setdefault(new.file, []).append((new.start, new.end, new.text.encode("latin-1")))
         if mark and changed.any():
             for number, source in enumerate(self.program.sources):
                 at, line = self.program.language.mark(source, mark)
@@ -357,13 +357,13 @@ class _State:
             self.std_mm,
             kept,
             tuple(listed),
-            steps.waypoints,
+            steps.texts.waypoints,
             (*self._notices(changed), *self._deviating(steps)),
         )
 
     def _inserted(self, changed: Bools, spacing: Spacing | None) -> Inserted:
         if spacing is None:
-            return Inserted((), 0, ())
+            return Inserted(StepTexts(), ())
         models, controller = self.models, self.models.controller
         encoder = Encoder(self.program, self.uses, controller.robot, controller.inverse)
         of_models = (models.programming, models.inverse, models.compensator)

@@ -12,10 +12,12 @@ from textwrap import wrap
 
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints
-from truearm.programs.program import LinearStep, Program
+from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.tp_configuration import ConfiguredPose
-from truearm.programs.tp_reader import Reader, section
+from truearm.programs.tp_positions import section
+from truearm.programs.tp_reader import Reader
+from truearm.programs.tp_steps import inserted
 from truearm.robot import Robot
 
 LONGEST_REMARK = 30
@@ -53,6 +55,6 @@ class FanucTp:
         remarks = wrap(text, LONGEST_REMARK) or [""]
         return at, "".join(f"    :  !{remark} ;{source.newline}" for remark in remarks)
 
-    def linear_step(self, program: Program, step: LinearStep) -> str | None:
-        """None: a step would need a position in /POS as well."""
-        return None
+    def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
+        """The motion's own line to a position of its own, a copy of the target's behind all others."""
+        return inserted(program, moves)

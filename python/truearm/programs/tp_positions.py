@@ -1,4 +1,4 @@
-"""The positions of a FANUC listing, /POS: where their numbers are and what they are of."""
+"""The sections of a FANUC listing and its positions, /POS: where their numbers are and what they are of."""
 
 import re
 from collections.abc import Iterator
@@ -10,6 +10,7 @@ from truearm.programs.tables import ABSENT, Number
 from truearm.programs.tp_configuration import LETTERS
 
 JOINTS, POSE = 0, 1
+_SECTION: Final = re.compile(r"^/(PROG|ATTR|APPL|MN|POS|END)\b[^\n]*(?:\n|\Z)", re.MULTILINE)
 _POSITION: Final = re.compile(r"^P\[(\d+)(?::[^\]\r\n]*)?\]\s*\{(.*?)^\s*\};?", re.MULTILINE | re.DOTALL)
 _OPENING: Final = re.compile(r"^P\[(\d+)", re.MULTILINE)
 _GROUP: Final = re.compile(r"\bGP(\d+)\s*:")
@@ -47,6 +48,21 @@ class Position:
     problem: str = ""
 
 
+def section(source: Source, name: str) -> tuple[int, int]:
+    """Where a section's text begins, and where it ends.
+
+    Raises:
+        InputError: If there is none.
+    """
+    marks = list(_SECTION.finditer(source.text))
+    for mark, behind in zip(marks, [*marks[1:], None], strict=False):
+        if mark.group(1) == name:
+            return mark.end(), len(source.text) if behind is None else behind.start()
+    return source.fail(
+        0, f"there is no section /{name}", rule="A FANUC listing has /PROG, /ATTR, /MN, /POS and /END"
+    )
+
+
 def positions(source: Source, start: int, end: int, joint_count: int) -> Iterator[Position]:
     """The positions between two offsets.
 
@@ -60,6 +76,14 @@ def positions(source: Source, start: int, end: int, joint_count: int) -> Iterato
             source.fail(opening.start(), f"position P[{opening.group(1)}] is not closed with }}")
         yield _position(text, found, joint_count)
         behind = found.end()
+
+
+def position_text(source: Source, at: int) -> str | None:
+    """The whole text of the position at an offset; None if more motion groups than one are in it."""
+    found = _POSITION.match(source.text, at)
+    if found is None or len(_GROUP.findall(found.group())) > 1:
+        return None
+    return found.group()
 
 
 def _position(text: str, found: re.Match[str], joint_count: int) -> Position:

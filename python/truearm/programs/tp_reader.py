@@ -16,13 +16,12 @@ from truearm.programs.program import Listed
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, Number, TargetTable
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
-from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, positions
+from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, positions, section
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
 
 Floats = NDArray[np.float64]
 
-_SECTION: Final = re.compile(r"^/(PROG|ATTR|APPL|MN|POS|END)\b[^\n]*(?:\n|\Z)", re.MULTILINE)
 _LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
 _TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
@@ -268,21 +267,6 @@ class Reader:
             environment.work_object.controller @ stored @ rigid_inverse(environment.tool.controller)
         )
         return flange
-
-
-def section(source: Source, name: str) -> tuple[int, int]:
-    """Where a section's text begins, and where it ends.
-
-    Raises:
-        InputError: If there is none.
-    """
-    marks = list(_SECTION.finditer(source.text))
-    for mark, behind in zip(marks, [*marks[1:], None], strict=False):
-        if mark.group(1) == name:
-            return mark.end(), len(source.text) if behind is None else behind.start()
-    return source.fail(
-        0, f"there is no section /{name}", rule="A FANUC listing has /PROG, /ATTR, /MN, /POS and /END"
-    )
 
 
 def _turns(position: Position) -> tuple[Number, ...]:

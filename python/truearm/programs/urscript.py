@@ -5,16 +5,15 @@ frame of the base. A program has no configuration data: the controller takes the
 where the arm stands, or to `qnear`.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
 
 from truearm.errors import InputError
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, RotationVectorPose
-from truearm.programs.program import LinearStep, Program
+from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
+from truearm.programs.stepping import lines_before, written
 from truearm.programs.urscript_constants import AXES
 from truearm.programs.urscript_places import argument
 from truearm.programs.urscript_reader import Reader
@@ -60,8 +59,12 @@ class UrScript:
         """A comment before the first line."""
         return source.first, f"# {text}{source.newline}"
 
-    def linear_step(self, program: Program, step: LinearStep) -> str | None:
-        """The motion's own line with the step in place of its target; None if it states a time."""
+    def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
+        """The motion's own line with the step in place of its target; none if it states a time."""
+        return lines_before(program, moves, self._step)
+
+    @staticmethod
+    def _step(program: Program, step: LinearStep) -> str | None:
         source = program.sources[step.file]
         start, end = source.line_starts[step.line - 1 : step.line + 1] or (0, 0)
         found = list(statements(source, start, end))
@@ -72,12 +75,6 @@ class UrScript:
         target = argument(call, 0, "pose") if call is not None and call.text == "movel" else None
         if call is None or target is None or argument(call, 3, "t") is not None:
             return None
-        numbers = ", ".join(_written(step.values, step.decimals))
+        numbers = ", ".join(map(written, step.values, step.decimals))
         line = source.text[start : target.start] + f"p[{numbers}]" + source.text[target.end : call.end]
         return line + source.newline
-
-
-def _written(values: Iterable[float], decimals: Iterable[int]) -> list[str]:
-    return [
-        f"{np.round(value, places) + 0.0:.{places}f}" for value, places in zip(values, decimals, strict=True)
-    ]
