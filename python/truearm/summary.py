@@ -1,5 +1,6 @@
 """A calibration in numbers, for programs: the content of summary.json."""
 
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 from truearm.units import MM_PER_METRE
@@ -56,7 +57,7 @@ def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:
     """Name, joints (from 1), features, length scales, amplitudes and number of cells of each block.
 
     Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units; a wave
-    has cycles a turn of its joint instead.
+    has cycles a turn of its joint instead. Amplitudes are prior standard deviations; a wave's is what it reaches.
     """
     field, details = calibration.model.field, calibration.variable
     if field is None or details is None:
@@ -97,11 +98,7 @@ def _lengths(block: dict[str, Any], hyper: dict[str, list[float]]) -> list[float
 def _amplitudes(block: dict[str, Any], hyper: dict[str, list[float]]) -> dict[str, float]:
     name = block["name"]
     if name == WAVE:
-        this = [float(block["inputs"][0]), block["axes"][0][1]]
-        stored = hyper["waves"]
-        waves = zip(stored[::3], stored[1::3], stored[2::3], strict=True)
-        amplitude = next(size for *wave, size in waves if wave == this)
-        return {"theta_mrad": amplitude * MRAD_PER_RAD}
+        return {"theta_mrad": float(math.sqrt(2.0) * block["weights"].std()) * MRAD_PER_RAD}
     if name == "sag":
         return {"theta_mrad_per_m": hyper["sag"][0] * MRAD_PER_RAD}
     values = hyper.get(f"{name}_amplitudes") or hyper[name]

@@ -11,7 +11,7 @@ use truearm_kinematics::is_length;
 
 use crate::alike::check_poses;
 use crate::dense::Cholesky;
-use crate::layout::{Layout, Problem};
+use crate::layout::{Layout, Problem, REACH};
 use crate::measurements::Noise;
 use crate::minimise::{Minimum, Objective, Reason, State};
 use crate::noise::Squares;
@@ -144,6 +144,7 @@ impl Fit<'_> {
             packets: self.packets,
             weighting: Some((balance.noise, &balance.weights)),
             precision: &self.precision(balance.scale),
+            target_precision: self.options.prior.map_or(0.0, |_| REACH.powi(-2)),
             nominal: self.nominal,
             cancel: &self.options.cancel,
         };
@@ -194,17 +195,17 @@ impl Fit<'_> {
         residuals_of(self.problem, self.packets, point)
     }
 
-    /// Inverse of the normal equations with the prior, rescaled to the balance's noise. A set-up counts as known to a
-    /// metre and a radian, or as well as rounding allows where the data is exact: flat, but never singular where frame
-    /// and targets cannot be told apart, as on a SCARA.
+    /// Inverse of the normal equations with the prior, rescaled to the balance's noise. The set-up has its own, or is known as
+    /// well as rounding allows where the data is exact.
     fn covariance(&self, minimum: &Minimum, balance: &Balance) -> Result<Mat<f64>, EstimateError> {
         let mut matrix = minimum.normal.matrix.clone();
         for (k, precision) in self.precision(balance.scale).into_iter().enumerate() {
             matrix[(k, k)] += precision;
         }
-        let n = matrix.nrows();
-        (self.problem.columns.len()..n)
-            .for_each(|k| matrix[(k, k)] += f64::max(1.0, ROUNDING * matrix[(k, k)]));
+        let (n, arm) = (matrix.nrows(), self.problem.columns.len());
+        for (k, known) in Layout::new(self.problem).setup_precision().into_iter().enumerate() {
+            matrix[(arm + k, arm + k)] += known.max(ROUNDING * matrix[(arm + k, arm + k)]);
+        }
         let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
         let scaled = Mat::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
         let factor = Cholesky::new(scaled, Par::Seq).ok_or_else(|| EstimateError::Singular {

@@ -80,6 +80,11 @@ impl Problem<'_> {
     }
 }
 
+/// How far from the flange targets are, m, as one standard deviation of each coordinate. Only where frame and target can
+/// hardly be told apart, as along the axes of a SCARA, does it decide: errors of its axes' directions must not be put down
+/// to a long tool.
+pub const REACH: f64 = 0.1;
+
 /// Positions of the unknowns in the vector of unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
@@ -127,6 +132,22 @@ impl Layout {
     /// Where an anchor's coordinates stand.
     pub fn anchor(&self, anchor: usize) -> usize {
         self.arm + self.groups * self.group_width() + 3 * anchor
+    }
+
+    /// Where each group's targets stand, one coordinate after another: group, coordinate, position.
+    pub fn target_coordinates(self) -> impl Iterator<Item = (usize, usize, usize)> {
+        (0..self.groups).flat_map(move |group| {
+            let start = self.group(group).start + self.frame;
+            (0..3 * self.targets).map(move |k| (group, k, start + k))
+        })
+    }
+
+    /// Prior precision of the set-up's unknowns (len - arm,): a frame is known to a metre and a radian, flat but never
+    /// singular; a target is within [`REACH`] of the flange.
+    pub fn setup_precision(&self) -> Vec<f64> {
+        let mut precision = vec![1.0; self.len() - self.arm];
+        self.target_coordinates().for_each(|(_, _, at)| precision[at - self.arm] = REACH.powi(-2));
+        precision
     }
 
     /// All unknowns.

@@ -46,6 +46,8 @@ pub struct Objective<'a> {
     pub weighting: Weighting<'a>,
     /// Prior precision of each active correction, (A,); zero where there is none.
     pub precision: &'a [f64],
+    /// Prior precision of each target's coordinates, about the flange; zero where there is none.
+    pub target_precision: f64,
     /// Nominal link parameters (5 L,).
     pub nominal: &'a [f64],
     pub cancel: &'a Cancel,
@@ -85,7 +87,9 @@ impl Objective<'_> {
     fn cost(&self, state: &State, normal: &Normal) -> f64 {
         let prior: f64 =
             self.precision.iter().enumerate().map(|(k, p)| p * self.correction(state, k).powi(2)).sum();
-        normal.squares + prior
+        let squares: f64 =
+            state.setup.groups.iter().flat_map(|group| group.targets.as_flattened()).map(|x| x * x).sum();
+        normal.squares + prior + self.target_precision * squares
     }
 
     /// The damped step and the decrease of the cost that it promises; `None` where the matrix is singular.
@@ -95,6 +99,10 @@ impl Objective<'_> {
         for (k, precision) in self.precision.iter().enumerate() {
             matrix[(k, k)] += precision;
             right[k] -= precision * self.correction(state, k);
+        }
+        for (group, k, at) in Layout::new(self.problem).target_coordinates() {
+            matrix[(at, at)] += self.target_precision;
+            right[at] -= self.target_precision * state.setup.groups[group].targets.as_flattened()[k];
         }
         // Unknowns scaled to a unit diagonal, so that damping and the factor see no units.
         let scale: Vec<f64> =

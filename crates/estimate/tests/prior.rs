@@ -20,10 +20,11 @@ fn plan() -> Plan {
 fn undetermined_parameters_stay_nominal() {
     let scene = plan().make();
     let (found, nominal) = (fit(&scene, Prior::default()), scene.chain.nominal());
-    // The first link's theta and d only move the frame; d and theta of the last only the target.
-    for column in [0, 1, 25, 26] {
+    // The first link's theta and d only move the frame; d and theta of the last only the target, whose own prior is far
+    // wider and leaves them next to nothing.
+    for (column, most) in [(0, 1e-7), (1, 1e-7), (25, 1e-4), (26, 1e-4)] {
         let correction = found.parameters[column] - nominal[column];
-        assert!(correction.abs() < 1e-7, "column {column} moved by {correction:e}");
+        assert!(correction.abs() < most, "column {column} moved by {correction:e}");
     }
     assert!((found.parameters[7] - nominal[7]).abs() > 1e-5);
 }

@@ -31,6 +31,12 @@ pub enum FieldError {
         /// The values.
         what: &'static str,
     },
+    /// Hyper-parameters of no arm, as a file that was changed may hold.
+    #[error("the hyper-parameters of the field are of no use: {what}; calibrate again")]
+    Hyper {
+        /// What is wrong.
+        what: &'static str,
+    },
     /// The constant stage failed.
     #[error(transparent)]
     Estimate(#[from] EstimateError),

@@ -124,7 +124,8 @@ impl<'a> Evidence<'a> {
         );
         let alpha = pulled(&factor, &root, &self.training.residual);
         let fit: f64 = alpha.iter().zip(&self.training.residual).map(|(a, r)| a * r).sum();
-        let value = -0.5 * (factor.log_determinant() + inner.log_determinant() + fit);
+        let known: f64 = self.training.setup_precision.iter().map(|known| known.ln()).sum();
+        let value = -0.5 * (factor.log_determinant() + inner.log_determinant() - known + fit);
         Ok(Restricted { factor, projected, alpha, value })
     }
 

@@ -16,7 +16,7 @@ use crate::refine::relinearised;
 use crate::select::{Found, contest_major, prune_major, refine, select_major};
 use crate::training::Training;
 use crate::upright::contest_up;
-use crate::waves::find_waves;
+use crate::waves::{are_alike, find_waves};
 use crate::widening::with_widenings;
 
 /// How the field is fitted.
@@ -107,11 +107,12 @@ pub fn fit_field(
         if !judged.judgement.reweigh(&mut training) {
             break;
         }
-        let posterior = if large {
+        let posterior = if large && !judged.judgement.spoils() {
             // Few rows of many change: hyper-parameters stay.
             judged.posterior.reweighed(training.weight.clone(), &options.cancel)?
         } else {
             hyper = search.again(&training, hyper)?;
+            hyper = search.with_waves(&training, &hyper)?.unwrap_or(hyper);
             search.posterior(&training, &hyper)?
         };
         judged = search.judge(posterior)?;
@@ -166,7 +167,7 @@ impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         let mut hyper = self.searched(training, noise)?;
         if self.options.hyper.is_none() {
-            hyper = self.with_waves(training, hyper)?;
+            hyper = self.with_waves(training, &hyper)?.unwrap_or(hyper);
             let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION, 0));
             let large = large.lifted(hyper.up)?;
             hyper.extrapolation =
@@ -175,13 +176,21 @@ impl Search<'_> {
         Ok(hyper)
     }
 
-    /// The hyper-parameters with the waves of single joints, and what else they are then.
-    fn with_waves(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
-        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
-        match find_waves(&large, &hyper, &self.options.cancel)? {
-            Some(waved) => self.again(training, waved),
-            None => Ok(hyper),
+    /// The hyper-parameters with the waves of single joints that they do not have yet, and what else they are then;
+    /// `None` where the residuals show no others.
+    fn with_waves(&mut self, training: &Training, hyper: &Hyper) -> Result<Option<Hyper>, FieldError> {
+        if self.options.hyper.is_some() {
+            return Ok(None);
         }
+        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
+        let waves = find_waves(&large, hyper, &self.options.cancel)?;
+        if are_alike(&waves, &hyper.waves) {
+            return Ok(None);
+        }
+        let found = self.again(training, Hyper { waves, ..hyper.clone() })?;
+        let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
+        let middle = middle.lifted(found.up)?;
+        Ok(Some(with_widenings(&Evidence::new(&middle, &self.options.cancel), &found)?))
     }
 
     fn searched(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {

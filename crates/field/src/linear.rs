@@ -35,6 +35,7 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
         jacobian: Vec::new(),
         setup: Vec::new(),
         setup_width: own,
+        setup_precision: layout.setup_precision(),
         residual: Vec::new(),
         variance: Vec::new(),
         weight: Vec::new(),

@@ -23,8 +23,11 @@ pub struct Judgement {
 
 /// Standard normal quantile of odds of one in a million: overwhelming evidence against a pose.
 const OVERWHELMING: f64 = 4.753_424_308_8;
-/// Weight of an outlier's rows: their noise is thirty times larger, and they no longer count.
+/// Weight of a row that just is an outlier's, less the farther it is out: its square no longer counts, in noise and
+/// amplitudes neither.
 const NEGLIGIBLE: f64 = 1e-3;
+/// Share of all squared residuals from which outliers have spoiled what noise and amplitudes were taken for.
+const SPOILING: f64 = 0.1;
 /// 95 % of a standard normal variable lies within this.
 pub const QUANTILE_95: f64 = 1.959_963_984_540_054;
 
@@ -92,13 +95,20 @@ impl Judgement {
     pub fn reweigh(&self, training: &mut Training) -> bool {
         let mut changed = false;
         for pose in 0..training.pose_count() {
-            let weight = if self.score[pose] > 1.0 { NEGLIGIBLE } else { 1.0 };
+            let weight = if self.score[pose] > 1.0 { NEGLIGIBLE / self.score[pose] } else { 1.0 };
             for row in training.rows(pose) {
-                changed |= training.weight[row] != weight;
+                changed |= (training.weight[row] < 1.0) != (weight < 1.0);
                 training.weight[row] = weight;
             }
         }
         changed
+    }
+
+    /// Whether hyper-parameters that were found with the outliers among the poses cannot stay.
+    pub fn spoils(&self) -> bool {
+        let square = |pose: &usize| self.distance[*pose].powi(2);
+        let of_outliers: f64 = self.outliers.iter().map(square).sum();
+        of_outliers > SPOILING * (0..self.distance.len()).map(|pose| square(&pose)).sum::<f64>()
     }
 }
 

@@ -109,8 +109,9 @@ impl Posterior {
     /// afforded, from poses that fill the space.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`], and [`FieldError::Kinematics`] if `up` is no direction.
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Hyper`], and [`FieldError::Kinematics`] if `up` is no direction.
     pub fn new(training: Training, hyper: Hyper, degree: usize, cancel: &Cancel) -> Result<Self, FieldError> {
+        hyper.check(&training.inputs)?;
         let rows = training.row_count();
         let model = Model::new(training.lifted(hyper.up)?, hyper, degree);
         if rows <= FEW_ROWS {

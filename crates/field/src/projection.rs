@@ -15,7 +15,7 @@ pub struct Projection {
     pub factor: Cholesky,
     /// K^-1 S, (R, s).
     pub spread: Mat<f64>,
-    /// Factor of S^T K^-1 S, with the precision of a set-up that is known to a metre and a radian: flat, but never singular.
+    /// Factor of S^T K^-1 S, with the set-up's prior precision: all but flat, and never singular.
     pub inner: Cholesky,
 }
 
@@ -30,7 +30,10 @@ impl Projection {
         let setup = setup_columns(training);
         let mut spread = setup.to_owned();
         factor.solve(spread.as_mut());
-        let precision = setup.transpose() * &spread + Mat::<f64>::identity(setup.ncols(), setup.ncols());
+        let mut precision = setup.transpose() * &spread;
+        for (k, known) in training.setup_precision.iter().enumerate() {
+            precision[(k, k)] += known;
+        }
         let inner = Cholesky::new(precision, faer::Par::Seq).ok_or_else(error)?;
         Ok(Self { factor, spread, inner })
     }

@@ -71,6 +71,8 @@ pub struct Training {
     pub setup: Vec<f64>,
     /// Set-up columns, s.
     pub setup_width: usize,
+    /// Prior precision of the steps of the set-up (s,).
+    pub setup_precision: Vec<f64>,
     /// (R,), m or rad.
     pub residual: Vec<f64>,
     /// Variance that each row has of its own, (R,).
@@ -169,6 +171,7 @@ impl Training {
             jacobian: take(&self.jacobian, self.columns.len()),
             setup: take(&self.setup, self.setup_width),
             setup_width: self.setup_width,
+            setup_precision: self.setup_precision.clone(),
             residual: take(&self.residual, 1),
             variance: take(&self.variance, 1),
             weight: take(&self.weight, 1),

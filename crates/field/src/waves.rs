@@ -6,8 +6,9 @@
 //!
 //! `1/2 z^T I^-1 z`,   z = sum s_i (cos c q_i, sin c q_i),   I = sum s_i^2 (cos, sin) (cos, sin)^T
 //!
-//! nats (the score test with White's covariance, which a few wild poses do not deceive). The best of all cycles is the
-//! best of many chances: it has to be ahead of what chance brings them.
+//! nats (the score test with White's covariance, by which a few wild poses never make a wave; they hide one, so that outliers
+//! are weighed down before). The best of all cycles is the best of many chances: it has to be ahead of what chance
+//! brings them. Poses that stand on a grid cannot tell some numbers of cycles from others; such a wave is not taken.
 
 use std::f64::consts::TAU;
 
@@ -26,34 +27,47 @@ use crate::training::Training;
 const CYCLES: [f64; 2] = [8.0, 520.0];
 /// Steps of the scan for each cycle more over the range that the joint covers: neighbours hardly differ.
 const STEPS: f64 = 5.0;
-/// Least part of a turn that a joint must cover for its waves to be told from each other.
-const LEAST_TURN: f64 = 0.1;
+/// Where the scan begins: too few cycles for a wave, but a grid of poses may show them as more.
+const FROM: f64 = 1.0;
+/// Turns that a joint must cover at the least, for its waves to be told from each other, and may at the most: a
+/// reading beyond is no joint's.
+const TURNS: [f64; 2] = [0.1, 16.0];
 /// Nats by which a wave has to be ahead of what the number of choices brings by chance: between two that are independent
 /// lie others, so that one fit in fifty finds a wave where there is none.
 const SURE: f64 = 6.0;
 /// Nats that a whole number of cycles may be behind: gears and encoders have whole numbers of teeth and poles.
 const WHOLE: f64 = 1.0;
+/// Nats within which another number of cycles explains the same as well, and the least coherence of the two over the
+/// poses that makes it the same: a second wave has hardly any with the first.
+const RIVAL: f64 = 3.0;
+const SAME: f64 = 0.8;
+/// Cycles by which two scans of nearly the same poses may differ.
+const SLIGHTLY: f64 = 0.1;
+/// Narrowings of a maximum between two steps of the scan, by the golden section each.
+const NARROWINGS: usize = 24;
+/// Least part of its value that is left of a determinant where cosine and sine are told apart.
+const APART: f64 = 1e-6;
 /// Poses below which there is no telling.
 const FEWEST: usize = 50;
 /// Rounds at the most, each with a wave a joint.
 const ROUNDS: usize = 4;
 
-/// The hyper-parameters with the waves that the residuals of a training set show; `None` where there are none.
+/// The waves that the residuals of a training set show under hyper-parameters, whatever waves these have.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
-pub fn find_waves(training: &Training, hyper: &Hyper, cancel: &Cancel) -> Result<Option<Hyper>, FieldError> {
+pub fn find_waves(training: &Training, hyper: &Hyper, cancel: &Cancel) -> Result<Vec<Wave>, FieldError> {
+    let mut found = Hyper { waves: Vec::new(), ..hyper.clone() };
     if training.pose_count() < FEWEST {
-        return Ok(None);
+        return Ok(found.waves);
     }
     let (evidence, by_column) = (Evidence::new(training, cancel), ByColumn::new(training));
-    let mut found = hyper.clone();
+    let joints: Vec<(usize, usize)> = (0..training.inputs.len())
+        .filter(|&joint| training.inputs[joint].kind == InputKind::Angle)
+        .filter_map(|joint| by_column.own[joint].map(|(column, _)| (joint, column)))
+        .collect();
     for _ in 0..ROUNDS {
         let pull = evidence.pull(&found)?;
-        let joints: Vec<(usize, usize)> = (0..training.inputs.len())
-            .filter(|&joint| training.inputs[joint].kind == InputKind::Angle)
-            .filter_map(|joint| by_column.own[joint].map(|(column, _)| (joint, column)))
-            .collect();
         let new: Vec<Wave> = joints
             .par_iter()
             .filter_map(|&(joint, column)| Scan::new(training, joint, column, &pull).best(joints.len()))
@@ -63,7 +77,18 @@ pub fn find_waves(training: &Training, hyper: &Hyper, cancel: &Cancel) -> Result
         }
         new.into_iter().for_each(|wave| take(&mut found.waves, wave));
     }
-    Ok((found.waves.len() > hyper.waves.len()).then_some(found))
+    Ok(found.waves)
+}
+
+/// Whether two scans found the same: waves of equal joints, cycles and, but for a factor of two, amplitudes.
+pub fn are_alike(first: &[Wave], second: &[Wave]) -> bool {
+    let alike = |one: &Wave, other: &Wave| {
+        let ratio = one.amplitude / other.amplitude;
+        one.joint == other.joint
+            && (one.cycles - other.cycles).abs() < SLIGHTLY
+            && (0.5..2.0).contains(&ratio)
+    };
+    first.len() == second.len() && first.iter().all(|one| second.iter().any(|other| alike(one, other)))
 }
 
 /// A wave beside the others; more of a known one makes that one larger.
@@ -108,28 +133,61 @@ impl Scan {
     fn best(&self, joints: usize) -> Option<Wave> {
         let (low, high) = range(&self.values);
         let turns = (high - low) / TAU;
-        if turns < LEAST_TURN {
+        if !(TURNS[0]..=TURNS[1]).contains(&turns) {
             return None;
         }
-        let step = 1.0 / (STEPS * turns);
-        let count = ((CYCLES[1] - CYCLES[0]) / step) as usize;
-        let (mut best, mut cycles) = (0.0, CYCLES[0]);
-        for (k, sums) in self.sums(CYCLES[0], step, count).into_iter().enumerate() {
-            if sums.gain() > best {
-                (best, cycles) = (sums.gain(), CYCLES[0] + step * k as f64);
-            }
-        }
+        // Farther apart, numbers of cycles are different ones to poses that stand anywhere.
+        let (step, apart) = (1.0 / (STEPS * turns), 1.0 / turns);
+        let count = ((CYCLES[1] - FROM) / step) as usize;
+        let gains: Vec<f64> = self.sums(FROM, step, count).iter().map(Sums::gain).collect();
+        let cycles_at = |k: usize| FROM + step * k as f64;
+        let candidates = (0..count).filter(|&k| cycles_at(k) >= CYCLES[0]);
+        let coarse = candidates.max_by(|&a, &b| gains[a].total_cmp(&gains[b])).map(cycles_at)?;
+        let peak = self.peak(coarse - step, coarse + step);
+        let best = self.at(peak).gain();
         // Independent choices: one for each cycle more over the range covered.
-        let choices = joints as f64 * count as f64 / STEPS;
+        let choices = joints as f64 * (CYCLES[1] - CYCLES[0]) / apart;
         if best < SURE + choices.max(1.0).ln() {
             return None;
         }
-        let whole = cycles.round();
-        if (whole - cycles).abs() < step * STEPS && self.at(whole).gain() > best - WHOLE {
-            cycles = whole;
+        let rivals = (0..count).filter(|&k| gains[k] > best - RIVAL).map(cycles_at);
+        if rivals.filter(|rival| (rival - peak).abs() > apart).any(|rival| self.is_same(peak, rival)) {
+            return None;
         }
+        let cycles = self.whole(peak, apart, best - WHOLE).unwrap_or(peak);
         let [cosine, sine] = self.at(cycles).weights();
         Some(Wave { joint: self.joint, cycles, amplitude: cosine.hypot(sine) * 0.5_f64.sqrt() })
+    }
+
+    /// The number of cycles of the largest power between two, which hold no other maximum: White's covariance, which holds the
+    /// wave itself, would move the gain's.
+    fn peak(&self, mut low: f64, mut high: f64) -> f64 {
+        let share = 0.5 * (5.0_f64.sqrt() - 1.0);
+        for _ in 0..NARROWINGS {
+            let (left, right) = (high - share * (high - low), low + share * (high - low));
+            if self.at(left).power() > self.at(right).power() { high = right } else { low = left }
+        }
+        0.5 * (low + high)
+    }
+
+    /// The whole number of cycles, of all within `apart` of a peak, that gains most and at least so much.
+    fn whole(&self, peak: f64, apart: f64, least: f64) -> Option<f64> {
+        let numbers = ((peak - apart).ceil() as usize..=(peak + apart).floor() as usize).map(|n| n as f64);
+        let gained = numbers.map(|n| (n, self.at(n).gain())).filter(|&(_, gain)| gain > least);
+        gained.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(n, _)| n)
+    }
+
+    /// Whether waves of two numbers of cycles are one to these poses: of the same turns, or of opposite ones.
+    fn is_same(&self, first: f64, second: f64) -> bool {
+        let weight: f64 = self.scores.iter().map(|score| score * score).sum();
+        [first - second, first + second].into_iter().any(|cycles| {
+            let (mut cosine, mut sine) = (0.0, 0.0);
+            for (value, score) in self.values.iter().zip(&self.scores) {
+                cosine += score * score * (cycles * value).cos();
+                sine += score * score * (cycles * value).sin();
+            }
+            f64::hypot(cosine, sine) > SAME * weight
+        })
     }
 
     /// Sums at `count` numbers of cycles: from one to the next each pose turns by the same angle.
@@ -170,14 +228,104 @@ impl Sums {
     fn weights(&self) -> [f64; 2] {
         let ([c, s], [cc, cs, ss]) = (self.score, self.information);
         let determinant = cc * ss - cs * cs;
-        if determinant <= f64::EPSILON * cc * ss {
+        if determinant <= APART * cc * ss {
             return [0.0; 2];
         }
         [(ss * c - cs * s) / determinant, (cc * s - cs * c) / determinant]
     }
 
+    fn power(&self) -> f64 {
+        self.score[0].powi(2) + self.score[1].powi(2)
+    }
+
     fn gain(&self) -> f64 {
         let [cosine, sine] = self.weights();
         0.5 * (cosine * self.score[0] + sine * self.score[1])
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may stop")]
+mod tests {
+    use super::*;
+
+    const POSES: usize = 400;
+
+    /// Numbers between minus one and one that no grid of poses has.
+    fn spread(seed: u64) -> impl Iterator<Item = f64> {
+        let mut state = seed;
+        std::iter::repeat_with(move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            2.0 * ((state >> 11) as f64 / (1_u64 << 53) as f64) - 1.0
+        })
+    }
+
+    /// Scores of waves, (amplitude, cycles) each, and of noise as large as one of amplitude one.
+    fn scan(values: Vec<f64>, waves: &[(f64, f64)]) -> Scan {
+        let noise = spread(5).map(|x| 1.2 * x);
+        let sum = |q: &f64| waves.iter().map(|(size, cycles)| size * (cycles * q + 0.7).cos()).sum::<f64>();
+        let scores = values.iter().zip(noise).map(|(q, noise)| sum(q) + noise).collect();
+        Scan { joint: 0, values, scores }
+    }
+
+    fn anywhere(within: f64) -> Vec<f64> {
+        spread(1).take(POSES).map(|x| within * x).collect()
+    }
+
+    #[test]
+    fn cycles_are_found_to_a_part_of_what_the_range_tells_apart() {
+        for cycles in [202.55, 77.35, 400.1] {
+            let wave = scan(anywhere(3.0), &[(4.0, cycles)]).best(6).unwrap();
+            assert!((wave.cycles - cycles).abs() < 0.03, "{} in place of {cycles}", wave.cycles);
+        }
+    }
+
+    #[test]
+    fn over_a_short_way_the_whole_number_nearest_to_the_peak_is_taken() {
+        for cycles in [100.0, 121.0, 360.0] {
+            let found = scan(anywhere(0.4), &[(4.0, cycles)]);
+            let wave = found.best(6).unwrap();
+            assert_eq!(wave.cycles, wave.cycles.round());
+            let gain = |n: f64| found.at(n).gain();
+            assert!(gain(wave.cycles) >= gain(wave.cycles - 1.0).max(gain(wave.cycles + 1.0)));
+            assert!((wave.cycles - cycles).abs() <= 1.0, "{} in place of {cycles}", wave.cycles);
+        }
+    }
+
+    #[test]
+    fn poses_on_a_grid_show_no_wave_that_could_be_another() {
+        let degrees = |step: f64, shaken: f64| -> Vec<f64> {
+            let values = spread(2).zip(spread(3)).take(POSES);
+            values.map(|(x, y)| (step * (150.0 / step * x).round() + shaken * y).to_radians()).collect()
+        };
+        for (step, cycles) in [(15.0, 77.3), (10.0, 156.0), (5.0, 202.0)] {
+            for shaken in [0.0, 0.01] {
+                assert!(scan(degrees(step, shaken), &[(2.0, cycles)]).best(6).is_none(), "{step} deg");
+            }
+        }
+        assert!(scan(degrees(0.1, 0.0), &[(2.0, 202.0)]).best(6).is_some_and(|wave| wave.cycles == 202.0));
+    }
+
+    #[test]
+    fn a_second_wave_is_no_rival() {
+        let wave = scan(anywhere(2.0), &[(1.0, 202.0), (1.0, 240.0)]).best(6).unwrap();
+        assert!([202.0, 240.0].contains(&wave.cycles), "{}", wave.cycles);
+    }
+
+    #[test]
+    fn readings_that_are_no_joints_are_not_scanned() {
+        let mut values = anywhere(2.0);
+        values[7] = 6e8;
+        assert!(scan(values, &[(2.0, 202.0)]).best(6).is_none());
+    }
+
+    #[test]
+    fn scans_are_alike_whatever_the_order() {
+        let wave = |joint, cycles, amplitude| Wave { joint, cycles, amplitude };
+        let found = [wave(1, 202.0, 1e-4), wave(2, 100.0, 5e-5)];
+        assert!(are_alike(&found, &[wave(2, 100.0, 6e-5), wave(1, 202.05, 1e-4)]));
+        assert!(!are_alike(&found, &found[..1]));
+        assert!(!are_alike(&found, &[wave(1, 202.0, 2.5e-4), found[1]]));
+        assert!(!are_alike(&found, &[wave(1, 203.0, 1e-4), found[1]]));
     }
 }

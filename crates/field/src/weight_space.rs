@@ -121,6 +121,10 @@ impl WeightSpace {
         let error = FieldError::NotPositiveDefinite { rows: model.training.row_count() };
         let (unknowns, width) = unknowns(&model).ok_or(error)?;
         let mut normal = Mat::<f64>::identity(width, width);
+        for (k, known) in model.training.setup_precision.iter().enumerate() {
+            let at = model.by_column.constant.len() + k;
+            normal[(at, at)] = *known;
+        }
         let parts = WeightSpaceParts { model: &model, unknowns: &unknowns };
         for batch in parts.batches() {
             cancel.check()?;

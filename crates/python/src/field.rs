@@ -79,7 +79,7 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         Ok(Product {
             name: name.to_owned(),
             amplitudes: three(&format!("{name}_amplitudes"))?,
-            joints: get(&format!("{name}_joints"))?.iter().map(|&joint| joint as usize).collect(),
+            joints: get(&format!("{name}_joints"))?.into_iter().map(joint_from).collect::<PyResult<_>>()?,
             lengths: get(&format!("{name}_lengths"))?,
             widening: three(&format!("{name}_widening"))?,
         })
@@ -94,7 +94,7 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         smooth_length: one("smooth_length")?,
         repeatability: one("repeatability")?,
         products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
-        waves: values.get("waves").map_or_else(Vec::new, |stored| waves_from(stored)),
+        waves: values.get("waves").map_or_else(|| Ok(Vec::new()), |stored| waves_from(stored))?,
         noise: [one("noise_position")?, one("noise_orientation")?],
         own_widening: one("own_widening")?,
         smooth_widening: three("smooth_widening")?,
@@ -106,9 +106,23 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
 }
 
 /// Of each wave its joint, its cycles a turn and its amplitude.
-fn waves_from(stored: &[f64]) -> Vec<Wave> {
-    let waves = stored.as_chunks().0.iter();
-    waves.map(|&[joint, cycles, amplitude]| Wave { joint: joint as usize, cycles, amplitude }).collect()
+fn waves_from(stored: &[f64]) -> PyResult<Vec<Wave>> {
+    let (waves, left) = stored.as_chunks();
+    if !left.is_empty() {
+        return Err(PyKeyError::new_err("hyper-parameter 'waves' needs three values a wave"));
+    }
+    let wave =
+        |&[joint, cycles, amplitude]: &[f64; 3]| Ok(Wave { joint: joint_from(joint)?, cycles, amplitude });
+    waves.iter().map(wave).collect()
+}
+
+fn joint_from(stored: f64) -> PyResult<usize> {
+    if stored < 0.0 || stored.fract() != 0.0 || !stored.is_finite() {
+        return Err(PyKeyError::new_err(format!(
+            "hyper-parameter of joint {stored}: joints are counted from 0"
+        )));
+    }
+    Ok(stored as usize)
 }
 
 fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {

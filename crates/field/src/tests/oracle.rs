@@ -173,6 +173,11 @@ impl<'a, K: Kernels> Oracle<'a, K> {
         &self.training.setup[row * width..(row + 1) * width]
     }
 
+    /// Prior covariance of two rows that the set-up brings.
+    fn of_setup(&self, a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).zip(&self.training.setup_precision).map(|((x, y), known)| x * y / known).sum()
+    }
+
     fn pose_of(&self, row: usize) -> usize {
         (0..self.training.pose_count()).find(|&pose| self.training.rows(pose).contains(&row)).unwrap()
     }
@@ -189,7 +194,7 @@ impl<'a, K: Kernels> Oracle<'a, K> {
                 for r in training.rows(i) {
                     for c in training.rows(j) {
                         let arm = inner(training.jacobian_row(r), &total, training.jacobian_row(c));
-                        matrix[(r, c)] = arm + dot(self.setup_row(r), self.setup_row(c));
+                        matrix[(r, c)] = arm + self.of_setup(self.setup_row(r), self.setup_row(c));
                         if i == j {
                             matrix[(r, c)] += self.anew(training.jacobian_row(r), training.jacobian_row(c));
                         }
@@ -239,7 +244,11 @@ impl<'a, K: Kernels> Oracle<'a, K> {
                 constant[p] += v.constant[p] * entry * weight;
                 varying[p] += v.varying[p] * entry * weight;
             }
-            setup.iter_mut().zip(self.setup_row(row)).for_each(|(sum, entry)| *sum += entry * weight);
+            for ((sum, entry), known) in
+                setup.iter_mut().zip(self.setup_row(row)).zip(&training.setup_precision)
+            {
+                *sum += entry * weight / known;
+            }
         }
         (constant, setup, varying)
     }
@@ -259,14 +268,15 @@ impl<'a, K: Kernels> Oracle<'a, K> {
         for row in 0..training.row_count() {
             let v = total(training.values_of(self.pose_of(row)));
             for i in 0..rows {
-                cross[(row, i)] =
-                    inner(training.jacobian_row(row), &v, line(i)) + dot(self.setup_row(row), own(i));
+                cross[(row, i)] = inner(training.jacobian_row(row), &v, line(i))
+                    + self.of_setup(self.setup_row(row), own(i));
             }
         }
         let mut solved = cross.clone();
         self.factor().solve(solved.as_mut());
         let here = total(values);
-        let prior = Mat::from_fn(rows, rows, |i, j| inner(line(i), &here, line(j)) + dot(own(i), own(j)));
+        let prior =
+            Mat::from_fn(rows, rows, |i, j| inner(line(i), &here, line(j)) + self.of_setup(own(i), own(j)));
         prior - cross.transpose() * solved
     }
 }
