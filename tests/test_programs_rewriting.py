@@ -132,8 +132,8 @@ def test_payloads_are_compared():
 class Wavy(Shift):
     """A correction that varies along the way, as arms do."""
 
-    def joints(self, q, *, tool=None):
-        found = super().joints(q, tool=tool)
+    def joints(self, q, *, tool=None, author=None):
+        found = super().joints(q, tool=tool, author=author)
         found.q = q + 4e-3 * np.sin(6.0 * q[:, :1]) * np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
         return found
 

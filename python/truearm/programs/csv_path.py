@@ -57,7 +57,7 @@ class CsvPath:
         """As in Language."""
         reader = _Reader(sources[0], robot)
         environments = Environments()
-        tool = frames.tool("tool", robot.tool)
+        tool = frames.tool("tool", None if "tool" in frames.tools else robot.tool)
         known = "object" in frames.objects
         environments.number(
             Environment(
