@@ -20,12 +20,14 @@ class Frame:
         controller: What the controller computes with; the same unless a frames file re-identified it.
         name: As the program names it; empty for one that is written out.
         unknown: Why it is not known; the transforms mean nothing then.
+        taught: Whether it was taught through a calibrated arm.
     """
 
     true: Transform
     controller: Transform
     name: str = ""
     unknown: str = ""
+    taught: bool = False
 
     @classmethod
     def of(cls, transform: Transform, name: str = "") -> "Frame":
