@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import truearm as ta
 from tests.programs_rig import ABB, KUKA, models, read, rewritten
 from tests.test_programs_krl import pose_text
 from tests.test_programs_rapid import GO, SEEN, module, numbers
@@ -13,6 +14,7 @@ from truearm.programs.languages import language_of
 from truearm.programs.notices import frames_notices
 from truearm.programs.source import Source
 from truearm.robot import Robot
+from truearm.simulation import VirtualArm
 
 TARGET = pose_text([10, -80, 95, 20, 60, -30])
 WRITTEN = "$TOOL={X 60,Y 0,Z 150,A 0,B 0,C 0}"
@@ -157,3 +159,45 @@ def test_no_name_is_offered_where_there_is_none():
         'tool "tool0" of cell.toml changes nothing: the program has none of that name, '
         "it asks for no tool there"
     ]
+
+
+@pytest.fixture(scope="module")
+def positions_alone():
+    arm = VirtualArm(ABB, seed=3)
+    return ta.calibrate(ABB, arm.measure(arm.poses(60, seed=1)), ta.Options.of(model="constant"))
+
+
+def notices_of(path, calibration, frames=""):
+    compensator = ta.Compensator(calibration, limits=ta.Limits(largest_std_mm=None, largest_mm=20.0))
+    given = Frames.parse(frames, where="cell.toml")
+    done = ta.compensate_program(path, compensator, controller="nominal", frames=given)
+    return [notice for notice in done.notices if notice.kind in ("frames", "tool")]
+
+
+def test_tools_that_positions_alone_do_not_place_are_told(tmp_path, positions_alone):
+    path = tmp_path / "a.mod"
+    path.write_bytes(RAPID.encode("latin-1"))
+    entry = "[tool.tG]\nxyz = [0, 0, 120.4]\n"
+    for frames in ("", entry):
+        (found,) = notices_of(path, positions_alone, frames)
+        assert found.kind == "tool"
+        assert 'tool "tG" is measured' in found.message
+        assert found.message.endswith("truearm frame CALIB touches.csv --tool tG")
+        assert "\n" not in found.message
+    assert notices_of(path, positions_alone, entry + "identified = {residual_mm = 0.03}\n") == []
+    arm = VirtualArm(ABB, seed=3)
+    poses = arm.measure(arm.poses(60, seed=1), orientation=True)
+    assert notices_of(path, ta.calibrate(ABB, poses, ta.Options.of(model="constant"))) == []
+
+
+def test_the_measured_point_is_known_by_positions_alone(tmp_path, positions_alone):
+    path = tmp_path / "a.csv"
+    path.write_text("q1,q2,q3,q4,q5,q6\n0.1,0.2,0.3,0.4,0.9,0.5\n")
+    point = 1e3 * positions_alone.model.setup.targets[0, 0]
+    measured = f"[tool.tool]\nxyz = {point.tolist()}\n"
+    beside = f"[tool.tool]\nxyz = {(point + np.array([0.0, 0.0, 0.5])).tolist()}\n"
+    assert notices_of(path, positions_alone, measured) == []
+    assert [notice.kind for notice in notices_of(path, positions_alone, beside)] == ["tool"]
+    unasked = notices_of(path, positions_alone, measured + "[object.wTable]\nxyz = [1, 2, 3]\n")
+    assert [notice.kind for notice in unasked] == ["frames"]
+    assert 'work object "wTable" of cell.toml' in unasked[0].message

@@ -12,7 +12,7 @@ from truearm.programs.declaring import declared_controller, refuse_contradiction
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
-from truearm.programs.notices import frames_notices, payload_notices
+from truearm.programs.notices import frames_notices, payload_notices, tool_notices
 from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
 
 
@@ -72,7 +72,11 @@ def compensate_program(
             "controller": {"kind": declared.kind, "source": declared.source},
             "task": compensator.task,
         },
-        [*frames_notices(program, known), *payload_notices(program, calibration.robot)],
+        [
+            *frames_notices(program, known),
+            *payload_notices(program, calibration.robot),
+            *tool_notices(done, calibration),
+        ],
     )
 
 

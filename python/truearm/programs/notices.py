@@ -2,12 +2,20 @@
 
 from typing import Final
 
-from truearm.errors import Notice, list_names
+import numpy as np
+
+from truearm.calibration import Calibration
+from truearm.errors import Notice, list_names, typed
+from truearm.programs.environment import Frame
 from truearm.programs.frames import Frames, Kind
 from truearm.programs.program import Program
+from truearm.programs.rewriting import Rewritten
+from truearm.programs.tables import Motion
 from truearm.robot import Robot
 
 SAME_PAYLOAD_KG: Final = 0.05
+MEASURED_M: Final = 1e-4
+"""A tool this near to a measured point is that point."""
 IN_WORDS: Final[dict[Kind, str]] = {"tool": "tool", "object": "work object"}
 
 
@@ -51,3 +59,41 @@ def _unasked(program: Program, frames: Frames, kind: Kind) -> Notice | None:
         f"{noun}{several} {list_names(left)} of {frames.where} {'change' if several else 'changes'} nothing: "
         f"the program has none of that name, {own}",
     )
+
+
+def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
+    """Tools of changed targets of which a calibration of positions alone does not know where they are.
+
+    Positions tell of a point that the flange carries, not of the flange, from which a drawing or a
+    controller measures a tool. A tool taught through the calibration is measured from the same point.
+    """
+    if calibration.selection.orientation:
+        return []
+    doubtful = [tool for tool in _tools_of(done) if not (tool.taught or _is_measured(tool, calibration))]
+    names = list(dict.fromkeys(tool.name for tool in doubtful if tool.name))
+    if not doubtful:
+        return []
+    tools = f"tool{'s' if len(names) > 1 else ''} {list_names(names)}" if names else "the program's tool"
+    name = typed(names[0]) if names else "NAME"
+    return [
+        Notice(
+            "tool",
+            "the calibration knows positions alone, which do not tell where the flange is, and from there "
+            f"{tools} is measured: all targets may be off by more than std_mm says. "
+            f"Teach it again through the calibration: truearm frame CALIB touches.csv --tool {name}",
+        )
+    ]
+
+
+def _tools_of(done: Rewritten) -> list[Frame]:
+    """Tools that motions to changed targets have."""
+    moves = done.program.moves
+    used = (moves.motion != Motion.NONE) & done.changed[moves.target]
+    return [done.program.environments[int(number)].tool for number in np.unique(moves.environment[used])]
+
+
+def _is_measured(tool: Frame, calibration: Calibration) -> bool:
+    """Whether a tool's point is one that was measured, as the calibration found it on the flange."""
+    points = calibration.model.setup.targets.reshape(-1, 3)
+    distances = np.linalg.norm(points - tool.true[:3, 3], axis=1)
+    return not tool.unknown and bool((distances < MEASURED_M).any())
