@@ -23,7 +23,7 @@ class Shift:
     by: object = 0.0
     tools: list = field(default_factory=list)
 
-    def joints(self, q, *, tool=None):
+    def joints(self, q, *, tool=None, author=None):
         self.tools.append(tool)
         zeros = np.zeros(len(q))
         return SimpleNamespace(

@@ -15,14 +15,20 @@ from truearm.robot import Robot
 
 
 class Shift:
-    """Adds the same to all readings: what is written can be told from what was read."""
+    """Adds the same to all readings: what is written can be told from what was read.
 
-    def __init__(self, by_rad, refuse=()):
-        self.by_rad, self.refuse = np.asarray(by_rad), refuse
+    Where the author took the arm for another than `robot`, the readings of `robot` for the same flange.
+    """
 
-    def joints(self, q, *, tool=None):
+    def __init__(self, by_rad, refuse=(), robot=None):
+        self.by_rad, self.refuse, self.robot = np.asarray(by_rad), refuse, robot
+
+    def joints(self, q, *, tool=None, author=None):
         assert tool is None or np.shape(tool) == (4, 4)
         count = len(q)
+        if author is not None:
+            flange = author.flange_chain.pose(author.joints_from_readings(q))
+            q = Inverse(self.robot).near(flange, q)
         refused = np.zeros(count, dtype=bool)
         refused[[place for place in self.refuse if place < count]] = True
         refusals = [
@@ -40,7 +46,7 @@ class Shift:
 
 def models(robot, by_rad=(1e-3, -1e-3, 5e-4, 1e-3, -1e-3, 2e-3), refuse=(), controller=None):
     """Programming and controller model of an arm, and a stand-in compensator."""
-    shift = Shift(np.zeros(robot.joint_count) + by_rad, refuse)
+    shift = Shift(np.zeros(robot.joint_count) + by_rad, refuse, robot)
     return Models(robot, Inverse(robot), controller or Controller.nominal(robot), shift)
 
 

@@ -11,7 +11,7 @@ from tests.test_programs_rapid import GO, NOTHING, SEEN, module, numbers, points
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.programs.configuration import nearest_turns, with_turns
-from truearm.programs.declaring import declared_controller, may_differ, payload_notices, refuse_contradiction
+from truearm.programs.declaring import declared_controller, may_differ, refuse_contradiction
 from truearm.programs.densify import Spacing
 from truearm.programs.folding import constant
 from truearm.programs.frames import Frames
@@ -19,6 +19,7 @@ from truearm.programs.languages import LANGUAGES, language_of
 from truearm.programs.layouts import EulerPose, Joints, QuaternionPose, RotationVectorPose
 from truearm.programs.lexing import Token
 from truearm.programs.marks import MARK, mark_text
+from truearm.programs.notices import payload_notices
 from truearm.programs.report import report_of, unified_diff
 from truearm.programs.rewriting import Choices, rewrite
 from truearm.programs.source import Source
@@ -132,8 +133,8 @@ def test_payloads_are_compared():
 class Wavy(Shift):
     """A correction that varies along the way, as arms do."""
 
-    def joints(self, q, *, tool=None):
-        found = super().joints(q, tool=tool)
+    def joints(self, q, *, tool=None, author=None):
+        found = super().joints(q, tool=tool, author=author)
         found.q = q + 4e-3 * np.sin(6.0 * q[:, :1]) * np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
         return found
 

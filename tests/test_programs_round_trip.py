@@ -241,12 +241,11 @@ class Run:
     def misses_mm(self, program, controller):
         """What the tool misses by when a controller runs a program.
 
-        A Cartesian target says where the tool is to be; joints say it through the arm and the tool as they
-        were meant to be, which is the tool taught again.
+        A Cartesian target says where the tool is to be; joints say it through the nominal arm and the tool
+        that the author had, which is the controller's.
         """
         robot = self.here.robot
-        wanted = robot.flange_chain.pose(robot.joints_from_readings(self.q))
-        wanted[:1], wanted[1:] = wanted[:1] @ self.here.tool, wanted[1:] @ TOOL
+        wanted = robot.flange_chain.pose(robot.joints_from_readings(self.q)) @ TOOL
         return self.here.misses_mm(VirtualController(controller).run(program), wanted)
 
     def again(self, done):

@@ -118,17 +118,13 @@ class Compensator:
         self.programming = required(programming or calibration.robot, Robot, "the programming model")
         self.task: Task = task
         self.limits = required(limits or Limits(), Limits, "the limits")
-        if self.programming.joints != calibration.robot.joints:
-            raise InputError(
-                f"the programming model {self.programming.name} has joints {self.programming.joints}",
-                rule=f"{calibration.robot.name} was calibrated with {calibration.robot.joints}",
-            )
+        self._check_joints(self.programming)
         self._moving = moving
         self._options = core_options(calibration.robot, task, moving, self.limits)
         self._features = feature_values(calibration, features)
         self._programming = plain_model(self.programming)
         self._calibrated = calibrated_model(calibration)
-        self._correctors: OrderedDict[bytes, Corrector] = OrderedDict()
+        self._correctors: OrderedDict[tuple[bytes, ...], Corrector] = OrderedDict()
 
     def __reduce__(self) -> tuple[object, ...]:
         names = self.calibration.options.features[: len(self._features)]
@@ -136,18 +132,23 @@ class Compensator:
         kept = (self.calibration, self.programming, self.task, self._moving, self.limits, features)
         return _compensator, kept
 
-    def joints(self, q: ArrayLike, *, tool: ArrayLike | None = None) -> Compensated:
+    def joints(
+        self, q: ArrayLike, *, tool: ArrayLike | None = None, author: Robot | None = None
+    ) -> Compensated:
         """Correct the joint targets of a path.
 
         Args:
             q: Readings (n, N) of the program, or (N,) for one.
             tool: flange_from_tool (4, 4), or a point (3,); the programming model's own by default.
+            author: The arm that with `tool` on its flange is, for readings `q`, where the author meant the
+                tool; the programming model by default. An author who took the tool, or the place of a work
+                object, for another than it is had an arm whose flange, or base, is shifted by as much.
 
         Raises:
-            InputError: If the readings or the tool are none.
+            InputError: If the readings or the tool are none, or the author's arm has other joints.
         """
         rows, _ = as_rows(q, self.programming.joint_count, what="joint readings")
-        return self._corrected(rows, self._tool(tool), {})
+        return self._corrected(rows, self._tool(tool), {}, author)
 
     def poses(
         self, base_from_tool: ArrayLike, seed: ArrayLike, *, tool: ArrayLike | None = None
@@ -204,24 +205,40 @@ class Compensator:
         """The core's corrector for a tool, flange_from_tool (4, 4) or a point (3,)."""
         return self._corrector(self._tool(tool))
 
-    def _corrector(self, flange_from_tool: Floats) -> Corrector:
-        """The corrector of a tool; those of the last TOOLS_KEPT tools are kept."""
-        key = flange_from_tool.tobytes()
+    def _check_joints(self, programming: Robot) -> None:
+        """Raise InputError where an author's arm has other joints than the calibrated one."""
+        if programming.joints != self.calibration.robot.joints:
+            raise InputError(
+                f"the programming model {programming.name} has joints {programming.joints}",
+                rule=f"{self.calibration.robot.name} was calibrated with {self.calibration.robot.joints}",
+            )
+
+    def _corrector(self, flange_from_tool: Floats, author: Robot | None = None) -> Corrector:
+        """The corrector of a tool, for an author's arm; the last TOOLS_KEPT of them are kept."""
+        shape = () if author is None else (author.base, author.flange, author.table, author.coupling)
+        key = tuple(part.tobytes() for part in (flange_from_tool, *shape))
         if key in self._correctors:
             self._correctors.move_to_end(key)
             return self._correctors[key]
+        if author is not None:
+            self._check_joints(author)
+        programming = self._programming if author is None else plain_model(author)
         tool = np.ascontiguousarray(flange_from_tool)
-        made = Corrector(self._calibrated, self._programming, tool, self._options)
+        made = Corrector(self._calibrated, programming, tool, self._options)
         self._correctors[key] = made
         if len(self._correctors) > TOOLS_KEPT:
             self._correctors.popitem(last=False)
         return made
 
     def _corrected(
-        self, rows: Floats, flange_from_tool: Floats, unsolved: Mapping[int, Refusal]
+        self,
+        rows: Floats,
+        flange_from_tool: Floats,
+        unsolved: Mapping[int, Refusal],
+        author: Robot | None = None,
     ) -> Compensated:
         try:
-            corrector = self._corrector(flange_from_tool)
+            corrector = self._corrector(flange_from_tool, author)
         except CoreError as error:
             raise InputError(str(error)) from None
         q, numbers, refused = corrector.path(rows, self._features)

@@ -8,10 +8,11 @@ from truearm.controller import Controller
 from truearm.errors import UsageError
 from truearm.inverse import Inverse
 from truearm.kinds import required
-from truearm.programs.declaring import declared_controller, payload_notices, refuse_contradiction
+from truearm.programs.declaring import declared_controller, refuse_contradiction
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
+from truearm.programs.notices import frames_notices, payload_notices, tool_notices
 from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
 
 
@@ -58,7 +59,8 @@ def compensate_program(
             f"the controller's model {declared.robot.name} has other joints than {author.name}",
             way_out="Declare the controller of this arm",
         )
-    program = read_program(Path(path), written_in, author, _frames(frames))
+    known = _frames(frames).fresh()
+    program = read_program(Path(path), written_in, author, known)
     refuse_contradiction(program, declared, force=chosen.force)
     positions_only = not calibration.selection.orientation
     models = Models(author, Inverse(author), declared, compensator, compensator.task, positions_only)
@@ -70,7 +72,11 @@ def compensate_program(
             "controller": {"kind": declared.kind, "source": declared.source},
             "task": compensator.task,
         },
-        payload_notices(program, calibration.robot),
+        [
+            *frames_notices(program, known),
+            *payload_notices(program, calibration.robot),
+            *tool_notices(done, calibration),
+        ],
     )
 
 

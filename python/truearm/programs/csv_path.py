@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.columns import JOINT, QUATERNION, TARGET
-from truearm.programs.environment import IDENTITY, Environment, Environments
+from truearm.programs.environment import IDENTITY, Environment, Environments, Frame
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
 from truearm.programs.program import LinearStep, Program, StepTexts
@@ -57,12 +57,10 @@ class CsvPath:
         """As in Language."""
         reader = _Reader(sources[0], robot)
         environments = Environments()
-        tool = frames.tool("tool", robot.tool)
-        known = "object" in frames.objects
         environments.number(
             Environment(
-                tool=tool,
-                work_object=frames.work_object("object") if known else IDENTITY,
+                tool=frames.held("tool", "tool") or Frame.of(robot.tool, "tool"),
+                work_object=frames.held("object", "object") or IDENTITY,
                 payload_kg=frames.payloads_kg.get("tool"),
             )
         )

@@ -4,7 +4,7 @@ import re
 from typing import Final
 
 from truearm.controller import Controller
-from truearm.errors import Notice, UsageError, WorkError
+from truearm.errors import UsageError, WorkError
 from truearm.programs.program import Language, Program
 from truearm.robot import Robot
 
@@ -14,7 +14,6 @@ UNIVERSAL: Final = (
 UR_MODEL: Final = re.compile(r"\bur-?\d{1,2}e?\b")
 MAKERS: Final = re.compile(r"\b(abb|fanuc|kuka)\b")
 """Makers whose controllers can hold the kinematics of the very arm, an option."""
-SAME_PAYLOAD_KG: Final = 0.05
 
 
 def declared_controller(declaration: str | None, language: Language, robot: Robot) -> Controller:
@@ -55,25 +54,6 @@ def refuse_contradiction(program: Program, controller: Controller, *, force: boo
             rule="A controller that corrects by itself would correct twice",
             way_out="Switch that off, or give its model with --controller FILE; --force goes on",
         )
-
-
-def payload_notices(program: Program, robot: Robot) -> list[Notice]:
-    """What differs between the payload that was calibrated with and those that the program states."""
-    stated = sorted({e.payload_kg for e in program.environments if e.payload_kg is not None})
-    if robot.payload is None or not stated:
-        return []
-    calibrated = robot.payload.mass_kg
-    others = [mass for mass in stated if abs(mass - calibrated) > SAME_PAYLOAD_KG]
-    if not others:
-        return []
-    masses = ", ".join(f"{mass:g} kg" for mass in others)
-    return [
-        Notice(
-            "payload",
-            f"the program states a payload of {masses}, the calibration was made with {calibrated:g} kg: "
-            "what the arm yields under the difference is not corrected",
-        )
-    ]
 
 
 def _is_universal(robot: Robot) -> bool:

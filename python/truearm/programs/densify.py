@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from truearm.errors import UsageError
 from truearm.inverse import Inverse
 from truearm.programs.encoding import Encoder
-from truearm.programs.environment import Environment
+from truearm.programs.environment import Environment, Transform, author_of
 from truearm.programs.layouts import of_joints, of_pose
 from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.tables import Motion
@@ -96,17 +96,28 @@ class Densifier:
     def _between(self, move: int, ends: Floats) -> list[LinearStep] | None:
         """Waypoints before a move; None where it deviates by more and that cannot be helped."""
         environment = self._program.environments[int(self._program.moves.environment[move])]
-        tool = environment.tool.true
+        uses, targets = self._encoder.uses, self._program.moves.target[move - 1 : move + 1]
+        start, end = uses.displaced[targets].tolist()
+        displacement = uses.displacements[end]
+        tool = environment.tool.controller
         poses = self._robot.flange_chain.pose(np.ascontiguousarray(self._robot.joints_from_readings(ends)))
+        if start != end:
+            poses[0] = rigid_inverse(_moved(displacement)) @ _moved(uses.displacements[start]) @ poses[0]
         line = _line(poses @ tool, self._spacing.least_m)
         if line is None:
             return []
         seeds = ends[0] + np.linspace(0.0, 1.0, len(line))[:, None] * (ends[1] - ends[0])
         nominal = self._inverse.near_or_nan(line @ rigid_inverse(tool), seeds)
-        nominal[[0, -1]] = ends
+        nominal[-1] = ends[-1]
+        if start == end:
+            nominal[0] = ends[0]
         if np.isnan(nominal).any():
             return None
-        found = self._compensator.joints(np.ascontiguousarray(nominal), tool=tool)
+        found = self._compensator.joints(
+            np.ascontiguousarray(nominal),
+            tool=environment.tool.true,
+            author=author_of(self._robot, environment.tool, displacement),
+        )
         if np.asarray(found.refused).any():
             return None
         chosen, enough = _needed(self._written(found.q, environment), self._spacing.deviation_m)
@@ -143,6 +154,10 @@ class Densifier:
             LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()))
             for row, digits in zip(values, decimals, strict=True)
         ]
+
+
+def _moved(displacement: Transform | None) -> Transform:
+    return np.eye(4) if displacement is None else displacement
 
 
 def _line(ends: Floats, least_m: float) -> Floats | None:

@@ -16,7 +16,6 @@ from truearm.programs.solving import AT_ONCE, are_singular, numbers_of
 from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
-from truearm.rotations import rigid_inverse
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -93,18 +92,14 @@ class Encoder:
         """Numbers and decimals (n, width) that say readings `q` (n, N) in the manner of targets `which`."""
         pose_width = layout.width - layout.configuration
         near = numbers_of(self.program, which, layout)
-        base_from_tool = self.robot.flange_chain.pose(
-            np.ascontiguousarray(self.robot.joints_from_readings(q))
+        stored = environment.stored_poses(
+            self.robot.flange_chain.pose(np.ascontiguousarray(self.robot.joints_from_readings(q)))
         )
-        base_from_tool = base_from_tool @ environment.tool.controller
-        outer = rigid_inverse(environment.work_object.controller @ environment.before)
-        stored = outer @ base_from_tool @ rigid_inverse(environment.after)
         values = np.array(near)
         values[:, :pose_width] = layout.from_poses(stored, near[:, :pose_width])
         values, decimals = self._rounded(which, layout, values)
-        inner = environment.after @ rigid_inverse(environment.tool.controller)
         again = layout.to_poses((values * self._factors(which, layout))[:, :pose_width])
-        flange = environment.work_object.controller @ environment.before @ again @ inner
+        flange = environment.flange_poses(again)
         said, steady = joints_of(self.robot, flange, q)
         for target in which[~steady]:
             self.reasons[int(target)] = CORRECTED_SINGULAR

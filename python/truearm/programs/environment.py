@@ -1,9 +1,12 @@
 """What a motion statement is executed with: its tool, its work object, and offsets on its target."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from truearm.robot import Robot
+from truearm.rotations import rigid_inverse
 
 Transform = NDArray[np.float64]
 
@@ -17,12 +20,14 @@ class Frame:
         controller: What the controller computes with; the same unless a frames file re-identified it.
         name: As the program names it; empty for one that is written out.
         unknown: Why it is not known; the transforms mean nothing then.
+        taught: Whether it was taught through a calibrated arm.
     """
 
     true: Transform
     controller: Transform
     name: str = ""
     unknown: str = ""
+    taught: bool = False
 
     @classmethod
     def of(cls, transform: Transform, name: str = "") -> "Frame":
@@ -38,6 +43,28 @@ class Frame:
     def key(self) -> tuple[bytes, bytes, str]:
         """Equal for frames that are the same."""
         return self.true.tobytes(), self.controller.tobytes(), self.unknown
+
+
+def author_of(robot: Robot, tool: Frame, displacement: Transform | None) -> Robot | None:
+    """The arm that has the true tool where the author meant the tool; None where that is `robot`.
+
+    The author's readings are those of `robot` with the controller's tool. An arm whose flange is shifted by
+    what lies between the controller's tool and the true one, and whose base by what displaces the work
+    object, has the true tool at the same place for the same readings.
+
+    Args:
+        robot: The programming model.
+        tool: The tool.
+        displacement: Of the work object, as in Environment; None for joint targets.
+    """
+    flange, base = robot.flange, robot.base
+    if tool.true.tobytes() != tool.controller.tobytes():
+        flange = flange @ tool.controller @ rigid_inverse(tool.true)
+    elif displacement is None:
+        return None
+    if displacement is not None:
+        base = displacement @ base
+    return replace(robot, flange=flange, base=base, base_row=None)
 
 
 IDENTITY = Frame.of(np.eye(4))
@@ -83,6 +110,31 @@ class Environment:
     def places_as_stored(self) -> bool:
         """Whether a target is placed where it is stored, without an offset."""
         return np.array_equal(self.before, np.eye(4)) and np.array_equal(self.after, np.eye(4))
+
+    @property
+    def displacement(self) -> Transform | None:
+        """What moves a place in the work object from where the controller has it to where it truly is.
+
+        base_from_base (4, 4); None where the controller has the object where it is.
+        """
+        here = self.work_object
+        if here.true.tobytes() == here.controller.tobytes():
+            return None
+        moved: Transform = here.true @ rigid_inverse(here.controller)
+        return moved
+
+    def flange_poses(self, stored: Transform) -> Transform:
+        """base_from_flange (n, 4, 4) that the controller makes of stored poses (n, 4, 4)."""
+        outer = self.work_object.controller @ self.before
+        inner = self.after @ rigid_inverse(self.tool.controller)
+        poses: Transform = outer @ stored @ inner
+        return poses
+
+    def stored_poses(self, base_from_flange: Transform) -> Transform:
+        """The stored poses (n, 4, 4) of which the controller makes poses (n, 4, 4) of the flange."""
+        outer = rigid_inverse(self.work_object.controller @ self.before)
+        poses: Transform = outer @ (base_from_flange @ self.tool.controller) @ rigid_inverse(self.after)
+        return poses
 
     @property
     def why_not_poses(self) -> str:

@@ -3,10 +3,10 @@
 A TOML file with a table `[tool.NAME]` or `[object.NAME]` a frame; docs/reference/programs.md has all keys.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
@@ -17,6 +17,8 @@ from truearm.files import parsed, read_text
 from truearm.programs.environment import Frame, Transform
 from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
 
+Kind = Literal["tool", "object"]
+Written = TypeVar("Written", bound=Hashable)
 Number = Annotated[float, Field(allow_inf_nan=False)]
 LENGTHS_M: Final = {"mm": 1e-3, "m": 1.0}
 ORIENTATIONS: Final = ("quaternion_wxyz", "euler_zyx_deg", "rotation_vector_rad")
@@ -76,6 +78,19 @@ class FramesFile(_Section):
     object: Mapping[str, FrameEntry] = Field(default_factory=dict)
 
 
+class Asked:
+    """Names under which a program's tools and objects were looked up.
+
+    Attributes:
+        names: Each as the program has it, by kind, "tool" or "object", and by the name with case ignored.
+        initial: Those of what holds until a program sets another.
+    """
+
+    def __init__(self) -> None:
+        self.names: dict[Kind, dict[str, str]] = {"tool": {}, "object": {}}
+        self.initial: dict[Kind, dict[str, str]] = {"tool": {}, "object": {}}
+
+
 @dataclass(frozen=True, eq=False)
 class Frames:
     """Tools and objects by name; names are compared with case ignored.
@@ -85,12 +100,14 @@ class Frames:
         objects: base_from_object of each.
         payloads_kg: Payloads of the tools that state one.
         where: The file, for messages; empty without one.
+        asked: What was looked up.
     """
 
     tools: Mapping[str, Frame] = field(default_factory=dict)
     objects: Mapping[str, Frame] = field(default_factory=dict)
     payloads_kg: Mapping[str, float] = field(default_factory=dict)
     where: str = ""
+    asked: Asked = field(default_factory=Asked)
 
     @classmethod
     def load(cls, path: str | Path) -> "Frames":
@@ -122,27 +139,63 @@ class Frames:
             where,
         )
 
+    def fresh(self) -> "Frames":
+        """The same, of which nothing was looked up."""
+        return replace(self, asked=Asked())
+
     def tool(self, name: str, stated: Transform | None = None) -> Frame:
         """The tool of that name; `stated` is what the program says, if it says, and what the controller has.
 
         A tool that the program states and the file holds is aimed with as the file has it: the file's
         is where the tool truly is. One that neither has is unknown.
         """
-        return self._found(self.tools, "tool", name, stated)
+        return self._found("tool", name, stated)
 
     def work_object(self, name: str, stated: Transform | None = None) -> Frame:
         """The work object of that name, likewise."""
-        return self._found(self.objects, "object", name, stated)
+        return self._found("object", name, stated)
 
-    def _found(self, known: Mapping[str, Frame], kind: str, name: str, stated: Transform | None) -> Frame:
-        found = known.get(name.casefold())
+    def held(self, kind: Kind, name: str) -> Frame | None:
+        """The tool or object of that name where the file holds it."""
+        self.asked.names[kind].setdefault(name.casefold(), name)
+        return self.of(kind).get(name.casefold())
+
+    def at_start(self, kind: Kind, name: str) -> Frame:
+        """What holds until the program sets another: asked for only where a motion has it."""
+        self.asked.initial[kind].setdefault(name.casefold(), name)
+        return self.of(kind).get(name.casefold()) or self._missing(kind, name)
+
+    def of(self, kind: Kind) -> Mapping[str, Frame]:
+        """Tools or objects."""
+        return self.tools if kind == "tool" else self.objects
+
+    def _found(self, kind: Kind, name: str, stated: Transform | None) -> Frame:
+        found = self.held(kind, name)
         if found is None:
-            reason = f'{kind} "{name}" is not in the program; give it in a file of --frames'
-            return Frame.of(stated, name) if stated is not None else Frame.missing(reason, name)
-        return found if stated is None else Frame(found.true, stated, name)
+            return self._missing(kind, name) if stated is None else Frame.of(stated, name)
+        return found if stated is None else replace(found, controller=stated, name=name)
+
+    def _missing(self, kind: Kind, name: str) -> Frame:
+        return Frame.missing(f'{kind} "{name}" is not in the program; give it in a file of --frames', name)
+
+
+def written_out(word: str, distinct: Iterable[Written]) -> dict[Written, str]:
+    """Names of tools or objects that a program writes out in numbers, in the order of the text.
+
+    The word itself, or with a number from 1 where several differ.
+    """
+    different = list(dict.fromkeys(distinct))
+    if len(different) == 1:
+        return {different[0]: word}
+    return {one: f"{word} {number}" for number, one in enumerate(different, 1)}
+
+
+def name_at_start(word: str, *, written: bool) -> str:
+    """The name of what holds until a program sets another: with 0 where the word is of one written out."""
+    return f"{word} 0" if written else word
 
 
 def _frame(name: str, entry: FrameEntry, unit_m: float) -> Frame:
     true = entry.transform(unit_m)
     controller = true if entry.controller is None else entry.controller.transform(unit_m)
-    return Frame(true, controller, name)
+    return Frame(true, controller, name, taught=entry.identified is not None)

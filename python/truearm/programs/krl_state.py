@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from truearm.programs.environment import Frame
-from truearm.programs.frames import Frames
+from truearm.programs.environment import Frame, Transform
+from truearm.programs.frames import Frames, name_at_start, written_out
 from truearm.programs.krl_storage import KrlStorage
 from truearm.programs.krl_values import Named, Operands, Structure
 from truearm.programs.source import Source
@@ -67,16 +67,23 @@ class KrlFrames:
 
     def __init__(self, storage: KrlStorage, frames: Frames, sources: tuple[Source, ...]) -> None:
         self._storage, self._frames, self._sources = storage, frames, sources
-        world = frames.objects.get("$world")
-        self._world = world if world is not None else Frame.of(np.eye(4), "$WORLD")
+        self._world = frames.held("object", "$WORLD") or Frame.of(np.eye(4), "$WORLD")
+        self._written = {kind: self._names_of_written(kind) for kind in KINDS}
+
+    def _names_of_written(self, kind: str) -> dict[bytes, str]:
+        """Names of tools or bases that are written out, by their numbers."""
+        stored = self._storage.values.get(f"${kind}", [])
+        stated = [value.transform() for _, value in stored if value is not None]
+        return written_out(f"${kind.upper()}", (one.tobytes() for one in stated if one is not None))
 
     def start(self) -> Modal:
-        """The state at the start: what the frames file calls $TOOL and $BASE.
+        """The state at the start: what the frames file calls $TOOL and $BASE, or $TOOL 0 and $BASE 0.
 
         What the program assigns to them holds from there on only.
         """
-        base = self._placed("base", self._frames.work_object("$BASE"))
-        return Modal(self._frames.tool("$TOOL"), base)
+        tool, base = (name_at_start(f"${kind.upper()}", written=bool(self._written[kind])) for kind in KINDS)
+        placed = self._placed("base", self._frames.at_start("object", base))
+        return Modal(self._frames.at_start("tool", tool), placed)
 
     def payload_kg(self, state: Modal) -> float | None:
         """The mass that the program, or the frames file, states."""
@@ -95,12 +102,15 @@ class KrlFrames:
         stored = self._storage.values.get(name.lower(), [])
         value = stored[0][1] if len(stored) == 1 else None
         stated = None if value is None else value.transform()
-        known = self._frames.tools if kind == "tool" else self._frames.objects
+        known = self._frames.of("tool" if kind == "tool" else "object")
         number = re.search(r"\[(\d+)\]", name)
         if number is not None and name.casefold() not in known and number.group(1) in known:
             name = number.group(1)
         if stored and stated is None:
             return Frame.missing(f"{kind} {name} is assigned more than once, or at run time", name)
+        return self._looked_up(kind, name, stated)
+
+    def _looked_up(self, kind: str, name: str, stated: Transform | None) -> Frame:
         if kind == "tool":
             return self._frames.tool(name, stated)
         return self._placed(kind, self._frames.work_object(name, stated))
@@ -121,12 +131,21 @@ class KrlFrames:
         """A tool or base from operands joined by the geometric operator."""
         if found is None:
             return Frame.missing(f"{kind}: it is computed at run time")
+        if len(found) == 1 and isinstance(found[0], Structure):
+            stated = found[0].transform()
+            name = "" if stated is None else self._written[kind].get(stated.tobytes(), "")
+            if name:
+                return self._looked_up(kind, name, stated)
         result = self.constant(kind, found[0])
         for operand in found[1:]:
             frame = self.constant("tool", operand)
             if frame.unknown or result.unknown:
                 return frame if frame.unknown else result
-            result = Frame(result.true @ frame.true, result.controller @ frame.controller)
+            result = Frame(
+                result.true @ frame.true,
+                result.controller @ frame.controller,
+                taught=result.taught or frame.taught,
+            )
         return result
 
     def constant(self, kind: str, operand: Structure | Named) -> Frame:
@@ -143,4 +162,5 @@ class KrlFrames:
     def _placed(self, kind: str, frame: Frame) -> Frame:
         if kind == "tool" or frame.unknown:
             return frame
-        return Frame(self._world.true @ frame.true, self._world.controller @ frame.controller, frame.name)
+        true, controller = self._world.true @ frame.true, self._world.controller @ frame.controller
+        return replace(frame, true=true, controller=controller)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
 from truearm.programs.environment import IDENTITY, Environment, Environments, Frame
-from truearm.programs.frames import Frames
+from truearm.programs.frames import Frames, name_at_start, written_out
 from truearm.programs.layouts import EulerPose
 from truearm.programs.melfa_configuration import StructureFlags
 from truearm.programs.melfa_text import (
@@ -98,7 +98,9 @@ class Reader:
         self._offsets = self._find_offsets()
         self._read_variables()
         self._targets = {name.casefold(): self._target(name, v) for name, v in self._known()}
-        self._tool, self._base, self._blended = frames.tool("tool"), IDENTITY, False
+        self._tool_names = self._written_tools()
+        start = name_at_start("tool", written=bool(self._tool_names))
+        self._tool, self._base, self._blended = frames.at_start("tool", start), IDENTITY, False
         self._follows = False
         self._several = self._count_settings() > 1
         for statement in self._statements:
@@ -225,10 +227,16 @@ class Reader:
         if given.casefold() == "p_ntool":
             return Frame.of(np.eye(4), given)
         stated = self._transform(given)
-        name = given if _VARIABLE.match(given) is not None else "tool"
+        name = self._tool_names.get(given, given)
         if stated is None:
             return Frame.missing("the tool is computed when the program runs", name)
         return self._frames.tool(name, stated)
+
+    def _written_tools(self) -> dict[str, str]:
+        """Names of tools that are written out in numbers, by their text."""
+        settings = (_SETTING.match(statement.text) for statement in self._statements)
+        texts = [m.group(2) for m in settings if m is not None and (m.group(1) or "").casefold() == "tool"]
+        return written_out("tool", (text for text in texts if _VARIABLE.match(text) is None))
 
     def _stated_base(self, given: str) -> Frame:
         """Base: only where it stands in the frames file, unless it is the robot's own.

@@ -1,7 +1,7 @@
 """Tools, work objects and loads of RAPID text: tooldata, wobjdata and loaddata."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -30,8 +30,7 @@ class RapidFrames:
 
     def __init__(self, declarations: Declarations, frames: Frames) -> None:
         self._declarations, self._frames = declarations, frames
-        world = frames.objects.get("wobj0")
-        self._world = world if world is not None else Frame.of(np.eye(4), "wobj0")
+        self._world = frames.held("object", "wobj0") or Frame.of(np.eye(4), "wobj0")
 
     def tool(self, given: Sequence[Token]) -> Found:
         """The tool that an argument names."""
@@ -104,7 +103,8 @@ class RapidFrames:
     def _in_world(self, frame: Frame) -> Frame:
         if frame.unknown:
             return frame
-        return Frame(self._world.true @ frame.true, self._world.controller @ frame.controller, frame.name)
+        true, controller = self._world.true @ frame.true, self._world.controller @ frame.controller
+        return replace(frame, true=true, controller=controller)
 
 
 def _mass(value: Value) -> float | None:

@@ -14,6 +14,7 @@ from truearm.inverse import Inverse
 from truearm.programs.densify import Densifier, Inserted, Spacing
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
+from truearm.programs.environment import Frame, Transform, author_of
 from truearm.programs.frames import Frames
 from truearm.programs.marks import refuse_marked
 from truearm.programs.outputs import output_paths, write_outputs
@@ -25,6 +26,7 @@ from truearm.programs.uses import Uses, target_count
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 UNSURE: Final = 8
@@ -75,8 +77,8 @@ class Corrected(Protocol):
 class Compensator(Protocol):
     """What turns readings into corrected ones."""
 
-    def joints(self, q: Floats, *, tool: Floats | None = None) -> Any:  # noqa: ANN401
-        """Corrected readings of rows (n, N), at a tool."""
+    def joints(self, q: Floats, *, tool: Floats | None = None, author: Robot | None = None) -> Any:  # noqa: ANN401
+        """Corrected readings of rows (n, N), at a tool; `author` as in author_of."""
         ...
 
 
@@ -125,10 +127,12 @@ class Rewritten:
     Attributes:
         program: The program as it was.
         contents: The bytes of its files now.
-        nominal: Readings that the author meant, (t, N); NaN where they are not known.
+        nominal: Readings that the author meant, with tools and work objects as the controller has them,
+            (t, N); NaN where they are not known.
         corrected: Readings that the program says now, (t, N); the nominal ones where it was left as it was.
         changed: Targets that were changed, (t,).
-        correction_mm: How far the tool's target moved, (t,); NaN where it was not changed.
+        correction_mm: How far the tool's target moved from where the program said it, for the controller's
+            tool, (t,); NaN where it was not changed.
         correction_mrad: How far it turned, (t,).
         std_mm: Standard deviation of the calibration there, (t,).
         kept: Targets that were refused and kept as they were, with the reason.
@@ -262,20 +266,28 @@ class _State:
                 self.reasons.update(dict.fromkeys(which.tolist(), tool.unknown))
                 self.known[which] = False
                 continue
-            rows = run_of(which)
-            found = self.models.compensator.joints(
-                np.ascontiguousarray(self.nominal[rows]), tool=None if tool.unknown else tool.true
-            )
-            self.corrected = placed(self.corrected, rows, found.q)
-            self.correction_mm = placed(self.correction_mm, rows, found.correction_mm)
-            self.correction_mrad = placed(self.correction_mrad, rows, found.correction_mrad)
-            if found.std_mm is not None:
-                self.std_mm = placed(self.std_mm, rows, found.std_mm)
-            for refusal in found.refusals:
-                self.refused[int(which[refusal.number - 1])] = refusal.reason
-            self.codes |= {refusal.code for refusal in found.refusals}
-            refused = which[np.asarray(found.refused, dtype=bool)]
-            self.corrected[refused] = self.nominal[refused]
+            displaced = self.uses.displaced[which]
+            for place in np.unique(displaced).tolist():
+                self._correct(which[displaced == place], tool, self.uses.displacements[place])
+
+    def _correct(self, which: Integers, tool: Frame, displacement: Transform | None) -> None:
+        """Corrected readings of targets with one tool, in work objects that are displaced alike."""
+        rows = run_of(which)
+        found = self.models.compensator.joints(
+            np.ascontiguousarray(self.nominal[rows]),
+            tool=None if tool.unknown else tool.true,
+            author=author_of(self.models.programming, tool, displacement),
+        )
+        self.corrected = placed(self.corrected, rows, found.q)
+        self.correction_mm = placed(self.correction_mm, rows, found.correction_mm)
+        self.correction_mrad = placed(self.correction_mrad, rows, found.correction_mrad)
+        if found.std_mm is not None:
+            self.std_mm = placed(self.std_mm, rows, found.std_mm)
+        for refusal in found.refusals:
+            self.refused[int(which[refusal.number - 1])] = refusal.reason
+        self.codes |= {refusal.code for refusal in found.refusals}
+        refused = which[np.asarray(found.refused, dtype=bool)]
+        self.corrected[refused] = self.nominal[refused]
 
     def _what_helps(self) -> str:
         """What can be done about the refusals there are: bounds that have an option may be allowed more."""

@@ -1,4 +1,8 @@
-"""From the targets of a program to the joint readings its author meant, q^n."""
+"""From the targets of a program to the joint readings that its author meant, q^n.
+
+Configuration data and the target before tell of the author's readings: those of the nominal arm with tools
+and work objects as the controller has them, wherever these truly are.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,13 +13,11 @@ from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, meant, nearest_turns, with_turns
-from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight
 from truearm.programs.tables import all_ones, placed, run_of
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
-from truearm.rotations import rigid_inverse
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -72,14 +74,6 @@ def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayo
     numbers: Floats = targets.of(targets.values, which, width)
     factors = targets.of(targets.factors, which, width)
     return numbers if all_ones(factors) else numbers * factors
-
-
-def flange_poses(stored: Floats, environment: Environment) -> Floats:
-    """base_from_flange (n, 4, 4) of stored poses, as they truly are meant."""
-    outer = environment.work_object.true @ environment.before
-    inner = environment.after @ rigid_inverse(environment.tool.true)
-    poses: Floats = outer @ stored @ inner
-    return poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +199,7 @@ class _Solver:
                     continue
                 values = numbers_of(self.program, which, layout)[:, : layout.width - layout.configuration]
                 stored = layout.to_poses(values)
-                poses = flange_poses(stored, self.program.environments[int(environment)])
+                poses = self.program.environments[int(environment)].flange_poses(stored)
                 found.update(zip(which.tolist(), poses, strict=True))
         return found
 

@@ -18,7 +18,6 @@ from truearm.programs.tables import Motion, MoveTable, Number, TargetTable
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
 from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, positions, section
 from truearm.robot import Robot
-from truearm.rotations import rigid_inverse
 
 Floats = NDArray[np.float64]
 
@@ -262,11 +261,7 @@ class Reader:
         if environment.tool.unknown or environment.work_object.unknown:
             return np.full((4, 4), np.nan)
         values = np.array([[number.value for number in position.numbers[: len("XYZWPR")]]])
-        stored = _POSE.to_poses(values)[0]
-        flange: Floats = (
-            environment.work_object.controller @ stored @ rigid_inverse(environment.tool.controller)
-        )
-        return flange
+        return environment.flange_poses(_POSE.to_poses(values)[0])
 
 
 def _turns(position: Position) -> tuple[Number, ...]:

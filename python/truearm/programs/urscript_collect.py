@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final, NamedTuple
 
 from truearm.programs.environment import Frame
-from truearm.programs.frames import Frames
+from truearm.programs.frames import Frames, written_out
 from truearm.programs.program import Listed
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion
@@ -101,7 +101,7 @@ class Collected:
 
     def installed(self, frames: Frames) -> Frame:
         """The TCP of the installation, which the arm has until the program sets one."""
-        return frames.tool(INSTALLATION if self._tcps or INSTALLATION in frames.tools else TCP)
+        return frames.at_start("tool", INSTALLATION if self._tcps or INSTALLATION in frames.tools else TCP)
 
     def _tool(self, at: int, name: str, frames: Frames) -> Frame:
         node = self._tcps.get(at)
@@ -117,9 +117,8 @@ class Collected:
         """Name of each TCP that is set: its variable, or tcp, or tcp 1, tcp 2 and so on where they differ."""
         written = {at: node for at, node in self._tcps.items() if node is not None and node.kind != "name"}
         texts = {at: self._source.part(node.start, node.end) for at, node in written.items()}
-        different = list(dict.fromkeys(texts.values()))
-        several = len(different) > 1
-        found = {at: f"{TCP} {different.index(text) + 1}" if several else TCP for at, text in texts.items()}
+        names = written_out(TCP, texts.values())
+        found = {at: names[text] for at, text in texts.items()}
         return found | {at: node.text for at, node in self._tcps.items() if node and node.kind == "name"}
 
     def _mass(self, node: Node | None) -> float | None:

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.programs.environment import Transform
 from truearm.programs.layouts import of_joints
 from truearm.programs.program import Program, motion_is_straight
 from truearm.programs.tables import Motion, run_of
@@ -28,6 +29,9 @@ class Uses:
         environment: Number of the environment of each, (t,); -1 where there is none.
         tool: Number of its tool among `tools`, (t,); -1 where there is none.
         tools: Number of an environment with each of the different tools.
+        displaced: Number of what displaces its work object among `displacements`, (t,).
+        displacements: What work objects are displaced by, (4, 4) each; the first is None, for nothing and for
+            joint targets, which no work object moves.
         several: Targets that are used in environments that contradict each other, (t,).
         of_joints: Targets that are joint readings, (t,).
         straight: Targets that a move along a line or an arc goes to, or comes from, (t,).
@@ -39,6 +43,8 @@ class Uses:
     environment: Integers
     tool: Integers
     tools: tuple[int, ...]
+    displaced: Integers
+    displacements: tuple[Transform | None, ...]
     several: Bools
     of_joints: Bools
     straight: Bools
@@ -59,6 +65,7 @@ class Uses:
         tool_of, tools = _tools(program)
         environment, several = _single(moves.environment[real], target, len(targets))
         tool, several_tools = _single(tool_of[moves.environment[real]], target, len(targets))
+        displaced_by, displacements = _displacements(program)
         straight, blended = _along(program, real)
         return cls(
             moved,
@@ -66,6 +73,8 @@ class Uses:
             environment,
             tool,
             tools,
+            np.where(joint_targets, 0, displaced_by[environment]),
+            displacements,
             np.where(joint_targets, several_tools, several),
             joint_targets,
             straight,
@@ -97,6 +106,21 @@ def _tools(program: Program) -> tuple[Integers, tuple[int, ...]]:
             examples.append(place)
         numbers.append(known[key])
     return np.array(numbers, dtype=np.int64), tuple(examples)
+
+
+def _displacements(program: Program) -> tuple[Integers, tuple[Transform | None, ...]]:
+    """For each environment, and for none, the number of what displaces its work object, and these."""
+    known: dict[bytes, int] = {b"": 0}
+    found: list[Transform | None] = [None]
+    numbers = []
+    for environment in program.environments:
+        displacement = environment.displacement
+        key = b"" if displacement is None else displacement.tobytes()
+        if key not in known:
+            known[key] = len(found)
+            found.append(displacement)
+        numbers.append(known[key])
+    return np.array([*numbers, 0], dtype=np.int64), tuple(found)
 
 
 def _single(values: Integers, targets: slice | Integers, count: int) -> tuple[Integers, Bools]:

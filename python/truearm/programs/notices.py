@@ -1,0 +1,99 @@
+"""What is to be known of a rewritten program's load, tools and frames file."""
+
+from typing import Final
+
+import numpy as np
+
+from truearm.calibration import Calibration
+from truearm.errors import Notice, list_names, typed
+from truearm.programs.environment import Frame
+from truearm.programs.frames import Frames, Kind
+from truearm.programs.program import Program
+from truearm.programs.rewriting import Rewritten
+from truearm.programs.tables import Motion
+from truearm.robot import Robot
+
+SAME_PAYLOAD_KG: Final = 0.05
+MEASURED_M: Final = 1e-4
+"""A tool this near to a measured point is that point."""
+IN_WORDS: Final[dict[Kind, str]] = {"tool": "tool", "object": "work object"}
+
+
+def payload_notices(program: Program, robot: Robot) -> list[Notice]:
+    """What differs between the payload that was calibrated with and those that the program states."""
+    stated = sorted({e.payload_kg for e in program.environments if e.payload_kg is not None})
+    if robot.payload is None or not stated:
+        return []
+    calibrated = robot.payload.mass_kg
+    others = [mass for mass in stated if abs(mass - calibrated) > SAME_PAYLOAD_KG]
+    if not others:
+        return []
+    masses = ", ".join(f"{mass:g} kg" for mass in others)
+    return [
+        Notice(
+            "payload",
+            f"the program states a payload of {masses}, the calibration was made with {calibrated:g} kg: "
+            "what the arm yields under the difference is not corrected",
+        )
+    ]
+
+
+def frames_notices(program: Program, frames: Frames) -> list[Notice]:
+    """Entries of the frames file that no tool or work object of the program has the name of."""
+    return [notice for kind in IN_WORDS if (notice := _unasked(program, frames, kind)) is not None]
+
+
+def _unasked(program: Program, frames: Frames, kind: Kind) -> Notice | None:
+    frame_of = "tool" if kind == "tool" else "work_object"
+    had = {getattr(environment, frame_of).name.casefold() for environment in program.environments}
+    initial = {folded: name for folded, name in frames.asked.initial[kind].items() if folded in had}
+    names = frames.asked.names[kind] | initial
+    left = [entry.name for folded, entry in frames.of(kind).items() if folded not in names]
+    if not left:
+        return None
+    noun = IN_WORDS[kind]
+    several = "s" if len(left) > 1 else ""
+    own = f"its {noun}s are {list_names(names.values())} there" if names else f"it asks for no {noun} there"
+    return Notice(
+        "frames",
+        f"{noun}{several} {list_names(left)} of {frames.where} {'change' if several else 'changes'} nothing: "
+        f"the program has none of that name, {own}",
+    )
+
+
+def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
+    """Tools of changed targets of which a calibration of positions alone does not know where they are.
+
+    Positions tell of a point that the flange carries, not of the flange, from which a drawing or a
+    controller measures a tool. A tool taught through the calibration is measured from the same point.
+    """
+    if calibration.selection.orientation:
+        return []
+    doubtful = [tool for tool in _tools_of(done) if not (tool.taught or _is_measured(tool, calibration))]
+    names = list(dict.fromkeys(tool.name for tool in doubtful if tool.name))
+    if not doubtful:
+        return []
+    tools = f"tool{'s' if len(names) > 1 else ''} {list_names(names)}" if names else "the program's tool"
+    name = typed(names[0]) if names else "NAME"
+    return [
+        Notice(
+            "tool",
+            "the calibration knows positions alone, which do not tell where the flange is, and from there "
+            f"{tools} is measured: all targets may be off by more than std_mm says. "
+            f"Teach it again through the calibration: truearm frame CALIB touches.csv --tool {name}",
+        )
+    ]
+
+
+def _tools_of(done: Rewritten) -> list[Frame]:
+    """Tools that motions to changed targets have."""
+    moves = done.program.moves
+    used = (moves.motion != Motion.NONE) & done.changed[moves.target]
+    return [done.program.environments[int(number)].tool for number in np.unique(moves.environment[used])]
+
+
+def _is_measured(tool: Frame, calibration: Calibration) -> bool:
+    """Whether a tool's point is one that was measured, as the calibration found it on the flange."""
+    points = calibration.model.setup.targets.reshape(-1, 3)
+    distances = np.linalg.norm(points - tool.true[:3, 3], axis=1)
+    return not tool.unknown and bool((distances < MEASURED_M).any())
