@@ -1,9 +1,12 @@
 """Waves of gears and encoders: found in measurements, told in summary and report, kept in the file."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.errors import TruearmError
 from truearm.exporting.field_grid import grid_axes, grid_table, grid_text
 from truearm.reporting.facts import Facts
 from truearm.reporting.parts import Figure
@@ -36,6 +39,7 @@ def test_a_wave_is_found_and_taken_away(found):
     (wave,) = waves_of(found)
     assert wave["joints"] == [JOINT]
     assert wave["cycles"] == CYCLES
+    assert wave["amplitudes"]["theta_mrad"] == pytest.approx(1e3 * np.radians(AMPLITUDE_DEG), rel=0.15)
     mean, free = (one.validation.holdout["variable"].position.mean for one in (found, plain))
     assert mean < 1.15 * free, "an arm with a wave is as good as one without"
     assert 0.9 < found.summary["coverage_95"] < 0.99
@@ -82,3 +86,21 @@ def test_corrections_reach_their_targets_where_a_wave_is_steep(found):
     corrected = ta.Compensator(found, limits=limits).joints(q)
     assert corrected.refusals == ()
     assert np.abs(found.pose(corrected.q) - found.robot.pose(q)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("waves", "reason"),
+    [
+        ([2.0, 202.0], "three values a wave"),
+        ([9.0, 202.0, 1e-4], "does not turn"),
+        ([-1.0, 202.0, 1e-4], "joint -1"),
+        ([1.0, 0.0, 1e-4], "no cycles of any drive"),
+        ([1.0, 202.0, float("inf")], "no amplitude"),
+        ([1.0, 202.0, 1e-4] * 200, "more waves than an arm has drives"),
+    ],
+)
+def test_waves_of_no_arm_end_in_an_error(found, waves, reason):
+    forged = dataclasses.replace(found.variable, hyper={**found.variable.hyper, "waves": waves})
+    calibration = dataclasses.replace(found, variable=forged)
+    with pytest.raises(TruearmError, match=reason):
+        calibration.position_std(np.zeros((3, 6)))

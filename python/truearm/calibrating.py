@@ -165,7 +165,8 @@ def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[
         return []
     text = (
         f"The poses determine {rank} of {unknowns} unknowns of frame and target: predictions of the measured "
-        "target are not harmed, but where the base stands in the world is not known."
+        "target are not harmed, but along what is left open neither the base's place in the world nor the "
+        "target's on the flange is known, and corrections for other tools depend on that."
     )
     return [Notice("open_setup", text)]
 

@@ -57,7 +57,8 @@ def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:
     """Name, joints (from 1), features, length scales, amplitudes and number of cells of each block.
 
     Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units; a wave
-    has cycles a turn of its joint instead. Amplitudes are prior standard deviations; a wave's is what it reaches.
+    has cycles a turn of its joint instead. Amplitudes are prior standard deviations; a wave's is what it
+    reaches.
     """
     field, details = calibration.model.field, calibration.variable
     if field is None or details is None:

@@ -11,7 +11,7 @@ use crate::limits::Limits;
 use crate::model::Model;
 use crate::newton::{Plan, Search, toward};
 use crate::refusal::{Reason, Refusal};
-use crate::task::{Task, shift, turn};
+use crate::task::{Task, axis_turn, shift, turn};
 
 /// Steps at most: two or three do for a model that is smooth over the correction, a field takes one or two more.
 const STEPS: usize = 10;
@@ -46,7 +46,8 @@ pub struct Correction {
     pub residual_rad: f64,
     /// Where the programming model puts the tool at the corrected readings, minus its target: base frame, m.
     pub shift: [f64; 3],
-    /// The turn between these two as a rotation vector in the base frame, rad.
+    /// The turn between these two as a rotation vector in the base frame, rad; of the tool's axis alone where the task is
+    /// that.
     pub turn: [f64; 3],
     /// Standard deviation of the tool's position, m; NaN where the model does not know it.
     pub std_m: f64,
@@ -203,7 +204,12 @@ impl Corrector {
             Some(spread) => spread.at::<I>(&self.calibrated, &search.best, alone, &mut search.model),
             None => Lane::splat(f64::NAN),
         };
-        Group { residual, shift: shift(&target, &reached), turn: turn::<I>(&target, &reached), std, target }
+        let turned = if self.plan.task == Task::Axis {
+            axis_turn::<I>(&target, &reached)
+        } else {
+            turn::<I>(&target, &reached)
+        };
+        Group { residual, shift: shift(&target, &reached), turn: turned, std, target }
     }
 
     /// What waypoint `i` of a group found, and whether that may be used.

@@ -61,9 +61,7 @@ impl Goal<5> for AxisGoal {
     #[inline(always)]
     fn error<I: Isa>(frame: &LaneFrame, target: &LaneFrame) -> [Lane; 5] {
         let [x, y, z] = shift(frame, target);
-        let (axis, wanted) = (frame.axis(2), target.axis(2));
-        let cosine = dot::<I>(&axis, &wanted);
-        let turn = halved(lane_cross::<I>(&axis, &wanted), cosine * 2.0 + Lane::splat(2.0));
+        let turn = axis_turn::<I>(frame, target);
         [x, y, z, dot::<I>(&frame.axis(0), &turn), dot::<I>(&frame.axis(1), &turn)]
     }
 
@@ -112,6 +110,14 @@ pub(crate) fn turn<I: Isa>(frame: &LaneFrame, target: &LaneFrame) -> [Lane; 3] {
         *value = *value * 0.5;
     }
     halved(sine, trace + Lane::splat(1.0))
+}
+
+/// The same of the tool's axis alone, whatever the turn about it.
+#[inline(always)]
+pub(crate) fn axis_turn<I: Isa>(frame: &LaneFrame, target: &LaneFrame) -> [Lane; 3] {
+    let (axis, wanted) = (frame.axis(2), target.axis(2));
+    let cosine = dot::<I>(&axis, &wanted);
+    halved(lane_cross::<I>(&axis, &wanted), cosine * 2.0 + Lane::splat(2.0))
 }
 
 /// Axis times twice the tangent of half the angle, from axis times sine and from 2 (1 + cosine).

@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::f64::consts::PI;
+
 use common::{Scene, apart, correct, five_axis, readings, seven_axis, six_axis, unbounded};
 use truearm_compensate::{Options, Task};
 use truearm_kinematics::Transform;
@@ -47,6 +49,28 @@ fn axis_leaves_the_turn_about_the_tool_free() {
         let (a, b) = (axis(&meant), axis(&real));
         assert!((0..3).all(|k| (a[k] - b[k]).abs() < MET), "waypoint {i}: {a:?} {b:?}");
     });
+}
+
+#[test]
+fn a_turn_about_the_tool_that_is_free_does_not_count() {
+    let mut scene = Scene::new(five_axis(), 0.0);
+    let offset = 2.0_f64.to_radians();
+    scene.constants[0] += offset;
+    let norm = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let turned = |task: Task, q: &[f64]| {
+        let corrector = scene.corrector(options(task, None));
+        let correction = corrector.correct(q, &[], &mut [0.0; 5], &mut corrector.workspace());
+        assert!(correction.refusal.is_none(), "{correction:?}");
+        correction.turn
+    };
+    // What the first axis is off is made good by turning about it; what of that is about the tool's axis is free.
+    for lean in 0..12 {
+        let q = [0.3, 0.6, -1.0, 0.4 + f64::from(lean) * PI / 6.0, 0.2];
+        let ([x, y, z], [u, v, w]) = (turned(Task::Pose, &q), axis(&scene.meant(&q)[0]));
+        assert!((norm([x, y, z]) / offset - 1.0).abs() < 1e-3);
+        let across = norm([y * w - z * v, z * u - x * w, x * v - y * u]);
+        assert!((norm(turned(Task::Axis, &q)) - across).abs() < 1e-4 * offset);
+    }
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
 fn waves_from(stored: &[f64]) -> PyResult<Vec<Wave>> {
     let (waves, left) = stored.as_chunks();
     if !left.is_empty() {
-        return Err(PyKeyError::new_err("hyper-parameter 'waves' needs three values a wave"));
+        return Err(CoreError::new_err("hyper-parameter 'waves' needs three values a wave; calibrate again"));
     }
     let wave =
         |&[joint, cycles, amplitude]: &[f64; 3]| Ok(Wave { joint: joint_from(joint)?, cycles, amplitude });
