@@ -30,6 +30,11 @@ TABLES = {
     "separator first": ("sep=,", ["q1,x,y,z", "0,1,2,3"], "is a remark.*--skip-lines 1"),
     "no header": ("0,0,1,2,3", ["0,0,1,2,3"], "first line holds numbers only.*q1,q2"),
     "mixed angles": ("q1_deg,q2,x,y,z", ["0,0,1,2,3"], 'mixed units: column "q1_deg" is in deg, "q2" in SI'),
+    "an angle, or a stroke in m": (
+        "q1_deg,q2,x,y,z",
+        ["0,0,1,2,3"],
+        r'"q2" in SI.*prismatic joint, end its name in _m or _mm, or say which joints .*joints=robot.joints',
+    ),
     "mixed lengths": ("q1,x_mm,y,z_mm", ["0,1,2,3"], 'mixed units: column "x_mm" is in mm, "y" in SI'),
     "mixed lengths of targets": ("q1,x,y,z,x2_mm,y2_mm,z2_mm", ["0,1,2,3,4,5,6"], "mixed units"),
     "NaN": (
