@@ -7,11 +7,71 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.grids import grid_steps
+from truearm.identified import IdentifiedArm
+from truearm.planning import JointSpace, choose, draw_pool
 from truearm.simulation import VirtualArm
 
 
 def notice_of(calibration, kind):
     return next((str(notice) for notice in calibration.notices if notice.kind == kind), "")
+
+
+STEP_DEG = 10.0
+
+
+def on_grid(readings, step_deg=STEP_DEG, offset_deg=3.0, jitter_deg=0.02):
+    """Readings (n, N) moved to the nearest values of a grid that a controller keeps within some jitter."""
+    values = step_deg * np.round(np.degrees(readings) / step_deg) + offset_deg
+    return np.radians(values + np.random.default_rng(0).normal(0.0, jitter_deg, values.shape))
+
+
+@pytest.mark.parametrize("step_deg", [0.5, 1.0, 7.3, 10.0, 45.0])
+@pytest.mark.parametrize("count", [30, 400])
+def test_a_grid_is_found_with_its_step(step_deg, count):
+    readings = np.random.default_rng(1).uniform(-2.8, 2.8, (count, 6))
+    readings[:, :2] = on_grid(readings[:, :2], step_deg)
+    kinds = ["revolute", "prismatic", *["revolute"] * 4]
+    found = grid_steps(readings, kinds)
+    assert list(found) == [1]
+    assert found[1] == pytest.approx(step_deg, rel=1e-3)
+    assert grid_steps(readings[:25], kinds) == {}
+
+
+@pytest.mark.parametrize("decimals", [1, 2, None])
+def test_random_poses_stand_on_no_grid(decimals):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    for count in (30, 300):
+        readings = np.degrees(arm.poses(count))
+        readings = readings if decimals is None else readings.round(decimals)
+        assert grid_steps(np.radians(readings), arm.robot.joints) == {}
+
+
+def test_planned_poses_stand_on_no_grid():
+    robot = ta.Robot.load("ur10")
+    pool = draw_pool(JointSpace(robot), 200)
+    choice = choose(IdentifiedArm(robot), pool.readings, 40)
+    assert grid_steps(pool.readings[choice.rows], robot.joints) == {}
+
+
+def test_joints_that_stand_still_or_are_measured_between_stand_on_no_grid():
+    drawn = np.random.default_rng(1).uniform(-2.8, 2.8, (100, 3))
+    readings = on_grid(drawn)
+    readings[:5, 0] = drawn[:5, 0]
+    readings[10:, 1] = 0.3
+    readings[:, 2] = np.radians(np.array([-70.3, -11.2, 33.9, 61.4])[np.arange(100) % 4])
+    assert grid_steps(readings, ["revolute"] * 3) == {}
+
+
+def test_a_grid_is_told_with_the_way_out():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    readings = arm.poses(90)
+    assert not notice_of(ta.calibrate(arm.robot, arm.measure(readings), model="constant"), "on_a_grid")
+    readings[:, 1:3] = on_grid(readings[:, 1:3])
+    told = notice_of(ta.calibrate(arm.robot, arm.measure(readings), model="constant"), "on_a_grid")
+    assert "joints 2 and 3 on a grid of 10 deg" in told
+    assert "20 to 30 poses between" in told
+    assert "truearm evaluate" in told
 
 
 def test_points_of_other_rows_are_doubted():

@@ -11,7 +11,7 @@ from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.doubts import doubts, mounting
+from truearm.doubts import doubts, mounting, on_a_grid
 from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
@@ -69,6 +69,7 @@ def calibrate(
     robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given = given.deduplicated()
+    notices += on_a_grid(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))

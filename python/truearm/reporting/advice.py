@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import count_of
+from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
@@ -93,6 +94,8 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     floor, mean = distance_at_floor_mm(facts), facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
+        if facts.grids:
+            return
         words = (
             f"The mean error is {left} mm, and noise alone would leave {noise} mm. More poses will hardly "
             "help: what is left is noise of the measuring device and what the arm does not repeat."
@@ -105,6 +108,15 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         "training poses leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
+
+
+def _on_a_grid(facts: Facts) -> Iterator[Advice]:
+    if facts.grids:
+        words = (
+            f"The measured poses have {facts.grids}: neither the calibration nor the errors "
+            f"above know of what varies within a step. {BETWEEN}."
+        )
+        yield Advice("between_the_grid", "Measure between the grid's values.", words, facts.mean_mm())
 
 
 def _tail(facts: Facts) -> Iterator[Advice]:
@@ -207,5 +219,14 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
         yield Advice("constant_suffices", "Constant parameters do as well.", words, 0.2 * mean)
 
 
-RULES: Final = (_outliers, _noise_or_poses, _tail, _unseen, _few_held, _intervals, _what_varies)
+RULES: Final = (
+    _outliers,
+    _on_a_grid,
+    _noise_or_poses,
+    _tail,
+    _unseen,
+    _few_held,
+    _intervals,
+    _what_varies,
+)
 RULES_OF_UPDATES: Final = (_no_longer_fits, _left_out, _unseen, _few_held)
