@@ -1,12 +1,14 @@
 """What cannot be true is said: rows that do not belong together, other robots, too few rows, wrong types."""
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.conventions import Convention
 from truearm.grids import grid_steps
 from truearm.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
@@ -83,6 +85,50 @@ def test_points_of_other_rows_are_doubted():
     table[points] = np.roll(table[points].to_numpy(), 1, axis=0)
     shifted = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
     assert "row by row" in notice_of(shifted, "no_help")
+
+
+def measured_otherwise(name, turned=(), coupled=None, mirrored=False):
+    """An arm whose controller counts joints otherwise than its file says, and what is measured of it."""
+    robot = ta.Robot.load(name)
+    own = Convention(turned, coupled, mirrored).robot(robot)
+    arm = VirtualArm(own, seed=4)
+    table = arm.measure_table(arm.poses(60))
+    table["y"] *= -1.0 if mirrored else 1.0
+    return robot, ta.Measurements.from_dataframe(table, joints=robot.joints)
+
+
+@pytest.mark.parametrize(
+    ("name", "otherwise", "words"),
+    [
+        ("ur10", {"turned": (0,)}, "if joint 1 is counted the other way (direction = -1 in its link). Put"),
+        ("kuka-kr-6-r900", {"turned": (0,)}, "joint 1 is counted the other way (direction = 1 in its link)"),
+        ("ur10", {"turned": (2, 4)}, "joint 3 is counted the other way .*, and joint 5 is counted the other"),
+        ("ur10", {"mirrored": True}, "if the device's frame is left-handed"),
+        (
+            "fanuc-lr-mate-200id",
+            {"coupled": 0.0},
+            r"joint 3 is counted against link 2 .* is [0, 0, 1, 0, 0, 0])",
+        ),
+        ("ur10", {"coupled": 1.0}, "joint 3 is counted against the horizontal .* is [0, 1, 1, 0, 0, 0])"),
+    ],
+)
+def test_what_the_controller_counts_otherwise_is_named(name, otherwise, words):
+    found = ta.calibrate(*measured_otherwise(name, **otherwise), model="constant", refit=False)
+    checks = notice_of(found, "no_help")
+    assert "direction = -1" in checks
+    assert "[coupling]" in checks
+    said = notice_of(found, "fits_otherwise")
+    assert re.search(re.escape(words).replace(r"\.\*", ".*"), said), said
+
+
+def test_nothing_is_named_where_no_convention_fits():
+    robot, data = measured_otherwise("ur10")
+    assert not notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
+    points = np.random.default_rng(0).permutation(len(data))
+    mixed = replace(data, targets=data.targets[points])
+    found = ta.calibrate(robot, mixed, model="constant", refit=False)
+    assert notice_of(found, "no_help")
+    assert not notice_of(found, "fits_otherwise")
 
 
 def test_another_robot_is_doubted():

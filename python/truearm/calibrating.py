@@ -9,9 +9,10 @@ import numpy as np
 
 from truearm import kinds
 from truearm.calibration import Calibration
+from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.doubts import doubts, mounting, on_a_grid
+from truearm.doubts import NO_HELP, doubts, mounting, on_a_grid
 from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
@@ -101,6 +102,9 @@ def calibrate(
         fitted_spread=_fitted_spread(task, final, variable),
     )
     doubted = doubts(task.arm, found.models, validation, found.model_name)
+    if any(notice.kind == NO_HELP for notice in doubted):
+        with stages("trying other conventions"):
+            doubted += fits_otherwise(task, given)
     return replace(found, notices=(*found.notices, *doubted))
 
 

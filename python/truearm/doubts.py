@@ -31,7 +31,8 @@ NO_HELP: Final = "no_help"
 ON_A_GRID: Final = "on_a_grid"
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
-    "frame that is right-handed, and the robot"
+    "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1) and "
+    "whether joint 3 is counted against link 2 or against the horizontal ([coupling])"
 )
 
 
