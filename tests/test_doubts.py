@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from truearm.grids import grid_steps
 from truearm.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
 from truearm.simulation import VirtualArm
+from truearm.turning_sense import check_turns
 
 
 def notice_of(calibration, kind):
@@ -196,6 +198,8 @@ def with_quaternions(table, quaternions):
     ("order", "sense", "words"),
     [
         ([1, 2, 3, 0], 1.0, "hold x y z w, where qw qx qy qz are named"),
+        ([3, 0, 1, 2], 1.0, "hold z w x y, where qw qx qy qz are named"),
+        ([2, 3, 0, 1], -1.0, "hold y z w x, where .* and turn the other way"),
         ([0, 1, 2, 3], -1.0, "turn the other way: target_from_world"),
         ([1, 2, 3, 0], -1.0, "x y z w, where .* and turn the other way"),
     ],
@@ -212,6 +216,19 @@ def test_quaternions_in_another_order_or_sense_are_refused(order, sense, words):
     assert calibration.validation.holdout["constant"].position.mean < 1.0
     with pytest.raises(ta.InputError, match=words):
         ta.evaluate(ta.calibrate(robot, good, model="constant"), wrong)
+
+
+def test_every_order_of_a_quaternion_is_recognised():
+    robot, table = posed()
+    found = table[QUATERNION].to_numpy()
+    check_turns(with_quaternions(table, found), robot)
+    for order, sense in list(product(permutations(range(4)), (1.0, -1.0)))[1:]:
+        wrong = with_quaternions(table, (found * [1.0, sense, sense, sense])[:, order])
+        said = " ".join("wxyz"[part] for part in order)
+        told = "they turn" if order == (0, 1, 2, 3) else f"hold {said}, where qw qx qy qz are named"
+        with pytest.raises(ta.InputError, match=told) as caught:
+            check_turns(wrong, robot)
+        assert ("turn the other way" in str(caught.value)) == (sense < 0.0)
 
 
 def test_orientations_in_an_unknown_convention_are_doubted():
