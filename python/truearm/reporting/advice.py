@@ -19,7 +19,6 @@ AT_THE_FLOOR: Final = 1.25
 """A mean error within so many times what noise alone leaves has reached it."""
 LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
-FEW_HELD: Final = 30
 COVERED: Final = 0.88
 SAME: Final = 0.97
 ROWS_NAMED: Final = 5
@@ -180,12 +179,10 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
-    held = facts.calibration.validation.n_holdout
-    if held < FEW_HELD and facts.update is not None:
-        words = f"The errors above come from {count_of(held, 'pose')}: truearm evaluate judges it on others."
+    words = facts.calibration.validation.few
+    if words and facts.update is not None:
         yield Advice("few_held_out", "Judge it on more poses.", words, 0.5 * facts.mean_mm())
-    elif held < FEW_HELD:
-        words = f"The errors above come from {facts.poses_judged}: another split would give others."
+    elif words:
         yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * facts.mean_mm())
 
 

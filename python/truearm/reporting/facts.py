@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from truearm._core import Field
 from truearm.calibration import Calibration
 from truearm.doubts import ON_A_GRID
-from truearm.errors import count_of
 from truearm.evaluation import Evaluation
 from truearm.grids import grid_steps, grid_words
 from truearm.held_rows import HeldRows
@@ -66,7 +65,7 @@ class Facts:
     @property
     def poses_judged(self) -> str:
         """How many they are: "832 held-out poses"."""
-        return count_of(self.calibration.validation.n_holdout, f"{self.judged} pose")
+        return self.calibration.validation.poses_judged
 
     @property
     def error(self) -> str:
