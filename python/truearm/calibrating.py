@@ -104,7 +104,7 @@ def calibrate(
     doubted = doubts(task.arm, found.models, validation, found.model_name)
     if any(notice.kind == NO_HELP for notice in doubted):
         with stages("trying other conventions"):
-            doubted += fits_otherwise(task, given)
+            doubted[1:1] = fits_otherwise(task, given)
     return replace(found, notices=(*found.notices, *doubted))
 
 

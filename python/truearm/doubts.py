@@ -69,7 +69,7 @@ def on_a_grid(robot: Robot, readings: Floats) -> list[Notice]:
     if not steps:
         return []
     text = (
-        f"The readings stand on a grid: {grid_words(steps)}. Errors that vary within a step, as gears leave "
+        f"The measured poses have {grid_words(steps)}. Errors that vary within a step, as gears leave "
         "them, are not seen there, and held-out poses on the same grid do not show them: between its values "
         f"the arm may be further off than the errors say. {BETWEEN}."
     )
