@@ -14,6 +14,7 @@ import pytest
 
 import truearm as ta
 from truearm.cli import main
+from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
 PROGRAM = str(Path(sys.executable).parent / "truearm")
@@ -66,10 +67,16 @@ def test_planned_poses_are_held_out_and_a_stated_share_comes_first(folder, capsy
     assert main(words) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "judged on 10 others, planned to validate (--holdout draws others)" in printed
+    few = "The errors above come from 10 held-out poses: another split would give others."
+    assert few in printed
+    told = report(ta.Calibration.load("planned/calibration.calib")).advice
+    assert [advice.words for advice in told if advice.kind == "few_held_out"] == [few]
     assert json.loads(Path("planned/summary.json").read_text())["n_planned"] == 10
     assert ta.Calibration.load("planned/calibration.calib").validation.n_planned == 10
     assert main([*words, "--holdout", "0.3"]) == 0
     assert "judged on 24 others." in capsys.readouterr().out
+    assert main([*words, "--holdout", "0.4"]) == 0
+    assert "another split" not in capsys.readouterr().out
 
 
 def test_the_summary_on_disk_and_on_stdout_is_one(folder):

@@ -19,6 +19,7 @@ from pathlib import Path
 import pytest
 
 import truearm as ta
+from truearm import validation
 from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.schema import checked
@@ -210,8 +211,8 @@ def test_the_report_page_has_the_rules_of_the_report():
         f"at most {advice.AT_THE_FLOOR:g} times what noise alone would leave",
         f"more than {advice.LONG_TAIL:g} times the mean",
         f"more than {certainty.STANDS_OUT:g} times its median",
-        f"fewer than {advice.FEW_HELD} were",
-        f"fewer than {advice.FEW_HELD} |",
+        f"fewer than {validation.FEW_HELD} were",
+        f"fewer than {validation.FEW_HELD} |",
         f"less than {advice.COVERED:.0%}".replace("%", " %"),
         f"by less than {1.0 - advice.SAME:.0%}".replace("%", " %"),
         f"more than {gravity.STANDS_OUT:g} times what horizontal ones do",

@@ -1,17 +1,81 @@
 """What cannot be true is said: rows that do not belong together, other robots, too few rows, wrong types."""
 
 import re
+from dataclasses import replace
+from itertools import permutations, product
 from typing import Any
 
 import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.conventions import Convention
+from truearm.grids import grid_steps
+from truearm.identified import IdentifiedArm
+from truearm.planning import JointSpace, choose, draw_pool
 from truearm.simulation import VirtualArm
+from truearm.turning_sense import check_turns
 
 
 def notice_of(calibration, kind):
     return next((str(notice) for notice in calibration.notices if notice.kind == kind), "")
+
+
+STEP_DEG = 10.0
+
+
+def on_grid(readings, step_deg=STEP_DEG, offset_deg=3.0, jitter_deg=0.02):
+    """Readings (n, N) moved to the nearest values of a grid that a controller keeps within some jitter."""
+    values = step_deg * np.round(np.degrees(readings) / step_deg) + offset_deg
+    return np.radians(values + np.random.default_rng(0).normal(0.0, jitter_deg, values.shape))
+
+
+@pytest.mark.parametrize("step_deg", [0.5, 1.0, 7.3, 10.0, 45.0])
+@pytest.mark.parametrize("count", [30, 400])
+def test_a_grid_is_found_with_its_step(step_deg, count):
+    readings = np.random.default_rng(1).uniform(-2.8, 2.8, (count, 6))
+    readings[:, :2] = on_grid(readings[:, :2], step_deg)
+    kinds = ["revolute", "prismatic", *["revolute"] * 4]
+    found = grid_steps(readings, kinds)
+    assert list(found) == [1]
+    assert found[1] == pytest.approx(step_deg, rel=1e-3)
+    assert grid_steps(readings[:25], kinds) == {}
+
+
+@pytest.mark.parametrize("decimals", [1, 2, None])
+def test_random_poses_stand_on_no_grid(decimals):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    for count in (30, 300):
+        readings = np.degrees(arm.poses(count))
+        readings = readings if decimals is None else readings.round(decimals)
+        assert grid_steps(np.radians(readings), arm.robot.joints) == {}
+
+
+def test_planned_poses_stand_on_no_grid():
+    robot = ta.Robot.load("ur10")
+    pool = draw_pool(JointSpace(robot), 200)
+    choice = choose(IdentifiedArm(robot), pool.readings, 40)
+    assert grid_steps(pool.readings[choice.rows], robot.joints) == {}
+
+
+def test_joints_that_stand_still_or_are_measured_between_stand_on_no_grid():
+    drawn = np.random.default_rng(1).uniform(-2.8, 2.8, (100, 3))
+    readings = on_grid(drawn)
+    readings[:5, 0] = drawn[:5, 0]
+    readings[10:, 1] = 0.3
+    readings[:, 2] = np.radians(np.array([-70.3, -11.2, 33.9, 61.4])[np.arange(100) % 4])
+    assert grid_steps(readings, ["revolute"] * 3) == {}
+
+
+def test_a_grid_is_told_with_the_way_out():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    readings = arm.poses(90)
+    assert not notice_of(ta.calibrate(arm.robot, arm.measure(readings), model="constant"), "on_a_grid")
+    readings[:, 1:3] = on_grid(readings[:, 1:3])
+    told = notice_of(ta.calibrate(arm.robot, arm.measure(readings), model="constant"), "on_a_grid")
+    assert "joints 2 and 3 on a grid of 10 deg" in told
+    assert "20 to 30 poses between" in told
+    assert "truearm evaluate" in told
 
 
 def test_points_of_other_rows_are_doubted():
@@ -23,6 +87,50 @@ def test_points_of_other_rows_are_doubted():
     table[points] = np.roll(table[points].to_numpy(), 1, axis=0)
     shifted = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
     assert "row by row" in notice_of(shifted, "no_help")
+
+
+def measured_otherwise(name, turned=(), coupled=None, mirrored=False):
+    """An arm whose controller counts joints otherwise than its file says, and what is measured of it."""
+    robot = ta.Robot.load(name)
+    own = Convention(turned, coupled, mirrored).robot(robot)
+    arm = VirtualArm(own, seed=4)
+    table = arm.measure_table(arm.poses(60))
+    table["y"] *= -1.0 if mirrored else 1.0
+    return robot, ta.Measurements.from_dataframe(table, joints=robot.joints)
+
+
+@pytest.mark.parametrize(
+    ("name", "otherwise", "words"),
+    [
+        ("ur10", {"turned": (0,)}, "if joint 1 is counted the other way (direction = -1 in its link). Put"),
+        ("kuka-kr-6-r900", {"turned": (0,)}, "joint 1 is counted the other way (direction = 1 in its link)"),
+        ("ur10", {"turned": (2, 4)}, "joint 3 is counted the other way .*, and joint 5 is counted the other"),
+        ("ur10", {"mirrored": True}, "if the device's frame is left-handed"),
+        (
+            "fanuc-lr-mate-200id",
+            {"coupled": 0.0},
+            r"joint 3 is counted against link 2 .* is [0, 0, 1, 0, 0, 0])",
+        ),
+        ("ur10", {"coupled": 1.0}, "joint 3 is counted against the horizontal .* is [0, 1, 1, 0, 0, 0])"),
+    ],
+)
+def test_what_the_controller_counts_otherwise_is_named(name, otherwise, words):
+    found = ta.calibrate(*measured_otherwise(name, **otherwise), model="constant", refit=False)
+    checks = notice_of(found, "no_help")
+    assert "direction = -1" in checks
+    assert "[coupling]" in checks
+    said = notice_of(found, "fits_otherwise")
+    assert re.search(re.escape(words).replace(r"\.\*", ".*"), said), said
+
+
+def test_nothing_is_named_where_no_convention_fits():
+    robot, data = measured_otherwise("ur10")
+    assert not notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
+    points = np.random.default_rng(0).permutation(len(data))
+    mixed = replace(data, targets=data.targets[points])
+    found = ta.calibrate(robot, mixed, model="constant", refit=False)
+    assert notice_of(found, "no_help")
+    assert not notice_of(found, "fits_otherwise")
 
 
 def test_another_robot_is_doubted():
@@ -90,6 +198,8 @@ def with_quaternions(table, quaternions):
     ("order", "sense", "words"),
     [
         ([1, 2, 3, 0], 1.0, "hold x y z w, where qw qx qy qz are named"),
+        ([3, 0, 1, 2], 1.0, "hold z w x y, where qw qx qy qz are named"),
+        ([2, 3, 0, 1], -1.0, "hold y z w x, where .* and turn the other way"),
         ([0, 1, 2, 3], -1.0, "turn the other way: target_from_world"),
         ([1, 2, 3, 0], -1.0, "x y z w, where .* and turn the other way"),
     ],
@@ -106,6 +216,19 @@ def test_quaternions_in_another_order_or_sense_are_refused(order, sense, words):
     assert calibration.validation.holdout["constant"].position.mean < 1.0
     with pytest.raises(ta.InputError, match=words):
         ta.evaluate(ta.calibrate(robot, good, model="constant"), wrong)
+
+
+def test_every_order_of_a_quaternion_is_recognised():
+    robot, table = posed()
+    found = table[QUATERNION].to_numpy()
+    check_turns(with_quaternions(table, found), robot)
+    for order, sense in list(product(permutations(range(4)), (1.0, -1.0)))[1:]:
+        wrong = with_quaternions(table, (found * [1.0, sense, sense, sense])[:, order])
+        said = " ".join("wxyz"[part] for part in order)
+        told = "they turn" if order == (0, 1, 2, 3) else f"hold {said}, where qw qx qy qz are named"
+        with pytest.raises(ta.InputError, match=told) as caught:
+            check_turns(wrong, robot)
+        assert ("turn the other way" in str(caught.value)) == (sense < 0.0)
 
 
 def test_orientations_in_an_unknown_convention_are_doubted():

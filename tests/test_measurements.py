@@ -71,6 +71,30 @@ def test_units_by_option(tmp_path: Path) -> None:
     assert data.joint_units == ("deg", "mm")
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "unit"), [("q2", 0.2, ""), ("q2_m", 0.2, "m"), ("q2_mm", 200.0, "mm")]
+)
+def test_a_prismatic_joint_has_a_unit_of_its_own(tmp_path: Path, name: str, value: float, unit: str) -> None:
+    kinds, header = ("revolute", "prismatic", "revolute"), f"q1_deg,q3_deg,x,y,z,{name}"
+    data = read(tmp_path, header, [f"90,45,1,2,3,{value}"], joints=kinds)
+    frame = pd.DataFrame([[90.0, 45.0, 1.0, 2.0, 3.0, value]], columns=header.split(","))
+    for found in (data, Measurements.from_dataframe(frame, joints=kinds)):
+        np.testing.assert_allclose(found.readings, [[np.pi / 2, 0.2, np.pi / 4]])
+        assert found.joint_units == ("deg", unit, "deg")
+    with pytest.raises(InputError, match='column "q1_deg" is in deg, "q3" in SI'):
+        read(tmp_path, f"q1_deg,q3,x,y,z,{name}", [f"90,0.7,1,2,3,{value}"], joints=kinds)
+    with pytest.raises(InputError, match="The robot has 2 joints"):
+        Measurements.from_dataframe(frame, joints=kinds[:2])
+
+
+def test_options_say_the_units_of_the_columns_that_name_none(tmp_path: Path) -> None:
+    kinds, rows = ("revolute", "revolute", "prismatic"), ["90,45,200,1,2,3"]
+    units = {"angle_unit": "deg", "length_unit": "mm", "joints": kinds}
+    data = read(tmp_path, "q1_deg,q2,q3,x_mm,y_mm,z_mm", rows, **units)
+    np.testing.assert_allclose(data.readings, [[np.pi / 2, np.pi / 4, 0.2]])
+    assert data.joint_units == ("deg", "deg", "mm")
+
+
 def test_several_targets_and_missing_ones(tmp_path: Path) -> None:
     data = read(tmp_path, "q1,x,y,z,x2,y2,z2", ["0,1,2,3,4,5,6", "1,,,,7,8,9", "2,1,1,1,,,"])
     assert data.target_count == 2

@@ -30,6 +30,11 @@ TABLES = {
     "separator first": ("sep=,", ["q1,x,y,z", "0,1,2,3"], "is a remark.*--skip-lines 1"),
     "no header": ("0,0,1,2,3", ["0,0,1,2,3"], "first line holds numbers only.*q1,q2"),
     "mixed angles": ("q1_deg,q2,x,y,z", ["0,0,1,2,3"], 'mixed units: column "q1_deg" is in deg, "q2" in SI'),
+    "an angle, or a stroke in m": (
+        "q1_deg,q2,x,y,z",
+        ["0,0,1,2,3"],
+        r'"q2" in SI.*prismatic joint, end its name in _m or _mm, or say which joints .*joints=robot.joints',
+    ),
     "mixed lengths": ("q1,x_mm,y,z_mm", ["0,1,2,3"], 'mixed units: column "x_mm" is in mm, "y" in SI'),
     "mixed lengths of targets": ("q1,x,y,z,x2_mm,y2_mm,z2_mm", ["0,1,2,3,4,5,6"], "mixed units"),
     "NaN": (
@@ -95,8 +100,19 @@ CONTENTS = {
     "web page": (b"<!DOCTYPE html><html>", "an HTML page, not CSV"),
     "URDF": (b"<?xml version='1.0'?><robot/>", "XML, not CSV"),
     "JSON": (b'{"q1": 0}', "JSON, not CSV"),
-    "UTF-16": ("q1,x".encode("utf-16"), "UTF-16 text. Save it as UTF-8"),
-    "Latin-1": (b"q1,x,y,z,\xb0C\n1,2,3,4,5", "line 1 holds bytes that are not UTF-8"),
+    "UTF-16": (
+        "q1,x".encode("utf-16"),
+        "UTF-16 text. Save it as UTF-8, or .*import .*csv --encoding utf-16.$",
+    ),
+    "Latin-1": (
+        b"q1,x,y,z,\xb0C\n1,2,3,4,5",
+        "line 1 holds bytes that are not UTF-8. Save .* truearm import .*data.csv -o .* --encoding cp1252.$",
+    ),
+    "Latin-1 with semicolons": (
+        b"q1 [\xb0];x;y;z\n0;1,5;2;3\n",
+        'import .*data.csv -o measurements.csv --encoding cp1252 --delimiter ";" --decimal ",".$',
+    ),
+    "other bytes": (b"\xb0\xb1\xb2\n\xb3", "line 1 holds bytes that are not UTF-8. Save it as UTF-8.$"),
     "semicolons": (
         b"q1;x;y;z\n0;1,5;2;3\n",
         'by semicolons.*truearm import .* --delimiter ";"',

@@ -52,6 +52,16 @@ def test_millimetres_read_as_metres(name: str) -> None:
         check_against(data, robot)
 
 
+def test_millimetres_of_a_stroke_read_as_metres() -> None:
+    robot = Robot.load("adept-cobra-600")
+    frame = table(robot, readings(robot))
+    frame["q3"] *= 1000.0
+    with pytest.raises(InputError, match=r"q3_mm.*give --length-unit mm, or name the columns: q3_mm"):
+        check_against(Measurements.from_dataframe(frame, joints=robot.joints), robot)
+    named = Measurements.from_dataframe(frame.rename(columns={"q3": "q3_mm"}), joints=robot.joints)
+    assert check_against(named, robot) == []
+
+
 @pytest.mark.parametrize("name", library_names())
 def test_metres_read_as_millimetres(name: str) -> None:
     robot = Robot.load(name)

@@ -216,6 +216,17 @@ def test_advice_follows_from_the_data(calibrations, reports):
     assert "row 5" in found.advice[0].words
 
 
+@pytest.mark.parametrize(("step_deg", "wanted"), [(10.0, "between_the_grid"), (0.01, "noise_floor")])
+def test_on_a_grid_the_noise_floor_is_not_said_to_be_reached(step_deg, wanted):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(share=0.0, noise_mm=0.05))
+    readings = np.radians(step_deg * np.round(np.degrees(arm.poses(150)) / step_deg))
+    found = ta.calibrate(arm.robot, arm.measure(readings), use="position", refit=False)
+    for calibration in (found, found.without_rows()):
+        told = {advice.kind: advice.words for advice in report(calibration).advice}
+        assert set(told) & {"between_the_grid", "noise_floor"} == {wanted}
+        assert ("truearm evaluate" in told[wanted]) == (wanted == "between_the_grid")
+
+
 def test_the_report_of_an_update_says_what_was_judged_how():
     arm = VirtualArm.paper(seed=2)
     old = small_calibration("constant")

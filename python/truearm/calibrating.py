@@ -9,9 +9,10 @@ import numpy as np
 
 from truearm import kinds
 from truearm.calibration import Calibration
+from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.doubts import doubts, mounting
+from truearm.doubts import NO_HELP, doubts, mounting, on_a_grid
 from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
@@ -69,6 +70,7 @@ def calibrate(
     robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given = given.deduplicated()
+    notices += on_a_grid(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))
@@ -100,6 +102,9 @@ def calibrate(
         fitted_spread=_fitted_spread(task, final, variable),
     )
     doubted = doubts(task.arm, found.models, validation, found.model_name)
+    if any(notice.kind == NO_HELP for notice in doubted):
+        with stages("trying other conventions"):
+            doubted[1:1] = fits_otherwise(task, given)
     return replace(found, notices=(*found.notices, *doubted))
 
 

@@ -18,6 +18,11 @@ AXES: Final = "xyz"
 PURPOSE: Final = "purpose"
 VALIDATE: Final = "validate"
 """In the column "purpose": a pose that was planned to judge by, not to fit to."""
+ONE_UNIT: Final = "Convert them to one unit, and end all names in it"
+OF_A_LENGTH: Final = (
+    f"{ONE_UNIT}; if one is of a prismatic joint, end its name in _m or _mm, or say which joints there are "
+    "(joints=robot.joints)"
+)
 K = TypeVar("K")
 
 
@@ -120,8 +125,10 @@ class _Finder:
                     f"q{number}", f'Joint column "q{number}" is missing before "q{max(found)}"'
                 )
         columns = [found[number] for number in sorted(found)]
-        self._same_unit([column for column in columns if column.unit not in LENGTH_UNITS])
-        return [self._with_stated(index, column) for index, column in enumerate(columns)]
+        columns = [self._with_stated(index, column) for index, column in enumerate(columns)]
+        angles = [column for index, column in enumerate(columns) if not self._is_length(index, column)]
+        self._same_unit(angles, OF_A_LENGTH if self.stated.joints is None else ONE_UNIT)
+        return columns
 
     def targets(self) -> list[tuple[Column, Column, Column]]:
         found: dict[tuple[int, str], Column] = {}
@@ -133,7 +140,7 @@ class _Finder:
             if (number, axis) not in found:
                 name = axis if number == 1 else f"{axis}{number}"
                 raise self.missing(name, f'Column "{name}" is missing')
-        self._same_unit(list(found.values()))
+        self._same_unit(list(found.values()), ONE_UNIT)
         numbers = sorted({number for number, _ in found})
         if numbers != list(range(1, len(numbers) + 1)):
             raise self.missing("x", f"Target {numbers[-1]} is there without the targets before it")
@@ -176,7 +183,7 @@ class _Finder:
         found[key] = column
         self.used.add(column.name)
 
-    def _same_unit(self, columns: Sequence[Column]) -> None:
+    def _same_unit(self, columns: Sequence[Column], way_out: str) -> None:
         for column in columns[1:]:
             if column.unit != columns[0].unit:
                 raise InputError(
@@ -184,14 +191,19 @@ class _Finder:
                     f'"{column.name}" in {_unit_in_words(column)}',
                     where=self.where,
                     rule="Columns of the same kind must be in the same unit",
+                    way_out=way_out,
                 )
 
-    def _with_stated(self, index: int, column: Column) -> Column:
+    def _is_length(self, index: int, column: Column) -> bool:
+        """Whether a joint's column is of a length, by its unit or, where joints are known, by their kind."""
         kinds = self.stated.joints
-        is_length = column.unit in LENGTH_UNITS or (
-            not column.unit and kinds is not None and index < len(kinds) and kinds[index] == "prismatic"
+        prismatic = kinds is not None and index < len(kinds) and kinds[index] == "prismatic"
+        return column.unit in LENGTH_UNITS or prismatic
+
+    def _with_stated(self, index: int, column: Column) -> Column:
+        return self._stated(
+            column, self.stated.length if self._is_length(index, column) else self.stated.angle
         )
-        return self._stated(column, self.stated.length if is_length else self.stated.angle)
 
     def _length(self, column: Column) -> Column:
         column = self._stated(column, self.stated.length)

@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from truearm.details import VariableDetails
 from truearm.errors import Notice
+from truearm.grids import BETWEEN, grid_steps, grid_words
 from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
+from truearm.robot import Robot
 from truearm.units import to_si
 from truearm.validation import Validation
 
@@ -26,9 +28,11 @@ LARGE_MRAD: Final = 50.0
 MOST_NAMED: Final = 4
 UPRIGHT: Final = (0.0, 0.0, 1.0)
 NO_HELP: Final = "no_help"
+ON_A_GRID: Final = "on_a_grid"
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
-    "frame that is right-handed, and the robot"
+    "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1) and "
+    "whether joint 3 is counted against link 2 or against the horizontal ([coupling])"
 )
 
 
@@ -57,6 +61,19 @@ def mounting(variable: VariableDetails | None) -> list[Notice]:
         "look like that, and nothing needs to be done."
     )
     return [Notice("mounting", text)]
+
+
+def on_a_grid(robot: Robot, readings: Floats) -> list[Notice]:
+    """A warning where joint readings (n, N) stand on a grid, which hides what varies between its values."""
+    steps = grid_steps(readings, robot.joints)
+    if not steps:
+        return []
+    text = (
+        f"The measured poses have {grid_words(steps)}. Errors that vary within a step, as gears leave "
+        "them, are not seen there, and held-out poses on the same grid do not show them: between its values "
+        f"the arm may be further off than the errors say. {BETWEEN}."
+    )
+    return [Notice(ON_A_GRID, text)]
 
 
 def helps(before_mm: float, after_mm: float) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 
 from truearm.errors import InputError, UsageError
 
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _SIGNATURES = (
     (b"PK\x03\x04", "a ZIP archive, such as an Excel workbook"),
     (b"\xd0\xcf\x11\xe0", "an old Office document"),
@@ -53,7 +54,7 @@ def decode_text(content: bytes, *, where: str, way_out: str = "Save it as UTF-8"
     for signature, kind in _SIGNATURES:
         if content.startswith(signature):
             raise InputError(f"this is {kind}, not text", where=where, way_out="Export it as text")
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if content.startswith(UTF_16):
         raise InputError("this is UTF-16 text", where=where, way_out=way_out)
     if b"\x00" in content:
         raise InputError("this is binary data, not text", where=where)

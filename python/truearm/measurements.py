@@ -209,6 +209,7 @@ class Measurements:
         name: str = "data",
         length_unit: str | None = None,
         angle_unit: str | None = None,
+        joints: Sequence[str] | None = None,
     ) -> "Measurements":
         """Measurements from a DataFrame with the columns of a measurement file.
 
@@ -217,6 +218,7 @@ class Measurements:
             name: Stands for the file in messages, and names the group where there is no such column.
             length_unit: As for read_csv.
             angle_unit: As for read_csv.
+            joints: As for read_csv.
 
         Raises:
             InputError: If columns are missing or values break a rule.
@@ -224,8 +226,10 @@ class Measurements:
         required(frame, pd.DataFrame, "the table")
         if len(frame) == 0:
             raise InputError("there are no data rows", where=name)
-        stated = StatedUnits(length_unit, angle_unit)
-        return cls(**read_fields(table_from_frame(frame, where=name), stated, default_group=name))
+        stated = StatedUnits(length_unit, angle_unit, joints)
+        read = cls(**read_fields(table_from_frame(frame, where=name), stated, default_group=name))
+        read.require_joint_count(None if joints is None else len(joints))
+        return read
 
     @staticmethod
     def concatenate(parts: Sequence["Measurements"]) -> "Measurements":

@@ -47,11 +47,13 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
         What the user should know: joints outside their limits.
 
     Raises:
-        InputError: If the number or kind of joints differs, or degrees were read as radians.
+        InputError: If the number or kind of joints differs, degrees were read as radians, or millimetres of a
+            prismatic joint as metres.
     """
     measurements.require_joint_count(robot.joint_count)
     _check_kinds(measurements, robot)
     _check_degrees(measurements, robot)
+    _check_strokes(measurements, robot)
     return _limit_notices(measurements, robot)
 
 
@@ -89,6 +91,23 @@ def _check_degrees(measurements: Measurements, robot: Robot) -> None:
             where=", ".join(measurements.files),
             rule="Revolute joints are in radians unless their columns say so (q1_deg)",
             way_out="If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ...",
+        )
+
+
+def _check_strokes(measurements: Measurements, robot: Robot) -> None:
+    prismatic = np.array([kind == "prismatic" for kind in robot.joints])
+    unstated = prismatic & (np.array(measurements.joint_units) == "")
+    readings = measurements.readings
+    outside = (_outside(readings, robot.limits) & unstated).any(axis=1)
+    as_millimetres = np.where(unstated, readings / MM_PER_METRE, readings)
+    if outside.mean() > 0.5 and not (_outside(as_millimetres, robot.limits) & unstated).any():
+        columns = ", ".join(f"q{joint + 1}_mm" for joint in np.flatnonzero(unstated))
+        raise InputError(
+            f"joint readings up to {np.abs(readings[:, unstated]).max():.4g} m in "
+            f"{measurements.row_names(outside)}, beyond what {robot.name} can reach",
+            where=", ".join(measurements.files),
+            rule="Prismatic joints are in metres unless their columns say so (q3_mm)",
+            way_out=f"If these are millimetres, give --length-unit mm, or name the columns: {columns}",
         )
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, list_rows, typed
-from truearm.files import decode_text, read_bytes
+from truearm.files import UTF_16, decode_text, read_bytes
 
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]
@@ -21,6 +21,8 @@ Texts = NDArray[np.str_]
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
 UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
+LOOKED_AT: Final = 4096
+"""Bytes of a file in another encoding, an even number, from which its marks are told."""
 REMARKS: Final = ("#", "sep=", "SEP=")
 
 
@@ -129,20 +131,47 @@ def read_csv_table(path: Path) -> Table:
             looks like and how to bring it in.
     """
     where = str(path)
-    text = decode_text(read_bytes(path), where=where)
+    content = read_bytes(path)
+    text = decode_text(content, where=where, way_out=_way_out_of_encoding(path, content))
     check_is_table(text, where=where)
-    header = text.lstrip().splitlines()[0]
-    other = [mark for mark in DELIMITERS if mark != "," and mark in header]
-    if other and header.count(",") < header.count(other[0]):
-        decimal = '","' if re.search(r"\d,\d", text) else '"."'
+    mark = _delimiter(text)
+    if mark != ",":
         raise InputError(
-            f"its fields are separated by {DELIMITERS[other[0]]}",
+            f"its fields are separated by {DELIMITERS[mark]}",
             where=where,
             rule="Measurement files have commas between fields and points as decimal marks",
-            way_out=f"Convert it with: truearm import {typed(path)} -o measurements.csv "
-            f"--delimiter {quoted_delimiter(other[0])} --decimal {decimal}",
+            way_out=f"Convert it with: {_import_command(path, text)}",
         )
     return split_table(text, ",", where=where)
+
+
+def _delimiter(text: str) -> str:
+    """The mark between the fields of the first line: a comma unless another one is there more often."""
+    header = "".join(text.lstrip().splitlines()[:1])
+    other = [mark for mark in DELIMITERS if mark != "," and mark in header]
+    return other[0] if other and header.count(",") < header.count(other[0]) else ","
+
+
+def _import_command(path: Path, text: str, encoding: str = "") -> str:
+    """The command that brings in a file with such a text, of an encoding other than UTF-8 if one is named."""
+    mark = _delimiter(text)
+    decimal = '","' if re.search(r"\d,\d", text) else '"."'
+    marks = "" if mark == "," else f" --delimiter {quoted_delimiter(mark)} --decimal {decimal}"
+    coded = f" --encoding {encoding}" if encoding else ""
+    return f"truearm import {typed(path)} -o measurements.csv{coded}{marks}"
+
+
+def _way_out_of_encoding(path: Path, content: bytes) -> str:
+    """What is said where `content` is not UTF-8: how to bring it in if it begins as a table does."""
+    encoding = "utf-16" if content.startswith(UTF_16) else "cp1252"
+    text = content[:LOOKED_AT].decode(encoding, errors="replace")
+    save = "Save it as UTF-8"
+    if not any(mark in "".join(text.lstrip().splitlines()[:1]) for mark in DELIMITERS):
+        return save
+    command = _import_command(path, text, encoding)
+    if encoding == "utf-16":
+        return f"{save}, or convert it with: {command}"
+    return f"{save}, or convert it, if it comes from Windows in western Europe, with: {command}"
 
 
 def check_is_table(text: str, *, where: str) -> None:

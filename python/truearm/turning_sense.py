@@ -1,5 +1,6 @@
 """Whether measured orientations can be of a given robot: the order and the sense of their quaternions."""
 
+from itertools import permutations, product
 from typing import Final
 
 import numpy as np
@@ -20,14 +21,9 @@ FIT: Final = 0.05
 FEWEST_POSES: Final = 6
 AXES: Final = 3
 
-W_FIRST: Final = (0, 1, 2, 3)
-W_LAST: Final = (3, 0, 1, 2)
-READINGS: Final = (
-    (W_FIRST, True, "they turn the other way: target_from_world, where world_from_target is wanted"),
-    (W_LAST, False, "their columns hold x y z w, where qw qx qy qz are named"),
-    (W_LAST, True, "their columns hold x y z w, where qw qx qy qz are named, and turn the other way"),
-)
-"""Other readings of the four columns: the place of w x y z, whether conjugate, and words."""
+COMPONENTS: Final = "wxyz"
+READINGS: Final = tuple(product(permutations(range(4)), (False, True)))[1:]
+"""Other readings of the four columns: which component each holds, and whether conjugate."""
 
 
 def check_turns(measurements: Measurements, robot: Robot) -> None:
@@ -50,15 +46,24 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
         flanges = robot.pose(rows.readings)
         if _misfit(flanges, points[seen], quaternions) < MISFIT:
             continue
-        for order, conjugate, words in READINGS:
+        for held, conjugate in READINGS:
             sense = np.where((np.arange(4) > 0) & conjugate, -1.0, 1.0)
-            if _misfit(flanges, points[seen], quaternions[:, order] * sense) < FIT:
+            if _misfit(flanges, points[seen], quaternions[:, np.argsort(held)] * sense) < FIT:
                 raise InputError(
-                    f"the quaternions do not turn as {robot.name} does; {words}",
+                    f"the quaternions do not turn as {robot.name} does; {_words(held, conjugate)}",
                     where=f"{', '.join(rows.files)}, group {group}",
                     rule="qw qx qy qz, w first, turn vectors of the target into the world",
                     way_out="Put the columns right (truearm import), or use positions alone: --use position",
                 )
+
+
+def _words(held: tuple[int, ...], conjugate: bool) -> str:
+    """A reading in words: what its columns hold, and how it turns."""
+    order = f"their columns hold {' '.join(COMPONENTS[part] for part in held)}, where qw qx qy qz are named"
+    turn = "turn the other way: target_from_world, where world_from_target is wanted"
+    if held == (0, 1, 2, 3):
+        return f"they {turn}"
+    return f"{order}, and {turn}" if conjugate else order
 
 
 def _misfit(flanges: Floats, points: Floats, quaternions: Floats) -> float:

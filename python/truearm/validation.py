@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from truearm._core import Problem, Setup, residuals
 from truearm.core_set import Selection, core_set
-from truearm.errors import InputError
+from truearm.errors import InputError, count_of
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
 
 Floats = NDArray[np.float64]
 
 MILLI = 1e-3
+FEW_HELD = 30
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,21 @@ class Validation:
     def judged(self) -> str:
         """What the rows that were judged are called: "held-out" or "left-out"."""
         return "left-out" if self.left_out else "held-out"
+
+    @property
+    def poses_judged(self) -> str:
+        """How many they are: "832 held-out poses"."""
+        return count_of(self.n_holdout, f"{self.judged} pose")
+
+    @property
+    def few(self) -> str:
+        """What is said where so few were judged that others would give other errors; empty elsewhere."""
+        if self.n_holdout >= FEW_HELD:
+            return ""
+        if self.left_out:
+            poses = count_of(self.n_holdout, "pose")
+            return f"The errors above come from {poses}: truearm evaluate judges it on others."
+        return f"The errors above come from {self.poses_judged}: another split would give others."
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""

@@ -216,6 +216,8 @@ def print_results(calibration: "Calibration") -> None:
     print_determined(calibration)
     of = "distance" if calibration.selection.distances else "position"
     print_errors(validation.holdout, count_of(validation.n_holdout, "held-out row"), of)
+    if validation.few:
+        say_wrapped(validation.few)
     per = "distance" if calibration.selection.distances else "coordinate"
     say(f"Standard deviation of what the model does not explain: {summary['noise_mm']:.3f} mm per {per}.")
     if validation.coverage_95 is not None:

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import count_of
+from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
@@ -18,7 +19,6 @@ AT_THE_FLOOR: Final = 1.25
 """A mean error within so many times what noise alone leaves has reached it."""
 LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
-FEW_HELD: Final = 30
 COVERED: Final = 0.88
 SAME: Final = 0.97
 ROWS_NAMED: Final = 5
@@ -93,6 +93,8 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     floor, mean = distance_at_floor_mm(facts), facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
+        if facts.grids:
+            return
         words = (
             f"The mean error is {left} mm, and noise alone would leave {noise} mm. More poses will hardly "
             "help: what is left is noise of the measuring device and what the arm does not repeat."
@@ -105,6 +107,15 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         "training poses leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
+
+
+def _on_a_grid(facts: Facts) -> Iterator[Advice]:
+    if facts.grids:
+        words = (
+            f"The measured poses have {facts.grids}: neither the calibration nor the errors "
+            f"above know of what varies within a step. {BETWEEN}."
+        )
+        yield Advice("between_the_grid", "Measure between the grid's values.", words, facts.mean_mm())
 
 
 def _tail(facts: Facts) -> Iterator[Advice]:
@@ -168,12 +179,10 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
-    held = facts.calibration.validation.n_holdout
-    if held < FEW_HELD and facts.update is not None:
-        words = f"The errors above come from {count_of(held, 'pose')}: truearm evaluate judges it on others."
+    words = facts.calibration.validation.few
+    if words and facts.update is not None:
         yield Advice("few_held_out", "Judge it on more poses.", words, 0.5 * facts.mean_mm())
-    elif held < FEW_HELD:
-        words = f"The errors above come from {facts.poses_judged}: another split would give others."
+    elif words:
         yield Advice("few_held_out", "Hold out more poses.", words, 0.5 * facts.mean_mm())
 
 
@@ -207,5 +216,14 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
         yield Advice("constant_suffices", "Constant parameters do as well.", words, 0.2 * mean)
 
 
-RULES: Final = (_outliers, _noise_or_poses, _tail, _unseen, _few_held, _intervals, _what_varies)
+RULES: Final = (
+    _outliers,
+    _on_a_grid,
+    _noise_or_poses,
+    _tail,
+    _unseen,
+    _few_held,
+    _intervals,
+    _what_varies,
+)
 RULES_OF_UPDATES: Final = (_no_longer_fits, _left_out, _unseen, _few_held)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from truearm._core import Field
 from truearm.calibration import Calibration
-from truearm.errors import count_of
+from truearm.doubts import ON_A_GRID
 from truearm.evaluation import Evaluation
+from truearm.grids import grid_steps, grid_words
 from truearm.held_rows import HeldRows
 from truearm.models import ArmModel
 from truearm.reporting.numbers import shown_readings, unit_of
@@ -64,7 +65,7 @@ class Facts:
     @property
     def poses_judged(self) -> str:
         """How many they are: "832 held-out poses"."""
-        return count_of(self.calibration.validation.n_holdout, f"{self.judged} pose")
+        return self.calibration.validation.poses_judged
 
     @property
     def error(self) -> str:
@@ -141,6 +142,15 @@ class Facts:
         """Readings (n, N) that the calibration was fitted to; None where they were left out of the file."""
         rows = self.calibration.learned_from
         return None if rows is None else rows.data.readings
+
+    @cached_property
+    def grids(self) -> str:
+        """What stood on which grid, in words; empty where nothing did, or neither rows nor notices tell."""
+        if self.readings is None:
+            noticed = any(notice.kind == ON_A_GRID for notice in self.calibration.notices)
+            return "readings on a grid" if noticed else ""
+        steps = grid_steps(self.readings, self.joints)
+        return grid_words(steps) if steps else ""
 
     @cached_property
     def features(self) -> dict[str, float]:

@@ -1,0 +1,95 @@
+"""Whether the readings of joints stand on a grid, between whose values nothing is seen."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.units import RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+
+FEWEST_ROWS: Final = 30
+FEWEST_VALUES: Final = 4
+FINEST_DEG: Final = 0.5
+"""Gears and encoders leave up to 520 cycles a turn: readings on a finer grid than this show most of them."""
+JITTER_DEG: Final = 0.1
+"""How far from its value of the grid a controller may have stopped."""
+SHARE: Final = 0.98
+"""Of the rows that have to stand on the grid: more off it show what lies between its values."""
+MOST_AT_ONE: Final = 0.5
+"""Of the rows that one value may hold: a joint that mostly stands still stands on no grid."""
+CHANCE: Final = 0.01
+"""How likely as few values as these may fall on some grid at random."""
+BIN_DEG: Final = 0.02
+FINER: Final = 8
+"""Steps that are tried lie so close that their grids differ by a part of this of a step at the far end."""
+ALIKE: Final = 0.9
+"""Share of the rows on a grid from which it is the one in question, and none of the finer ones."""
+BETWEEN: Final = (
+    "Measure 20 to 30 poses between the values of the grid and judge on them with truearm evaluate; truearm "
+    "plan chooses poses that stand on no grid"
+)
+"""The way out."""
+
+
+def grid_steps(readings: Floats, joints: Sequence[str]) -> dict[int, float]:
+    """Steps of the grids that revolute joints stand on, deg, by the number of the joint from 1.
+
+    Args:
+        readings: Joint readings (n, N), rad or m.
+        joints: Kind of each joint.
+    """
+    if len(readings) < FEWEST_ROWS:
+        return {}
+    found = {
+        joint: _step(readings[:, joint - 1] / RADIANS_PER_DEGREE)
+        for joint, kind in enumerate(joints, start=1)
+        if kind == "revolute"
+    }
+    return {joint: step for joint, step in found.items() if step is not None}
+
+
+def grid_words(steps: Mapping[int, float]) -> str:
+    """Grids of joints, of which there must be one, in words: "joints 1 and 2 on a grid of 10 deg"."""
+    by_step: dict[str, list[str]] = {}
+    for joint, step in steps.items():
+        by_step.setdefault(f"{step:.3g}", []).append(str(joint))
+    return ", ".join(
+        f"joint{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:-1])}"
+        f"{' and ' if len(numbers) > 1 else ''}{numbers[-1]} on a grid of {step} deg"
+        for step, numbers in by_step.items()
+    )
+
+
+def _step(readings: Floats) -> float | None:
+    """The largest step of a grid that readings (n,) of a joint stand on, deg; None where there is none."""
+    low, span = float(readings.min()), float(np.ptp(readings))
+    if span < (FEWEST_VALUES - 1) * FINEST_DEG:
+        return None
+    counts = np.bincount(np.rint((readings - low) / BIN_DEG).astype(np.int64))
+    length = FINER * len(counts)
+    likeness = np.abs(np.fft.rfft(counts, length)) / len(readings)
+    per_deg = np.arange(len(likeness)) / (length * BIN_DEG)
+    least, most = (FEWEST_VALUES - 1) / (span + JITTER_DEG), 1.0 / FINEST_DEG + per_deg[1]
+    tried = np.flatnonzero((likeness > ALIKE) & (per_deg >= least) & (per_deg <= most))
+    peaks = [k for k in tried if likeness[k] >= max(likeness[k - 1], likeness[k + 1])]
+    fits = (_fitted(readings - low, 1.0 / float(per_deg[k])) for k in peaks)
+    found = next((fit for fit in fits if fit[1] > ALIKE), None)
+    if found is None:
+        return None
+    step, share, counts = found
+    likely = 2.0 * span / step * (2.0 * JITTER_DEG / step) ** (len(counts) - 2)
+    varied = len(counts) >= FEWEST_VALUES and counts.max() <= MOST_AT_ONE * len(readings)
+    return step if share >= SHARE and varied and likely < CHANCE else None
+
+
+def _fitted(places: Floats, step: float) -> tuple[float, float, NDArray[np.int64]]:
+    """The step that fits places (n,) best, deg, what share stand on its grid, and how many on each value."""
+    turned = np.exp(2j * np.pi * places / step).mean()
+    numbers = np.rint(places / step - np.angle(turned) / (2.0 * np.pi))
+    basis = np.stack([np.ones_like(numbers), numbers], axis=1)
+    fitted = np.linalg.lstsq(basis, places)[0]
+    on = np.abs(places - basis @ fitted) <= JITTER_DEG
+    return float(fitted[1]), float(on.mean()), np.unique(numbers[on], return_counts=True)[1]
