@@ -258,3 +258,11 @@ def test_what_is_read_is_never_written_over(words, capsys):
     assert run(*words) == 2
     assert "never written over" in capsys.readouterr().err
     assert [Path(name).read_bytes() for name in ("arm.calib", "demo.mod")] == before
+
+
+def test_inserted_waypoints_are_counted(capsys):
+    assert run("-o", "dense.mod", "--densify-mm", "0.001", "--least-spacing-mm", "5") == 0
+    told = capsys.readouterr().out
+    lines = Path("dense.mod").read_text(encoding="latin-1").count("MoveL [[")
+    assert lines > 0
+    assert f"Waypoints inserted on straight lines: {lines}." in told

@@ -21,6 +21,8 @@ def print_rewritten(done: Rewritten, *, dry_run: bool) -> None:
     if done.changed.any():
         moved = done.correction_mm[done.changed]
         say_wrapped(f"Corrections: {moved.mean():.3f} mm mean, {moved.max():.3f} mm at most.")
+    if done.inserted:
+        say_wrapped(f"Waypoints inserted on straight lines: {done.inserted}.")
     for title, lines in (("Kept after a refusal:", done.kept), ("Left as they are:", done.listed)):
         if lines:
             say(title)
