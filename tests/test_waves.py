@@ -99,8 +99,10 @@ def test_corrections_reach_their_targets_where_a_wave_is_steep(found):
         ([1.0, 202.0, 1e-4] * 200, "more waves than an arm has drives"),
     ],
 )
-def test_waves_of_no_arm_end_in_an_error(found, waves, reason):
+def test_waves_of_no_arm_end_in_an_error(found, waves, reason, tmp_path):
+    found.save(tmp_path / "arm.calib")
+    kept = ta.Calibration.load(tmp_path / "arm.calib")
     forged = dataclasses.replace(found.variable, hyper={**found.variable.hyper, "waves": waves})
-    calibration = dataclasses.replace(found, variable=forged)
+    calibration = dataclasses.replace(kept, variable=forged)
     with pytest.raises(TruearmError, match=reason):
         calibration.position_std(np.zeros((3, 6)))

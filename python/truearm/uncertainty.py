@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Posterior
+from truearm._core import CoreError, Posterior
 from truearm.core_set import core_set
-from truearm.errors import WorkError
+from truearm.errors import InputError, WorkError
 from truearm.fitting import (
     FRAME_UNKNOWNS,
     Task,
@@ -173,6 +173,7 @@ class VariableSpread:
 
         Raises:
             WorkError: If the rows were left out of the file.
+            InputError: If its hyper-parameters are of no arm.
         """
         rows, details = calibration.rows, calibration.variable
         if rows is None or details is None:
@@ -190,7 +191,10 @@ class VariableSpread:
         options = field_options(task, names, values, details.feature_ranges, details.hyper)
         columns = list(calibration.arm.candidates.columns)
         point = calibration.models[CONSTANT]
-        posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
+        try:
+            posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
+        except CoreError as error:
+            raise InputError(str(error), where="the calibration's variable model") from None
         place = SetupPlace.of(task, rows.data)
         return cls(columns, posterior, details.inflation, noises_of(details.hyper), place)
 

@@ -6,7 +6,7 @@ use crate::FieldError;
 use crate::bank::Bank;
 use crate::evidence::Evidence;
 use crate::extrapolation::extrapolation_factor;
-use crate::hyper::Hyper;
+use crate::hyper::{Hyper, Wave};
 use crate::kernel::Input;
 use crate::linear::training;
 use crate::optimise::{Curvature, Limits};
@@ -111,8 +111,7 @@ pub fn fit_field(
             // Few rows of many change: hyper-parameters stay.
             judged.posterior.reweighed(training.weight.clone(), &options.cancel)?
         } else {
-            hyper = search.again(&training, hyper)?;
-            hyper = search.with_waves(&training, &hyper)?.unwrap_or(hyper);
+            hyper = search.cleaned(&training, hyper)?;
             search.posterior(&training, &hyper)?
         };
         judged = search.judge(posterior)?;
@@ -167,7 +166,6 @@ impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         let mut hyper = self.searched(training, noise)?;
         if self.options.hyper.is_none() {
-            hyper = self.with_waves(training, &hyper)?.unwrap_or(hyper);
             let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION, 0));
             let large = large.lifted(hyper.up)?;
             hyper.extrapolation =
@@ -176,21 +174,25 @@ impl Search<'_> {
         Ok(hyper)
     }
 
-    /// The hyper-parameters with the waves of single joints that they do not have yet, and what else they are then;
-    /// `None` where the residuals show no others.
-    fn with_waves(&mut self, training: &Training, hyper: &Hyper) -> Result<Option<Hyper>, FieldError> {
-        if self.options.hyper.is_some() {
-            return Ok(None);
-        }
+    /// The waves of single joints that the residuals show under hyper-parameters.
+    fn waves(&self, training: &Training, hyper: &Hyper) -> Result<Vec<Wave>, FieldError> {
         let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
-        let waves = find_waves(&large, hyper, &self.options.cancel)?;
-        if are_alike(&waves, &hyper.waves) {
-            return Ok(None);
+        find_waves(&large, hyper, &self.options.cancel)
+    }
+
+    /// Hyper-parameters without what outliers made of them: waves are found again, and all else with them.
+    fn cleaned(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
+        let hyper = self.again(training, hyper)?;
+        if self.options.hyper.is_some() {
+            return Ok(hyper);
         }
-        let found = self.again(training, Hyper { waves, ..hyper.clone() })?;
+        let waves = self.waves(training, &hyper)?;
+        if are_alike(&waves, &hyper.waves) {
+            return Ok(hyper);
+        }
+        let found = self.again(training, Hyper { waves, ..hyper })?;
         let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
-        let middle = middle.lifted(found.up)?;
-        Ok(Some(with_widenings(&Evidence::new(&middle, &self.options.cancel), &found)?))
+        with_widenings(&Evidence::new(&middle.lifted(found.up)?, &self.options.cancel), &found)
     }
 
     fn searched(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
@@ -209,9 +211,10 @@ impl Search<'_> {
         let found = contest_major(&evidence, found, joints)?;
         let mut found = prune_major(&evidence, found)?;
         found = refine_more(&evidence, found, POLISH)?;
+        found.hyper.waves = self.waves(training, &found.hyper)?;
         found.hyper = with_widenings(&evidence, &found.hyper)?;
         self.note(&found);
-        if training.row_count() > middle.row_count() {
+        if training.row_count() > middle.row_count() || !found.hyper.waves.is_empty() {
             return self.again(training, found.hyper);
         }
         Ok(found.hyper)

@@ -118,9 +118,9 @@ fn waves_from(stored: &[f64]) -> PyResult<Vec<Wave>> {
 
 fn joint_from(stored: f64) -> PyResult<usize> {
     if stored < 0.0 || stored.fract() != 0.0 || !stored.is_finite() {
-        return Err(PyKeyError::new_err(format!(
-            "hyper-parameter of joint {stored}: joints are counted from 0"
-        )));
+        let text =
+            format!("hyper-parameters name joint {stored}: joints are counted from 0; calibrate again");
+        return Err(CoreError::new_err(text));
     }
     Ok(stored as usize)
 }
