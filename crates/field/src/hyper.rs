@@ -190,7 +190,8 @@ impl Hyper {
                 return refuse("a wave is of a joint that does not turn");
             }
             let of_drives = wave.cycles > 0.0 && wave.cycles <= MOST_CYCLES;
-            if !of_drives || !(wave.amplitude > 0.0 && wave.amplitude.is_finite()) {
+            let is_there = wave.amplitude > 0.0 && wave.amplitude.is_finite();
+            if !(of_drives && is_there) {
                 return refuse("a wave has no cycles of any drive, or no amplitude");
             }
         }
