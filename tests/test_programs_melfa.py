@@ -343,6 +343,13 @@ def test_lines_without_numbers_get_none(robot):
     assert done.inserted >= 2
 
 
+def test_numbers_out_of_order_stay(robot):
+    text = long_line(robot, ["20 Mov P1", "10 Ovrd 50", "Mvs P3", "End"])
+    done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
+    assert done.inserted >= 2
+    assert line_numbers(done.contents[0]) == [20, 10]
+
+
 @pytest.mark.parametrize("motion", ["Mvs P3 Wth M_Out(1)=1", "Mvs P3 Type 0,0", "*L1:Mvs P3"])
 def test_a_motion_that_does_more_gets_no_waypoints(robot, motion):
     text = long_line(robot, ["Mov P1", motion, "End"])

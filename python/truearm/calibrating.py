@@ -101,11 +101,16 @@ def calibrate(
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
-    doubted = doubts(task.arm, found.models, validation, found.model_name)
+    return replace(found, notices=(*found.notices, *_doubts(task, found, given, stages)))
+
+
+def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
+    """What makes a calibration doubtful; where it does not help, with what would fit instead."""
+    doubted = doubts(task.arm, found.models, found.validation, found.model_name)
     if any(notice.kind == NO_HELP for notice in doubted):
         with stages("trying other conventions"):
-            doubted[1:1] = fits_otherwise(task, given)
-    return replace(found, notices=(*found.notices, *doubted))
+            doubted[1:1] = fits_otherwise(task, data)
+    return doubted
 
 
 def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:

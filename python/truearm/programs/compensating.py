@@ -13,7 +13,9 @@ from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
 from truearm.programs.notices import frames_notices, payload_notices, tool_notices
+from truearm.programs.program import Language
 from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
+from truearm.robot import Robot
 
 
 def compensate_program(
@@ -49,16 +51,7 @@ def compensate_program(
     compensator = required(compensator, Compensator, "the compensator")
     calibration, author = compensator.calibration, compensator.programming
     written_in = language_of(Path(path), chosen.language)
-    declared = (
-        controller
-        if isinstance(controller, Controller)
-        else declared_controller(None if controller is None else str(controller), written_in, author)
-    )
-    if declared.robot.joints != author.joints:
-        raise UsageError(
-            f"the controller's model {declared.robot.name} has other joints than {author.name}",
-            way_out="Declare the controller of this arm",
-        )
+    declared = _declared(controller, written_in, author)
     known = _frames(frames).fresh()
     program = read_program(Path(path), written_in, author, known)
     refuse_contradiction(program, declared, force=chosen.force)
@@ -78,6 +71,24 @@ def compensate_program(
             *tool_notices(done, calibration),
         ],
     )
+
+
+def _declared(given: Controller | str | Path | None, language: Language, author: Robot) -> Controller:
+    """The controller's model as it is declared.
+
+    Raises:
+        UsageError: If it must be declared and is not, or is of another kind of arm.
+    """
+    if isinstance(given, Controller):
+        declared = given
+    else:
+        declared = declared_controller(None if given is None else str(given), language, author)
+    if declared.robot.joints != author.joints:
+        raise UsageError(
+            f"the controller's model {declared.robot.name} has other joints than {author.name}",
+            way_out="Declare the controller of this arm",
+        )
+    return declared
 
 
 def _frames(given: Frames | str | Path | None) -> Frames:

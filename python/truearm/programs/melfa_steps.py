@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from itertools import count, pairwise
+from itertools import pairwise
 from typing import Final
 
 from truearm.programs.melfa_text import NAME, without_remark
 from truearm.programs.program import Insertion, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
-from truearm.programs.stepping import copied, line_start, target_of
+from truearm.programs.stepping import copied, free_numbers, line_start, target_of
 
 _PLAIN: Final = re.compile(rf"([ \t]*\d+(?=[ \t]))?([ \t]*Mvs[ \t]+){NAME}[ \t]*", re.IGNORECASE)
 _LINE_NUMBER: Final = re.compile(r"^[ \t]*(\d+)(?=[ \t*])", re.MULTILINE)
@@ -23,7 +23,7 @@ def inserted(program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTex
     plain = [_PLAIN.fullmatch(without_remark(source.line_text(steps[0].line))) for steps in moves]
     numbered = zip(moves, plain, strict=True)
     numbering = _Numbering(source, {m[0].line: len(m) for m, found in numbered if found and found.group(1)})
-    free = _free_names(source)
+    free = (f"P{number}" for number in free_numbers(source, _POSITION))
     lines: list[Insertion] = []
     positions: list[str] = []
     impossible = []
@@ -58,12 +58,6 @@ def _behind(source: Source, positions: Sequence[str]) -> Iterator[Insertion]:
         yield Insertion(0, end, end, text)
 
 
-def _free_names(source: Source) -> Iterator[str]:
-    """Names of position variables that occur nowhere in a program."""
-    named = {int(found.group(1)) for found in _POSITION.finditer(source.text)}
-    return (f"P{number}" for number in count(1) if number not in named)
-
-
 class _Numbering:
     """Line numbers of a program that lines are inserted into."""
 
@@ -77,7 +71,7 @@ class _Numbering:
         between = [number - before - 1 for before, number in pairwise([0, *stated])]
         fits = all(room >= some for room, some in zip(between, self._wanted, strict=True))
         self._jumps = _JUMP_TO_NUMBER.search("\n".join(map(without_remark, source.text.splitlines())))
-        self._numbers = stated if fits else self._renumbered(stated)
+        self._numbers = stated if fits or not self._ascending else self._renumbered(stated)
 
     def before(self, line: int) -> Sequence[int] | None:
         """Numbers for the lines before a line; None where there are none."""

@@ -1,11 +1,14 @@
 """How waypoints on a straight line are put in words, as far as languages have it in common."""
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count
 
 import numpy as np
 
 from truearm._core import splice_numbers
 from truearm.programs.program import Insertion, LinearStep, Program, StepTexts
+from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT_AT
 
 
@@ -42,6 +45,12 @@ def line_start(program: Program, step: LinearStep) -> int:
 def target_of(program: Program, step: LinearStep) -> int:
     """Number of the target that a waypoint's move leads to."""
     return int(program.moves.target[step.move])
+
+
+def free_numbers(source: Source, naming: re.Pattern[str]) -> Iterator[int]:
+    """Numbers from 1 that a program names no position by; the first group of `naming` is such a number."""
+    named = {int(found.group(1)) for found in naming.finditer(source.text)}
+    return (number for number in count(1) if number not in named)
 
 
 def written(value: float, decimals: int) -> str:

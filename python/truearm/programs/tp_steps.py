@@ -1,13 +1,11 @@
 """Waypoints in a FANUC listing: a motion line each in /MN, and a position each in /POS."""
 
 import re
-from collections.abc import Iterator, Sequence
-from itertools import count
+from collections.abc import Sequence
 from typing import Final
 
 from truearm.programs.program import Insertion, LinearStep, Program, StepTexts
-from truearm.programs.source import Source
-from truearm.programs.stepping import copied, line_start, target_of
+from truearm.programs.stepping import copied, free_numbers, line_start, target_of
 from truearm.programs.tp_positions import position_text, section
 
 _PLAIN: Final = re.compile(
@@ -25,7 +23,7 @@ PASSED: Final = "CNT100"
 def inserted(program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
     """Lines without numbers before the motions, and positions with numbers that are free."""
     source = program.sources[0]
-    free = _free_numbers(source)
+    free = free_numbers(source, _NUMBER)
     lines: list[Insertion] = []
     positions: list[str] = []
     impossible = []
@@ -47,9 +45,3 @@ def inserted(program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTex
     end = section(source, "POS")[1]
     behind = [Insertion(0, end, end, text) for text in positions]
     return StepTexts((*lines, *behind), len(lines), tuple(impossible))
-
-
-def _free_numbers(source: Source) -> Iterator[int]:
-    """Numbers of positions that the program does not name."""
-    named = {int(found.group(1)) for found in _NUMBER.finditer(source.text)}
-    return (number for number in count(1) if number not in named)
