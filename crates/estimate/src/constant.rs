@@ -11,7 +11,7 @@ use truearm_kinematics::is_length;
 
 use crate::alike::check_poses;
 use crate::dense::Cholesky;
-use crate::layout::{Layout, Problem, REACH};
+use crate::layout::{Layout, Problem, TARGET_PRECISION};
 use crate::measurements::Noise;
 use crate::minimise::{Minimum, Objective, Reason, State};
 use crate::noise::Squares;
@@ -144,7 +144,7 @@ impl Fit<'_> {
             packets: self.packets,
             weighting: Some((balance.noise, &balance.weights)),
             precision: &self.precision(balance.scale),
-            target_precision: self.options.prior.map_or(0.0, |_| REACH.powi(-2)),
+            target_precision: self.options.prior.map_or(0.0, |_| TARGET_PRECISION),
             nominal: self.nominal,
             cancel: &self.options.cancel,
         };

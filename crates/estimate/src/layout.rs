@@ -83,7 +83,9 @@ impl Problem<'_> {
 /// How far from the flange targets are, m, as one standard deviation of each coordinate. Only where frame and target can
 /// hardly be told apart, as along the axes of a SCARA, does it decide: errors of its axes' directions must not be put down
 /// to a long tool.
-pub const REACH: f64 = 0.1;
+const REACH: f64 = 0.1;
+/// The same as a precision, 1/m^2.
+pub const TARGET_PRECISION: f64 = 1.0 / (REACH * REACH);
 
 /// Positions of the unknowns in the vector of unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -143,10 +145,10 @@ impl Layout {
     }
 
     /// Prior precision of the set-up's unknowns (len - arm,): a frame is known to a metre and a radian, flat but never
-    /// singular; a target is within [`REACH`] of the flange.
+    /// singular; a target is within a tenth of one of the flange.
     pub fn setup_precision(&self) -> Vec<f64> {
         let mut precision = vec![1.0; self.len() - self.arm];
-        self.target_coordinates().for_each(|(_, _, at)| precision[at - self.arm] = REACH.powi(-2));
+        self.target_coordinates().for_each(|(_, _, at)| precision[at - self.arm] = TARGET_PRECISION);
         precision
     }
 

@@ -90,7 +90,7 @@ impl<'a> Evidence<'a> {
     pub fn pull(&self, hyper: &Hyper) -> Result<Vec<f64>, FieldError> {
         self.cancel.check()?;
         let kernels = Continuous::new(self.training, &self.pairings, hyper);
-        let [mut covariance, _] = self.room().take().unwrap_or_else(|| self.empty());
+        let mut covariance = Mat::zeros(self.by_column.rows, self.by_column.rows);
         write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
         let projection = Projection::new(self.training, covariance)?;
         Ok(pulled(&projection.factor, &projection.root(), &self.training.residual))

@@ -166,8 +166,7 @@ impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         let mut hyper = self.searched(training, noise)?;
         if self.options.hyper.is_none() {
-            let large = training.select(&spread_poses(training, ROWS_FOR_EXTRAPOLATION, 0));
-            let large = large.lifted(hyper.up)?;
+            let large = part_of(training, ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
             hyper.extrapolation =
                 extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         }
@@ -176,23 +175,23 @@ impl Search<'_> {
 
     /// The waves of single joints that the residuals show under hyper-parameters.
     fn waves(&self, training: &Training, hyper: &Hyper) -> Result<Vec<Wave>, FieldError> {
-        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
+        let large = part_of(training, ROWS_FOR_POLISH, 0).lifted(hyper.up)?;
         find_waves(&large, hyper, &self.options.cancel)
     }
 
     /// Hyper-parameters without what outliers made of them: waves are found again, and all else with them.
     fn cleaned(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
-        let hyper = self.again(training, hyper)?;
         if self.options.hyper.is_some() {
             return Ok(hyper);
         }
+        let hyper = self.again(training, hyper)?;
         let waves = self.waves(training, &hyper)?;
         if are_alike(&waves, &hyper.waves) {
             return Ok(hyper);
         }
         let found = self.again(training, Hyper { waves, ..hyper })?;
-        let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
-        with_widenings(&Evidence::new(&middle.lifted(found.up)?, &self.options.cancel), &found)
+        let middle = part_of(training, ROWS_FOR_HYPER, POSES_FOR_HYPER).lifted(found.up)?;
+        with_widenings(&Evidence::new(&middle, &self.options.cancel), &found)
     }
 
     fn searched(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
@@ -200,11 +199,10 @@ impl Search<'_> {
             return Ok(hyper.clone());
         }
         let joints = self.problem.measurements.joint_count;
-        let small = training.select(&spread_poses(training, ROWS_FOR_SELECTION, POSES_FOR_SELECTION));
+        let small = part_of(training, ROWS_FOR_SELECTION, POSES_FOR_SELECTION);
         let chosen = select_major(&small, joints, noise, &self.options.cancel)?;
         let chosen = contest_up(&small, chosen, &self.options.cancel)?;
-        let middle = training.select(&spread_poses(training, ROWS_FOR_HYPER, POSES_FOR_HYPER));
-        let middle = middle.lifted(chosen.hyper.up)?;
+        let middle = part_of(training, ROWS_FOR_HYPER, POSES_FOR_HYPER).lifted(chosen.hyper.up)?;
         let evidence = Evidence::new(&middle, &self.options.cancel);
         let mut found = refine(&evidence, chosen.hyper, chosen.curvature, SEARCH)?;
         found.evaluations += chosen.evaluations;
@@ -222,10 +220,7 @@ impl Search<'_> {
 
     /// Hyper-parameters from present ones, on as many rows as can be afforded.
     fn again(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
-        if self.options.hyper.is_some() {
-            return Ok(hyper);
-        }
-        let large = training.select(&spread_poses(training, ROWS_FOR_POLISH, 0)).lifted(hyper.up)?;
+        let large = part_of(training, ROWS_FOR_POLISH, 0).lifted(hyper.up)?;
         let evidence = Evidence::new(&large, &self.options.cancel);
         let found = refine(&evidence, hyper, self.curvature.take(), POLISH)?;
         self.note(&found);
@@ -259,9 +254,9 @@ fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Foun
 
 /// Poses spread evenly over the training set (and so over its groups) with at most `rows` rows, or
 /// `at_least` poses.
-fn spread_poses(training: &Training, rows: usize, at_least: usize) -> Vec<usize> {
+fn part_of(training: &Training, rows: usize, at_least: usize) -> Training {
     let poses = training.pose_count();
     let per_pose = (training.row_count() as f64 / poses.max(1) as f64).max(1.0);
     let wanted = ((rows as f64 / per_pose) as usize).max(at_least).clamp(1, poses);
-    (0..wanted).map(|k| k * poses / wanted).collect()
+    training.select(&(0..wanted).map(|k| k * poses / wanted).collect::<Vec<usize>>())
 }

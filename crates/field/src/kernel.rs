@@ -21,7 +21,7 @@ pub enum InputKind {
 pub struct Input {
     /// Kind of values.
     pub kind: InputKind,
-    /// Values are multiplied with this (one for angles).
+    /// Values are multiplied with this (one for angles, the cycles a turn for those of a wave).
     pub scale: f64,
 }
 

@@ -9,7 +9,6 @@ use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
@@ -62,17 +61,17 @@ impl Options<'_> {
 
 fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
     let get = |name: &str| {
-        let message = || PyKeyError::new_err(format!("hyper-parameter '{name}' is missing"));
+        let message = || CoreError::new_err(format!("hyper-parameter '{name}' is missing"));
         values.get(name).cloned().ok_or_else(message)
     };
     let one = |name: &str| {
         let found = get(name)?;
-        let message = || PyKeyError::new_err(format!("hyper-parameter '{name}' has no value"));
+        let message = || CoreError::new_err(format!("hyper-parameter '{name}' has no value"));
         found.first().copied().ok_or_else(message)
     };
     let three = |name: &str| -> PyResult<[f64; 3]> {
         let found = get(name)?;
-        let message = || PyKeyError::new_err(format!("hyper-parameter '{name}' needs 3 values"));
+        let message = || CoreError::new_err(format!("hyper-parameter '{name}' needs 3 values"));
         found.try_into().map_err(|_| message())
     };
     let product = |name: &str| -> PyResult<Product> {
