@@ -1,5 +1,7 @@
 """Shared settings and fixtures."""
 
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,14 @@ SHARED_DATA = ROOT.parent / "shared" / "data"
 # One machine, one answer: a test that failed yesterday fails today, and a slow machine is no failure.
 settings.register_profile("truearm", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("truearm")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def interruptible() -> Iterator[None]:
+    """Where tests run in the background Ctrl-C is ignored, and the programs they start would inherit that."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")

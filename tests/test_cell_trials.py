@@ -260,16 +260,7 @@ def test_a_device_that_goes_away_stops_the_robot(tmp_path):
     record("device-gone", said=str(raised.value))
 
 
-@pytest.fixture
-def interruptible():
-    """Where the trials run in the background Ctrl-C is ignored, and those they start would inherit that."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_in_any_state_ends_within_two_seconds(tmp_path):
     count = sized(1, 30)
     text = cell_text(simulate={"speed": 4.0}, process={"stretch": 20})

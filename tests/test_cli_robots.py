@@ -276,7 +276,6 @@ def test_interrupts_end_the_process_with_130(tmp_path):
     script = tmp_path / "run.py"
     script.write_text(
         "import os, signal, sys, types\nfrom truearm import cli\nfrom truearm.cli.lazy import Entry\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a job in the background inherits none
         "def command() -> None:\n    os.kill(os.getpid(), signal.SIGINT)\n    import time; time.sleep(30)\n"
         "sys.modules['waiting'] = types.SimpleNamespace(command=command)\n"
         "cli.COMMANDS = (Entry('wait', 'waiting', 'Wait.'),)\nsys.exit(cli.main(['wait']))\n"
