@@ -49,7 +49,7 @@ pub struct Correction {
     /// The turn between these two as a rotation vector in the base frame, rad; of the tool's axis alone where the task is
     /// that.
     pub turn: [f64; 3],
-    /// Standard deviation of the tool's position, m; NaN where the model does not know it.
+    /// Standard deviation of the tool's position, m; NaN where the model does not know it, or nobody asks.
     pub std_m: f64,
     /// Why it must not be used.
     pub refusal: Option<Refusal>,
@@ -143,11 +143,13 @@ impl Corrector {
     /// The corrected readings of one waypoint, without allocation, lock or panic.
     ///
     /// `readings` (N) and `features` (F) in, `out` (N); where the waypoint is refused, `out` is filled with NaN. Arrays
-    /// of other lengths are refused as not finite.
+    /// of other lengths are refused as not finite. Unless `spread` is asked for, the standard deviation is worked out
+    /// where a bound needs it alone, and else NaN.
     pub fn correct(
         &self,
         readings: &[f64],
         features: &[f64],
+        spread: bool,
         out: &mut [f64],
         workspace: &mut Workspace,
     ) -> Correction {
@@ -155,7 +157,8 @@ impl Corrector {
             out.fill(f64::NAN);
             return Correction::refused(Refusal::plain(Reason::NotFinite));
         }
-        let group = dispatch(One { corrector: self, workspace });
+        let spread = spread || self.options.limits.largest_std.is_finite();
+        let group = dispatch(One { corrector: self, spread, workspace });
         let correction = self.judge(&group, workspace, 0);
         self.write(&correction, workspace, 0, out);
         correction
@@ -190,9 +193,9 @@ impl Corrector {
         Some(())
     }
 
-    /// Corrects the waypoints in `workspace.nominal`.
+    /// Corrects the waypoints in `workspace.nominal`; `alone`: there is one.
     #[inline(always)]
-    pub(crate) fn group<I: Isa>(&self, alone: bool, workspace: &mut Workspace) -> Group {
+    pub(crate) fn group<I: Isa>(&self, alone: bool, spread: bool, workspace: &mut Workspace) -> Group {
         let Workspace { nominal, search, programming } = workspace;
         let nominal = &nominal[..self.joint_count()];
         let target = self.programming.end::<I>(nominal, alone, programming);
@@ -201,8 +204,8 @@ impl Corrector {
         let reached = self.programming.end::<I>(&search.best, alone, programming);
         // A closure would be compiled without the instruction set of this function.
         let std = match &self.calibrated.model.spread {
-            Some(spread) => spread.at::<I>(&self.calibrated, &search.best, alone, &mut search.model),
-            None => Lane::splat(f64::NAN),
+            Some(known) if spread => known.at::<I>(&self.calibrated, &search.best, alone, &mut search.model),
+            _ => Lane::splat(f64::NAN),
         };
         let turned = if self.plan.task == Task::Axis {
             axis_turn::<I>(&target, &reached)
@@ -304,6 +307,7 @@ impl Plan {
 
 struct One<'a> {
     corrector: &'a Corrector,
+    spread: bool,
     workspace: &'a mut Workspace,
 }
 
@@ -312,7 +316,7 @@ impl Kernel for One<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> Group {
-        self.corrector.group::<I>(true, self.workspace)
+        self.corrector.group::<I>(true, self.spread, self.workspace)
     }
 }
 

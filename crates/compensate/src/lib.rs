@@ -10,6 +10,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes go through several arrays with one index")]
 
 mod aimed;
+mod bend;
 mod change;
 mod cholesky;
 mod corrector;

@@ -3,31 +3,33 @@
 //! Each step is the smallest change of the joints that removes the error, J^T (J J^T)^-1 e. Where that is longer than a
 //! step may be, the error is far smaller than what the joints would have to turn for it: the step is then damped,
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
-//! which the arm moves well nearly undamped. A step that makes the error larger is halved. Once the error is small its
-//! Jacobian is kept, and corrected by what the last steps brought: Broyden's method with a memory of two steps (Kelley,
-//! Iterative Methods for Linear and Nonlinear Equations, 1995). A search ends with a step whose error is not looked at
-//! where the rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential
-//! Equations II, section IV.8). What a pose gets does not depend on the poses beside it.
+//! which the arm moves well nearly undamped. A step that makes the error larger is halved. How a step bends off its straight
+//! line is known from the screws of the joints, [`crate::bend`]: taken off the error, and solved again, that makes the step
+//! exact to the third order (Chebyshev's method; Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations in Several
+//! Variables, 1970), and a Jacobian good for all short steps that follow. A search ends with a step whose error is not
+//! looked at where the rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary
+//! Differential Equations II, section IV.8). What a pose gets does not depend on the poses beside it.
 
 use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
 
 use crate::aimed::{Aimed, AimedScratch};
+use crate::bend::Bend;
 use crate::cholesky::{Factor, gram};
 use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task};
 
 /// Error at which the search ends, m: a few roundings of a pose.
 const ENOUGH: f64 = 1e-13;
-/// The same where the parameters vary, which each step leaves a hundredth to a thousandth of the error for.
+/// The same where the parameters vary, which each step leaves a thousandth of the error for, or less.
 const ENOUGH_VARIED: f64 = 1e-10;
-/// Error from which on a Jacobian is good enough for the steps to come, m.
-const CALM: f64 = 1e-4;
+/// Step up to which a Jacobian is good enough for the steps to come, rad.
+const SHORT: f64 = 1e-2;
+/// Part of the error up to which a step may bend, if that is to be trusted.
+const SLIGHT: f64 = 0.3;
 /// Step at which it ends where an error is left that the joints cannot remove, rad.
 const STANDSTILL: f64 = 1e-11;
 /// Largest rate at which errors fall that is trusted to hold for one more step.
 const STEADY: f64 = 0.1;
-/// Share of a step along the one before from which on it says nothing.
-const UNSURE: f64 = 0.3;
 /// Added to J J^T so that it can be inverted everywhere, m^2.
 const FLOOR: f64 = 1e-12;
 
@@ -71,12 +73,14 @@ pub(crate) struct Search {
     /// The best readings so far, N; the start when a search begins.
     pub best: Vec<Lane>,
     trial: Vec<Lane>,
-    /// The step that is worked out, the last one, and the one before, in units.
-    next: Vec<Lane>,
-    last: Vec<Lane>,
-    older: Vec<Lane>,
+    /// The last step of the moving readings, in units.
+    step: Vec<Lane>,
+    /// The same of all readings, and of all joint values.
+    shifts: Vec<Lane>,
+    turns: Vec<Lane>,
     /// Motions of the task's rows by the moving readings, in metres and units.
     pub columns: Vec<[Lane; 6]>,
+    bend: Bend,
     pub model: AimedScratch,
 }
 
@@ -88,9 +92,10 @@ impl Search {
             best: lanes.clone(),
             trial: lanes.clone(),
             columns: vec![[Lane::ZERO; 6]; lanes.len()],
-            next: lanes.clone(),
-            last: lanes.clone(),
-            older: lanes,
+            bend: Bend::new(lanes.len()),
+            step: lanes.clone(),
+            shifts: lanes.clone(),
+            turns: lanes,
             model: aimed.scratch(),
         }
     }
@@ -100,9 +105,8 @@ impl Search {
 struct Progress {
     /// Smallest squared error.
     least: Lane,
-    /// Squared length of the last step, and of the one before.
+    /// Squared length of the last step.
     length: Lane,
-    older: Lane,
     /// What the smallest error leaves of position and orientation, squared.
     left: [Lane; 2],
     /// Squared ratio of the last error to the smallest before it; zero where there was none.
@@ -117,6 +121,17 @@ struct Progress {
     stale: Lane,
     /// Damping of the last Jacobian.
     damping: Lane,
+}
+
+/// A step by the Jacobian alone.
+struct Straight<const M: usize> {
+    /// What is left to do, in metres, and its square.
+    error: [Lane; M],
+    norm: Lane,
+    /// Squared length of the step in units.
+    length: Lane,
+    /// What it brings beside its straight line, in metres.
+    bent: [Lane; M],
 }
 
 const NO: Lane = Lane::ZERO;
@@ -184,8 +199,6 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
     let mut progress = Progress::new();
     let mut factor = None;
     search.trial.copy_from_slice(&search.best);
-    search.last.fill(NO);
-    search.older.fill(NO);
     for step in 0..=plan.steps {
         let stale = progress.any_stale();
         let frame = if stale {
@@ -204,13 +217,15 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
         }
         // Every search begins without a Jacobian.
         let Some(factor) = &mut factor else { break };
-        progress.find_step::<I, M>(plan, factor, (&error, norm), search);
+        let length = step_for::<I, M>(plan, &factor.solve::<I>(&error), search);
+        let straight = Straight { error, norm, length, bent: search.bent::<I, G, M>(aimed, plan, &frame) };
+        progress.find_step::<I, M>(plan, factor, straight, search);
         search.advance(plan, &progress);
         progress.foresee(norm, plan, search);
         if !progress.any_open() {
             break;
         }
-        progress.settle(norm, plan.varied);
+        progress.settle();
     }
     [progress.left[0].sqrt(), progress.left[1].sqrt() * (1.0 / plan.turn_weight)]
 }
@@ -222,7 +237,6 @@ impl Progress {
         Self {
             least: infinite,
             length: infinite,
-            older: infinite,
             left: [infinite; 2],
             rate: NO,
             rate_before: NO,
@@ -274,47 +288,30 @@ impl Progress {
         Factor::new::<I>(&gram::<I, M>(&search.columns[..plan.moving.len()]), self.damping)
     }
 
-    /// Writes the next step in units, damped where it would be too long.
+    /// Writes the next step in units: where it would be too long damped, else with how it bends.
     #[inline(always)]
     fn find_step<I: Isa, const M: usize>(
         &mut self,
         plan: &Plan,
         factor: &mut Factor<M>,
-        (error, norm): (&[Lane; M], Lane),
+        straight: Straight<M>,
         search: &mut Search,
     ) {
         let longest = Lane::splat(plan.longest * plan.longest);
-        let length = step_for::<I, M>(plan, &factor.solve::<I>(error), search);
-        let mut fresh = self.stale;
+        let Straight { error, norm, length, bent } = straight;
+        let slight = squared::<I>(&bent).where_below(norm * (SLIGHT * SLIGHT), YES, NO);
+        let slight = longest.where_below(length, NO, slight);
+        let mut rest = error;
+        for (rest, bent) in rest.iter_mut().zip(&bent) {
+            *rest = NO.where_below(slight, *rest - *bent, *rest);
+        }
         if longest.any_below(length) {
             let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
             self.damping = longest.where_below(length, damping, self.damping);
-            fresh = longest.where_below(length, YES, fresh);
             let columns = &search.columns[..plan.moving.len()];
             dispatch_on(I::LEVEL, Damp { columns, damping: self.damping, factor });
-            step_for::<I, M>(plan, &factor.solve::<I>(error), search);
         }
-        self.correct::<I>(plan, fresh, search);
-    }
-
-    /// Broyden's updates of the step for the two before it. Flag `fresh`: the Jacobian is new, or the step damped, and
-    /// stays as it is.
-    #[inline(always)]
-    fn correct<I: Isa>(&mut self, plan: &Plan, fresh: Lane, search: &mut Search) {
-        let moving = plan.moving.len();
-        let share = held(dot::<I>(&search.older[..moving], &search.next) / self.older, fresh);
-        for (next, last) in search.next.iter_mut().zip(&search.last).take(moving) {
-            *next = I::mul_add(*last, share, *next);
-        }
-        let share = held(dot::<I>(&search.last[..moving], &search.next) / self.length, fresh);
-        let factor = YES / (YES - share);
-        for next in search.next.iter_mut().take(moving) {
-            *next = *next * factor;
-        }
-        self.older = NO.where_below(fresh, Lane::splat(f64::INFINITY), self.length);
-        self.length = squared::<I>(&search.next[..moving]);
-        std::mem::swap(&mut search.older, &mut search.last);
-        std::mem::swap(&mut search.last, &mut search.next);
+        self.length = step_for::<I, M>(plan, &factor.solve::<I>(&rest), search);
     }
 
     /// Takes over the next trials where they will be near enough, and ends their searches.
@@ -339,16 +336,11 @@ impl Progress {
         self.open = NO.where_below(near, NO, self.open);
     }
 
-    /// Which poses need a Jacobian at their next trial: those with a large error, and those that did not improve.
-    ///
-    /// Where the parameters vary no Jacobian of the chain is better than that of the start, once corrected, as long as
-    /// errors fall with it.
+    /// Which poses need a Jacobian at their next trial: those with a long step, and those whose errors do not fall fast.
     #[inline(always)]
-    fn settle(&mut self, norm: Lane, varied: bool) {
-        let mut far = Lane::splat(CALM * CALM).where_below(norm, YES, NO);
-        if varied {
-            far = Lane::splat(STEADY * STEADY).where_below(self.rate, far, NO);
-        }
+    fn settle(&mut self) {
+        let far = Lane::splat(SHORT * SHORT).where_below(self.length, YES, NO);
+        let far = Lane::splat(STEADY * STEADY).where_below(self.rate, YES, far);
         self.stale = NO.where_below(self.better, far, YES);
     }
 }
@@ -360,11 +352,16 @@ fn weighted<I: Isa, G: Goal<M>, const M: usize>(
     target: &LaneFrame,
     weight: f64,
 ) -> [Lane; M] {
-    let mut error = G::error::<I>(frame, target);
-    for value in error.iter_mut().skip(3) {
+    weigh(G::error::<I>(frame, target), weight)
+}
+
+/// Rows of a task, all of them in metres.
+#[inline(always)]
+fn weigh<const M: usize>(mut rows: [Lane; M], weight: f64) -> [Lane; M] {
+    for value in rows.iter_mut().skip(3) {
         *value = *value * weight;
     }
-    error
+    rows
 }
 
 #[inline(always)]
@@ -391,6 +388,7 @@ fn fill_columns<I: Isa, G: Goal<M>, const M: usize>(
             *value = NO.where_below(stale, row, *value);
         }
     }
+    search.bend.take(screws, &search.model.inputs, stale);
 }
 
 /// The columns of a pose at `search.best`, see [`fill_columns`].
@@ -404,24 +402,15 @@ pub(crate) fn fill_pose_columns<I: Isa>(aimed: &Aimed, plan: &Plan, alone: bool,
 #[inline(always)]
 fn step_for<I: Isa, const M: usize>(plan: &Plan, y: &[Lane; M], search: &mut Search) -> Lane {
     let mut length = NO;
-    for (next, column) in search.next.iter_mut().zip(&search.columns).take(plan.moving.len()) {
+    for (step, column) in search.step.iter_mut().zip(&search.columns).take(plan.moving.len()) {
         let mut sum = NO;
         for (value, row) in column.iter().zip(y) {
             sum = I::mul_add(*value, *row, sum);
         }
-        *next = sum;
+        *step = sum;
         length = I::mul_add(sum, sum, length);
     }
     length
-}
-
-/// A step's share along another, as far as it can be trusted; none where the flag `fresh` holds.
-#[inline(always)]
-fn held(share: Lane, fresh: Lane) -> Lane {
-    let (low, high) = (Lane::splat(-UNSURE), Lane::splat(UNSURE));
-    let share = low.where_below(share, share, low);
-    let share = share.where_below(high, share, high);
-    NO.where_below(fresh, NO, share)
 }
 
 #[inline(always)]
@@ -450,10 +439,26 @@ impl<const M: usize> Kernel for Damp<'_, M> {
 }
 
 impl Search {
+    /// What the step brings to the task's rows beside its straight line, in metres.
+    #[inline(always)]
+    fn bent<I: Isa, G: Goal<M>, const M: usize>(
+        &mut self,
+        aimed: &Aimed,
+        plan: &Plan,
+        frame: &LaneFrame,
+    ) -> [Lane; M] {
+        for ((&k, &unit), step) in plan.moving.iter().zip(&plan.unit).zip(&self.step) {
+            self.shifts[k] = *step * unit;
+        }
+        aimed.model.coupling.joints::<I>(&self.shifts, &mut self.turns);
+        let bent = self.bend.along::<I>(&self.model.inputs, &self.turns);
+        weigh(G::column::<I>(&bent, frame), plan.turn_weight)
+    }
+
     /// The next trials: a step on from those that were better, half the way back from the others.
     #[inline(always)]
     fn advance(&mut self, plan: &Plan, progress: &Progress) {
-        for ((&k, &unit), step) in plan.moving.iter().zip(&plan.unit).zip(&self.last) {
+        for ((&k, &unit), step) in plan.moving.iter().zip(&plan.unit).zip(&self.step) {
             let best = self.best[k];
             let back = (self.trial[k] + best) * 0.5;
             let next = NO.where_below(progress.better, best + *step * unit, back);

@@ -146,7 +146,7 @@ impl Kernel for Piece<'_> {
         for first in (0..waypoints).step_by(LANES) {
             load_lanes::<I>(readings, count, first, &mut workspace.nominal);
             let bad = not_finite(&mut workspace.nominal[..count]);
-            let group = corrector.group::<I>(false, workspace);
+            let group = corrector.group::<I>(false, true, workspace);
             for place in first..waypoints.min(first + LANES) {
                 let i = place - first;
                 let mut mark = Mark::new(corrector.judge(&group, workspace, i), &group.target, i);

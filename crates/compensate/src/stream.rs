@@ -208,7 +208,8 @@ impl Stream {
         if features.len() != self.corrector.feature_count() || !finite(features) {
             return Some(Fault::NotFinite);
         }
-        let found = self.corrector.correct(readings, features, &mut self.corrected, &mut self.workspace);
+        let found =
+            self.corrector.correct(readings, features, false, &mut self.corrected, &mut self.workspace);
         if let Some(refusal) = found.refusal {
             return Some(Fault::Refused(refusal));
         }

@@ -23,7 +23,7 @@ fn limits(limits: Limits) -> Options {
 
 fn one(corrector: &Corrector, q: &[f64]) -> (Vec<f64>, Correction) {
     let mut out = vec![0.0; q.len()];
-    let found = corrector.correct(q, &[], &mut out, &mut corrector.workspace());
+    let found = corrector.correct(q, &[], true, &mut out, &mut corrector.workspace());
     (out, found)
 }
 
@@ -68,17 +68,17 @@ fn not_finite_and_of_other_lengths() {
     let corrector = scene().corrector(Options::default());
     for q in [vec![f64::NAN; 6], vec![f64::INFINITY; 6], vec![0.1; 5], vec![]] {
         let mut out = [0.0; 6];
-        let found = corrector.correct(&q, &[], &mut out, &mut corrector.workspace());
+        let found = corrector.correct(&q, &[], true, &mut out, &mut corrector.workspace());
         assert_eq!(found.refusal.unwrap().reason, Reason::NotFinite);
         assert!(out.iter().all(|value| value.is_nan()));
     }
     let (q, mut workspace) = (Q, corrector.workspace());
     let mut out = [0.0; 6];
     assert_eq!(
-        corrector.correct(&q, &[1.0], &mut out, &mut workspace).refusal.unwrap().reason,
+        corrector.correct(&q, &[1.0], true, &mut out, &mut workspace).refusal.unwrap().reason,
         Reason::NotFinite
     );
-    assert_eq!(corrector.correct(&q, &[], &mut out, &mut workspace).refusal, None);
+    assert_eq!(corrector.correct(&q, &[], true, &mut out, &mut workspace).refusal, None);
 }
 
 #[test]
@@ -146,6 +146,23 @@ fn standard_deviation_of_constants() {
         found.std_m,
         variance.sqrt()
     );
+}
+
+#[test]
+fn a_standard_deviation_that_nobody_asks_for_is_not_worked_out_and_a_bound_asks() {
+    let scene = scene();
+    let told = |asked: bool, largest_std: f64| {
+        let model = Model::new(scene.chain.clone(), &scene.constants, &scene.coupling).unwrap();
+        let spread = Spread::Constant(ConstantSpread::new(vec![0], &[1e-6]).unwrap());
+        let model = std::sync::Arc::new(model.with_spread(spread).unwrap());
+        let options = limits(Limits { largest_std, ..Limits::default() });
+        let corrector = Corrector::new(model, scene.programming(), &tool(), options).unwrap();
+        corrector.correct(&Q, &[], asked, &mut [0.0; 6], &mut corrector.workspace())
+    };
+    let [silent, asked] = [false, true].map(|asked| told(asked, f64::INFINITY));
+    assert!(silent.std_m.is_nan() && asked.std_m > 1e-4);
+    assert_eq!((silent.residual_m, silent.shift), (asked.residual_m, asked.shift));
+    assert_eq!(told(false, 1e-5).refusal.unwrap().reason, Reason::Spread);
 }
 
 #[test]

@@ -72,7 +72,7 @@ fn after_the_ramp_set_points_are_corrected_as_single_ones() {
         let (mut out, mut alone) = ([0.0; JOINTS], [0.0; JOINTS]);
         let step = stream.step(Some(&readings), &[], CYCLE, &mut out);
         assert_eq!((step.phase, step.gain, step.fault), (Phase::On, 1.0, None));
-        assert!(corrector.correct(&readings, &[], &mut alone, &mut workspace).refusal.is_none());
+        assert!(corrector.correct(&readings, &[], true, &mut alone, &mut workspace).refusal.is_none());
         for (a, b) in out.iter().zip(alone) {
             assert!((a - b).abs() < 1e-9, "{a} {b}");
         }

@@ -59,7 +59,7 @@ fn a_turn_about_the_tool_that_is_free_does_not_count() {
     let norm = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let turned = |task: Task, q: &[f64]| {
         let corrector = scene.corrector(options(task, None));
-        let correction = corrector.correct(q, &[], &mut [0.0; 5], &mut corrector.workspace());
+        let correction = corrector.correct(q, &[], true, &mut [0.0; 5], &mut corrector.workspace());
         assert!(correction.refusal.is_none(), "{correction:?}");
         correction.turn
     };
@@ -92,7 +92,7 @@ fn position_with_all_joints_moves_them_least() {
     accepted(&scene, options(Task::Position, None), |i, from, to| {
         assert!(distance(&scene.meant(from)[0], &scene.real(to)[0]) < MET, "waypoint {i}");
         let mut other = vec![0.0; 6];
-        few.correct(from, &[], &mut other, &mut workspace.borrow_mut());
+        few.correct(from, &[], true, &mut other, &mut workspace.borrow_mut());
         if other[0].is_finite() {
             assert!(change(from, to) <= change(from, &other) * (1.0 + 1e-2), "waypoint {i}");
         }
@@ -151,7 +151,7 @@ fn five_axes_meet_the_position_and_come_near_the_orientation() {
             let (meant, real) = (scene.meant(from)[0], scene.real(to)[0]);
             assert!(distance(&meant, &real) < MET, "waypoint {i}: {:e}", distance(&meant, &real));
             let mut other = vec![0.0; 5];
-            position.correct(from, &[], &mut other, &mut workspace.borrow_mut());
+            position.correct(from, &[], true, &mut other, &mut workspace.borrow_mut());
             if other[0].is_finite() {
                 let (nearest, careless) = (left(&meant, &real), left(&meant, &scene.real(&other)[0]));
                 assert!(nearest <= careless * 1.01 + 1e-6, "waypoint {i}: {nearest:e} beside {careless:e}");

@@ -217,7 +217,7 @@ impl Corrector {
             let mut out = out.readwrite();
             // A workspace holds nothing from one waypoint to the next, so that of a thread that failed can be used.
             let mut workspace = self.workspace.lock().unwrap_or_else(PoisonError::into_inner);
-            self.core.correct(values, &features, out.as_slice_mut()?, &mut workspace)
+            self.core.correct(values, &features, false, out.as_slice_mut()?, &mut workspace)
         };
         let refusal = correction.refusal.map(|refusal| (refusal.reason as u32, refusal.to_string()));
         Ok((out, refusal))

@@ -38,7 +38,8 @@ pub unsafe extern "C" fn truearm_correct(
         };
         check_array(out, out_size, corrector.joint_count())?;
         let (workspace, memory) = held.parts();
-        let found = corrector.correct(&memory.readings, &memory.features, &mut memory.out, workspace);
+        let (readings, features, spread) = (&memory.readings, &memory.features, !correction.is_null());
+        let found = corrector.correct(readings, features, spread, &mut memory.out, workspace);
         // SAFETY: as the caller promises.
         unsafe { put(correction, Waypoint::of(&found))? };
         if found.refusal.is_some() {

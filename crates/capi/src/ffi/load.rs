@@ -344,5 +344,5 @@ fn warm_up(corrector: &Corrector) {
     let mut workspace = corrector.workspace();
     let (joints, features) = (corrector.joint_count(), corrector.feature_count());
     let mut out = vec![0.0; joints];
-    let _ = corrector.correct(&vec![0.0; joints], &vec![0.0; features], &mut out, &mut workspace);
+    let _ = corrector.correct(&vec![0.0; joints], &vec![0.0; features], true, &mut out, &mut workspace);
 }
