@@ -48,7 +48,8 @@ impl Rig {
             let status = truearm_load_file(path.as_ptr(), &mut calibration, message.as_mut_ptr(), 256);
             assert_eq!(status, Status::Ok, "{path:?}");
             let mut options = truearm_default_options();
-            options.largest_std_m = f64::INFINITY;
+            // Looked at as by default, but no reason to refuse poses beyond the measured ones.
+            options.largest_std_m = f64::MAX;
             truearm_corrector_new(calibration, null(), &options, &mut corrector, null_mut(), 0);
             truearm_workspace_new(corrector, &mut workspace);
             truearm_stream_new(corrector, null(), &mut stream, null_mut(), 0);

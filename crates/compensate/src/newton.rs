@@ -3,12 +3,13 @@
 //! Each step is the smallest change of the joints that removes the error, J^T (J J^T)^-1 e. Where that is longer than a
 //! step may be, the error is far smaller than what the joints would have to turn for it: the step is then damped,
 //! J^T (J J^T + m)^-1 e with m = (|e| / 2 longest)^2, which is never longer than `longest` and leaves the directions in
-//! which the arm moves well nearly undamped. A step that makes the error larger is halved. How a step bends off its straight
-//! line is known from the screws of the joints, [`crate::bend`]: taken off the error, and solved again, that makes the step
-//! exact to the third order (Chebyshev's method; Ortega and Rheinboldt, Iterative Solution of Nonlinear Equations in Several
-//! Variables, 1970), and a Jacobian good for all short steps that follow. A search ends with a step whose error is not
-//! looked at where the rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary
-//! Differential Equations II, section IV.8). What a pose gets does not depend on the poses beside it.
+//! which the arm moves well nearly undamped. A step that makes the error larger is halved.
+//!
+//! How a step bends off its straight line is known from the screws of the joints, [`truearm_kinematics::bend`]: taken off
+//! the error before that is solved again, it makes a step exact but for the third order (Chebyshev's method), and a
+//! Jacobian good for the steps that follow a short one. A search ends with a step whose error is not looked at where the rate at which
+//! errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8).
+//! What a pose gets does not depend on the poses beside it.
 
 use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
@@ -22,13 +23,13 @@ use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task};
 const ENOUGH: f64 = 1e-13;
 /// The same where the parameters vary, which each step leaves a thousandth of the error for, or less.
 const ENOUGH_VARIED: f64 = 1e-10;
-/// Step up to which a Jacobian is good enough for the steps to come, rad.
+/// Step up to which a Jacobian is good enough for the steps to come, in units, if errors fall fast.
 const SHORT: f64 = 1e-2;
-/// Part of the error up to which a step may bend, if that is to be trusted.
+/// Part of the error up to which a step may bend, if that is to be trusted, and by which it may make the step longer.
 const SLIGHT: f64 = 0.3;
-/// Step at which it ends where an error is left that the joints cannot remove, rad.
+/// Step at which it ends where an error is left that the joints cannot remove, in units.
 const STANDSTILL: f64 = 1e-11;
-/// Largest rate at which errors fall that is trusted to hold for one more step.
+/// Largest rate at which errors fall that is trusted to hold for one more step, and with the same Jacobian.
 const STEADY: f64 = 0.1;
 /// Added to J J^T so that it can be inverted everywhere, m^2.
 const FLOOR: f64 = 1e-12;
@@ -75,7 +76,7 @@ pub(crate) struct Search {
     trial: Vec<Lane>,
     /// The last step of the moving readings, in units.
     step: Vec<Lane>,
-    /// The same of all readings, and of all joint values.
+    /// The same in rad and m: of all readings, zero where they may not move, and of all joint values.
     shifts: Vec<Lane>,
     turns: Vec<Lane>,
     /// Motions of the task's rows by the moving readings, in metres and units.
@@ -119,6 +120,10 @@ struct Progress {
     better: Lane,
     /// Flag: the next step needs a Jacobian of its own.
     stale: Lane,
+    /// Flag: the last step had one.
+    fresh: Lane,
+    /// Flag: the last step was damped.
+    damped: Lane,
     /// Damping of the last Jacobian.
     damping: Lane,
 }
@@ -213,6 +218,8 @@ fn approach<I: Isa, G: Goal<M>, const M: usize>(
         }
         if stale {
             fill_columns::<I, G, M>(aimed, plan, &frame, progress.stale, search);
+            let joints = aimed.chain.joint_count();
+            search.bend.take(&search.model.screws[..joints], &search.model.inputs[..joints], progress.stale);
             factor = Some(progress.factor::<I, M>(plan, search));
         }
         // Every search begins without a Jacobian.
@@ -243,6 +250,8 @@ impl Progress {
             open: YES,
             better: NO,
             stale: YES,
+            fresh: NO,
+            damped: NO,
             damping: Lane::splat(FLOOR),
         }
     }
@@ -277,6 +286,7 @@ impl Progress {
         let far = Lane::splat(plan.enough() * plan.enough()).where_below(self.least, self.open, NO);
         let far = Lane::splat(STANDSTILL * STANDSTILL).where_below(self.length, far, NO);
         let slow = Lane::splat(plan.hopeless * plan.hopeless).where_below(self.rate, self.better, NO);
+        let slow = NO.where_below(self.fresh, slow, NO);
         self.open = NO.where_below(slow, NO, far);
         norm
     }
@@ -299,19 +309,29 @@ impl Progress {
     ) {
         let longest = Lane::splat(plan.longest * plan.longest);
         let Straight { error, norm, length, bent } = straight;
-        let slight = squared::<I>(&bent).where_below(norm * (SLIGHT * SLIGHT), YES, NO);
-        let slight = longest.where_below(length, NO, slight);
-        let mut rest = error;
-        for (rest, bent) in rest.iter_mut().zip(&bent) {
-            *rest = NO.where_below(slight, *rest - *bent, *rest);
-        }
-        if longest.any_below(length) {
+        self.damped = longest.where_below(length, YES, NO);
+        if NO.any_below(self.damped) {
             let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
-            self.damping = longest.where_below(length, damping, self.damping);
+            self.damping = NO.where_below(self.damped, damping, self.damping);
             let columns = &search.columns[..plan.moving.len()];
             dispatch_on(I::LEVEL, Damp { columns, damping: self.damping, factor });
         }
-        self.length = step_for::<I, M>(plan, &factor.solve::<I>(&rest), search);
+        let slight = squared::<I>(&bent).where_below(norm * (SLIGHT * SLIGHT), YES, NO);
+        let mut bends = NO.where_below(self.damped, NO, slight);
+        // Near a singular configuration little of the error may ask for much of the joints: such steps stay straight.
+        let longer = length * ((1.0 + SLIGHT) * (1.0 + SLIGHT));
+        loop {
+            let mut rest = error;
+            for (rest, bent) in rest.iter_mut().zip(&bent) {
+                *rest = NO.where_below(bends, *rest - *bent, *rest);
+            }
+            self.length = step_for::<I, M>(plan, &factor.solve::<I>(&rest), search);
+            let jumps = longer.where_below(self.length, bends, NO);
+            if !NO.any_below(jumps) {
+                break;
+            }
+            bends = NO.where_below(jumps, NO, bends);
+        }
     }
 
     /// Takes over the next trials where they will be near enough, and ends their searches.
@@ -336,11 +356,14 @@ impl Progress {
         self.open = NO.where_below(near, NO, self.open);
     }
 
-    /// Which poses need a Jacobian at their next trial: those with a long step, and those whose errors do not fall fast.
+    /// Which poses need a Jacobian at their next trial: those with a long or damped step, and those whose errors do not fall
+    /// fast.
     #[inline(always)]
     fn settle(&mut self) {
         let far = Lane::splat(SHORT * SHORT).where_below(self.length, YES, NO);
         let far = Lane::splat(STEADY * STEADY).where_below(self.rate, YES, far);
+        let far = NO.where_below(self.damped, YES, far);
+        self.fresh = self.stale;
         self.stale = NO.where_below(self.better, far, YES);
     }
 }
@@ -388,7 +411,6 @@ fn fill_columns<I: Isa, G: Goal<M>, const M: usize>(
             *value = NO.where_below(stale, row, *value);
         }
     }
-    search.bend.take(screws, &search.model.inputs, stale);
 }
 
 /// The columns of a pose at `search.best`, see [`fill_columns`].
@@ -447,12 +469,13 @@ impl Search {
         plan: &Plan,
         frame: &LaneFrame,
     ) -> [Lane; M] {
+        self.shifts.fill(NO);
         for ((&k, &unit), step) in plan.moving.iter().zip(&plan.unit).zip(&self.step) {
             self.shifts[k] = *step * unit;
         }
         aimed.model.coupling.joints::<I>(&self.shifts, &mut self.turns);
         let bent = self.bend.along::<I>(&self.model.inputs, &self.turns);
-        weigh(G::column::<I>(&bent, frame), plan.turn_weight)
+        weigh(G::bent::<I>(&bent, frame), plan.turn_weight)
     }
 
     /// The next trials: a step on from those that were better, half the way back from the others.

@@ -1,6 +1,6 @@
 //! What of a pose is to be met, as rows of an error and of its Jacobian.
 
-use truearm_kinematics::{Isa, Lane, LaneFrame, Screw, lane_cross};
+use truearm_kinematics::{Bent, Isa, Lane, LaneFrame, Screw, lane_cross};
 
 /// What the corrected joints bring the tool to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,6 +37,12 @@ pub(crate) trait Goal<const M: usize> {
 
     /// Motion of the rows by a screw.
     fn column<I: Isa>(screw: &Screw, frame: &LaneFrame) -> [Lane; M];
+
+    /// What a step from where the frame is brings to the rows beside its straight line.
+    #[inline(always)]
+    fn bent<I: Isa>(bent: &Bent, frame: &LaneFrame) -> [Lane; M] {
+        Self::column::<I>(&bent.beside, frame)
+    }
 }
 
 pub(crate) struct PoseGoal;
@@ -69,6 +75,20 @@ impl Goal<5> for AxisGoal {
     fn column<I: Isa>(screw: &Screw, frame: &LaneFrame) -> [Lane; 5] {
         let [x, y, z] = screw.linear;
         [x, y, z, dot::<I>(&frame.axis(0), &screw.angular), dot::<I>(&frame.axis(1), &screw.angular)]
+    }
+
+    /// The turn about the tool's axis, which is free, carries that about the others with it; and the axes that rows are
+    /// told in have turned since the columns were taken.
+    #[inline(always)]
+    fn bent<I: Isa>(bent: &Bent, frame: &LaneFrame) -> [Lane; 5] {
+        let mut rows = Self::column::<I>(&bent.beside, frame);
+        let (x, y) = (frame.axis(0), frame.axis(1));
+        let half = dot::<I>(&frame.axis(2), &bent.turn) * 0.5;
+        rows[3] = I::mul_add(-half, dot::<I>(&y, &bent.turn), rows[3]);
+        rows[4] = I::mul_add(half, dot::<I>(&x, &bent.turn), rows[4]);
+        rows[3] += dot::<I>(&bent.turned, &lane_cross::<I>(&x, &bent.turn));
+        rows[4] += dot::<I>(&bent.turned, &lane_cross::<I>(&y, &bent.turn));
+        rows
     }
 }
 

@@ -253,3 +253,20 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn from_a_singular_wrist_a_bound_refuses_nothing_that_it_allows() {
+    let scene = scene();
+    let mut q = readings(&scene.chain, 2000, 5);
+    q.iter_mut().skip(4).step_by(6).for_each(|fifth| *fifth = 0.0);
+    let free = correct(&scene.corrector(limits(unbounded())), &q, 1);
+    let bound = 3.0_f64.to_radians();
+    let bounded = correct(&scene.corrector(limits(Limits { largest_angle: bound, ..unbounded() })), &q, 1);
+    let largest =
+        |i: usize| (0..6).map(|k| (free.readings[6 * i + k] - q[6 * i + k]).abs()).fold(0.0, f64::max);
+    let allowed: Vec<usize> =
+        (0..2000).filter(|i| free.readings[6 * i].is_finite() && largest(*i) < bound).collect();
+    assert!(allowed.len() > 20, "{} of 2000", allowed.len());
+    let refused = allowed.iter().filter(|i| bounded.readings[6 * **i].is_nan()).count();
+    assert!(refused * 10 <= allowed.len(), "{refused} of {} refused", allowed.len());
+}

@@ -25,8 +25,9 @@ fn check_pose(scene: &Scene) {
     for i in (0..WAYPOINTS).filter(|i| found.readings[i * n].is_finite()) {
         let (distance, angle) = apart(&meant[i], &real[i]);
         assert!(distance < MET && angle < MET, "waypoint {i}: {distance:e} m, {angle:e} rad");
-        let reported = found.numbers[i][0];
+        let [reported, turned] = [0, 1].map(|k| found.numbers[i][k]);
         assert!((distance - reported).abs() < told, "waypoint {i}: {distance:e} m, reported {reported:e}");
+        assert!((angle - turned).abs() < 10.0 * told, "waypoint {i}: {angle:e} rad, reported {turned:e}");
     }
 }
 

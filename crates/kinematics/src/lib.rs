@@ -8,6 +8,7 @@
 #![allow(clippy::needless_range_loop, reason = "loops over lanes go through several arrays with one index")]
 
 mod batch;
+mod bend;
 mod chain;
 mod error;
 mod exponential;
@@ -29,6 +30,7 @@ mod writer;
 mod x86;
 
 pub use batch::Batch;
+pub use bend::{Bent, bend};
 pub use chain::{Chain, Convention, Joint, Link};
 pub use error::KinematicsError;
 pub use exponential::exp;
