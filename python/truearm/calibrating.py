@@ -12,7 +12,7 @@ from truearm.calibration import Calibration
 from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.doubts import NO_HELP, doubts, mounting, on_a_grid
+from truearm.doubts import NO_HELP, doubts, mounting, on_a_grid, stood_still
 from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
@@ -70,7 +70,7 @@ def calibrate(
     robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given = given.deduplicated()
-    notices += on_a_grid(robot, given.readings)
+    notices += stood_still(robot, given.readings) + on_a_grid(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
     trained = fit_rows(task, given.select(split.train))

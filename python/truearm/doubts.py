@@ -13,6 +13,7 @@ from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
+from truearm.stillness import MOVE_IT, still_joints, still_words
 from truearm.units import to_si
 from truearm.validation import Validation
 
@@ -61,6 +62,15 @@ def mounting(variable: VariableDetails | None) -> list[Notice]:
         "look like that, and nothing needs to be done."
     )
     return [Notice("mounting", text)]
+
+
+def stood_still(robot: Robot, readings: Floats) -> list[Notice]:
+    """A warning where a joint has one reading in all rows of `readings` (n, N)."""
+    still = still_joints(readings, robot.joints)
+    if not still:
+        return []
+    text = f"All poses were measured with {still_words(still, robot.joints)}. {MOVE_IT}."
+    return [Notice("stood_still", text)]
 
 
 def on_a_grid(robot: Robot, readings: Floats) -> list[Notice]:

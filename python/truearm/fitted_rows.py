@@ -61,17 +61,26 @@ class FittedRows:
         return np.array([mark in known for mark in _marks(data)], dtype=np.bool_)
 
     def outliers(self) -> list[dict[str, Any]]:
-        """File, row, score and distance_mm of each outlier, the worst first."""
+        """File, row, score and distance_mm of each outlier, of its farthest target, the worst first."""
         found = np.flatnonzero(self.score > 1.0)
+        distance_m = np.maximum(self.distance_m, self._farthest())
         return [
             {
                 "file": str(self.data.sources[k]),
                 "row": int(self.data.rows[k]),
                 "score": float(self.score[k]),
-                "distance_mm": float(self.distance_m[k] * MM_PER_METRE),
+                "distance_mm": float(distance_m[k] * MM_PER_METRE),
             }
             for k in found[np.argsort(-self.score[found], kind="stable")]
         ]
+
+    def _farthest(self) -> Floats:
+        """How far the farthest target of each row (n,) is from where it should be, m."""
+        count = min(self.data.target_count, self.residual.shape[1] // 3)
+        if count == 0:
+            return np.zeros(len(self.data))
+        points = self.residual[:, : 3 * count].reshape(-1, count, 3)
+        return np.asarray(np.linalg.norm(points, axis=2).max(axis=1))
 
 
 def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:

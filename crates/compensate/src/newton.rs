@@ -27,6 +27,9 @@ const ENOUGH_VARIED: f64 = 1e-10;
 const SHORT: f64 = 1e-2;
 /// Part of the error up to which a step may bend, if that is to be trusted, and by which it may make the step longer.
 const SLIGHT: f64 = 0.3;
+/// Longest step after which an error is foreseen, in units: near singular configurations a small error asks for a long one, on
+/// which parameters vary.
+const NEAR: f64 = 5e-6;
 /// Step at which it ends where an error is left that the joints cannot remove, in units.
 const STANDSTILL: f64 = 1e-11;
 /// Largest rate at which errors fall that is trusted to hold for one more step, and with the same Jacobian.
@@ -346,6 +349,7 @@ impl Progress {
         let enough = Lane::splat(plan.foreseen * plan.foreseen);
         let near = (norm * rate).where_below(enough, self.open, NO);
         let near = rate.where_below(Lane::splat(STEADY * STEADY), near, NO);
+        let near = self.length.where_below(Lane::splat(NEAR * NEAR), near, NO);
         let near = NO.where_below(self.rate, near, NO);
         for (best, trial) in search.best.iter_mut().zip(&search.trial) {
             *best = NO.where_below(near, *trial, *best);

@@ -12,7 +12,7 @@ from truearm.programs.declaring import declared_controller, refuse_contradiction
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
-from truearm.programs.notices import frames_notices, payload_notices, tool_notices
+from truearm.programs.notices import frames_notices, payload_notices, still_notices, tool_notices
 from truearm.programs.program import Language
 from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
 from truearm.robot import Robot
@@ -68,6 +68,7 @@ def compensate_program(
         [
             *frames_notices(program, known),
             *payload_notices(program, calibration.robot),
+            *still_notices(done, calibration),
             *tool_notices(done, calibration),
         ],
     )

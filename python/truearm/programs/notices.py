@@ -12,6 +12,7 @@ from truearm.programs.program import Program
 from truearm.programs.rewriting import Rewritten
 from truearm.programs.tables import Motion
 from truearm.robot import Robot
+from truearm.stillness import moved_joints, still_words
 
 SAME_PAYLOAD_KG: Final = 0.05
 MEASURED_M: Final = 1e-4
@@ -59,6 +60,22 @@ def _unasked(program: Program, frames: Frames, kind: Kind) -> Notice | None:
         f"{noun}{several} {list_names(left)} of {frames.where} {'change' if several else 'changes'} nothing: "
         f"the program has none of that name, {own}",
     )
+
+
+def still_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
+    """Joints that stood still while the arm was measured, and move in the program."""
+    rows, joints = calibration.learned_from, calibration.robot.joints
+    moved = {} if rows is None else moved_joints(rows.data.readings, done.nominal, joints)
+    if not moved:
+        return []
+    return [
+        Notice(
+            "stood_still",
+            f"the arm was measured with {still_words(moved, joints)} alone, and the program moves it: how "
+            "far its targets are off there is not known, whatever std_mm says. Calibrate with poses in which "
+            "every joint moves",
+        )
+    ]
 
 
 def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:

@@ -13,6 +13,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.numbers import listed, percent, short, shown_readings
+from truearm.stillness import MOVE_IT
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -107,6 +108,12 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         "training poses leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
+
+
+def _stood_still(facts: Facts) -> Iterator[Advice]:
+    if facts.still:
+        words = f"All poses were measured with {facts.still}. {MOVE_IT}."
+        yield Advice("joint_stood_still", "Move every joint.", words, 10.0 * facts.mean_mm())
 
 
 def _on_a_grid(facts: Facts) -> Iterator[Advice]:
@@ -218,6 +225,7 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
 
 RULES: Final = (
     _outliers,
+    _stood_still,
     _on_a_grid,
     _noise_or_poses,
     _tail,

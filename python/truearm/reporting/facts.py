@@ -16,6 +16,7 @@ from truearm.grids import grid_steps, grid_words
 from truearm.held_rows import HeldRows
 from truearm.models import ArmModel
 from truearm.reporting.numbers import shown_readings, unit_of
+from truearm.stillness import still_joints, still_words
 from truearm.summary import WAVE
 from truearm.units import MM_PER_METRE
 
@@ -151,6 +152,12 @@ class Facts:
             return "readings on a grid" if noticed else ""
         steps = grid_steps(self.readings, self.joints)
         return grid_words(steps) if steps else ""
+
+    @cached_property
+    def still(self) -> str:
+        """Which joints stood still, and where, in words; empty where none did, or the rows are not known."""
+        still = {} if self.readings is None else still_joints(self.readings, self.joints)
+        return still_words(still, self.joints) if still else ""
 
     @cached_property
     def features(self) -> dict[str, float]:

@@ -71,9 +71,11 @@ def _states(facts: Facts) -> list[tuple[str, str, int]]:
 
 
 def _scale(places: Floats, vectors: Floats) -> int:
-    """A round magnification that makes large nominal errors an eighth of the workspace."""
+    """A round magnification that makes large nominal errors an eighth of the workspace; 1 for one place."""
     reach = float(np.ptp(places, axis=0).max())
     large = float(np.quantile(np.linalg.norm(vectors, axis=1), 0.9))
+    if reach == 0.0:
+        return 1
     wanted = SHARE_OF_REACH * reach / max(large, 1e-9)
     known: list[int] = [mantissa * pow(10, power) for power in range(7) for mantissa in ROUND]
     return min(known, key=lambda value: abs(float(np.log(value / wanted))))

@@ -1,0 +1,86 @@
+"""Joints that stood still in all measured poses are told, wherever the calibration is used."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import truearm as ta
+from truearm.cli import main
+from truearm.reporting.advice import advise
+from truearm.reporting.facts import Facts
+from truearm.rotations import matrix_from_quaternion
+from truearm.simulation import VirtualArm
+from truearm.stillness import moved_joints, still_joints, still_words
+
+KINDS = ("revolute", "prismatic", "revolute")
+
+
+def test_a_joint_within_what_controllers_differ_by_stands_still():
+    readings = np.array([[0.5, 0.1, 0.0], [0.503, 0.1002, 0.2], [0.5, 0.1004, -0.2]])
+    still = still_joints(readings, KINDS)
+    assert list(still) == [1, 2]
+    assert still_words(still, KINDS) == "joint 1 at 28.65 deg, joint 2 at 100.2 mm"
+    readings[1, 0] = 0.52
+    assert list(still_joints(readings, KINDS)) == [2]
+
+
+def test_only_joints_that_move_from_where_they_stood_count():
+    known = np.array([[0.5, 0.1, 0.0], [0.5, 0.1, 0.2]])
+    there = np.array([[0.5, 0.2, 1.0], [np.nan, np.nan, np.nan]])
+    assert moved_joints(known, there, KINDS) == {2: pytest.approx(100.0)}
+    assert moved_joints(known, known, KINDS) == {}
+
+
+@pytest.fixture(scope="module")
+def locked():
+    """A UR10 whose sixth joint stood still while it was measured."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    poses = arm.poses(60)
+    poses[:, 5] = 0.25
+    return ta.calibrate(arm.robot, arm.measure(poses), model="constant")
+
+
+def test_a_calibration_says_which_joint_stood_still(locked):
+    told = [str(notice) for notice in locked.notices if notice.kind == "stood_still"]
+    assert len(told) == 1
+    assert "joint 6 at 14.32 deg" in told[0]
+    assert "Measure poses in which it moves" in told[0]
+    first = advise(Facts(locked), None)[0]
+    assert first.kind == "joint_stood_still"
+    assert "joint 6" in first.words
+
+
+def test_a_program_that_moves_it_is_warned_of(locked, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    locked.save(tmp_path / "arm.calib")
+    q = np.tile([0.1, -1.2, 1.3, -0.5, 0.9, 0.25], (4, 1))
+    for name, by in (("still", 0.0), ("moves", 0.3)):
+        q[1:, 5] = 0.25 + by
+        np.savetxt(
+            f"{name}.csv", q, delimiter=",", header="q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad", comments=""
+        )
+        words = ["compensate", "arm.calib", f"{name}.csv", "--controller", "nominal", "--dry-run"]
+        main([*words, "--largest-mm", "50", "--largest-std-mm", "50"])
+        assert ("measured with joint 6 at 14.32 deg alone" in capsys.readouterr().err) == (by > 0.0)
+
+
+def test_one_held_out_row_is_enough_for_a_report(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    arm.measure_table(arm.poses(20)).to_csv("arm.csv", index=False)
+    assert main(["calibrate", "ur10", "arm.csv", "-o", "out", "--holdout", "0.05"]) == 0
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_an_outlier_at_the_second_target_is_told_with_its_distance():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    q = arm.poses(80)
+    first, second = (arm.measure(q, seed=seed, orientation=True) for seed in (0, 1))
+    beside = second.targets[:, 0] + matrix_from_quaternion(second.orientations) @ [0.1, 0.0, 0.05]
+    beside[7, 0] += 0.008
+    columns = [*(f"q{k}" for k in range(1, 7)), "x", "y", "z", "x2", "y2", "z2"]
+    table = pd.DataFrame(np.hstack([q, first.targets[:, 0], beside]), columns=columns)
+    data = ta.Measurements.from_dataframe(table, length_unit="m", angle_unit="rad")
+    (outlier,) = ta.calibrate(arm.robot, data, use="targets").rows.outliers()
+    assert outlier["row"] == data.rows[7]
+    assert outlier["distance_mm"] == pytest.approx(8.0, abs=1.0)
