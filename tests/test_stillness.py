@@ -76,11 +76,15 @@ def test_an_outlier_at_the_second_target_is_told_with_its_distance():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
     q = arm.poses(80)
     first, second = (arm.measure(q, seed=seed, orientation=True) for seed in (0, 1))
-    beside = second.targets[:, 0] + matrix_from_quaternion(second.orientations) @ [0.1, 0.0, 0.05]
+    assert second.orientations is not None
+    turned = matrix_from_quaternion(second.orientations) @ np.array([0.1, 0.0, 0.05])
+    beside = second.targets[:, 0] + turned
     beside[7, 0] += 0.008
     columns = [*(f"q{k}" for k in range(1, 7)), "x", "y", "z", "x2", "y2", "z2"]
     table = pd.DataFrame(np.hstack([q, first.targets[:, 0], beside]), columns=columns)
     data = ta.Measurements.from_dataframe(table, length_unit="m", angle_unit="rad")
-    (outlier,) = ta.calibrate(arm.robot, data, use="targets").rows.outliers()
+    rows = ta.calibrate(arm.robot, data, use="targets").rows
+    assert rows is not None
+    (outlier,) = rows.outliers()
     assert outlier["row"] == data.rows[7]
     assert outlier["distance_mm"] == pytest.approx(8.0, abs=1.0)
