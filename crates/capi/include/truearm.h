@@ -271,7 +271,8 @@ truearm_status truearm_stream_free(truearm_stream *stream);
 // Corrects one waypoint: readings of the program in, readings to command out.
 //
 // TRUEARM_STATUS_OK: `out` is written. TRUEARM_STATUS_REFUSED: `out` is not written, `correction` says why. The arrays may be
-// one and the same. `correction` may be null. Where the calibration needs no features, `features` may be null.
+// one and the same. `correction` may be null. Where the calibration needs no features, `features` may be null. The standard
+// deviation takes part of the time: it is worked out where `correction` is given or `largest_std_m` is finite.
 //
 // # Safety
 // The handles were made and not freed, `readings` has `joints` numbers, `features` `feature_count`, `out` `out_size`.
