@@ -6,11 +6,14 @@ the message and exits with status 1, or 2 for :class:`UsageError`.
 
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
 
 MAX_ROWS_NAMED = 10
+OUTLIERS_NAMED = 5
 
 
 class TruearmError(Exception):
@@ -76,6 +79,22 @@ def list_rows(rows: Iterable[int], noun: str = "row") -> str:
     if rest > 0:
         return f"{noun}s {', '.join(named)} and {rest} more"
     return f"{noun}s {', '.join(named[:-1])} and {named[-1]}"
+
+
+def list_outliers(outliers: Sequence[Mapping[str, Any]], *, several: bool) -> str:
+    """Rows with their distances in words, the first five: "row 3 (24.98 mm), row 8 (12.10 mm) and 2 more".
+
+    Args:
+        outliers: file, row and distance_mm of each, the worst first.
+        several: Whether the rows are of several files, so that each has to be named.
+    """
+    named = [
+        f"row {outlier['row']}{' of ' + Path(outlier['file']).name if several else ''}"
+        f" ({outlier['distance_mm']:.2f} mm)"
+        for outlier in outliers[:OUTLIERS_NAMED]
+    ]
+    more = f" and {len(outliers) - len(named)} more" if len(outliers) > len(named) else ""
+    return f"{', '.join(named)}{more}"
 
 
 def count_of(count: int, noun: str) -> str:

@@ -1,8 +1,7 @@
 """Errors of a calibration on measurements that it has not seen, mostly in a new set-up."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from truearm.doubts import no_help
 from truearm.errors import InputError, Notice, UsageError, count_of, list_names
 from truearm.fitted_rows import known_rows
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
+from truearm.gross_rows import Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
 from truearm.judging import judge, model_inputs
 from truearm.measurements import Measurements
@@ -25,16 +25,13 @@ from truearm.plausibility import check_against
 from truearm.registration import register
 from truearm.turning_sense import check_turns
 from truearm.units import MM_PER_METRE
-from truearm.validation import Errors, RowErrors, row_errors
+from truearm.validation import Errors, RowErrors
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 MOST_FRAME_ROWS: Final = 400
 FEWEST_FRAME_ROWS: Final = 3
-FAR_ROWS: Final = "far_rows"
-FAR: Final = 8.0
-"""Times the median distance, and the constants' noise: what no row misses by that belongs to the others."""
 
 
 @dataclass(frozen=True)
@@ -142,13 +139,14 @@ def evaluate(
         }
     with stages("judging"):
         chosen_rows = data.select(judged)
-        errors = judge(task, models, chosen_rows, data.select(frame if len(frame) else judged))
-    spoiled = []
-    if not (chosen.keep_frames or chosen.keep_tool):
-        spoiled = _spoiled(task, calibration, data.select(frame))
-    notices = [*notices, *(spoiled or _of_no_use(errors, calibration.model_name))]
+        found_by = data.select(frame if len(frame) else judged)
+        errors = judge(task, models, chosen_rows, found_by)
+        held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
+        rows = chosen_rows, held
+        spoiled, outliers = _gross(task, calibration, models[best], found_by, rows, chosen)
+    notices = [*notices, *(spoiled or _of_no_use(errors, best)), *outliers]
     statistics = {name: found.statistics() for name, found in errors.items()}
-    return Evaluation(len(frame), len(judged), statistics, tuple(notices), HeldRows.of(chosen_rows, errors))
+    return Evaluation(len(frame), len(judged), statistics, tuple(notices), held)
 
 
 def _divide(data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]:
@@ -194,27 +192,30 @@ def _of_no_use(errors: Mapping[str, RowErrors], best: str) -> list[Notice]:
     return no_help(before, after, "median error on the rows that were judged")
 
 
-def _spoiled(task: Task, calibration: Calibration, data: Measurements) -> list[Notice]:
-    """What rows that found frame and tool lie far from where the others put them."""
-    model = calibration.model
-    parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
-    measured = core_set(task.arm.robot, data, task.selection, task.groups)
-    with core_errors(data):
-        options = fit_options(task, parameters=parameters, robust="cauchy")
-        setup = fit_constant(task.problem(measured, []), options).setup
-    left = row_errors(task.arm, data, task.selection, task.groups, parameters, setup).distance_m
-    far = left > FAR * max(float(np.nanmedian(left)), calibration.constant.noise_m)
-    if not far.any():
-        return []
-    named = ", ".join(
-        f"{data.rows[k]} of {Path(data.sources[k]).name} ({MM_PER_METRE * left[k]:.3g} mm)"
-        for k in np.flatnonzero(far)
-    )
-    text = (
-        "Among the rows that found frame and tool some lie far from where the others put them, and move "
-        f"both: row {named}. Take them out, or let more rows find the frame (--frame-rows)."
-    )
-    return [Notice(FAR_ROWS, text, tuple(data.rows[far].tolist()))]
+def _gross(
+    task: Task,
+    calibration: Calibration,
+    model: ArmModel,
+    frame: Measurements,
+    held: tuple[Measurements, HeldRows],
+    options: EvaluationOptions,
+) -> tuple[list[Notice], list[Notice]]:
+    """Notices of rows that spoil frame and tool, and of gross ones among those that were judged.
+
+    Where frame and tool are found, a robust fit says where the first of them belong.
+    """
+    finds = {"finds_tool": not (options.keep_tool or options.keep_frames)}
+    finds["finds_frame"] = not (options.keep_frames or task.arm.world_is_known)
+    of_frame = Expected(task, calibration, model, frame, **finds)
+    judged = Expected(task, calibration, model, held[0], **finds)
+    outliers = gross_judged_rows(judged, of_frame, held[1])
+    if finds["finds_tool"]:
+        measured = core_set(task.arm.robot, frame, task.selection, task.groups)
+        with core_errors(frame):
+            chosen = fit_options(task, parameters=of_frame.parameters, robust="cauchy")
+            setup = fit_constant(task.problem(measured, []), chosen).setup
+        of_frame = replace(of_frame, model=replace(model, setup=setup))
+    return gross_frame_rows(of_frame), outliers
 
 
 def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:

@@ -20,7 +20,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
 from truearm.defaults import HOLDOUT, SEED
-from truearm.errors import InputError, UsageError, count_of, typed
+from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
 from truearm.files import write_whole
 from truearm.scheme_options import SchemeOptions
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 SCHEME = SchemeOptions()
 SUMMARY_NAME = "summary.json"
-OUTLIERS_NAMED = 5
 
 
 def command(
@@ -269,15 +268,9 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
     if not outliers:
         return
     several = calibration.rows is not None and len(calibration.rows.data.files) > 1
-    named = [
-        f"row {outlier['row']}{' of ' + Path(outlier['file']).name if several else ''}"
-        f" ({outlier['distance_mm']:.2f} mm)"
-        for outlier in outliers[:OUTLIERS_NAMED]
-    ]
-    more = f" and {len(outliers) - len(named)} more" if len(outliers) > len(named) else ""
     fate = "taken out of the variable fit" if calibration.variable is not None else "not taken out of the fit"
     hint = "" if calibration.variable is not None else " --robust huber gives them less weight."
-    say_wrapped(f"Outliers, {fate}: {', '.join(named)}{more}.{hint}")
+    say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, several=several)}.{hint}")
     held = None if calibration.selection.distances else calibration.held
     means = {} if held is None else held.means_without_mm(outliers)
     if means:

@@ -44,7 +44,8 @@ def command(
     from truearm.calibration import Calibration
     from truearm.cli.error_tables import print_errors
     from truearm.doubts import NO_HELP
-    from truearm.evaluation import FAR_ROWS, EvaluationOptions, evaluate
+    from truearm.evaluation import EvaluationOptions, evaluate
+    from truearm.gross_rows import FAR_ROWS
     from truearm.measurements import Measurements
 
     options = EvaluationOptions(

@@ -1,5 +1,6 @@
 """Whether touches agree with each other, and which of them do not."""
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,23 @@ WORST_M: Final = 0.01
 TWICE: Final = 2.0
 MUCH_BETTER: Final = 0.2
 UNIT_FACTOR: Final = (500.0, 2000.0)
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """What n rows leave in fits without them, each in a fit to all the others.
+
+    Attributes:
+        alone: Residual of each row in the fit without it (n, 3), m.
+        lengths: Its length, of which what the others leave uncertain is taken off (n,), m: as long as noise.
+        squares: Sum of squares that the fit to all rows leaves, m^2.
+        rank: How many unknowns the rows tell.
+    """
+
+    alone: Floats
+    lengths: Floats
+    squares: float
+    rank: int
 
 
 def far_rows(residuals: Floats, jacobian: Floats, rows: Rows) -> list[Notice]:
@@ -54,21 +72,28 @@ def far_rows(residuals: Floats, jacobian: Floats, rows: Rows) -> list[Notice]:
 
 def _farthest(residuals: Floats, jacobian: Floats, chance: float) -> tuple[int | None, float]:
     """The row that the others contradict most and by how much, m; None where they contradict none."""
-    n, unknowns = len(residuals), jacobian.shape[2]
-    basis = _basis(jacobian.reshape(3 * n, unknowns))
-    freedom = 3 * n - basis.shape[1]
+    found = left_out(residuals, jacobian)
+    freedom = 3 * len(residuals) - found.rank
     if freedom <= 3:
         return None, 0.0
+    gained = np.square(found.lengths)
+    place = int(gained.argmax())
+    others = max(found.squares - float(gained[place]), 0.0) / (freedom - 3)
+    if gained[place] / 3.0 <= f_distribution.isf(chance, 3, freedom - 3) * others:
+        return None, 0.0
+    return place, float(np.linalg.norm(found.alone[place]))
+
+
+def left_out(residuals: Floats, jacobian: Floats) -> LeftOut:
+    """What rows leave in fits without them; arguments as for `far_rows`."""
+    n, unknowns = len(residuals), jacobian.shape[2]
+    basis = _basis(jacobian.reshape(3 * n, unknowns))
     left = residuals.reshape(-1) - basis @ (basis.T @ residuals.reshape(-1))
     blocks, of_row = basis.reshape(n, 3, -1), left.reshape(n, 3)
     free = np.eye(3) - blocks @ blocks.transpose(0, 2, 1)
     alone = np.einsum("nij,nj->ni", np.linalg.pinv(free, rcond=1e-6, hermitian=True), of_row)
-    gained = np.einsum("ni,ni->n", of_row, alone)
-    place = int(gained.argmax())
-    others = max(float(left @ left) - float(gained[place]), 0.0) / (freedom - 3)
-    if gained[place] / 3.0 <= f_distribution.isf(chance, 3, freedom - 3) * others:
-        return None, 0.0
-    return place, float(np.linalg.norm(alone[place]))
+    lengths = np.sqrt(np.maximum(np.einsum("ni,ni->n", of_row, alone), 0.0))
+    return LeftOut(alone, lengths, float(left @ left), basis.shape[1])
 
 
 def _basis(jacobian: Floats) -> Floats:
