@@ -123,6 +123,39 @@ def test_what_the_controller_counts_otherwise_is_named(name, otherwise, words):
     assert re.search(re.escape(words).replace(r"\.\*", ".*"), said), said
 
 
+def named_otherwise(name, **otherwise):
+    robot, data = measured_otherwise(name, **otherwise)
+    return notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
+
+
+@pytest.mark.parametrize("name", ["ur10", "abb-irb-120"])
+@pytest.mark.parametrize("turned", [(3, 5), (1, 3, 4), (0, 1, 3, 5)])
+def test_joints_counted_otherwise_are_not_put_down_to_a_left_handed_frame(name, turned):
+    told, _, others = named_otherwise(name, turned=turned).partition(" They fit as well if ")
+    named = [int(joint) - 1 for joint in re.findall(r"joint (\d) is counted the other way", told)]
+    assert named == list(turned)
+    assert "left-handed" not in told
+    assert ("left-handed" in others) == (name != "ur10")
+
+
+def test_of_joints_that_fit_as_well_the_fewest_are_named():
+    told, _, others = named_otherwise("kuka-iiwa-7", turned=(1, 3, 4)).partition(" They fit as well if ")
+    assert 1 <= told.count("counted the other way") <= 3
+    assert "left-handed" not in told
+    assert re.search(r"or in \d+ other ways: measurements alone do not tell which is true", others)
+
+
+@pytest.mark.parametrize(
+    ("name", "mirror_image"),
+    [("ur10", []), ("abb-irb-120", ["1", "4", "6"]), ("kuka-kr-6-r900", ["1", "4", "6"])],
+)
+def test_a_left_handed_frame_is_told_with_the_joints_that_look_like_it(name, mirror_image):
+    told, _, others = named_otherwise(name, mirrored=True).partition(" They fit as well if ")
+    assert "if the device's frame is left-handed (one axis reversed, or two exchanged). Put" in told
+    assert re.findall(r"joint (\d) is counted the other way", others) == mirror_image
+    assert ("measurements alone do not tell" in others) == bool(mirror_image)
+
+
 def test_nothing_is_named_where_no_convention_fits():
     robot, data = measured_otherwise("ur10")
     assert not notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
