@@ -123,6 +123,39 @@ def test_what_the_controller_counts_otherwise_is_named(name, otherwise, words):
     assert re.search(re.escape(words).replace(r"\.\*", ".*"), said), said
 
 
+def named_otherwise(name, **otherwise):
+    robot, data = measured_otherwise(name, **otherwise)
+    return notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
+
+
+@pytest.mark.parametrize("name", ["ur10", "abb-irb-120"])
+@pytest.mark.parametrize("turned", [(3, 5), (1, 3, 4), (0, 1, 3, 5)])
+def test_joints_counted_otherwise_are_not_put_down_to_a_left_handed_frame(name, turned):
+    told, _, others = named_otherwise(name, turned=turned).partition(" They fit as well if ")
+    named = [int(joint) - 1 for joint in re.findall(r"joint (\d) is counted the other way", told)]
+    assert named == list(turned)
+    assert "left-handed" not in told
+    assert ("left-handed" in others) == (name != "ur10")
+
+
+def test_of_joints_that_fit_as_well_the_fewest_are_named():
+    told, _, others = named_otherwise("kuka-iiwa-7", turned=(1, 3, 4)).partition(" They fit as well if ")
+    assert 1 <= told.count("counted the other way") <= 3
+    assert "left-handed" not in told
+    assert re.search(r"or in \d+ other ways: measurements alone do not tell which is true", others)
+
+
+@pytest.mark.parametrize(
+    ("name", "mirror_image"),
+    [("ur10", []), ("abb-irb-120", ["1", "4", "6"]), ("kuka-kr-6-r900", ["1", "4", "6"])],
+)
+def test_a_left_handed_frame_is_told_with_the_joints_that_look_like_it(name, mirror_image):
+    told, _, others = named_otherwise(name, mirrored=True).partition(" They fit as well if ")
+    assert "if the device's frame is left-handed (one axis reversed, or two exchanged). Put" in told
+    assert re.findall(r"joint (\d) is counted the other way", others) == mirror_image
+    assert ("measurements alone do not tell" in others) == bool(mirror_image)
+
+
 def test_nothing_is_named_where_no_convention_fits():
     robot, data = measured_otherwise("ur10")
     assert not notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
@@ -141,15 +174,63 @@ def test_another_robot_is_doubted():
     assert "another robot" in doubt
 
 
-def test_too_few_rows_say_how_many_are_enough():
-    arm = VirtualArm.paper(seed=4)
-    few = arm.measure(arm.poses(3))
-    with pytest.raises(ta.WorkError, match=r"Measure at least (\d+) poses: 30% are held out") as caught:
-        ta.calibrate(arm.robot, few, model="constant")
-    said = re.search(r"at least (\d+) poses", str(caught.value))
-    assert said is not None
-    enough = int(said[1])
-    assert ta.calibrate(arm.robot, arm.measure(arm.poses(enough)), model="constant").validation.n_holdout > 0
+def refusal(robot, data, **options):
+    """What is said where so few rows are calibrated from; empty where they are enough."""
+    try:
+        held = ta.calibrate(robot, data, model="constant", refit=False, **options).validation.n_holdout
+    except ta.WorkError as error:
+        return str(error)
+    assert held > 0
+    return ""
+
+
+@pytest.mark.parametrize(
+    ("name", "orientation", "holdout", "enough"),
+    [("ur10", False, 0.3, 15), ("rv-m2", False, 0.3, 12), ("ur10", False, 0.5, 20), ("ur10", True, 0.3, 9)],
+)
+def test_too_few_rows_say_how_many_are_just_enough(name, orientation, holdout, enough):
+    arm = VirtualArm(ta.Robot.load(name), seed=4)
+    table = arm.measure_table(arm.poses(enough), orientation=orientation)
+    for count in (3, enough - 1):
+        few = ta.Measurements.from_dataframe(table[:count])
+        said = refusal(arm.robot, few, holdout=holdout)
+        assert f"Measure at least {enough} poses: {holdout:.0%} are held out" in said
+    assert "--holdout" not in refusal(arm.robot, ta.Measurements.from_dataframe(table[:3]))
+    assert not refusal(arm.robot, ta.Measurements.from_dataframe(table), holdout=holdout)
+
+
+def test_too_few_rows_name_the_largest_share_that_may_be_held_out():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    few = arm.measure(arm.poses(14))
+    found = re.search(r", or hold out less: --holdout (0\.\d+) is enough for", refusal(arm.robot, few))
+    assert found is not None
+    largest = float(found[1])
+    assert not refusal(arm.robot, few, holdout=largest)
+    assert refusal(arm.robot, few, holdout=round(largest + 0.01, 2))
+
+
+def test_too_few_rows_of_several_files_say_how_many_are_just_enough():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    table = arm.measure_table(arm.poses(21)).assign(group="one")
+
+    def of_two(count):
+        parts = (("a", table[:7]), ("b", table[7:count]))
+        return ta.Measurements.concatenate([ta.Measurements.from_dataframe(t, name=n) for n, t in parts])
+
+    for count in (14, 20):
+        assert "Measure at least 21 poses: 50%" in refusal(arm.robot, of_two(count), holdout=0.5)
+    assert not refusal(arm.robot, of_two(21), holdout=0.5)
+
+
+def test_too_few_rows_that_train_by_another_rule_say_how_many_are_to_train():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    data = arm.measure(arm.poses(30))
+    said = refusal(arm.robot, data, train_size=9)
+    assert "at least 10 poses to train on, or use a larger --train-size" in said
+    assert not refusal(arm.robot, data, train_size=10)
+    planned = np.where(np.arange(30) < 9, "fit", "validate")
+    said = refusal(arm.robot, replace(data, purpose=planned))
+    assert said.endswith("Measure at least 10 poses to train on.")
 
 
 def test_what_is_no_robot_and_no_measurements_is_said(tmp_path):

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from truearm.errors import InputError
 from truearm.library import library_names
 from truearm.measurements import Measurements
-from truearm.plausibility import check_against
+from truearm.plausibility import FAR_FACTOR, check_against
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
+from truearm.units import LengthUnit
 
 Floats = NDArray[np.float64]
 WORLD = np.array([3.0, -2.0, 0.5])
@@ -135,6 +136,47 @@ def test_identical_rows_are_warned_of_with_rows() -> None:
     (notice,) = check_against(data, robot)
     assert (notice.kind, notice.rows) == ("identical_rows", (11, 12))
     assert notice.message == "Identical to an earlier row in everything, counted once: rows 11 and 12."
+
+
+MM_PER_INCH = 25.4
+INCHES = ["abb-irb-120", "ur10", "kuka-iiwa-7", "adept-cobra-600"]
+
+
+@pytest.mark.parametrize("name", INCHES)
+@pytest.mark.parametrize(
+    ("scale", "unit", "words"),
+    [
+        (1000.0 / MM_PER_INCH, "mm", "times 25.4 they fit it.*stated as millimetres.*multiply by 25.4"),
+        (1000.0 / MM_PER_INCH, "m", "times 0.0254 they fit it.*stated as metres.*--length-unit mm"),
+        (MM_PER_INCH, "m", "times 0.03937 they fit it.*as if they were inches.*divide by 25.4"),
+    ],
+)
+def test_inches_are_recognised(name: str, scale: float, unit: LengthUnit, words: str) -> None:
+    robot = Robot.load(name)
+    data = Measurements.from_dataframe(table(robot, readings(robot), scale), length_unit=unit)
+    with pytest.raises(InputError, match=words):
+        check_against(data, robot)
+
+
+@pytest.mark.parametrize("off_m", [0.0, 0.005])
+def test_a_point_that_stands_nearly_still_is_not_in_inches(off_m: float) -> None:
+    """The wrist turns about a point beside its middle, as where a tip is held to one place."""
+    robot = Robot.load("abb-irb-120")
+    q = readings(robot)
+    q[:, :3] = q[0, :3]
+    flange = robot.pose(q)
+    wrist_in_flange = np.array([off_m, 0.0, -0.072])
+    data = table(robot, q)
+    points = flange[:, :3, 3] + flange[:, :3, :3] @ wrist_in_flange
+    data[["x", "y", "z"]] = points + np.random.default_rng(0).normal(0.0, 1e-5, points.shape)
+    assert np.ptp(flange[:, :3, 3], axis=0).max() > FAR_FACTOR * np.ptp(points, axis=0).max()
+    assert check_against(Measurements.from_dataframe(data), robot) == []
+
+
+def test_poses_in_a_small_box_are_not_in_inches() -> None:
+    robot = Robot.load("ur10")
+    q = readings(robot, 1) + np.random.default_rng(0).uniform(-0.02, 0.02, (40, 6))
+    assert check_against(Measurements.from_dataframe(table(robot, q)), robot) == []
 
 
 def test_all_poses_alike() -> None:

@@ -73,6 +73,7 @@ def calibrate(
     notices += stood_still(robot, given.readings) + on_a_grid(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
+    task = replace(task, sizes=() if split.planned else given.sizes)
     trained = fit_rows(task, given.select(split.train))
     with stages("judging on held-out rows"):
         validation, held = _validate(task, trained, given, split)

@@ -8,15 +8,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import CoreError, fit_constant
-from truearm.core_set import Selection, core_set
-from truearm.errors import Notice
-from truearm.fitting import Task, fit_options
-from truearm.identified import IdentifiedArm
+from truearm.errors import Notice, count_of
+from truearm.fitting import Task
 from truearm.measurements import Measurements
+from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
-from truearm.validation import row_errors
 
 Floats = NDArray[np.float64]
 
@@ -24,9 +21,12 @@ BETTER: Final = 5.0
 """Times that the right convention brings the nominal arm closer: one that is wrong leaves centimetres."""
 NEAR_M: Final = 0.02
 """A nominal arm that is read rightly is nearer."""
-MOST_ROWS: Final = 60
-FEWEST_ROWS: Final = 12
-MOST_CHANGES: Final = 4
+AS_WELL: Final = 1.5
+EXACT_M: Final = 1e-4
+"""Conventions fit as well whose misfits are within this factor of the least, or are none to speak of."""
+ALL_OF_JOINTS: Final = 7
+"""With as many joints all combinations of them are tried, with more those of MOST_TURNED."""
+MOST_TURNED: Final = 3
 SHOULDER, ELBOW = 1, 2
 MIRROR: Final = np.array([1.0, -1.0, 1.0])
 
@@ -49,6 +49,11 @@ class Convention:
     def changes(self) -> int:
         """In how much it differs from what robot file and measurements say."""
         return len(self.turned) + (self.coupled is not None) + self.mirrored
+
+    @property
+    def order(self) -> tuple[bool, int, bool]:
+        """The least comes first: a left-handed frame beside other changes last, then few changes."""
+        return self.mirrored and self.changes > 1, self.changes, self.mirrored
 
     def robot(self, robot: Robot) -> Robot:
         """A robot with directions and coupling of this convention."""
@@ -82,7 +87,11 @@ class Convention:
 def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     """A notice where the nominal arm fits measured points far better in another convention.
 
-    Conventions with few changes come first; the best of those with as few is named.
+    Of an arm that is its own mirror image, as most with a spherical wrist are, a left-handed frame with some
+    joints counted the other way is the same as a right-handed one with others: no measurement tells them
+    apart. Of those that fit as well one with a right-handed frame is named, of these the one with the fewest
+    changes, and that there are others is said. A left-handed frame alone, with all joints as the robot file
+    has them, is one change: it is named where no single change of a right-handed frame fits.
 
     Args:
         task: What was fitted to the measurements.
@@ -90,53 +99,55 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     """
     if task.selection.distances:
         return []
-    rows = _some_rows(task, data)
+    target, robot = task.selection.targets[0], task.arm.robot
+    rows = _some_rows(task, data, target)
     if len(rows) < FEWEST_ROWS:
         return []
-    robot = task.arm.robot
-    before = _misfit_m(task, rows, Convention())
-    for changes in range(1, MOST_CHANGES + 1):
-        tried = [convention for convention in _conventions(robot) if convention.changes == changes]
-        misfits = [_misfit_m(task, rows, convention) for convention in tried]
-        best = int(np.argmin(misfits))
-        if misfits[best] < min(before / BETTER, NEAR_M):
-            off, instead = (f"{value * MM_PER_METRE:.3g} mm" for value in (misfits[best], before))
-            text = (
-                f"The measurements fit {robot.name}, with a median of {off} in place of {instead} before any "
-                f"calibration, if {tried[best].words(robot)}. Put that right in a robot file of the arm or "
-                "in the measurements, and calibrate again."
-            )
-            return [Notice("fits_otherwise", text)]
-    return []
+
+    def misfit(convention: Convention) -> float:
+        return misfit_m(convention.robot(robot), convention.points(rows), target, task.threads)
+
+    before = misfit(Convention())
+    found = {convention: misfit(convention) for convention in _conventions(robot) if convention.changes}
+    best = min(found.values())
+    if best >= min(before / BETTER, NEAR_M):
+        return []
+    fitting = [convention for convention, off in found.items() if off <= max(AS_WELL * best, EXACT_M)]
+    named, *others = sorted(fitting, key=lambda convention: (convention.order, found[convention]))
+    off, instead = (f"{value * MM_PER_METRE:.3g} mm" for value in (found[named], before))
+    text = (
+        f"The measurements fit {robot.name}, with a median of {off} in place of {instead} before any "
+        f"calibration, if {named.words(robot)}. Put that right in a robot file of the arm or "
+        f"in the measurements, and calibrate again.{_words_of_others(robot, others)}"
+    )
+    return [Notice("fits_otherwise", text)]
 
 
-def _some_rows(task: Task, data: Measurements) -> Measurements:
+def _words_of_others(robot: Robot, others: list[Convention]) -> str:
+    """That, and what, fits as well as what was named."""
+    if not others:
+        return ""
+    rest = f", or in {count_of(len(others) - 1, 'other way')}" if len(others) > 1 else ""
+    return (
+        f" They fit as well if {others[0].words(robot)}{rest}: measurements alone do not tell which is true. "
+        "Jog each joint that is named, and look which way it turns."
+    )
+
+
+def _some_rows(task: Task, data: Measurements, target: int) -> Measurements:
     """Some rows of the set-up with the most, with points that were measured."""
-    seen = np.isfinite(data.targets[:, task.selection.targets[0]]).all(axis=1)
+    seen = np.isfinite(data.targets[:, target]).all(axis=1)
     groups = [np.flatnonzero(seen & (data.group == group)) for group in task.groups]
-    rows = max(groups, key=len)
-    return data.select(rows[np.unique(np.linspace(0, len(rows) - 1, MOST_ROWS).astype(np.int64))])
+    return data.select(some_rows(max(groups, key=len)))
 
 
 def _conventions(robot: Robot) -> Iterator[Convention]:
-    """All conventions of a robot."""
-    joints = range(robot.joint_count)
-    turned = list(chain.from_iterable(combinations(joints, count) for count in range(MOST_CHANGES + 1)))
+    """All conventions of a robot; with many joints those that turn few of them."""
+    count = robot.joint_count
+    most = count if count <= ALL_OF_JOINTS else MOST_TURNED
+    turned = chain.from_iterable(combinations(range(count), turning) for turning in range(most + 1))
     coupled: list[float | None] = [None]
     if robot.joints[:3] == ("revolute",) * 3:
         known = float(robot.coupling[ELBOW, SHOULDER])
         coupled += [value for value in (0.0, 1.0, -1.0) if value != known]
     yield from (Convention(*parts) for parts in product(turned, coupled, (False, True)))
-
-
-def _misfit_m(task: Task, rows: Measurements, convention: Convention) -> float:
-    """Median distance of points from where the nominal arm, its frame and target fitted, has them."""
-    arm, data = IdentifiedArm(convention.robot(task.arm.robot)), convention.points(rows)
-    own = replace(task, arm=arm, selection=Selection(task.selection.targets[:1]), groups=data.groups)
-    measured = core_set(arm.robot, data, own.selection, own.groups)
-    try:
-        setup = fit_constant(own.problem(measured, []), fit_options(own)).setup
-    except CoreError:
-        return np.inf
-    errors = row_errors(arm, data, own.selection, own.groups, arm.table, setup)
-    return float(np.nanmedian(errors.distance_m))

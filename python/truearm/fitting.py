@@ -1,10 +1,9 @@
 """The three fits of one set of rows: frame and tool alone, constants, and what varies."""
 
-import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +15,7 @@ from truearm._core import (
     FieldFit,
     MeasurementSet,
     Problem,
+    Setup,
     fit_constant,
     fit_field,
 )
@@ -28,12 +28,16 @@ from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.options import Options
 from truearm.scheme_fitting import SchemeFit, SchemeRows, fit_scheme, well_determined
 from truearm.schemes import SCHEMES
+from truearm.splitting import rows_needed, share_needed
 
 Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
 Stages = Callable[[str], AbstractContextManager[Any]]
 
 FRAME_UNKNOWNS: Final = 6
+POSES_PER_ROW: Final = 20
+ANY_TARGET_M: Final = 0.3
+"""How many poses are drawn for each row, and how far from the flange targets lie, to count unknowns."""
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
 
@@ -54,6 +58,7 @@ class Task:
         options: How to fit.
         threads: Threads at the most; the result does not depend on it.
         stages: Told what is being done.
+        sizes: Rows of each file that a share is held out of; empty where none is.
     """
 
     arm: IdentifiedArm
@@ -62,6 +67,7 @@ class Task:
     options: Options
     threads: int | None = None
     stages: Stages = no_stages
+    sizes: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         """Check what the core takes as it is."""
@@ -265,21 +271,48 @@ def _check_enough(task: Task, data: Measurements, rank: int) -> None:
     values = _measured_values(task, data)
     if values > rank:
         return
-    unknowns = len(task.arm.candidates.constant) + setup_unknowns(task)
-    needed = unknowns // max(values // max(len(data), 1), 1) + 1
-    split = task.options.split
-    if split.train_size is None and not split.split_by and split.holdout_range is None:
-        poses = math.ceil(needed / (1.0 - split.holdout))
-        way_out = f"Measure at least {poses} poses: {split.holdout:.0%} are held out"
-    else:
-        way_out = f"Measure at least {needed} poses to train on, or use a larger --train-size"
+    unknowns = max(rank, _full_rank(task, data))
+    needed = unknowns * len(data) // max(values, 1) + 1
     raise WorkError(
-        f"{values} measured values in {count_of(len(data), 'training row')} cannot determine up to "
+        f"{values} measured values in {count_of(len(data), 'training row')} cannot determine "
         f"{unknowns} unknowns",
         where=", ".join(data.files),
         rule="There must be more measured values than unknowns",
-        way_out=way_out,
+        way_out=_way_out_of_few(task, needed),
     )
+
+
+def _full_rank(task: Task, data: Measurements) -> int:
+    """How many unknowns many poses all over the joints would determine, of each of which as much is measured.
+
+    With distances all unknowns are counted: what they tell depends on where the bars and wires are.
+    """
+    if task.selection.distances:
+        return len(task.arm.candidates.constant) + setup_unknowns(task)
+    robot, rng = task.arm.robot, np.random.default_rng(0)
+    rows = data.select(np.tile(np.arange(len(data)), POSES_PER_ROW))
+    low, high = np.clip(robot.limits, -np.pi, np.pi).T
+    readings = rng.uniform(low, high, rows.readings.shape)
+    measured = core_set(robot, replace(rows, readings=readings), task.selection, task.groups)
+    frames = np.tile(np.eye(4), (len(task.groups), 1, 1))
+    points = rng.uniform(-ANY_TARGET_M, ANY_TARGET_M, (len(frames), len(task.selection.targets), 3))
+    setup = Setup(frames, points, frames[:, :3, :3].copy(), np.zeros((0, 3)))
+    return identify(task.arm, measured, setup).total_rank
+
+
+def _way_out_of_few(task: Task, needed: int) -> str:
+    """What to do where fewer than `needed` rows train."""
+    split = task.options.split
+    if not task.sizes:
+        return f"Measure at least {needed} poses to train on"
+    if split.train_size is not None or split.split_by or split.holdout_range is not None:
+        return f"Measure at least {needed} poses to train on, or use a larger --train-size"
+    share, poses = split.holdout, rows_needed(task.sizes, needed, split.holdout)
+    way_out = f"Measure at least {poses} poses: {share:.0%} are held out"
+    smaller = share_needed(task.sizes, needed, share)
+    if smaller is None:
+        return way_out
+    return f"{way_out}, or hold out less: --holdout {smaller:g} is enough for {sum(task.sizes)} poses"
 
 
 def _check_set_ups(task: Task, data: Measurements) -> None:

@@ -114,6 +114,11 @@ class Measurements:
         """The files the rows came from, in order of appearance."""
         return list(dict.fromkeys(self.sources.tolist()))
 
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """How many rows came from each file."""
+        return tuple(int((self.sources == file).sum()) for file in self.files)
+
     @classmethod
     def read_csv(
         cls,

@@ -1,5 +1,6 @@
 """Whether measurements can be of a given robot: units, limits, poses that tell something."""
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -7,7 +8,9 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
+from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
 from truearm.robot import Robot
+from truearm.turning_sense import FIT, MISFIT
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
@@ -20,6 +23,27 @@ LIMIT_TOLERANCE: Final = 1e-6
 SPREAD_FACTOR: Final = 30.0
 """Between the factor that a long tool may stretch the poses by and the 1000 of a wrong unit."""
 TOOL_ALLOWANCE_M: Final = 0.1
+FAR_FACTOR: Final = 8.0
+"""Spreads that differ by more are worth a fit that asks whether points are in inches."""
+MM_PER_INCH: Final = 25.4
+INCHES: Final = (
+    (
+        MM_PER_INCH,
+        "The positions look like inches that are stated as millimetres",
+        "Convert them to millimetres: multiply by 25.4",
+    ),
+    (
+        MM_PER_INCH / MM_PER_METRE,
+        "The positions look like inches that are stated as metres",
+        "Convert them to millimetres: multiply by 25.4, and give --length-unit mm",
+    ),
+    (
+        1.0 / MM_PER_INCH,
+        "The positions look like millimetres that were multiplied by 25.4 as if they were inches",
+        "Convert them to millimetres: divide by 25.4",
+    ),
+)
+"""Factors that bring points to metres where inches were mistaken, what they were taken for, what to do."""
 SHORTEST_M: Final = 0.005
 """No bar or wire that tells distances is as short as this; a metre read as a millimetre is shorter."""
 
@@ -32,7 +56,7 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
 
     Raises:
         InputError: If the number or kind of joints differs, degrees were read as radians or the other
-            way round, millimetres as metres or the other way round, or all poses are alike.
+            way round, millimetres as metres or the other way round, inches as either, or all poses are alike.
     """
     outside = check_readings(measurements, robot)
     _check_alike(measurements)
@@ -58,7 +82,7 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
 
 
 def check_points(measurements: Measurements, robot: Robot) -> None:
-    """Raise InputError where measured points lie too far apart, or too close together, for their readings."""
+    """Raise InputError where measured points lie too far apart, too close together, or in inches."""
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
     _check_distances(measurements, robot)
@@ -143,6 +167,8 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
         f"half of the measured points lie more than {measured:.4g} m from their middle, "
         f"and {robot.name} takes its tool {nominal:.3g} m there"
     )
+    if max(measured, nominal) > FAR_FACTOR * min(measured, nominal):
+        _check_inches(group.select(seen), robot, found, where)
     if measured > SPREAD_FACTOR * (nominal + TOOL_ALLOWANCE_M):
         raise InputError(
             found,
@@ -165,6 +191,30 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
             way_out="If they are in metres, give --length-unit m, or name the columns x, y, z; "
             "if they are not, check that the columns belong together",
         )
+
+
+def _check_inches(rows: Measurements, robot: Robot, found: str, where: str) -> None:
+    """Raise InputError where points fit the nominal arm once they are taken for inches, and as stated do not.
+
+    Points that lie close together do not tell a unit: a tool whose point stands still while the arm turns
+    about it does so as well, and fits as stated.
+    """
+    if len(rows) < FEWEST_ROWS:
+        return
+    rows = rows.select(some_rows(np.arange(len(rows))))
+    if _misfit(rows, robot, 1.0) < MISFIT:
+        return
+    for factor, rule, way_out in INCHES:
+        if _misfit(rows, robot, factor) < FIT:
+            raise InputError(
+                f"{found}; times {factor:.4g} they fit it", where=where, rule=rule, way_out=way_out
+            )
+
+
+def _misfit(rows: Measurements, robot: Robot, factor: float) -> float:
+    """How far points times `factor` are from those of the nominal arm, over their spread."""
+    points = factor * rows.targets
+    return misfit_m(robot, replace(rows, targets=points)) / max(_spread(points[:, 0]), ALIKE_RAD_OR_M)
 
 
 def _check_distances(measurements: Measurements, robot: Robot) -> None:

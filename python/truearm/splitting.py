@@ -1,5 +1,6 @@
 """Which rows train and which are held out."""
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -135,6 +136,38 @@ def split_rows(data: Measurements, rule: SplitRule) -> Split:
     return split
 
 
+def rows_needed(sizes: Sequence[int], wanted: int, share: float) -> int:
+    """How many rows there must be that `wanted` train where `share` is held out plainly.
+
+    Args:
+        sizes: Rows of each file there are; those that are missing join the last one.
+        wanted: Training rows.
+        share: Part of the rows, between 0 and 1.
+    """
+    *others, last = sizes
+    missing = wanted - sum(_trained(size, share) for size in others)
+    last = next(count for count in itertools.count(last) if _trained(count, share) >= missing)
+    return sum(others) + last
+
+
+def share_needed(sizes: Sequence[int], wanted: int, share: float) -> float | None:
+    """The largest share, in whole per cent below `share`, with which `wanted` of the rows of the files train.
+
+    None where there is none that holds out a row of each file.
+    """
+    for percent in range(99, 0, -1):
+        train = [_trained(size, percent / 100) for size in sizes]
+        holds = all(count < size for count, size in zip(train, sizes, strict=True))
+        if percent / 100 < share and sum(train) >= wanted and holds:
+            return percent / 100
+    return None
+
+
+def _trained(count: int, share: float) -> int:
+    """How many of so many train where `share` of them is held out plainly."""
+    return int((1.0 - share) * count)
+
+
 def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule) -> Split:
     """Split the rows (r,) of one file; `first_of` (n,) names each row's first kin."""
     rng = np.random.default_rng(rule.seed)
@@ -148,7 +181,7 @@ def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule)
     else:
         order = rng.permutation(len(rows))
         held = np.zeros(len(rows), dtype=np.bool_)
-        held[order[int((1.0 - rule.holdout) * len(rows)) :]] = True
+        held[order[_trained(len(rows), rule.holdout) :]] = True
     held = _together(held, rows, first_of)
     if rule.split_by or rule.holdout_range is not None or planned.any():
         order = np.concatenate([rng.permutation(np.flatnonzero(~held)), np.flatnonzero(held)])
@@ -174,7 +207,7 @@ def _tail(data: Measurements, rows: Rows, tail: HoldoutRange) -> Mask:
             f'"{tail}" names joint {tail.joint}', rule=f"The measurements have {data.joint_count} joints"
         )
     readings = data.readings[rows, tail.joint - 1] * (1.0 if tail.high else -1.0)
-    boundary = np.sort(readings)[int((1.0 - tail.share) * len(rows))]
+    boundary = np.sort(readings)[_trained(len(rows), tail.share)]
     return np.asarray(readings >= boundary)
 
 
@@ -189,7 +222,7 @@ def _drawn_keys(data: Measurements, rows: Rows, rule: SplitRule, rng: np.random.
             rule="Rows that are equal in these columns stay together, so there would be nothing to hold out",
             way_out="Name columns that tell rows apart, or leave out --split-by",
         )
-    drawn = rng.permutation(count)[int((1.0 - rule.holdout) * count) :]
+    drawn = rng.permutation(count)[_trained(count, rule.holdout) :]
     return np.isin(index.reshape(-1), drawn)
 
 
