@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from truearm.calibration import Calibration
 from truearm.errors import Notice, WorkError, list_outliers
 from truearm.fitting import Task
-from truearm.framing.agreement import left_out
 from truearm.held_rows import HeldRows
 from truearm.judging import model_inputs
+from truearm.leaving_out import left_out
 from truearm.measurements import Measurements
 from truearm.models import ArmModel
 from truearm.rotations import rigid_motion

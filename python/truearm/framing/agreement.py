@@ -1,6 +1,5 @@
 """Whether touches agree with each other, and which of them do not."""
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -8,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution
 
 from truearm.errors import InputError, Notice, WorkError, list_rows
+from truearm.leaving_out import left_out
 from truearm.registration import register
 from truearm.units import MM_PER_METRE
 
@@ -21,23 +21,6 @@ WORST_M: Final = 0.01
 TWICE: Final = 2.0
 MUCH_BETTER: Final = 0.2
 UNIT_FACTOR: Final = (500.0, 2000.0)
-
-
-@dataclass(frozen=True, eq=False)
-class LeftOut:
-    """What n rows leave in fits without them, each in a fit to all the others.
-
-    Attributes:
-        alone: Residual of each row in the fit without it (n, 3), m.
-        lengths: Its length, of which what the others leave uncertain is taken off (n,), m: as long as noise.
-        squares: Sum of squares that the fit to all rows leaves, m^2.
-        rank: How many unknowns the rows tell.
-    """
-
-    alone: Floats
-    lengths: Floats
-    squares: float
-    rank: int
 
 
 def far_rows(residuals: Floats, jacobian: Floats, rows: Rows) -> list[Notice]:
@@ -82,25 +65,6 @@ def _farthest(residuals: Floats, jacobian: Floats, chance: float) -> tuple[int |
     if gained[place] / 3.0 <= f_distribution.isf(chance, 3, freedom - 3) * others:
         return None, 0.0
     return place, float(np.linalg.norm(found.alone[place]))
-
-
-def left_out(residuals: Floats, jacobian: Floats) -> LeftOut:
-    """What rows leave in fits without them; arguments as for `far_rows`."""
-    n, unknowns = len(residuals), jacobian.shape[2]
-    basis = _basis(jacobian.reshape(3 * n, unknowns))
-    left = residuals.reshape(-1) - basis @ (basis.T @ residuals.reshape(-1))
-    blocks, of_row = basis.reshape(n, 3, -1), left.reshape(n, 3)
-    free = np.eye(3) - blocks @ blocks.transpose(0, 2, 1)
-    alone = np.einsum("nij,nj->ni", np.linalg.pinv(free, rcond=1e-6, hermitian=True), of_row)
-    lengths = np.sqrt(np.maximum(np.einsum("ni,ni->n", of_row, alone), 0.0))
-    return LeftOut(alone, lengths, float(left @ left), basis.shape[1])
-
-
-def _basis(jacobian: Floats) -> Floats:
-    """Orthonormal columns that span those of a Jacobian, whatever the sizes of its unknowns."""
-    scaled = jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
-    u, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
-    return np.asarray(u[:, sizes > 1e-10 * sizes[0]])
 
 
 def check_agreement(noise_m: float, notices: list[Notice]) -> None:
