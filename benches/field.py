@@ -52,7 +52,7 @@ def readings(poses):
 def gaussian_process():
     """Anisotropic kernel and noise, one model for the three coordinates."""
     from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415 - our own process does without
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415 - as above
 
     kernel = ConstantKernel(1.0) * RBF(np.ones(6), (0.05, 100.0)) + WhiteKernel(0.1)
     return GaussianProcessRegressor(kernel, n_restarts_optimizer=RESTARTS, normalize_y=True, random_state=0)

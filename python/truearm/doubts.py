@@ -13,7 +13,7 @@ from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
-from truearm.stillness import MOVE_IT, still_joints, still_words
+from truearm.stillness import still_warning
 from truearm.units import to_si
 from truearm.validation import Validation
 
@@ -66,11 +66,8 @@ def mounting(variable: VariableDetails | None) -> list[Notice]:
 
 def stood_still(robot: Robot, readings: Floats) -> list[Notice]:
     """A warning where a joint has one reading in all rows of `readings` (n, N)."""
-    still = still_joints(readings, robot.joints)
-    if not still:
-        return []
-    text = f"All poses were measured with {still_words(still, robot.joints)}. {MOVE_IT}."
-    return [Notice("stood_still", text)]
+    text = still_warning(readings, robot.joints)
+    return [Notice("stood_still", text)] if text else []
 
 
 def on_a_grid(robot: Robot, readings: Floats) -> list[Notice]:

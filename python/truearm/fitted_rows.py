@@ -34,7 +34,7 @@ class FittedRows:
         residual: Measured minus predicted (n, m), base frame: three a target in m, then three of the
             orientation in rad; zero where not measured. For distances (d, 1).
         score: Squared standardised residuals over the limit (n,); above one is an outlier.
-        distance_m: Lengths of the residuals that were judged (n,).
+        distance_m: How far the farthest target of each row is from where the model has it (n,).
     """
 
     data: Measurements
@@ -50,10 +50,11 @@ class FittedRows:
         if fits.variable is None:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)
-            score, distance = _judge_constant(fits, residual, selection)
+            score, distance = _judge_constant(fits, residual, selection), _farthest(residual, selection)
             return cls(fits.data, side, fits.constant.weights, residual, score, distance)
         variable = fits.variable
-        return cls(fits.data, side, variable.weights, variable.residuals, variable.scores, variable.distances)
+        distance = np.maximum(variable.distances, _farthest(variable.residuals, selection))
+        return cls(fits.data, side, variable.weights, variable.residuals, variable.scores, distance)
 
     def among(self, data: Measurements) -> NDArray[np.bool_]:
         """Which rows (n,) of other measurements are among these: by readings and first point."""
@@ -61,26 +62,17 @@ class FittedRows:
         return np.array([mark in known for mark in _marks(data)], dtype=np.bool_)
 
     def outliers(self) -> list[dict[str, Any]]:
-        """File, row, score and distance_mm of each outlier, of its farthest target, the worst first."""
+        """File, row, score and distance_mm of each outlier, the worst first."""
         found = np.flatnonzero(self.score > 1.0)
-        distance_m = np.maximum(self.distance_m, self._farthest())
         return [
             {
                 "file": str(self.data.sources[k]),
                 "row": int(self.data.rows[k]),
                 "score": float(self.score[k]),
-                "distance_mm": float(distance_m[k] * MM_PER_METRE),
+                "distance_mm": float(self.distance_m[k] * MM_PER_METRE),
             }
             for k in found[np.argsort(-self.score[found], kind="stable")]
         ]
-
-    def _farthest(self) -> Floats:
-        """How far the farthest target of each row (n,) is from where it should be, m."""
-        count = min(self.data.target_count, self.residual.shape[1] // 3)
-        if count == 0:
-            return np.zeros(len(self.data))
-        points = self.residual[:, : 3 * count].reshape(-1, count, 3)
-        return np.asarray(np.linalg.norm(points, axis=2).max(axis=1))
 
 
 def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:
@@ -109,10 +101,18 @@ def sides(count: int, split: Split) -> NDArray[np.int64]:
     return side
 
 
-def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> tuple[Floats, Floats]:
-    """Score and distance (n,) of each row against the constant model; rows of distances are not judged."""
+def _farthest(residual: Floats, selection: Selection) -> Floats:
+    """How far the farthest target of each row (n,) is from where the model has it, m; zero for distances."""
     if selection.distances:
-        return np.zeros(len(fits.data)), np.zeros(len(fits.data))
+        return np.zeros(len(residual))
+    count = len(selection.targets)
+    return np.asarray(np.linalg.norm(residual[:, : 3 * count].reshape(-1, count, 3), axis=2).max(axis=1))
+
+
+def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> Floats:
+    """Score (n,) of each row against the constant model; rows of distances are not judged."""
+    if selection.distances:
+        return np.zeros(len(fits.data))
     position, orientation = fits.constant.noise
     own = np.zeros(len(fits.data)) if fits.data.sigma_m is None else np.nan_to_num(fits.data.sigma_m)
     variance = np.repeat((position**2 + own**2)[:, None], residual.shape[1], axis=1)
@@ -121,4 +121,4 @@ def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> tuple
     squares = (residual**2 / variance).sum(axis=1)
     freedom = np.maximum((residual != 0.0).sum(axis=1), 1)
     limit = 2.0 * gammainccinv(freedom / 2.0, OVERWHELMING)
-    return squares / limit, np.linalg.norm(residual[:, :3], axis=1)
+    return np.asarray(squares / limit)

@@ -27,21 +27,26 @@ def still_joints(readings: Floats, joints: Sequence[str]) -> dict[int, float]:
         readings: Joint readings (n, N), rad or m.
         joints: Kind of each joint.
     """
-    turns = np.array([kind == "revolute" for kind in joints])
-    shown = readings * np.where(turns, 1.0 / RADIANS_PER_DEGREE, MM_PER_METRE)
-    still = np.ptp(shown, axis=0) <= np.where(turns, STILL_DEG, STILL_MM)
+    slides = np.array([kind == "prismatic" for kind in joints])
+    shown = readings * np.where(slides, MM_PER_METRE, 1.0 / RADIANS_PER_DEGREE)
+    still = np.ptp(shown, axis=0) <= np.where(slides, STILL_MM, STILL_DEG)
     return {int(k) + 1: float(np.median(shown[:, k])) for k in np.flatnonzero(still)}
 
 
 def moved_joints(known: Floats, readings: Floats, joints: Sequence[str]) -> dict[int, float]:
     """Of the joints that stood still in `known` (n, N) those that move from there in `readings` (t, N)."""
-    still = still_joints(known, joints)
-    apart = np.abs(readings - np.median(known, axis=0))
-    moved = still_joints(np.stack([np.zeros(len(joints)), np.nanmax(apart, axis=0, initial=0.0)]), joints)
-    return {joint: value for joint, value in still.items() if joint not in moved}
+    there = readings[np.isfinite(readings).all(axis=1)]
+    stay = still_joints(np.concatenate([np.median(known, axis=0)[None], there]), joints)
+    return {joint: at for joint, at in still_joints(known, joints).items() if joint not in stay}
 
 
 def still_words(still: dict[int, float], joints: Sequence[str]) -> str:
     """Joints that stood still, of which there must be one, in words: "joint 6 at 0 deg"."""
-    units = ["deg" if kind == "revolute" else "mm" for kind in joints]
+    units = ["mm" if kind == "prismatic" else "deg" for kind in joints]
     return ", ".join(f"joint {joint} at {value:.4g} {units[joint - 1]}" for joint, value in still.items())
+
+
+def still_warning(readings: Floats, joints: Sequence[str]) -> str:
+    """What is to be known where joints stood still in readings (n, N), and what to do; empty if none did."""
+    still = still_joints(readings, joints)
+    return f"All poses were measured with {still_words(still, joints)}. {MOVE_IT}." if still else ""

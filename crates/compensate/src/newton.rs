@@ -7,9 +7,9 @@
 //!
 //! How a step bends off its straight line is known from the screws of the joints, [`truearm_kinematics::bend`]: taken off
 //! the error before that is solved again, it makes a step exact but for the third order (Chebyshev's method), and a
-//! Jacobian good for the steps that follow a short one. A search ends with a step whose error is not looked at where the rate at which
-//! errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8).
-//! What a pose gets does not depend on the poses beside it.
+//! Jacobian good for the steps that follow a short one. A search ends with a step whose error is not looked at where the
+//! rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential Equations II,
+//! section IV.8). What a pose gets does not depend on the poses beside it.
 
 use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};

@@ -13,7 +13,6 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.numbers import listed, percent, short, shown_readings
-from truearm.stillness import MOVE_IT
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -112,8 +111,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
 
 def _stood_still(facts: Facts) -> Iterator[Advice]:
     if facts.still:
-        words = f"All poses were measured with {facts.still}. {MOVE_IT}."
-        yield Advice("joint_stood_still", "Move every joint.", words, 10.0 * facts.mean_mm())
+        yield Advice("joint_stood_still", "Move every joint.", facts.still, 10.0 * facts.mean_mm())
 
 
 def _on_a_grid(facts: Facts) -> Iterator[Advice]:

@@ -16,7 +16,7 @@ from truearm.grids import grid_steps, grid_words
 from truearm.held_rows import HeldRows
 from truearm.models import ArmModel
 from truearm.reporting.numbers import shown_readings, unit_of
-from truearm.stillness import still_joints, still_words
+from truearm.stillness import still_warning
 from truearm.summary import WAVE
 from truearm.units import MM_PER_METRE
 
@@ -155,9 +155,8 @@ class Facts:
 
     @cached_property
     def still(self) -> str:
-        """Which joints stood still, and where, in words; empty where none did, or the rows are not known."""
-        still = {} if self.readings is None else still_joints(self.readings, self.joints)
-        return still_words(still, self.joints) if still else ""
+        """What is to be known of joints that stood still; empty where none did, or the rows are not known."""
+        return "" if self.readings is None else still_warning(self.readings, self.joints)
 
     @cached_property
     def features(self) -> dict[str, float]:
