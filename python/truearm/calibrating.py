@@ -6,6 +6,7 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm.calibration import Calibration
@@ -13,6 +14,7 @@ from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.doubts import NO_HELP, doubts, mounting, on_a_grid, stood_still
+from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
@@ -74,14 +76,17 @@ def calibrate(
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
     task = replace(task, sizes=() if split.planned else given.sizes)
-    trained = fit_rows(task, given.select(split.train))
+    trained, drift = fit_settled(task, given, split.train)
+    steady = drift.taken_out(given)
     with stages("judging on held-out rows"):
-        validation, held = _validate(task, trained, given, split)
+        validation, held = _validate(task, trained, steady, split)
+        details = drift_details(task, trained, drift, (given, split.holdout, held.errors))
+        validation = replace(validation, drift=details)
     final, order, hyper = trained, split.train, None
     if chosen.refit:
         order = np.random.default_rng(chosen.split.seed).permutation(len(given))
         hyper = _kept_hyper(trained)
-        final = fit_rows(task, given.select(order), hyper)
+        final = fit_rows(task, steady.select(order), hyper)
     variable = _variable_details(task, final, final if hyper is None else trained)
     found = Calibration(
         robot=robot,
@@ -94,11 +99,16 @@ def calibrate(
         variable=variable,
         validation=validation,
         held=held,
-        rows=FittedRows.of(final, sides(len(given), split)[order], task.selection),
+        rows=_fitted_rows(task, final, drift, (given, order, split)),
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(*notices, *_open_setup(task, final.identifiability, final.data), *mounting(variable)),
+        notices=(
+            *notices,
+            *_open_setup(task, final.identifiability, final.data),
+            *mounting(variable),
+            *drift_notices(details),
+        ),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
@@ -164,6 +174,15 @@ def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> tu
         coverage_95=interval_coverage(task, trained, held),
     )
     return validation, HeldRows.of(held, errors)
+
+
+def _fitted_rows(
+    task: Task, final: Fits, drift: Drift, given: tuple[Measurements, NDArray[np.int64], Split]
+) -> FittedRows:
+    """The rows of the last fit as they were measured; `given` are all rows, which of them, and the split."""
+    data, order, split = given
+    rows = FittedRows.of(final, sides(len(data), split)[order], task.selection)
+    return replace(rows, data=data.select(order), moved=drift.moved[order]) if drift else rows
 
 
 def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[Notice]:

@@ -1,6 +1,8 @@
 """What a fit found beside the parameters themselves."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,3 +64,20 @@ class VariableDetails:
     inflation: float
     unexplained_m: float
     feature_ranges: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class DriftDetails:
+    """What the set-ups moved while they were measured, which was taken out of the measurements.
+
+    Attributes:
+        moved_mm: How far apart each set-up that moved has been, at the most.
+        left_in_mean_mm: Mean held-out position error of each model with the drift left in.
+    """
+
+    moved_mm: Mapping[str, float]
+    left_in_mean_mm: Mapping[str, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return asdict(self)

@@ -35,6 +35,7 @@ class FittedRows:
             orientation in rad; zero where not measured. For distances (d, 1).
         score: Squared standardised residuals over the limit (n,); above one is an outlier.
         distance_m: How far the farthest target of each row is from where the model has it (n,).
+        moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was.
     """
 
     data: Measurements
@@ -43,6 +44,7 @@ class FittedRows:
     residual: Floats
     score: Floats
     distance_m: Floats
+    moved: Floats | None = None
 
     @classmethod
     def of(cls, fits: Fits, side: NDArray[np.int64], selection: Selection) -> "FittedRows":

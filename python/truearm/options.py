@@ -16,11 +16,13 @@ from truearm.splitting import HoldoutRange, SplitRule
 
 ModelName = Literal["variable", "constant", "regions", "cmac", "fcmac"]
 Robust = Literal["none", "huber", "cauchy"]
+Drifting = Literal["auto", "none"]
 
 CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
     "use": (None, *USES),
     "model": ("variable", "constant", *SCHEMES),
     "robust": ("none", "huber", "cauchy"),
+    "drift": ("auto", "none"),
     "frame": ("free", "world"),
     "degree": (2, 3),
 }
@@ -37,6 +39,8 @@ class Options:
         use: What of the measurements to use; None for all: targets, else pose, else position.
         model: "variable", "constant" for that alone, or a scheme of the paper: "regions", "cmac", "fcmac".
         robust: Loss of the constant fit.
+        drift: "auto" to take out how set-ups moved while they were measured, where the rows show that they
+            did; "none" to leave it in.
         refit: Whether the calibration is fitted to all rows after validation.
         features: Columns that the field depends on beside the joints.
         frame: "free" for an unknown world_from_base of each set-up; "world" for none and a base that is
@@ -55,6 +59,7 @@ class Options:
     use: Use | None = None
     model: ModelName = "variable"
     robust: Robust = "none"
+    drift: Drifting = "auto"
     refit: bool = True
     features: tuple[str, ...] = ()
     frame: Frame = "free"

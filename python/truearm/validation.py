@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Problem, Setup, residuals
 from truearm.core_set import Selection, core_set
+from truearm.details import DriftDetails
 from truearm.errors import InputError, count_of
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
@@ -112,6 +113,7 @@ class Validation:
         left_out: Whether each row was judged by what the other rows gave, as after an update; else the rows
             were held out of one fit.
         n_planned: How many rows were held out because they were planned to validate.
+        drift: What was taken out of all measurements, those that were held out too; None where nothing was.
     """
 
     n_train: int
@@ -121,6 +123,7 @@ class Validation:
     coverage_95: float | None = None
     left_out: bool = False
     n_planned: int = 0
+    drift: DriftDetails | None = None
 
     @property
     def judged(self) -> str:
@@ -152,6 +155,7 @@ class Validation:
             "coverage_95": self.coverage_95,
             "left_out": self.left_out,
             "n_planned": self.n_planned,
+            "drift": None if self.drift is None else self.drift.to_dict(),
         }
 
     @classmethod
@@ -169,6 +173,7 @@ class Validation:
             coverage_95=content["coverage_95"],
             left_out=content.get("left_out", False),
             n_planned=content.get("n_planned", 0),
+            drift=DriftDetails(**content["drift"]) if content.get("drift") else None,
         )
 
 

@@ -16,7 +16,8 @@ pub struct Root {
 }
 
 impl Root {
-    fn new(cells: &CellKernel) -> Option<Self> {
+    /// Of an axis's cells; `None` where their prior has no eigenvectors.
+    pub fn new(cells: &CellKernel) -> Option<Self> {
         let n = cells.axis.count;
         let matrix = Mat::from_fn(n, n, |i, j| cells.correlation[i.abs_diff(j)]);
         let eigen = matrix.self_adjoint_eigen(Side::Lower).ok()?;

@@ -11,6 +11,7 @@ mod compensate;
 mod conservative;
 mod division;
 mod door;
+mod drift;
 mod estimate;
 mod field;
 mod greedy;
@@ -66,6 +67,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;
     module.add_function(wrap_pyfunction!(field::fit_field, module)?)?;
+    module.add_function(wrap_pyfunction!(drift::find_drift, module)?)?;
     module.add_function(wrap_pyfunction!(text::find_bytes, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(text::read_numbers, module)?)?;

@@ -36,6 +36,13 @@ Model: TypeAlias = Annotated[
 Robust: TypeAlias = Annotated[
     str, typer.Option(metavar="none|huber|cauchy", help="Loss of the constant fit.")
 ]
+Drift: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        metavar="auto|none",
+        help="Whether to take out how set-ups moved while they were measured, row by row.",
+    ),
+]
 Features: TypeAlias = Annotated[
     str | None, typer.Option(metavar="COL,COL", help="Columns that parameters may vary with.")
 ]

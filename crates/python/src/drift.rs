@@ -1,0 +1,24 @@
+//! `_core.find_drift`.
+
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use truearm_field::find_drift as found_drift;
+
+use crate::door::quick;
+
+/// Displacements (t, 3), the noise that is left, the length scale, and the gain in evidence.
+type Found<'py> = (Bound<'py, PyArray2<f64>>, f64, f64, f64);
+
+/// How a set-up moved, see the stub.
+#[pyfunction]
+pub fn find_drift<'py>(
+    py: Python<'py>,
+    progress: PyReadonlyArray1<'py, f64>,
+    residual: PyReadonlyArray2<'py, f64>,
+    wanted: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Found<'py>> {
+    let (progress, residual, wanted) = (progress.as_slice()?, residual.as_slice()?, wanted.as_slice()?);
+    let found = quick(py, || found_drift(progress, residual, wanted))?;
+    let moved: Bound<'py, PyArray1<f64>> = found.moved.into_pyarray(py);
+    Ok((moved.reshape([wanted.len(), 3])?, found.noise, found.length, found.gain))
+}
