@@ -19,7 +19,17 @@ from truearm.simulation import VirtualArm
 
 PROGRAM = str(Path(sys.executable).parent / "truearm")
 STATISTICS = ["mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm"]
-SUMMARY = ["robot", "n_train", "n_holdout", "holdout", "train", "coverage_95", "left_out", "n_planned", "drift"]
+SUMMARY = [
+    "robot",
+    "n_train",
+    "n_holdout",
+    "holdout",
+    "train",
+    "coverage_95",
+    "left_out",
+    "n_planned",
+    "drift",
+]
 SUMMARY += ["identifiability", "noise_mm"]
 
 

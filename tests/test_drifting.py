@@ -1,14 +1,17 @@
 """Set-ups that move while they are measured."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import truearm as ta
+from tests.report_support import words_of
 from truearm.cli import main
 from truearm.drifting import Drift
+from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
 FAR = np.array([0.12, -0.05, 0.16]) / 1e3
@@ -39,13 +42,25 @@ def settled(measured):
     return ta.calibrate(arm.robot, data)
 
 
+def rows_of(calibration):
+    """The rows of a calibration that has them."""
+    assert calibration.rows is not None
+    return calibration.rows
+
+
+def drift_of(calibration):
+    """What a calibration says that was taken out, where something was."""
+    assert calibration.validation.drift is not None
+    return calibration.validation.drift
+
+
 def held_mean(calibration):
     return calibration.validation.holdout["variable"].position.mean
 
 
 def test_what_a_set_up_moved_is_found_and_taken_out(measured, settled):
     arm, steady, data = measured
-    rows = settled.rows
+    rows = rows_of(settled)
     order = np.argsort(rows.data.rows)
     truth = warming(ROWS)
     left = rows.moved[order] - (truth - truth.mean(axis=0))
@@ -54,11 +69,11 @@ def test_what_a_set_up_moved_is_found_and_taken_out(measured, settled):
     left_in, alone = ta.calibrate(arm.robot, data, drift="none"), ta.calibrate(arm.robot, steady)
     assert held_mean(settled) < 0.5 * (held_mean(left_in) + held_mean(alone))
     assert left_in.validation.drift is None
-    assert left_in.rows.moved is None
+    assert rows_of(left_in).moved is None
 
 
 def test_it_is_told_with_what_it_would_do_if_left_in(settled):
-    drift = settled.validation.drift
+    drift = drift_of(settled)
     (span,) = drift.moved_mm.values()
     assert 0.5 < span / (1e3 * np.linalg.norm(FAR)) < 1.2
     assert drift.left_in_mean_mm["variable"] > 1.05 * held_mean(settled)
@@ -70,12 +85,12 @@ def test_it_is_told_with_what_it_would_do_if_left_in(settled):
 
 def test_the_rows_stay_as_they_were_measured(measured, settled, tmp_path):
     _, _, data = measured
-    rows = settled.rows
+    rows = rows_of(settled)
     assert np.array_equal(rows.data.targets, data.targets[rows.data.rows - 1])
     assert ta.evaluate(settled, data, keep_frames=True).notices[0].kind == "known_rows"
     settled.save(tmp_path / "a.calib")
     again = ta.Calibration.load(tmp_path / "a.calib")
-    assert np.array_equal(again.rows.moved, rows.moved)
+    assert np.array_equal(rows_of(again).moved, rows.moved)
     assert again.validation.drift == settled.validation.drift
 
 
@@ -84,7 +99,8 @@ def test_rows_in_any_order_give_the_same_drift(measured, settled):
     arm, _, data = measured
     order = np.random.default_rng(5).permutation(ROWS)
     other = ta.calibrate(arm.robot, data.select(order))
-    assert np.ptp(other.rows.moved, axis=0) == pytest.approx(np.ptp(settled.rows.moved, axis=0), abs=4e-5)
+    spans = [np.ptp(rows_of(calibration).moved, axis=0) for calibration in (other, settled)]
+    assert spans[0] == pytest.approx(spans[1], abs=4e-5)
 
 
 def test_nothing_moves_where_nothing_moved():
@@ -102,8 +118,8 @@ def test_a_set_up_that_moved_leaves_the_others_where_they_are():
     still = replace(first, group=np.full(120, "still"), sources=np.full(120, "still.csv"))
     warm = replace(moved(second, warming(120)), group=np.full(120, "warm"), sources=np.full(120, "warm.csv"))
     calibration = ta.calibrate(arm.robot, [still, warm])
-    assert list(calibration.validation.drift.moved_mm) == ["warm"]
-    rows = calibration.rows
+    assert list(drift_of(calibration).moved_mm) == ["warm"]
+    rows = rows_of(calibration)
     assert not rows.moved[rows.data.group == "still"].any()
 
 
@@ -146,3 +162,16 @@ def test_the_command_line_finds_it_or_leaves_it_in(tmp_path, monkeypatch, capsys
     status, _, err = calibrated("--drift", "some")
     assert status == 2
     assert 'drift: "some" is not known. Either auto or none' in err
+
+
+def test_the_report_shows_how_the_set_up_moved(settled):
+    made = report(settled)
+    told = {advice.kind: advice.words for advice in made.advice}
+    assert "moved by 0.1" in told["warm_up"]
+    (says,) = [says for title, says in made.figures if title.startswith("How the set-up moved")]
+    first = int(re.findall(r"within the first (\d+) of 150 rows", says)[0])
+    assert 10 < first < 50, "half of it took an eighth of the session"
+    assert drift_of(settled).words in words_of(made.html)
+    without = report(settled.without_rows())
+    assert not [title for title, _ in without.figures if title.startswith("How the set-up moved")]
+    assert "warm_up" in {advice.kind for advice in without.advice}

@@ -78,6 +78,16 @@ class DriftDetails:
     moved_mm: Mapping[str, float]
     left_in_mean_mm: Mapping[str, float]
 
+    @property
+    def words(self) -> str:
+        """What was taken out, and what the errors would be without that."""
+        spans = ", ".join(f"{group} moved by {span:.2g} mm" for group, span in self.moved_mm.items())
+        means = ", ".join(f"{name} {mean:.3f}" for name, mean in self.left_in_mean_mm.items())
+        return (
+            f"What the set-up moved while it was measured is taken out ({spans}). With it left in, the means "
+            f"are {means} mm."
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
         return asdict(self)

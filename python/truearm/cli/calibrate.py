@@ -217,6 +217,8 @@ def print_results(calibration: "Calibration") -> None:
     print_determined(calibration)
     of = "distance" if calibration.selection.distances else "position"
     print_errors(validation.holdout, count_of(validation.n_holdout, "held-out row"), of)
+    if validation.drift is not None:
+        say_wrapped(validation.drift.words)
     if validation.few:
         say_wrapped(validation.few)
     per = "distance" if calibration.selection.distances else "coordinate"

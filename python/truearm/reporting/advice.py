@@ -109,6 +109,20 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
 
+def _warm_up(facts: Facts) -> Iterator[Advice]:
+    drift = facts.calibration.validation.drift
+    if drift is None:
+        return
+    span, left_in = max(drift.moved_mm.values()), drift.left_in_mean_mm[facts.best]
+    moved, left, mean = short(span, left_in, facts.calibration.validation.holdout[facts.best].position.mean)
+    words = (
+        f"The set-up moved by {moved} mm while it was measured. That is known and taken out: the mean error "
+        f"is {mean} mm, and {left} mm with it left in. Whether arm or measuring device moved, these data do "
+        "not tell: let both warm up before they are used, and measure a fixed point now and then."
+    )
+    yield Advice("warm_up", "Let the set-up warm up.", words, span)
+
+
 def _stood_still(facts: Facts) -> Iterator[Advice]:
     if facts.still:
         yield Advice("joint_stood_still", "Move every joint.", facts.still, 10.0 * facts.mean_mm())
@@ -224,6 +238,7 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
 RULES: Final = (
     _outliers,
     _stood_still,
+    _warm_up,
     _on_a_grid,
     _noise_or_poses,
     _tail,

@@ -14,6 +14,7 @@ GENERAL: Final[Mapping[str, str]] = {
     "use": "measurements used",
     "judge_target": "target that errors are judged at",
     "robust": "loss of the constant fit",
+    "drift": "movement of set-ups while measuring taken out",
     "refit": "fitted to all rows after validation",
     "frame": "frame",
     "prior_mm": "prior standard deviation of lengths, mm",

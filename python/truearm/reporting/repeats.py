@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import count_of
 from truearm.reporting.charts import axis
+from truearm.reporting.drifts import drifts
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.numbers import fixed, lean, short
@@ -106,7 +107,7 @@ def repeats(facts: Facts) -> Section:
         parts.append(Text(_nothing(facts)))
     else:
         parts += [scatter(facts, found), *hysteresis(facts, found)]
-    return Section(title, parts)
+    return Section(title, [*parts, *drifts(facts)])
 
 
 def _nothing(facts: Facts) -> str:

@@ -139,7 +139,9 @@ def _found_from(facts: Facts) -> str:
             "Each pose is predicted from the others: with every model they give frame and target, and the "
             "joint offsets of all but the nominal one."
         )
-    return "Frame and target of each model were fitted to the same training poses."
+    drift = facts.calibration.validation.drift
+    taken_out = "" if drift is None else f" {drift.words}"
+    return f"Frame and target of each model were fitted to the same training poses.{taken_out}"
 
 
 def _cells(found: Statistics) -> list[str]:

@@ -1,0 +1,70 @@
+"""How set-ups moved while they were measured."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.fitted_rows import FittedRows
+from truearm.reporting.charts import axis, legend, line, points, running_median
+from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import listed, short
+from truearm.reporting.parts import Figure
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+COORDINATES: Final = (("x", "nominal"), ("y", "constant"), ("z", "variable"))
+"""Each in the manner of a model, which differ in colour, dash and symbol."""
+BINS: Final = 40
+FEWEST: Final = 5
+MOST_SHOWN: Final = 4
+
+
+def drifts(facts: Facts) -> Iterator[Figure]:
+    """A figure of each set-up that moved; of none where the rows were left out of the file."""
+    rows, drift = facts.calibration.rows, facts.calibration.validation.drift
+    if rows is None or rows.moved is None or drift is None:
+        return
+    moved = sorted(drift.moved_mm, key=lambda group: -drift.moved_mm[group])
+    for group in moved[:MOST_SHOWN]:
+        yield _drift(facts, rows, group, drift.moved_mm[group])
+
+
+def _drift(facts: Facts, rows: FittedRows, group: str, span_mm: float) -> Figure:
+    own = np.flatnonzero(rows.data.group == group)
+    files = {file: number for number, file in enumerate(rows.data.files)}
+    number = np.array([files[file] for file in rows.data.sources[own].tolist()])
+    own = own[np.lexsort((rows.data.rows[own], number))]
+    place = np.arange(1.0, len(own) + 1.0)
+    moved = MM_PER_METRE * rows.moved[own] if rows.moved is not None else np.zeros((len(own), 3))
+    frame = facts.calibration.model.setup.frames[facts.calibration.groups.index(group), :3, :3]
+    left = moved + MM_PER_METRE * rows.residual[own, :3] @ frame.T
+    traces = []
+    for k, (name, manner) in enumerate(COORDINATES):
+        _, middles, medians = running_median(place, left[:, k], BINS, FEWEST)
+        traces.append(points(middles, medians, manner, name=f"{name}, medians of rows", opacity=0.8))
+        traces.append(line(place, moved[:, k], manner, name=name))
+    half = _row_of_half(moved)
+    span = short(span_mm)[0]
+    return Figure(
+        f"How the set-up moved: {group}",
+        f"Positions measured at the same pose moved by up to {span} mm in the frame of the measuring device, "
+        f"half of that within the first {half} of {len(own)} rows. Points are medians of what the "
+        f"{facts.best} model leaves of some rows with nothing taken out; the lines were taken out of all "
+        "rows, the held-out ones too.",
+        traces,
+        {
+            "xaxis": axis("rows in the order of measuring"),
+            "yaxis": axis(f"displacement along {listed([name for name, _ in COORDINATES])}, mm"),
+            **legend(),
+        },
+        height=320,
+    )
+
+
+def _row_of_half(moved: Floats) -> int:
+    """After how many rows half of the way from the first place to the farthest is done."""
+    way = np.linalg.norm(moved - moved[0], axis=1)
+    return int(np.argmax(way >= 0.5 * way.max())) + 1
