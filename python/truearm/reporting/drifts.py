@@ -11,6 +11,7 @@ from truearm.reporting.charts import axis, legend, line, points, running_median
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import listed, short
 from truearm.reporting.parts import Figure
+from truearm.reporting.style import colour_of, marker_of
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -44,7 +45,8 @@ def _drift(facts: Facts, rows: FittedRows, group: str, span_mm: float) -> Figure
     traces = []
     for k, (name, manner) in enumerate(COORDINATES):
         _, middles, medians = running_median(place, left[:, k], BINS, FEWEST)
-        traces.append(points(middles, medians, manner, name=f"{name}, medians of rows", opacity=0.8))
+        marker = {"color": colour_of(manner), "symbol": marker_of(manner), "size": 6}
+        traces.append(points(middles, medians, manner, name=f"{name}, medians of rows", marker=marker))
         traces.append(line(place, moved[:, k], manner, name=name))
     half = _row_of_half(moved)
     span = short(span_mm)[0]
