@@ -28,8 +28,10 @@ FEWEST_ROWS: Final = 30
 """Rows of a set-up, at the least, that are asked for a drift."""
 OVERWHELMING: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
-NOTICEABLE: Final = 0.2
-"""A change of the drift that is smaller than this, in standard deviations of what is left, is let be."""
+NOTICEABLE: Final = 0.3
+"""A drift whose root mean square is less than this, in standard deviations of what is left, is let be."""
+SETTLED: Final = 0.2
+"""The same of a change of the drift that was taken out."""
 MOST_FITS: Final = 3
 """A fit takes some of a drift for what varies with the pose: the next one, without it, shows the rest."""
 TRUSTED: Final = 0.5
@@ -118,7 +120,8 @@ def _drift_of(task: Task, fits: Fits, data: Measurements, trained: tuple[Rows, F
             continue
         moved[rows] = found[: len(rows)]
         change = found[len(rows) :] - before[own]
-        changed |= bool(np.sqrt(np.square(change).mean()) > NOTICEABLE * noise)
+        least = SETTLED if before[own].any() else NOTICEABLE
+        changed |= bool(np.sqrt(np.square(change).mean()) > least * noise)
     return Drift(moved) if changed else None
 
 
