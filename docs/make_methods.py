@@ -54,7 +54,7 @@ Every method but the first begins with the constant calibration, frame and targe
   residuals weighted by distance (scikit-learn).
 - **multilayer perceptron** (scikit-learn), **gradient-boosted trees** (LightGBM) of the residual.
 - **grid of errors**: errors at its nodes by least squares, interpolated linearly between them (scipy).
-- **variable D-H (ours)**: `truearm calibrate`.
+- **variable D-H (ours)**: `truearm calibrate --drift none`: no method has what set-ups moved taken out.
 
 Settings of the others - space, kernel, number of neighbours, layers, ridge - are found by fourfold
 cross-validation on at most 500 of the training poses, of Gaussian processes by likelihood on at most 400;

@@ -645,21 +645,26 @@ def fit_field(problem: Problem, constant: ConstantFit, options: Mapping[str, Any
     """
 
 def find_drift(
-    progress: NDArray[np.float64], residual: NDArray[np.float64], wanted: NDArray[np.float64]
+    progress: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    wanted: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], float, float, float]:
     """How a set-up moved while it was measured.
 
     Args:
         progress: When each row was measured, parts of the session (n,).
         residual: What is left of it (n, 3), m.
+        weight: What its noise variance is divided by (n,), positive.
         wanted: When to tell how far it had moved (t,).
 
     Returns:
-        Displacements (t, 3), m, whose mean over the measured rows is zero; standard deviation of a coordinate
-        that is left, m; length scale in sessions; logarithm of the evidence over that of no drift.
+        Displacements (t, 3), m, whose mean over the measured rows is zero; standard deviation of a
+        coordinate that is left at weight one, m; length scale in sessions; logarithm of the evidence over
+        that of no drift.
 
     Raises:
-        CoreError: There are fewer than two rows, or a value is not finite.
+        CoreError: There are fewer than two rows, or a value is not finite, or a weight not positive.
     """
 
 def identifiability(

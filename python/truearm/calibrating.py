@@ -182,7 +182,9 @@ def _fitted_rows(
     """The rows of the last fit as they were measured; `given` are all rows, which of them, and the split."""
     data, order, split = given
     rows = FittedRows.of(final, sides(len(data), split)[order], task.selection)
-    return replace(rows, data=data.select(order), moved=drift.moved[order]) if drift else rows
+    if not drift:
+        return rows
+    return replace(rows, data=data.select(order), moved=drift.moved[order], progress=drift.progress[order])
 
 
 def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[Notice]:

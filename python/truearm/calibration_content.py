@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from truearm import conservative, revision, rows_content, schemes
 from truearm._core import Field, Setup
 from truearm.core_set import Selection
+from truearm.defaults import NO_DRIFT
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.errors import InputError
 from truearm.held_rows import HeldRows
@@ -28,6 +29,8 @@ Arrays = dict[str, NDArray[Any]]
 
 SETUP_PARTS: Final = ("frames", "targets", "rotations", "anchors")
 CONSTANT_KEYS: Final = ("noise_m", "noise_rad", "prior_scale", "iterations", "reason")
+LEFT_OUT: Final[Mapping[str, str]] = {"drift": NO_DRIFT}
+"""Options that calibrations of earlier versions do not name, as they were made."""
 VARIABLE_KEYS: Final = ("evidence", "evaluations", "inflation", "unexplained_m")
 
 
@@ -77,7 +80,7 @@ def unpack(arrays: Arrays, content: Mapping[str, Any], *, where: str) -> dict[st
 
 
 def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
-    options = Options.of(**content["options"])
+    options = Options.of(**LEFT_OUT | content["options"])
     robot = Robot.from_dict(content["robot"])
     arm = IdentifiedArm(robot, options.frame)
     selection = content["selection"]

@@ -28,3 +28,5 @@ HOLD_S: Final = 0.1
 
 DEADLINE_S: Final = 0.05
 """Longest time between two set-points."""
+NO_DRIFT: Final = "none"
+"""What the option `drift` says where set-ups are taken to stand still."""

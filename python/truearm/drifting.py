@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 
-from truearm._core import Setup, find_drift
+from truearm._core import FieldFit, Setup, find_drift
+from truearm.defaults import NO_DRIFT
 from truearm.details import DriftDetails
 from truearm.errors import Notice
 from truearm.fitting import Fits, Task, core_errors, fit_rows
 from truearm.measurements import Measurements
+from truearm.unexplained import unexplained
 from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
 
@@ -25,7 +27,7 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 FEWEST_ROWS: Final = 30
-"""Rows of a set-up, at the least, that are asked for a drift."""
+"""Training rows of a set-up, at the least, that are asked for a drift: fewer have shown none."""
 OVERWHELMING: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
 NOTICEABLE: Final = 0.3
@@ -34,10 +36,8 @@ SETTLED: Final = 0.2
 """The same of a change of the drift that was taken out."""
 MOST_FITS: Final = 3
 """A fit takes some of a drift for what varies with the pose: the next one, without it, shows the rest."""
-TRUSTED: Final = 0.5
-"""Outliers have less weight."""
 SAMPLED: Final = 200
-NO_DRIFT: Final = "none"
+"""Rows of a set-up whose places are compared with one another: as many as a curve of its lengths needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,16 @@ class Drift:
 
     Attributes:
         moved: Displacement in world of each row from where its set-up was on average (n, 3), m.
+        progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,).
     """
 
     moved: Floats
+    progress: Floats
 
     @classmethod
-    def none(cls, count: int) -> "Drift":
-        """No drift, of so many rows."""
-        return cls(np.zeros((count, 3)))
+    def none(cls, data: Measurements) -> "Drift":
+        """No drift of these rows."""
+        return cls(np.zeros((len(data), 3)), _progress(data))
 
     def __bool__(self) -> bool:
         return bool(self.moved.any())
@@ -76,6 +78,9 @@ class Drift:
 def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drift]:
     """Fit to the rows `train`, with the drift that they show taken out of all of `data`.
 
+    Only what the variable model leaves is asked for one: constants leave what depends on the pose, and poses
+    may have been measured in an order.
+
     Args:
         task: What to fit. Its option `drift` may forbid to look for one.
         data: All rows, those of each set-up in the order of measuring.
@@ -84,56 +89,58 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
     Returns:
         The fits, and the drift at every row of `data`.
     """
-    drift = Drift.none(len(data))
+    drift = Drift.none(data)
     fits = fit_rows(task, data.select(train))
-    if task.options.drift == NO_DRIFT or task.selection.distances:
-        return fits, drift
-    for _ in range(MOST_FITS - 1):
-        found = _drift_of(task, fits, data, (train, drift.moved[train]))
+    looks = 0 if task.options.drift == NO_DRIFT else MOST_FITS - 1
+    while looks > 0 and fits.variable is not None:
+        with task.stages("looking for what drifted"):
+            found = _drift_of(task, fits.variable, drift, (data, train))
         if found is None:
             break
-        drift = found
-        with task.stages("taking out what drifted"):
-            fits = fit_rows(task, drift.taken_out(data).select(train))
+        drift, looks = found, looks - 1
+        fits = fit_rows(task, drift.taken_out(data).select(train))
     return fits, drift
 
 
-def _drift_of(task: Task, fits: Fits, data: Measurements, trained: tuple[Rows, Floats]) -> Drift | None:
-    """The drift that fits show; None where it is that which they were made without, or next to it.
+def _drift_of(task: Task, fit: FieldFit, before: Drift, rows: tuple[Measurements, Rows]) -> Drift | None:
+    """The drift that a fit shows; None where it is that which it was made without, or next to it.
 
-    `trained` are the rows that were fitted and what was taken out of each (n, 3).
+    `rows` are all rows and those of them that were fitted.
     """
-    train, before = trained
-    left, trusted = _residuals_in_world(task, fits)
-    progress, changed = _progress(data), False
-    moved = np.zeros((len(data), 3))
+    data, train = rows
+    left, weight = _residuals_in_world(task, fit, data.select(train))
+    left += before.moved[train]
+    moved = before.moved.copy()
     for group in task.groups:
-        rows = np.flatnonzero(data.group == group)
-        own = np.flatnonzero((data.group[train] == group) & trusted)
+        every = np.flatnonzero(data.group == group)
+        own = np.flatnonzero((data.group[train] == group) & (weight > 0.0))
         if len(own) < FEWEST_ROWS:
             continue
-        known = progress[train[own]]
-        wanted = np.concatenate([progress[rows], known])
+        known = before.progress[train[own]]
+        wanted = np.concatenate([before.progress[every], known])
         with core_errors(data):
-            found, noise, _, gain = find_drift(known, (left + before)[own], wanted)
-        if gain < OVERWHELMING:
-            continue
-        moved[rows] = found[: len(rows)]
-        change = found[len(rows) :] - before[own]
-        least = SETTLED if before[own].any() else NOTICEABLE
-        changed |= bool(np.sqrt(np.square(change).mean()) > least * noise)
-    return Drift(moved) if changed else None
+            found, noise, _, gain = find_drift(known, left[own], weight[own], wanted)
+        taken_out = before.moved[train[own]]
+        change = float(np.sqrt(np.square(found[len(every) :] - taken_out).mean()))
+        if gain > OVERWHELMING and change > (SETTLED if taken_out.any() else NOTICEABLE) * noise:
+            moved[every] = found[: len(every)]
+    return None if np.array_equal(moved, before.moved) else Drift(moved, before.progress)
 
 
-def _residuals_in_world(task: Task, fits: Fits) -> tuple[Floats, NDArray[np.bool_]]:
-    """Mean over the targets of what the best model leaves (n, 3), m, and which of the n rows to trust."""
-    data, count = fits.data, len(task.selection.targets)
-    best = fits.constant if fits.variable is None else fits.variable
+def _residuals_in_world(task: Task, fit: FieldFit, data: Measurements) -> tuple[Floats, Floats]:
+    """Mean over the targets of what a fit leaves of its rows (n, 3), m, and the weight of each row (n,).
+
+    Rows without a target have none. The others have what the fit gave them, and less where their own sigma
+    adds to the noise that all have.
+    """
+    count = len(task.selection.targets)
     seen = np.asarray(np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2))
-    left = best.residuals.reshape(len(data), -1)[:, : 3 * count].reshape(-1, count, 3)
+    left = fit.residuals[:, : 3 * count].reshape(-1, count, 3)
     mean = (left * seen[:, :, None]).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)[:, None]
-    in_world = _turned(mean, data, task.groups, best.setup)
-    return in_world, seen.any(axis=1) & (best.weights > TRUSTED)
+    sigma = np.zeros(len(data)) if data.sigma_m is None else np.nan_to_num(data.sigma_m)
+    noise = unexplained(task, fit, data)
+    weight = fit.weights * seen.any(axis=1) / (1.0 + np.square(sigma / noise))
+    return _turned(mean, data, task.groups, fit.setup), weight
 
 
 def _turned(
@@ -148,13 +155,19 @@ def _turned(
 
 
 def _progress(data: Measurements) -> Floats:
-    """When each row was measured, from 0 for the first of its set-up to 1 for the last, (n,)."""
+    """When each row was measured, from 0 for the first of its set-up to 1 for the last, (n,).
+
+    Files come in the order in which they first appear, rows in that of their numbers; where these do not tell
+    the rows of a set-up apart, all of its rows come in the order in which they are given.
+    """
     places = {file: place for place, file in enumerate(data.files)}
     files = np.array([places[file] for file in data.sources.tolist()], dtype=np.int64)
-    order = np.lexsort((data.rows, files))
     progress = np.zeros(len(data))
     for group in data.groups:
-        own = order[data.group[order] == group]
+        own = np.flatnonzero(data.group == group)
+        named = np.column_stack([files[own], data.rows[own]])
+        if len(np.unique(named, axis=0)) == len(own):
+            own = own[np.lexsort((named[:, 1], named[:, 0]))]
         progress[own] = np.linspace(0.0, 1.0, len(own))
     return progress
 
@@ -184,11 +197,9 @@ def drift_notices(details: DriftDetails | None) -> list[Notice]:
     if details is None:
         return []
     spans = [f"{group} by {span:.2g} mm" for group, span in details.moved_mm.items()]
-    name, left_in = list(details.left_in_mean_mm.items())[-1]
     text = (
         f"The set-up moved while it was measured, whatever the pose: {', '.join(spans)}. Arms and "
-        "instruments that warm up do so. It is taken out of all measurements, the held-out ones too; with it "
-        f"left in, the {name} model's mean error there is {left_in:.4g} mm. Rows are taken to be in the "
-        "order of measuring: if they are not, give --drift none."
+        "instruments that warm up do so. It is taken out of all measurements, the held-out ones too. Rows "
+        "are taken to be in the order of measuring: if they are not, give --drift none."
     )
     return [Notice("drift", text)]

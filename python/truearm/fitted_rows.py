@@ -35,7 +35,10 @@ class FittedRows:
             orientation in rad; zero where not measured. For distances (d, 1).
         score: Squared standardised residuals over the limit (n,); above one is an outlier.
         distance_m: How far the farthest target of each row is from where the model has it (n,).
-        moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was.
+        moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
+            `distance_m` are without it, `data` is as it was measured.
+        progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
+            where no drift was taken out.
     """
 
     data: Measurements
@@ -45,6 +48,7 @@ class FittedRows:
     score: Floats
     distance_m: Floats
     moved: Floats | None = None
+    progress: Floats | None = None
 
     @classmethod
     def of(cls, fits: Fits, side: NDArray[np.int64], selection: Selection) -> "FittedRows":

@@ -6,6 +6,7 @@ from numbers import Integral, Real
 from typing import Any, Final, Literal
 
 from truearm.core_set import FIRST_TARGET, USES, Use
+from truearm.defaults import NO_DRIFT
 from truearm.errors import UsageError
 from truearm.identified import Frame
 from truearm.kinds import check_name
@@ -22,7 +23,7 @@ CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
     "use": (None, *USES),
     "model": ("variable", "constant", *SCHEMES),
     "robust": ("none", "huber", "cauchy"),
-    "drift": ("auto", "none"),
+    "drift": ("auto", NO_DRIFT),
     "frame": ("free", "world"),
     "degree": (2, 3),
 }

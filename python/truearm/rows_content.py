@@ -14,8 +14,8 @@ Arrays = dict[str, NDArray[Any]]
 
 NUMBERS: Final = ("readings", "targets", "orientations", "sigma_m", "distance_m", "rows")
 WORDS: Final = ("group", "sources", "anchor", "pair")
-MOVED: Final = "outcome.moved"
 OUTCOMES: Final = ("side", "weight", "residual", "score", "distance_m")
+OF_DRIFT: Final = ("moved", "progress")
 
 
 def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str, Any]:
@@ -35,8 +35,9 @@ def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str,
         arrays[f"rows.feature.{name}"] = rows.data.features[name].to_numpy(np.float64)
     for name in OUTCOMES:
         arrays[f"outcome.{name}"] = getattr(rows, name)
-    if rows.moved is not None:
-        arrays[MOVED] = rows.moved
+    for name in OF_DRIFT:
+        if getattr(rows, name) is not None:
+            arrays[f"outcome.{name}"] = getattr(rows, name)
     return {"words": words, "features": list(features), "joint_units": list(rows.data.joint_units)}
 
 
@@ -60,5 +61,5 @@ def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
         features=pd.DataFrame(columns, index=index),
         joint_units=tuple(content["joint_units"]),
     )
-    moved = np.array(arrays[MOVED]) if MOVED in arrays else None
-    return FittedRows(data, **{name: np.array(arrays[f"outcome.{name}"]) for name in OUTCOMES}, moved=moved)
+    known = [*OUTCOMES, *(name for name in OF_DRIFT if f"outcome.{name}" in arrays)]
+    return FittedRows(data, **{name: np.array(arrays[f"outcome.{name}"]) for name in known})

@@ -20,7 +20,7 @@ use crate::unknowns::Root;
 pub struct Drift {
     /// Displacement at each progress that was asked for, (t, 3), m; its mean over the measured rows is zero.
     pub moved: Vec<f64>,
-    /// Standard deviation of a coordinate that is left, m.
+    /// Standard deviation of a coordinate that is left, at weight one, m.
     pub noise: f64,
     /// Length scale, in sessions.
     pub length: f64,
@@ -42,24 +42,52 @@ const PER_LENGTH: f64 = 3.0;
 const DEGREE: usize = 3;
 const COORDINATES: usize = 3;
 
-/// The drift that residuals (n, 3), m, show over the progress (n,) of their session, from zero to one; told at `wanted` (t,).
+/// What is left of the rows of a session.
+#[derive(Debug, Clone, Copy)]
+pub struct Left<'a> {
+    /// When each row was measured, from zero to one, (n,).
+    pub progress: &'a [f64],
+    /// (n, 3), m.
+    pub residual: &'a [f64],
+    /// Weight of each row, (n,): its noise variance is divided by it.
+    pub weight: &'a [f64],
+}
+
+impl Left<'_> {
+    fn check(&self) -> Result<(), FieldError> {
+        let rows = self.progress.len();
+        for (what, found, expected) in [
+            ("residuals of a drift", self.residual.len(), COORDINATES * rows),
+            ("weights of a drift", self.weight.len(), rows),
+        ] {
+            if found != expected {
+                return Err(FieldError::Length { what, found, expected });
+            }
+        }
+        let finite = self.progress.iter().chain(self.residual).all(|value| value.is_finite());
+        let positive = self.weight.iter().all(|weight| weight.is_finite() && *weight > 0.0);
+        if rows < 2 || !finite || !positive {
+            return Err(FieldError::NotFinite { what: "progress, residuals and weights of a drift" });
+        }
+        Ok(())
+    }
+}
+
+/// The drift that residuals show over the progress of their session; told at `wanted` (t,).
 ///
 /// # Errors
 /// [`FieldError::Length`], [`FieldError::NotFinite`], and [`FieldError::NotPositiveDefinite`] where the cells' prior fails.
-pub fn find_drift(progress: &[f64], residual: &[f64], wanted: &[f64]) -> Result<Drift, FieldError> {
-    let expected = COORDINATES * progress.len();
-    if residual.len() != expected {
-        return Err(FieldError::Length { what: "residuals of a drift", found: residual.len(), expected });
+pub fn find_drift(left: Left, wanted: &[f64]) -> Result<Drift, FieldError> {
+    left.check()?;
+    if !wanted.iter().all(|value| value.is_finite()) {
+        return Err(FieldError::NotFinite { what: "progress at which a drift is asked for" });
     }
-    let finite = progress.iter().chain(residual).chain(wanted).all(|value| value.is_finite());
-    if progress.len() < 2 || !finite {
-        return Err(FieldError::NotFinite { what: "progress and residuals of a drift" });
-    }
-    let right = centred(Mat::from_fn(progress.len(), COORDINATES, |i, k| residual[COORDINATES * i + k])).0;
+    let rows = left.progress.len();
+    let right = Mat::from_fn(rows, COORDINATES, |i, k| left.residual[COORDINATES * i + k]);
+    let right = centred(right, left.weight).0;
     let mut best: Option<(Curve, Choice)> = None;
     for length in LENGTHS {
-        let curve = Curve::new(progress, &right, length)
-            .ok_or(FieldError::NotPositiveDefinite { rows: progress.len() })?;
+        let curve = Curve::new(&left, &right, length).ok_or(FieldError::NotPositiveDefinite { rows })?;
         let choice = curve.choose();
         if best.as_ref().is_none_or(|(_, known)| choice.evidence > known.evidence) {
             best = Some((curve, choice));
@@ -95,15 +123,15 @@ struct Choice {
 }
 
 impl Curve {
-    fn new(progress: &[f64], right: &Mat<f64>, length: f64) -> Option<Self> {
+    fn new(left: &Left, right: &Mat<f64>, length: f64) -> Option<Self> {
         let input = Input::line(1.0);
         let scaled = input.scale * length;
         let axis = Axis::covering(input, [0.0, 1.0].into_iter(), scaled, PER_LENGTH, DEGREE);
         let cells = CellKernel::new(axis, |distance| Shape::Matern.at(distance, scaled));
         let root = Root::new(&cells)?;
-        let features: Vec<Vec<f64>> = progress.iter().map(|&at| root.features(&cells, at)).collect();
+        let features: Vec<Vec<f64>> = left.progress.iter().map(|&at| root.features(&cells, at)).collect();
         let (rows, width) = (features.len(), features[0].len());
-        let (features, mean) = centred(Mat::from_fn(rows, width, |i, k| features[i][k]));
+        let (features, mean) = centred(Mat::from_fn(rows, width, |i, k| features[i][k]), left.weight);
         let gram = transposed_product(features.as_ref(), features.as_ref());
         let eigen = gram.self_adjoint_eigen(Side::Lower).ok()?;
         let vectors = eigen.U().to_owned();
@@ -163,13 +191,15 @@ impl Curve {
     }
 }
 
-/// A matrix less the means of its columns, and these.
-fn centred(mut matrix: Mat<f64>) -> (Mat<f64>, Vec<f64>) {
-    let (rows, width) = (matrix.nrows(), matrix.ncols());
-    let mean = |k: usize| (0..rows).map(|i| matrix[(i, k)]).sum::<f64>() / rows as f64;
-    let means: Vec<f64> = (0..width).map(mean).collect();
+/// Rows less their weighted mean, each times the root of its weight, and this mean.
+fn centred(mut matrix: Mat<f64>, weight: &[f64]) -> (Mat<f64>, Vec<f64>) {
+    let total: f64 = weight.iter().sum();
+    let mean = |k: usize| weight.iter().enumerate().map(|(i, w)| w * matrix[(i, k)]).sum::<f64>() / total;
+    let means: Vec<f64> = (0..matrix.ncols()).map(mean).collect();
     for (k, mean) in means.iter().enumerate() {
-        (0..rows).for_each(|i| matrix[(i, k)] -= mean);
+        for (i, w) in weight.iter().enumerate() {
+            matrix[(i, k)] = (matrix[(i, k)] - mean) * w.sqrt();
+        }
     }
     (matrix, means)
 }
@@ -182,6 +212,11 @@ mod tests {
     use super::*;
 
     const ROWS: usize = 200;
+
+    fn found_in(residual: &[f64], weight: &[f64]) -> Drift {
+        let progress = progress();
+        find_drift(Left { progress: &progress, residual, weight }, &progress).unwrap()
+    }
 
     fn progress() -> Vec<f64> {
         (0..ROWS).map(|k| k as f64 / (ROWS - 1) as f64).collect()
@@ -210,7 +245,7 @@ mod tests {
             let progress = progress();
             let truth: Vec<f64> = progress.iter().flat_map(|&at| warming(at)).collect();
             let residual: Vec<f64> = truth.iter().zip(noise(seed)).map(|(a, b)| a + 2e-5 * b).collect();
-            let found = find_drift(&progress, &residual, &progress).unwrap();
+            let found = found_in(&residual, &[1.0; ROWS]);
             let mean = |c: usize| truth.iter().skip(c).step_by(3).sum::<f64>() / ROWS as f64;
             let means = [mean(0), mean(1), mean(2)];
             let squares = truth.iter().zip(&found.moved).enumerate();
@@ -223,39 +258,55 @@ mod tests {
 
         #[test]
         fn noise_alone_has_next_to_none(seed in 0_u64..1000) {
-            let progress = progress();
             let residual: Vec<f64> = noise(seed).iter().map(|value| 1e-4 * value).collect();
-            let found = find_drift(&progress, &residual, &progress).unwrap();
+            let found = found_in(&residual, &[1.0; ROWS]);
             let moved = (found.moved.iter().map(|x| x * x).sum::<f64>() / (3 * ROWS) as f64).sqrt();
             prop_assert!(found.gain < 8.0 && moved < 0.3e-4, "{} {moved}", found.gain);
         }
+    }
+
+    /// A third of the rows with noise that is fifty times as large, and said to be.
+    #[test]
+    fn rows_that_are_known_to_be_noisy_hide_nothing() {
+        let worse = |row: usize| if row.is_multiple_of(3) { 50.0 } else { 1.0 };
+        let truth: Vec<f64> = progress().iter().flat_map(|&at| warming(at)).collect();
+        let rows = truth.iter().zip(noise(3)).enumerate();
+        let residual: Vec<f64> = rows.map(|(k, (a, b))| a + 2e-5 * worse(k / COORDINATES) * b).collect();
+        let weight: Vec<f64> = (0..ROWS).map(|row| 1.0 / worse(row).powi(2)).collect();
+        assert!(found_in(&residual, &weight).gain > 20.0);
+        assert!(found_in(&residual, &[1.0; ROWS]).gain < 10.0);
     }
 
     /// The likelihood in closed form is that of the covariance matrix of the rows.
     #[test]
     fn the_evidence_is_that_of_the_rows_covariance() {
         let (progress, residual) = (progress(), noise(7));
-        let (right, _) = centred(Mat::from_fn(ROWS, COORDINATES, |i, k| residual[COORDINATES * i + k]));
-        let curve = Curve::new(&progress, &right, 0.2).unwrap();
+        let weight: Vec<f64> = (0..ROWS).map(|row| 1.0 / (1 + row % 4) as f64).collect();
+        let measured = Mat::from_fn(ROWS, COORDINATES, |i, k| residual[COORDINATES * i + k]);
+        let (right, _) = centred(measured.clone(), &weight);
+        let left = Left { progress: &progress, residual: &residual, weight: &weight };
+        let curve = Curve::new(&left, &right, 0.2).unwrap();
         let (value, variance) = curve.likelihood(0.3);
         let features: Vec<Vec<f64>> =
             progress.iter().map(|&at| curve.root.features(&curve.cells, at)).collect();
         let dot =
             |i: usize, j: usize| -> f64 { features[i].iter().zip(&features[j]).map(|(a, b)| a * b).sum() };
-        let entry = |i: usize, j: usize| variance * (0.3 * dot(i, j) + f64::from(u8::from(i == j)));
+        let own = |i: usize, j: usize| if i == j { 1.0 / weight[i] } else { 0.0 };
+        let entry = |i: usize, j: usize| variance * (0.3 * dot(i, j) + own(i, j));
         let covariance = Mat::from_fn(ROWS, ROWS, entry);
         let factor = truearm_estimate::dense::Cholesky::new(covariance, faer::Par::Seq).unwrap();
         let ones = vec![1.0; ROWS];
         let spread = factor.solve_vector(&ones);
-        let weight: f64 = spread.iter().sum();
+        let total: f64 = spread.iter().sum();
+        let known = weight.iter().map(|w| w.ln()).sum::<f64>() - weight.iter().sum::<f64>().ln();
         let mut expected = 0.0;
         for c in 0..COORDINATES {
-            let column: Vec<f64> = (0..ROWS).map(|i| right[(i, c)]).collect();
+            let column: Vec<f64> = (0..ROWS).map(|i| measured[(i, c)]).collect();
             let solved = factor.solve_vector(&column);
-            let mean = solved.iter().sum::<f64>() / weight;
+            let mean = solved.iter().sum::<f64>() / total;
             let fit: f64 =
                 column.iter().zip(&solved).zip(&spread).map(|((r, s), o)| r * (s - mean * o)).sum();
-            expected -= 0.5 * (factor.log_determinant() + weight.ln() - (ROWS as f64).ln() + fit);
+            expected -= 0.5 * (factor.log_determinant() + total.ln() + known + fit);
         }
         let shown = value - 0.5 * curve.freedom;
         assert!((shown / expected - 1.0).abs() < 1e-9, "{shown} {expected}");
@@ -263,8 +314,14 @@ mod tests {
 
     #[test]
     fn rows_that_do_not_belong_together_are_refused() {
-        assert!(find_drift(&[0.0, 1.0], &[0.0; 5], &[]).is_err());
-        assert!(find_drift(&[0.0, f64::NAN], &[0.0; 6], &[]).is_err());
-        assert!(find_drift(&[0.5], &[0.0; 3], &[]).is_err());
+        let refused = |progress: &[f64], residual: &[f64], weight: &[f64]| {
+            find_drift(Left { progress, residual, weight }, &[]).is_err()
+        };
+        assert!(!refused(&[0.0, 1.0], &[0.0; 6], &[1.0; 2]));
+        assert!(refused(&[0.0, 1.0], &[0.0; 5], &[1.0; 2]));
+        assert!(refused(&[0.0, 1.0], &[0.0; 6], &[1.0; 3]));
+        assert!(refused(&[0.0, 1.0], &[0.0; 6], &[1.0, 0.0]));
+        assert!(refused(&[0.0, f64::NAN], &[0.0; 6], &[1.0; 2]));
+        assert!(refused(&[0.5], &[0.0; 3], &[1.0]));
     }
 }

@@ -61,7 +61,7 @@ pub use cells::{Axis, Grid, StoredAxis};
 pub use compiled::{Compiled, FieldScratch};
 pub use conservative::{BOUNDED, Conservative, ConservativeParts};
 pub use conservative_fit::{ConservativePlan, Samples};
-pub use drift::{Drift, find_drift};
+pub use drift::{Drift, Left, find_drift};
 pub use error::FieldError;
 pub use fit::{FieldFit, FieldOptions, fit_field, restore};
 pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};

@@ -2,7 +2,7 @@
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
-use truearm_field::find_drift as found_drift;
+use truearm_field::{Left, find_drift as found_drift};
 
 use crate::door::quick;
 
@@ -15,10 +15,12 @@ pub fn find_drift<'py>(
     py: Python<'py>,
     progress: PyReadonlyArray1<'py, f64>,
     residual: PyReadonlyArray2<'py, f64>,
+    weight: PyReadonlyArray1<'py, f64>,
     wanted: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<Found<'py>> {
-    let (progress, residual, wanted) = (progress.as_slice()?, residual.as_slice()?, wanted.as_slice()?);
-    let found = quick(py, || found_drift(progress, residual, wanted))?;
+    let (weight, wanted) = (weight.as_slice()?, wanted.as_slice()?);
+    let left = Left { progress: progress.as_slice()?, residual: residual.as_slice()?, weight };
+    let found = quick(py, || found_drift(left, wanted))?;
     let moved: Bound<'py, PyArray1<f64>> = found.moved.into_pyarray(py);
     Ok((moved.reshape([wanted.len(), 3])?, found.noise, found.length, found.gain))
 }

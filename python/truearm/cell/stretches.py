@@ -12,6 +12,7 @@ from truearm.calibration import Calibration
 from truearm.cell.accepted import measurements_of
 from truearm.cell.cell_file import Cell
 from truearm.cell.session import Session
+from truearm.defaults import NO_DRIFT
 from truearm.errors import TruearmError
 from truearm.units import MM_PER_METRE
 
@@ -60,11 +61,14 @@ def boundaries(stretch: int, total: int) -> list[int]:
 def calibrate_so_far(
     cell: Cell, session: Session, measured: int, note: Callable[[str, str], None]
 ) -> Stretch | None:
-    """Calibrate with the first `measured` poses; None if that cannot be done yet, which is noted."""
+    """Calibrate with the first `measured` poses; None if that cannot be done yet, which is noted.
+
+    What drifts is left in: the cell is to stand still, and the accuracy to stop at is that of its readings.
+    """
     model = cell.file.process.model if measured >= LEAST_FOR_VARIABLE else "constant"
     try:
         calibration = calibrate(
-            cell.arm, measurements_of(session, most=measured), model=model, by_purpose=False
+            cell.arm, measurements_of(session, most=measured), model=model, by_purpose=False, drift=NO_DRIFT
         )
         expected_mm = _expected_mm(calibration, session)
     except TruearmError as error:

@@ -51,6 +51,7 @@ class DefaultsSection(Section):
     judge_target: Whole | None = None
     model: str | None = None
     robust: str | None = None
+    drift: str | None = None
     features: list[Text] | None = None
     frame: str | None = None
     refit: bool | None = None

@@ -113,14 +113,15 @@ def _warm_up(facts: Facts) -> Iterator[Advice]:
     drift = facts.calibration.validation.drift
     if drift is None:
         return
+    steady = facts.calibration.validation.holdout[facts.best].position.mean
     span, left_in = max(drift.moved_mm.values()), drift.left_in_mean_mm[facts.best]
-    moved, left, mean = short(span, left_in, facts.calibration.validation.holdout[facts.best].position.mean)
+    moved, left, mean = short(span, left_in, steady)
     words = (
         f"The set-up moved by {moved} mm while it was measured. That is known and taken out: the mean error "
         f"is {mean} mm, and {left} mm with it left in. Whether arm or measuring device moved, these data do "
         "not tell: let both warm up before they are used, and measure a fixed point now and then."
     )
-    yield Advice("warm_up", "Let the set-up warm up.", words, span)
+    yield Advice("warm_up", "Let the set-up warm up.", words, left_in - steady)
 
 
 def _stood_still(facts: Facts) -> Iterator[Advice]:

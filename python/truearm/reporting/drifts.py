@@ -20,26 +20,28 @@ COORDINATES: Final = (("x", "nominal"), ("y", "constant"), ("z", "variable"))
 """Each in the manner of a model, which differ in colour, dash and symbol."""
 BINS: Final = 40
 FEWEST: Final = 5
+"""Medians along a session at the most, and rows of each at the least: enough to see a curve by eye."""
 MOST_SHOWN: Final = 4
+"""Set-ups with a figure of their own, those that moved most."""
 
 
 def drifts(facts: Facts) -> Iterator[Figure]:
     """A figure of each set-up that moved; of none where the rows were left out of the file."""
     rows, drift = facts.calibration.rows, facts.calibration.validation.drift
-    if rows is None or rows.moved is None or drift is None:
+    if rows is None or rows.moved is None or rows.progress is None or drift is None:
         return
-    moved = sorted(drift.moved_mm, key=lambda group: -drift.moved_mm[group])
-    for group in moved[:MOST_SHOWN]:
-        yield _drift(facts, rows, group, drift.moved_mm[group])
+    groups = sorted(drift.moved_mm, key=lambda group: -drift.moved_mm[group])
+    for group in groups[:MOST_SHOWN]:
+        yield _drift(facts, rows, (rows.moved, rows.progress), (group, drift.moved_mm[group]))
 
 
-def _drift(facts: Facts, rows: FittedRows, group: str, span_mm: float) -> Figure:
+def _drift(facts: Facts, rows: FittedRows, found: tuple[Floats, Floats], of: tuple[str, float]) -> Figure:
+    """The figure of a set-up: `found` are displacement (n, 3) and progress (n,), `of` its name and span."""
+    (moved_m, progress), (group, span_mm) = found, of
     own = np.flatnonzero(rows.data.group == group)
-    files = {file: number for number, file in enumerate(rows.data.files)}
-    number = np.array([files[file] for file in rows.data.sources[own].tolist()])
-    own = own[np.lexsort((rows.data.rows[own], number))]
+    own = own[np.argsort(progress[own])]
     place = np.arange(1.0, len(own) + 1.0)
-    moved = MM_PER_METRE * rows.moved[own] if rows.moved is not None else np.zeros((len(own), 3))
+    moved = MM_PER_METRE * moved_m[own]
     frame = facts.calibration.model.setup.frames[facts.calibration.groups.index(group), :3, :3]
     left = moved + MM_PER_METRE * rows.residual[own, :3] @ frame.T
     traces = []
@@ -48,14 +50,14 @@ def _drift(facts: Facts, rows: FittedRows, group: str, span_mm: float) -> Figure
         marker = {"color": colour_of(manner), "symbol": marker_of(manner), "size": 6}
         traces.append(points(middles, medians, manner, name=f"{name}, medians of rows", marker=marker))
         traces.append(line(place, moved[:, k], manner, name=name))
-    half = _row_of_half(moved)
+    half = _rows_to_half(moved)
     span = short(span_mm)[0]
     return Figure(
         f"How the set-up moved: {group}",
         f"Positions measured at the same pose moved by up to {span} mm in the frame of the measuring device, "
-        f"half of that within the first {half} of {len(own)} rows. Points are medians of what the "
-        f"{facts.best} model leaves of some rows with nothing taken out; the lines were taken out of all "
-        "rows, the held-out ones too.",
+        f"half of the way from where it began within the first {half} of {len(own)} rows. Points are medians "
+        f"of what the {facts.best} model leaves of some rows with nothing taken out; the lines were taken "
+        "out of all rows, the held-out ones too.",
         traces,
         {
             "xaxis": axis("rows in the order of measuring"),
@@ -66,7 +68,7 @@ def _drift(facts: Facts, rows: FittedRows, group: str, span_mm: float) -> Figure
     )
 
 
-def _row_of_half(moved: Floats) -> int:
+def _rows_to_half(moved: Floats) -> int:
     """After how many rows half of the way from the first place to the farthest is done."""
     way = np.linalg.norm(moved - moved[0], axis=1)
     return int(np.argmax(way >= 0.5 * way.max())) + 1

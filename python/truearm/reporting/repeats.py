@@ -31,7 +31,8 @@ class Repeats:
 
     Attributes:
         place: Number of the pose (n,); rows of one set-up with equal readings share it.
-        missed: Measured minus predicted (n, 3), m; what is predicted is the same within a pose.
+        missed: Measured minus predicted (n, 3), m, what drifted taken out; what is predicted is the same
+            within a pose.
         approach: Sign of each joint's last movement (n, N).
     """
 
@@ -133,6 +134,8 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
         else ""
     )
     poses = len(np.unique(found.place))
+    moved = facts.calibration.validation.drift is not None
+    steady = " What the set-up moved while it was measured is taken out of this." if moved else ""
     trace = {
         "type": "histogram",
         "x": lean(distances),
@@ -142,7 +145,7 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     return Figure(
         "How well poses repeat",
         f"{len(distances)} measurements of {count_of(poses, 'pose')} lie {texts[0]} mm from the mean of "
-        f"their pose on average; mean plus three standard deviations is {texts[1]} mm.{times}",
+        f"their pose on average; mean plus three standard deviations is {texts[1]} mm.{times}{steady}",
         [trace],
         {
             "xaxis": axis("distance from the mean of the pose, mm", rangemode="tozero"),

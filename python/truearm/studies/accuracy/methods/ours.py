@@ -21,7 +21,7 @@ PRODUCT_KEYS: Final = ("major_amplitudes", "wrist_amplitudes")
 
 
 def fit_variable(prepared: Prepared, _: Effort) -> Mapping[str, Fitted]:
-    """Ours by `truearm calibrate`; and with the same scales, but blocks switched off, its parts."""
+    """Ours by `truearm calibrate --drift none`; and its parts: the same scales, but blocks switched off."""
     task = replace(prepared.task, options=replace(prepared.task.options, model=VARIABLE))
     fits = fit_rows(task, prepared.train)
     covered = None if prepared.cell.cut.target else interval_coverage(task, fits, prepared.held)
