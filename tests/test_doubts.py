@@ -100,6 +100,20 @@ def measured_otherwise(name, turned=(), coupled=None, mirrored=False):
 
 
 @pytest.mark.parametrize(
+    ("lag", "words"), [(1, "1 row before it"), (-1, "1 row after it"), (2, "2 rows before it")]
+)
+def test_readings_of_other_rows_are_named(lag, words):
+    """Each point stands beside the readings of an earlier row, or of a later one."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    data = arm.measure(arm.poses(60))
+    kept = np.arange(60)[max(lag, 0) : 60 + min(lag, 0)]
+    shifted = replace(data.select(kept), readings=data.readings[kept - lag])
+    found = ta.calibrate(arm.robot, shifted, model="constant", refit=False)
+    assert words in notice_of(found, "rows_shifted")
+    assert not notice_of(found, "fits_otherwise")
+
+
+@pytest.mark.parametrize(
     ("name", "otherwise", "words"),
     [
         ("ur10", {"turned": (0,)}, "if joint 1 is counted the other way (direction = -1 in its link). Put"),

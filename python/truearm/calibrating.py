@@ -37,6 +37,7 @@ from truearm.measurements import Measurements
 from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
+from truearm.row_lag import fits_shifted
 from truearm.splitting import Split, split_rows
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
@@ -120,7 +121,7 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     doubted = doubts(task.arm, found.models, found.validation, found.model_name)
     if any(notice.kind == NO_HELP for notice in doubted):
         with stages("trying other conventions"):
-            doubted[1:1] = fits_otherwise(task, data)
+            doubted[1:1] = fits_shifted(task, data) or fits_otherwise(task, data)
     return doubted
 
 
