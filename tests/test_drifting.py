@@ -9,9 +9,11 @@ import pytest
 
 import truearm as ta
 from tests.report_support import words_of
+from truearm import drifting
 from truearm.calibration_content import pack, unpack
 from truearm.cli import main
 from truearm.drifting import Drift
+from truearm.fitting import fit_rows
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
@@ -233,3 +235,18 @@ def test_the_report_shows_how_the_set_up_moved(settled):
     without = report(settled.without_rows())
     assert not [title for title, _ in without.figures if title.startswith("How the set-up moved")]
     assert "warm_up" in {advice.kind for advice in without.advice}
+
+
+def test_the_time_is_that_of_all_fits(measured, monkeypatch):
+    """Each of which takes a second here."""
+    arm, _, data = measured
+    made = []
+
+    def counted(task, rows, hyper=None):
+        made.append(len(rows))
+        return replace(fit_rows(task, rows, hyper), seconds={"constant": 1.0, "variable": 1.0})
+
+    monkeypatch.setattr(drifting, "fit_rows", counted)
+    calibration = ta.calibrate(arm.robot, data, refit=False)
+    assert len(made) > 1
+    assert calibration.seconds == {"constant": len(made), "variable": len(made)}
