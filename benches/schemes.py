@@ -20,7 +20,7 @@ ARMS = {
 }
 SPLINES = "--train-on measurements --membership bspline --composition product"
 SCHEMES = {
-    "variable": "--model variable",
+    "variable": "--model variable --drift none",
     "regions": "--model regions",
     "regions-least-squares": "--model regions --region-ceps least_squares",
     "fcmac": "--model fcmac",
