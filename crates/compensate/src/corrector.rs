@@ -23,6 +23,8 @@ const SHORT_STEP: f64 = 0.05;
 const HOPELESS: f64 = 0.999;
 /// Errors of a field fall less steadily: so much less has to be foreseen for a search to end.
 const UNSTEADY: f64 = 0.1;
+/// Those of constant parameters fall by what the last step tells: still below 1e-12 m, with so much more foreseen.
+const STEADILY: f64 = 5.0;
 /// With fewer joints than the task has numbers, turns weigh so much less that the position is met first.
 const POSITION_FIRST: f64 = 1e-4;
 
@@ -278,7 +280,7 @@ fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let plan = Plan::new(model, options.task, options.moving.as_deref(), STEPS, longest)?;
     // The turn that five axes leave is no failure: its least value is searched for to the end.
     let hopeless = if plan.position_first() { plan.hopeless } else { HOPELESS };
-    let foreseen = plan.enough() * if plan.varied { UNSTEADY } else { 1.0 };
+    let foreseen = plan.enough() * if plan.varied { UNSTEADY } else { STEADILY };
     Ok(Plan { hopeless, foreseen, ..plan })
 }
 

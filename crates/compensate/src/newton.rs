@@ -117,6 +117,8 @@ struct Progress {
     rate: Lane,
     /// The same of the error before.
     rate_before: Lane,
+    /// Squared length of the step to the last trial, in units.
+    behind: Lane,
     /// Flag: the search goes on.
     open: Lane,
     /// Flag: the last trial was better than those before.
@@ -250,6 +252,7 @@ impl Progress {
             left: [infinite; 2],
             rate: NO,
             rate_before: NO,
+            behind: infinite,
             open: YES,
             better: NO,
             stale: YES,
@@ -275,7 +278,7 @@ impl Progress {
         let before = self.least;
         let infinite = Lane::splat(f64::INFINITY);
         let norm = NO.where_below(self.open, squared::<I>(error), infinite);
-        self.rate_before = self.rate;
+        (self.rate_before, self.behind) = (self.rate, self.length);
         self.rate = before.where_below(infinite, norm / before, NO);
         let left = [squared::<I>(&error[..3]), squared::<I>(&error[3..])];
         for (kept, found) in self.left.iter_mut().zip(left) {
@@ -339,13 +342,12 @@ impl Progress {
 
     /// Takes over the next trials where they will be near enough, and ends their searches.
     ///
-    /// Where the parameters vary errors fall by turns more and less: the lesser of the last two falls counts.
+    /// Where the parameters vary errors fall by turns more and less: the lesser of the last two falls counts. Where they do not, a
+    /// Jacobian that is kept is off by about the angle of the step behind it, and errors fall no faster than that.
     #[inline(always)]
     fn foresee(&mut self, norm: Lane, plan: &Plan, search: &mut Search) {
-        let mut rate = self.rate;
-        if plan.varied {
-            rate = rate.where_below(self.rate_before, self.rate_before, rate);
-        }
+        let least = if plan.varied { self.rate_before } else { self.behind };
+        let rate = self.rate.where_below(least, least, self.rate);
         let enough = Lane::splat(plan.foreseen * plan.foreseen);
         let near = (norm * rate).where_below(enough, self.open, NO);
         let near = rate.where_below(Lane::splat(STEADY * STEADY), near, NO);
