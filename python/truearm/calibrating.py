@@ -78,16 +78,12 @@ def calibrate(
     split = split_rows(given, chosen.split)
     task = replace(task, sizes=() if split.planned else given.sizes)
     trained, drift = fit_settled(task, given, split.train)
-    steady = drift.taken_out(given)
     with stages("judging on held-out rows"):
-        validation, held = _validate(task, trained, steady, split)
-        details = drift_details(task, trained, drift, (given, split.holdout, held.errors))
-        validation = replace(validation, drift=details)
+        validation, held = _validate(task, trained, drift, (given, split))
     final, order, hyper = trained, split.train, None
     if chosen.refit:
-        order = np.random.default_rng(chosen.split.seed).permutation(len(given))
-        hyper = _kept_hyper(trained)
-        final = fit_rows(task, steady.select(order), hyper)
+        order, hyper = np.random.default_rng(chosen.split.seed).permutation(len(given)), _kept_hyper(trained)
+        final = fit_rows(task, drift.taken_out(given).select(order), hyper)
     variable = _variable_details(task, final, final if hyper is None else trained)
     found = Calibration(
         robot=robot,
@@ -104,12 +100,7 @@ def calibrate(
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(
-            *notices,
-            *_open_setup(task, final.identifiability, final.data),
-            *mounting(variable),
-            *drift_notices(details),
-        ),
+        notices=(*notices, *_of_fit(task, final, variable), *drift_notices(validation.drift)),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
@@ -161,9 +152,13 @@ def _check_features(data: Measurements, names: Sequence[str]) -> None:
             )
 
 
-def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> tuple[Validation, HeldRows]:
+def _validate(
+    task: Task, trained: Fits, drift: Drift, given: tuple[Measurements, Split]
+) -> tuple[Validation, HeldRows]:
+    """Errors of the fits without the drift; `given` are all rows as they were measured, and the split."""
+    data, split = given
     models = trained.models(task.arm)
-    held = data.select(split.holdout)
+    held = drift.taken_out(data).select(split.holdout)
     errors = judge(task, models, held, trained.data)
     on_training = judge(task, models, trained.data, trained.data)
     validation = Validation(
@@ -173,6 +168,7 @@ def _validate(task: Task, trained: Fits, data: Measurements, split: Split) -> tu
         holdout={name: found.statistics() for name, found in errors.items()},
         train={name: found.statistics() for name, found in on_training.items()},
         coverage_95=interval_coverage(task, trained, held),
+        drift=drift_details(task, trained, drift, (data, split.holdout, errors)),
     )
     return validation, HeldRows.of(held, errors)
 
@@ -186,6 +182,11 @@ def _fitted_rows(
     if not drift:
         return rows
     return replace(rows, data=data.select(order), moved=drift.moved[order], progress=drift.progress[order])
+
+
+def _of_fit(task: Task, final: Fits, variable: VariableDetails | None) -> list[Notice]:
+    """What the last fit shows of the set-up and of how the arm stands."""
+    return [*_open_setup(task, final.identifiability, final.data), *mounting(variable)]
 
 
 def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[Notice]:
