@@ -34,7 +34,7 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help setup demo test trials check check-capi check-report bench docs site figures rust-test rust-build py-test clean
+.PHONY: help setup demo test trials check check-capi check-report bench docs site figures rust-test py-test clean
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
@@ -54,14 +54,13 @@ demo: $(STAMPS)/built
 
 test: rust-test py-test
 
-RUST_TESTS := $(CARGO) test --locked --workspace --exclude truearm-python
+# With the extension's features and profile, so that what both rest on is built once.
+RUST_WHOLE := --release --locked --workspace --features truearm-python/extension-module
 
+# Text comes from files: its numbers are looked at for overflows as well.
 rust-test: $(STAMPS)/tools
-	$(RUST_TESTS)
-
-# The tests are built and not run: beside the extension that leaves no core idle.
-rust-build: $(STAMPS)/tools
-	$(RUST_TESTS) --no-run
+	$(CARGO) test $(RUST_WHOLE)
+	$(CARGO) test --locked --package truearm-text
 
 py-test: $(STAMPS)/built
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
@@ -77,11 +76,11 @@ check: $(STAMPS)/built
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(CARGO) fmt --all --check
-	$(CARGO) clippy --locked --workspace --all-targets -- $(CLIPPY)
+	$(CARGO) clippy $(RUST_WHOLE) --all-targets -- $(CLIPPY)
 
 # Needs a C and a C++ compiler with address and undefined-behaviour sanitizers.
 check-capi: $(STAMPS)/tools
-	TRUEARM_SANITIZE=1 $(CARGO) test --locked -p truearm-capi --test examples
+	TRUEARM_SANITIZE=1 $(CARGO) test $(RUST_WHOLE) --test examples
 
 # Installs Chromium where there is none and apt-get may install packages.
 check-report: $(STAMPS)/built
