@@ -187,6 +187,24 @@ def test_what_is_left_in_is_what_an_evaluation_finds(measured):
     assert drift_of(calibration).left_in_mean_mm["variable"] == pytest.approx(found, rel=1e-9)
 
 
+def test_a_drift_that_only_the_first_look_shows_is_let_be(measured, monkeypatch):
+    arm, steady, _ = measured
+    looks = []
+
+    def shown(progress, left, weight, wanted):
+        looks.append(len(left))
+        moved = np.outer(wanted - 0.5, [0.0, 0.0, 1e-3])
+        return (moved, 1e-4, 1.0, 20.0) if len(looks) == 1 else (moved, 1e-4, 1.0, 0.0)
+
+    monkeypatch.setattr(drifting, "find_drift", shown)
+    calibration = ta.calibrate(arm.robot, steady, refit=False)
+    assert len(looks) == 2
+    assert calibration.validation.drift is None
+    undisturbed = ta.calibrate(arm.robot, steady, refit=False, drift="none").validation.holdout
+    found = calibration.validation.holdout["variable"].position.mean
+    assert found == pytest.approx(undisturbed["variable"].position.mean, rel=0.05)
+
+
 def test_a_file_of_before_does_not_claim_it(settled):
     arrays, content = pack(settled, with_rows=True)
     del content["options"]["drift"]
@@ -242,9 +260,9 @@ def test_the_time_is_that_of_all_fits(measured, monkeypatch):
     arm, _, data = measured
     made = []
 
-    def counted(task, rows, hyper=None):
+    def counted(task, rows, *known):
         made.append(len(rows))
-        return replace(fit_rows(task, rows, hyper), seconds={"constant": 1.0, "variable": 1.0})
+        return replace(fit_rows(task, rows, *known), seconds={"constant": 1.0, "variable": 1.0})
 
     monkeypatch.setattr(drifting, "fit_rows", counted)
     calibration = ta.calibrate(arm.robot, data, refit=False)

@@ -638,7 +638,9 @@ def fit_field(problem: Problem, constant: ConstantFit, options: Mapping[str, Any
         problem: Over all candidates.
         constant: The constants' fit, over those that are determined.
         options: determined and driven, indices into the problem's columns; features (n, F); feature_ranges;
-            degree 2 or 3; prior as for fit_constant; hyper, or None to find them; threads, or None for all.
+            degree 2 or 3; prior as for fit_constant; hyper, or None to find them; near, a fit
+            to nearly the same rows whose hyper-parameters the search begins at, or None; rough, whether those
+            of a search on a part of the rows are enough; threads, or None for all.
 
     Raises:
         CoreError: Values are far outside the model.

@@ -19,7 +19,9 @@ from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
     ENOUGH_FOR_HYPER,
+    NOTHING_KNOWN,
     Fits,
+    KnownHyper,
     Stages,
     Task,
     feature_ranges,
@@ -80,11 +82,12 @@ def calibrate(
     trained, drift = fit_settled(task, given, split.train)
     with stages("judging on held-out rows"):
         validation, held = _validate(task, trained, drift, (given, split))
-    final, order, hyper = trained, split.train, None
+    final, order, searched = trained, split.train, trained
     if chosen.refit:
-        order, hyper = np.random.default_rng(chosen.split.seed).permutation(len(given)), _kept_hyper(trained)
-        final = fit_rows(task, drift.taken_out(given).select(order), hyper)
-    variable = _variable_details(task, final, final if hyper is None else trained)
+        order, known = np.random.default_rng(chosen.split.seed).permutation(len(given)), _kept_hyper(trained)
+        final = fit_rows(task, drift.taken_out(given).select(order), known)
+        searched = final if known.exactly is None else trained
+    variable = _variable_details(task, final, searched)
     found = Calibration(
         robot=robot,
         options=chosen,
@@ -214,11 +217,11 @@ def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> V
     return VariableSpread(columns, fits.variable.posterior, details.inflation, noises, place)
 
 
-def _kept_hyper(trained: Fits) -> dict[str, list[float]] | None:
-    """Hyper-parameters for the fit to all rows; None to find them again where few rows trained."""
+def _kept_hyper(trained: Fits) -> KnownHyper:
+    """Hyper-parameters for the fit to all rows, which are found again where few rows trained."""
     if trained.variable is None or len(trained.data) < ENOUGH_FOR_HYPER:
-        return None
-    return trained.variable.hyper
+        return NOTHING_KNOWN
+    return KnownHyper(trained.variable.hyper)
 
 
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:

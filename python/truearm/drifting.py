@@ -17,8 +17,9 @@ from truearm._core import FieldFit, Setup, find_drift
 from truearm.defaults import NO_DRIFT
 from truearm.details import DriftDetails
 from truearm.errors import Notice
-from truearm.fitting import Fits, Task, core_errors, fit_rows
+from truearm.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
 from truearm.measurements import Measurements
+from truearm.models import VARIABLE
 from truearm.unexplained import unexplained
 from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
@@ -30,11 +31,9 @@ FEWEST_ROWS: Final = 30
 """Training rows of a set-up, at the least, that are asked for a drift: fewer have shown none."""
 OVERWHELMING: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
-NOTICEABLE: Final = 0.3
-"""A drift whose root mean square is less than this, in standard deviations of what is left, is let be."""
-SETTLED: Final = 0.2
-"""The same of a change of the drift that was taken out."""
-MOST_FITS: Final = 3
+NOTICEABLE: Final = 0.1
+"""A drift, or a change of one, whose root mean square is less, in standard deviations of what is left, is let be."""
+MOST_LOOKS: Final = 2
 """A fit takes some of a drift for what varies with the pose: the next one, without it, shows the rest."""
 SAMPLED: Final = 200
 """Rows of a set-up whose places are compared with one another: as many as a curve of its lengths needs."""
@@ -89,27 +88,30 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
     Returns:
         The fits, with the time of all that it took, and the drift at every row of `data`.
     """
-    drift = Drift.none(data)
-    fits = fit_rows(task, data.select(train))
-    looks = 0 if task.options.drift == NO_DRIFT else MOST_FITS - 1
-    while looks > 0 and fits.variable is not None:
+    drift, rows = Drift.none(data), data.select(train)
+    if task.options.drift == NO_DRIFT or task.options.model != VARIABLE:
+        return fit_rows(task, rows), drift
+    fits = fit_rows(task, rows, KnownHyper(rough=True))
+    for look in range(MOST_LOOKS):
         with task.stages("looking for what drifted"):
-            found = _drift_of(task, fits.variable, drift, (data, train))
-        if found is None:
+            found = _drift_of(task, fits, drift, (data, train))
+        if found is None and look > 0:
             break
-        drift, looks, spent = found, looks - 1, fits.seconds
-        fits = fit_rows(task, drift.taken_out(data).select(train))
+        drift, spent = drift if found is None else found, fits.seconds
+        fits = fit_rows(task, drift.taken_out(data).select(train), KnownHyper(near=fits.variable))
         fits = replace(fits, seconds={name: value + spent[name] for name, value in fits.seconds.items()})
     return fits, drift
 
 
-def _drift_of(task: Task, fit: FieldFit, before: Drift, rows: tuple[Measurements, Rows]) -> Drift | None:
-    """The drift that a fit shows; None where it is that which it was made without, or next to it.
+def _drift_of(task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, Rows]) -> Drift | None:
+    """The drift that the variable fit shows; None where it is that which it was made without, or next to it.
 
     `rows` are all rows and those of them that were fitted.
     """
+    if fits.variable is None:
+        return None
     data, train = rows
-    left, weight = _residuals_in_world(task, fit, data.select(train))
+    left, weight = _residuals_in_world(task, fits.variable, data.select(train))
     left += before.moved[train]
     moved = before.moved.copy()
     for group in task.groups:
@@ -121,9 +123,10 @@ def _drift_of(task: Task, fit: FieldFit, before: Drift, rows: tuple[Measurements
         wanted = np.concatenate([before.progress[every], known])
         with core_errors(data):
             found, noise, _, gain = find_drift(known, left[own], weight[own], wanted)
-        taken_out = before.moved[train[own]]
-        change = float(np.sqrt(np.square(found[len(every) :] - taken_out).mean()))
-        if gain > OVERWHELMING and change > (SETTLED if taken_out.any() else NOTICEABLE) * noise:
+        if gain <= OVERWHELMING:
+            found = np.zeros_like(found)
+        change = found[len(every) :] - before.moved[train[own]]
+        if np.sqrt(np.square(change).mean()) > NOTICEABLE * noise:
             moved[every] = found[: len(every)]
     return None if np.array_equal(moved, before.moved) else Drift(moved, before.progress)
 

@@ -48,6 +48,24 @@ def no_stages(_: str) -> AbstractContextManager[None]:
 
 
 @dataclass(frozen=True, eq=False)
+class KnownHyper:
+    """What is known of a field's hyper-parameters before it is fitted.
+
+    Attributes:
+        exactly: Those to keep; None to search.
+        near: A fit to nearly the same rows, at whose the search begins; None to begin from nothing.
+        rough: Whether those of a search on a part of the rows are enough.
+    """
+
+    exactly: Hyper | None = None
+    near: FieldFit | None = None
+    rough: bool = False
+
+
+NOTHING_KNOWN: Final = KnownHyper()
+
+
+@dataclass(frozen=True, eq=False)
 class Task:
     """What is the same for every set of rows that is fitted.
 
@@ -122,13 +140,13 @@ class Fits:
         return models
 
 
-def fit_rows(task: Task, data: Measurements, hyper: Hyper | None = None) -> Fits:
+def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) -> Fits:
     """Fit all models to all rows of `data`.
 
     Args:
         task: What to fit.
         data: The rows.
-        hyper: Hyper-parameters of the field to keep; found from the rows by default.
+        known: What is known of the field's hyper-parameters; by default they are found from the rows.
 
     Raises:
         WorkError: If the rows are too few or too alike.
@@ -151,8 +169,11 @@ def fit_rows(task: Task, data: Measurements, hyper: Hyper | None = None) -> Fits
     variable = None
     if task.options.model == VARIABLE:
         began = time.perf_counter()
-        with task.stages("fitting what varies"), core_errors(data):
-            variable = _fit_field(task, measured, constant, found, data, hyper)
+        with (
+            task.stages("searching what varies" if known.rough else "fitting what varies"),
+            core_errors(data),
+        ):
+            variable = _fit_field(task, measured, constant, found, data, known)
         seconds[VARIABLE] = time.perf_counter() - began
     scheme = None
     if task.options.model in SCHEMES:
@@ -197,7 +218,7 @@ def fit_options(
 
 
 def field_options(
-    task: Task, names: Sequence[str], features: Floats, ranges: Sequence[float], hyper: Hyper | None
+    task: Task, names: Sequence[str], features: Floats, ranges: Sequence[float], known: KnownHyper
 ) -> dict[str, Any]:
     """The core's options of a field.
 
@@ -206,7 +227,7 @@ def field_options(
         names: Names of the candidates whose constants the data determines.
         features: Values of the features (n, F).
         ranges: How far the values of each feature reach.
-        hyper: Known hyper-parameters, or None to find them.
+        known: What is known of the hyper-parameters.
     """
     candidates = task.arm.candidates
     return {
@@ -216,7 +237,9 @@ def field_options(
         "feature_ranges": list(ranges),
         "degree": task.options.degree,
         "prior": task.options.prior,
-        "hyper": hyper,
+        "hyper": known.exactly,
+        "near": known.near,
+        "rough": known.rough,
         "threads": task.threads,
     }
 
@@ -227,10 +250,10 @@ def _fit_field(
     constant: ConstantFit,
     found: Identifiability,
     data: Measurements,
-    hyper: Hyper | None,
+    known: KnownHyper,
 ) -> FieldFit:
     values = feature_values(data, task.options.features)
-    options = field_options(task, found.determined, values, feature_ranges(values), hyper)
+    options = field_options(task, found.determined, values, feature_ranges(values), known)
     return fit_field(task.problem(measured, task.arm.candidates.columns), constant, options)
 
 

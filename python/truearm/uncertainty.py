@@ -12,6 +12,7 @@ from truearm.core_set import core_set
 from truearm.errors import InputError, WorkError
 from truearm.fitting import (
     FRAME_UNKNOWNS,
+    KnownHyper,
     Task,
     feature_values,
     field_options,
@@ -188,7 +189,7 @@ class VariableSpread:
         )
         values = feature_values(rows.data, calibration.options.features)
         names = calibration.identifiability.determined
-        options = field_options(task, names, values, details.feature_ranges, details.hyper)
+        options = field_options(task, names, values, details.feature_ranges, KnownHyper(details.hyper))
         columns = list(calibration.arm.candidates.columns)
         point = calibration.models[CONSTANT]
         try:

@@ -73,14 +73,21 @@ impl<'a> Evidence<'a> {
         let mut gradient = self.gradient(hyper, &kernels, &restricted);
         let mut value = restricted.value;
         *self.room() = Some([restricted.factor.into_matrix(), restricted.projected]);
-        for (k, (range, log)) in hyper.ranges().iter().zip(hyper.to_logs()).enumerate() {
-            if range.spread.is_finite() {
-                let z = (log - range.start.ln()) / range.spread;
-                value -= 0.5 * z * z;
-                gradient[k] -= z / range.spread;
-            }
+        for (k, z, spread) in deviations(hyper) {
+            value -= 0.5 * z * z;
+            gradient[k] -= z / spread;
         }
         Ok(Score { value, gradient })
+    }
+
+    /// Evidence and prior alone, in less than half of the time.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
+    pub fn value(&self, hyper: &Hyper) -> Result<f64, FieldError> {
+        let projection = self.projection(hyper)?;
+        let (_, value) = self.explained(&projection, &projection.root());
+        Ok(value - deviations(hyper).map(|(_, z, _)| 0.5 * z * z).sum::<f64>())
     }
 
     /// What pulls at the rows, P r (R,): their residual over the covariance that it has under the hyper-parameters.
@@ -88,12 +95,26 @@ impl<'a> Evidence<'a> {
     /// # Errors
     /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn pull(&self, hyper: &Hyper) -> Result<Vec<f64>, FieldError> {
+        let projection = self.projection(hyper)?;
+        Ok(pulled(&projection.factor, &projection.root(), &self.training.residual))
+    }
+
+    fn projection(&self, hyper: &Hyper) -> Result<Projection, FieldError> {
         self.cancel.check()?;
         let kernels = Continuous::new(self.training, &self.pairings, hyper);
         let mut covariance = Mat::zeros(self.by_column.rows, self.by_column.rows);
         write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
-        let projection = Projection::new(self.training, covariance)?;
-        Ok(pulled(&projection.factor, &projection.root(), &self.training.residual))
+        Projection::new(self.training, covariance)
+    }
+
+    /// P r and the logarithm of the restricted likelihood.
+    fn explained(&self, projection: &Projection, root: &Mat<f64>) -> (Vec<f64>, f64) {
+        let Projection { factor, inner, .. } = projection;
+        let alpha = pulled(factor, root, &self.training.residual);
+        let fit: f64 = alpha.iter().zip(&self.training.residual).map(|(a, r)| a * r).sum();
+        let known: f64 = self.training.setup_precision.iter().map(|known| known.ln()).sum();
+        let value = -0.5 * (factor.log_determinant() + inner.log_determinant() - known + fit);
+        (alpha, value)
     }
 
     fn room(&self) -> MutexGuard<'_, Option<Room>> {
@@ -109,7 +130,8 @@ impl<'a> Evidence<'a> {
     fn restricted(&self, covariance: Mat<f64>, mut projected: Mat<f64>) -> Result<Restricted, FieldError> {
         let projection = Projection::new(self.training, covariance)?;
         let root = projection.root();
-        let Projection { factor, inner, .. } = projection;
+        let (alpha, value) = self.explained(&projection, &root);
+        let Projection { factor, .. } = projection;
         factor.inverse_lower(projected.as_mut());
         triangular::matmul(
             projected.as_mut(),
@@ -122,10 +144,6 @@ impl<'a> Evidence<'a> {
             -1.0,
             parallelism(),
         );
-        let alpha = pulled(&factor, &root, &self.training.residual);
-        let fit: f64 = alpha.iter().zip(&self.training.residual).map(|(a, r)| a * r).sum();
-        let known: f64 = self.training.setup_precision.iter().map(|known| known.ln()).sum();
-        let value = -0.5 * (factor.log_determinant() + inner.log_determinant() - known + fit);
         Ok(Restricted { factor, projected, alpha, value })
     }
 
@@ -149,6 +167,13 @@ impl<'a> Evidence<'a> {
         }
         gradient
     }
+}
+
+/// How far each hyper-parameter with a prior is from its middle: its position, by how many spreads, and the spread.
+fn deviations(hyper: &Hyper) -> impl Iterator<Item = (usize, f64, f64)> {
+    let ranges = hyper.ranges().into_iter().zip(hyper.to_logs()).enumerate();
+    let known = ranges.filter(|(_, (range, _))| range.spread.is_finite());
+    known.map(|(k, (range, log))| (k, (log - range.start.ln()) / range.spread, range.spread))
 }
 
 /// P r, from the factor of K and Q.

@@ -36,8 +36,19 @@ pub struct FieldOptions {
     pub feature_values: Vec<f64>,
     /// Hyper-parameters to use instead of searching for them.
     pub hyper: Option<Hyper>,
+    /// Where a fit to nearly the same measurements ended, which the search begins at.
+    pub near: Option<Start>,
+    /// Whether hyper-parameters of a search on a part of the poses are enough.
+    pub rough: bool,
     /// Looked at between evaluations.
     pub cancel: Cancel,
+}
+
+/// Where a search of hyper-parameters begins.
+#[derive(Debug, Clone)]
+pub struct Start {
+    hyper: Hyper,
+    curvature: Curvature,
 }
 
 /// A variable calibration.
@@ -62,9 +73,15 @@ pub struct FieldFit {
     pub posterior: Posterior,
     /// The posterior under widened amplitudes, where it is another one.
     pub wide: Option<Posterior>,
+    curvature: Curvature,
 }
 
 impl FieldFit {
+    /// For a fit to nearly the same measurements.
+    pub fn start(&self) -> Start {
+        Start { hyper: self.hyper.clone(), curvature: self.curvature.clone() }
+    }
+
     /// For standard deviations.
     pub fn spread(&self) -> &Posterior {
         self.wide.as_ref().unwrap_or(&self.posterior)
@@ -103,12 +120,12 @@ pub fn fit_field(
     let mut judged = search.judge(search.posterior(&training, &hyper)?)?;
     training = judged.posterior.training().clone();
     let large = training.row_count() > ROWS_FOR_POLISH;
-    for _ in 0..if large { 1 } else { REWEIGHTINGS } {
+    for _ in 0..if large || options.rough { 1 } else { REWEIGHTINGS } {
         if !judged.judgement.reweigh(&mut training) {
             break;
         }
-        let posterior = if large && !judged.judgement.spoils() {
-            // Few rows of many change: hyper-parameters stay.
+        let posterior = if options.rough || (large && !judged.judgement.spoils()) {
+            // Where few rows of many change, hyper-parameters stay.
             judged.posterior.reweighed(training.weight.clone(), &options.cancel)?
         } else {
             hyper = search.cleaned(&training, hyper)?;
@@ -118,7 +135,7 @@ pub fn fit_field(
     }
     let Judged { posterior, solution, judgement } = judged;
     let refined = relinearised(problem, point, &posterior, solution)?;
-    let wide = posterior.widened(options.degree, &options.cancel)?;
+    let wide = if options.rough { None } else { posterior.widened(options.degree, &options.cancel)? };
     Ok(FieldFit {
         parameters: refined.parameters,
         bank: refined.bank,
@@ -130,6 +147,7 @@ pub fn fit_field(
         judgement,
         posterior,
         wide,
+        curvature: search.curvature,
     })
 }
 
@@ -164,13 +182,36 @@ struct Search<'a> {
 
 impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
-        let mut hyper = self.searched(training, noise)?;
-        if self.options.hyper.is_none() {
-            let large = part_of(training, ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
-            hyper.extrapolation =
-                extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
+        if let Some(hyper) = &self.options.hyper {
+            return Ok(hyper.clone());
         }
+        let begun = match self.options.near.clone() {
+            Some(near) => {
+                self.curvature = near.curvature;
+                near.hyper
+            }
+            None => self.searched(training, noise)?,
+        };
+        if self.options.rough { Ok(begun) } else { self.finished(training, begun) }
+    }
+
+    /// Hyper-parameters for all poses from those that a search found.
+    fn finished(&mut self, training: &Training, mut hyper: Hyper) -> Result<Hyper, FieldError> {
+        hyper.waves = self.waves(training, &hyper)?;
+        hyper = self.widened(training, &hyper)?;
+        let part = training.row_count() > middle_of(training).row_count();
+        if part || !hyper.waves.is_empty() || self.options.near.is_some() {
+            hyper = self.again(training, hyper)?;
+        }
+        let large = part_of(training, ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
+        hyper.extrapolation =
+            extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         Ok(hyper)
+    }
+
+    fn widened(&self, training: &Training, hyper: &Hyper) -> Result<Hyper, FieldError> {
+        let middle = middle_of(training).lifted(hyper.up)?;
+        with_widenings(&Evidence::new(&middle, &self.options.cancel), hyper)
     }
 
     /// The waves of single joints that the residuals show under hyper-parameters.
@@ -190,31 +231,22 @@ impl Search<'_> {
             return Ok(hyper);
         }
         let found = self.again(training, Hyper { waves, ..hyper })?;
-        let middle = part_of(training, ROWS_FOR_HYPER, POSES_FOR_HYPER).lifted(found.up)?;
-        with_widenings(&Evidence::new(&middle, &self.options.cancel), &found)
+        self.widened(training, &found)
     }
 
     fn searched(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
-        if let Some(hyper) = &self.options.hyper {
-            return Ok(hyper.clone());
-        }
         let joints = self.problem.measurements.joint_count;
         let small = part_of(training, ROWS_FOR_SELECTION, POSES_FOR_SELECTION);
         let chosen = select_major(&small, joints, noise, &self.options.cancel)?;
         let chosen = contest_up(&small, chosen, &self.options.cancel)?;
-        let middle = part_of(training, ROWS_FOR_HYPER, POSES_FOR_HYPER).lifted(chosen.hyper.up)?;
+        let middle = middle_of(training).lifted(chosen.hyper.up)?;
         let evidence = Evidence::new(&middle, &self.options.cancel);
         let mut found = refine(&evidence, chosen.hyper, chosen.curvature, SEARCH)?;
         found.evaluations += chosen.evaluations;
         let found = contest_major(&evidence, found, joints)?;
-        let mut found = prune_major(&evidence, found)?;
-        found = refine_more(&evidence, found, POLISH)?;
-        found.hyper.waves = self.waves(training, &found.hyper)?;
-        found.hyper = with_widenings(&evidence, &found.hyper)?;
+        let found = prune_major(&evidence, found)?;
+        let found = refine_more(&evidence, found, POLISH)?;
         self.note(&found);
-        if training.row_count() > middle.row_count() || !found.hyper.waves.is_empty() {
-            return self.again(training, found.hyper);
-        }
         Ok(found.hyper)
     }
 
@@ -250,6 +282,10 @@ impl Search<'_> {
 fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Found, FieldError> {
     let better = refine(evidence, found.hyper, found.curvature, limits)?;
     Ok(Found { evaluations: found.evaluations + better.evaluations, ..better })
+}
+
+fn middle_of(training: &Training) -> Training {
+    part_of(training, ROWS_FOR_HYPER, POSES_FOR_HYPER)
 }
 
 /// Poses spread evenly over the training set (and so over its groups) with at most `rows` rows, or

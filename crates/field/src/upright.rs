@@ -42,7 +42,7 @@ pub fn contest_up(training: &Training, found: Found, cancel: &Cancel) -> Result<
         let evidence = Evidence::new(&lifted, cancel);
         for sag in AMPLITUDES {
             let hyper = Hyper { up, sag, ..found.hyper.clone() };
-            let value = evidence.score(&hyper)?.value;
+            let value = evidence.value(&hyper)?;
             evaluations += 1;
             if best.as_ref().is_none_or(|(most, _)| value > *most) {
                 best = Some((value, hyper));

@@ -63,6 +63,23 @@ fn threads_do_not_change_weight_space() {
 }
 
 #[test]
+fn a_fit_that_begins_at_a_rough_one_ends_where_one_from_nothing_does() {
+    let arm = six_axes(Truth::BENDING);
+    let set = Measure::poses(320).of(&arm);
+    let (constant, mut options) = options(&arm, &set).unwrap();
+    let mut fitted = |near, rough| {
+        (options.near, options.rough) = (near, rough);
+        fit_from(&arm, &set, constant.clone(), options.clone()).unwrap().field
+    };
+    let whole = fitted(None, false);
+    let rough = fitted(None, true);
+    assert!(rough.wide.is_none() && rough.evaluations < whole.evaluations);
+    let finished = fitted(Some(rough.start()), false);
+    assert!(bits(&finished) == bits(&whole));
+    assert!(finished.evaluations + rough.evaluations == whole.evaluations);
+}
+
+#[test]
 fn a_restored_posterior_is_as_sure_as_the_fit() {
     let arm = six_axes(Truth::BENDING);
     let mut set = Measure::poses(60).of(&arm);

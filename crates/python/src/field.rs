@@ -13,15 +13,15 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
-    Bank, Compiled, FieldFit as CoreFit, FieldOptions, Hyper, Input, Levers, MAJOR_NAME,
-    Posterior as CorePosterior, Product, UPRIGHT, WRIST_NAME, Wave, fit_field as fit, measurement_covariance,
-    restore,
+    Bank, Compiled, FieldFit as CoreFit, FieldOptions, Input, Levers, Posterior as CorePosterior, UPRIGHT,
+    fit_field as fit, measurement_covariance, restore,
 };
 
 use crate::blocks::{block_from, block_into, sag_into, up_of};
 use crate::chain::{Chain, contiguous};
 use crate::door::{CoreError, Failure, long, quick, with_threads};
 use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
+use crate::hyper::{hyper_from, hyper_into};
 use crate::measured::{Setup, matrix, vector};
 
 /// Options of [`fit_field`] by keyword.
@@ -35,6 +35,8 @@ pub struct Options<'py> {
     degree: usize,
     prior: PriorTuple,
     hyper: Option<HashMap<String, Vec<f64>>>,
+    near: Option<PyRef<'py, FieldFit>>,
+    rough: bool,
     threads: Option<usize>,
 }
 
@@ -54,104 +56,11 @@ impl Options<'_> {
             features: self.feature_ranges.iter().map(|&r| Input::line(r)).collect(),
             feature_values: self.features.as_array().iter().copied().collect(),
             hyper: self.hyper.as_ref().map(hyper_from).transpose()?,
+            near: self.near.as_ref().map(|fit| fit.core.start()),
+            rough: self.rough,
             cancel,
         })
     }
-}
-
-fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
-    let get = |name: &str| {
-        let message = || CoreError::new_err(format!("hyper-parameter '{name}' is missing"));
-        values.get(name).cloned().ok_or_else(message)
-    };
-    let one = |name: &str| {
-        let found = get(name)?;
-        let message = || CoreError::new_err(format!("hyper-parameter '{name}' has no value"));
-        found.first().copied().ok_or_else(message)
-    };
-    let three = |name: &str| -> PyResult<[f64; 3]> {
-        let found = get(name)?;
-        let message = || CoreError::new_err(format!("hyper-parameter '{name}' needs 3 values"));
-        found.try_into().map_err(|_| message())
-    };
-    let product = |name: &str| -> PyResult<Product> {
-        Ok(Product {
-            name: name.to_owned(),
-            amplitudes: three(&format!("{name}_amplitudes"))?,
-            joints: get(&format!("{name}_joints"))?.into_iter().map(joint_from).collect::<PyResult<_>>()?,
-            lengths: get(&format!("{name}_lengths"))?,
-            widening: three(&format!("{name}_widening"))?,
-        })
-    };
-    let names = [MAJOR_NAME, WRIST_NAME];
-    let present = names.iter().filter(|name| values.contains_key(&format!("{name}_joints")));
-    Ok(Hyper {
-        constant: one("constant")?,
-        own: one("own")?,
-        own_length: one("own_length")?,
-        smooth: three("smooth")?,
-        smooth_length: one("smooth_length")?,
-        repeatability: one("repeatability")?,
-        products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
-        waves: values.get("waves").map_or_else(|| Ok(Vec::new()), |stored| waves_from(stored))?,
-        noise: [one("noise_position")?, one("noise_orientation")?],
-        own_widening: one("own_widening")?,
-        smooth_widening: three("smooth_widening")?,
-        sag: values.get("sag").map_or(Ok(0.0), |_| one("sag"))?,
-        up: values.get("up").map_or(Ok(UPRIGHT), |_| three("up"))?,
-        sag_widening: values.get("sag_widening").map_or(Ok(1.0), |_| one("sag_widening"))?,
-        extrapolation: one("extrapolation")?,
-    })
-}
-
-/// Of each wave its joint, its cycles a turn and its amplitude.
-fn waves_from(stored: &[f64]) -> PyResult<Vec<Wave>> {
-    let (waves, left) = stored.as_chunks();
-    if !left.is_empty() {
-        return Err(CoreError::new_err("hyper-parameter 'waves' needs three values a wave; calibrate again"));
-    }
-    let wave =
-        |&[joint, cycles, amplitude]: &[f64; 3]| Ok(Wave { joint: joint_from(joint)?, cycles, amplitude });
-    waves.iter().map(wave).collect()
-}
-
-fn joint_from(stored: f64) -> PyResult<usize> {
-    if stored < 0.0 || stored.fract() != 0.0 || !stored.is_finite() {
-        let text =
-            format!("hyper-parameters name joint {stored}: joints are counted from 0; calibrate again");
-        return Err(CoreError::new_err(text));
-    }
-    Ok(stored as usize)
-}
-
-fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
-    let mut values = HashMap::from([
-        ("constant".to_owned(), vec![hyper.constant]),
-        ("own".to_owned(), vec![hyper.own]),
-        ("own_length".to_owned(), vec![hyper.own_length]),
-        ("smooth".to_owned(), hyper.smooth.to_vec()),
-        ("smooth_length".to_owned(), vec![hyper.smooth_length]),
-        ("repeatability".to_owned(), vec![hyper.repeatability]),
-        ("noise_position".to_owned(), vec![hyper.noise[0]]),
-        ("noise_orientation".to_owned(), vec![hyper.noise[1]]),
-        ("own_widening".to_owned(), vec![hyper.own_widening]),
-        ("smooth_widening".to_owned(), hyper.smooth_widening.to_vec()),
-        ("sag".to_owned(), vec![hyper.sag]),
-        ("sag_widening".to_owned(), vec![hyper.sag_widening]),
-        ("up".to_owned(), hyper.up.to_vec()),
-        ("extrapolation".to_owned(), vec![hyper.extrapolation]),
-    ]);
-    let waves = hyper.waves.iter().flat_map(|wave| [wave.joint as f64, wave.cycles, wave.amplitude]);
-    values.insert("waves".to_owned(), waves.collect());
-    for product in &hyper.products {
-        let name = &product.name;
-        let joints = product.joints.iter().map(|&joint| joint as f64).collect();
-        values.insert(format!("{name}_amplitudes"), product.amplitudes.to_vec());
-        values.insert(format!("{name}_joints"), joints);
-        values.insert(format!("{name}_lengths"), product.lengths.clone());
-        values.insert(format!("{name}_widening"), product.widening.to_vec());
-    }
-    values
 }
 
 /// A variable calibration, see the stub.

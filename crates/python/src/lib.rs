@@ -15,6 +15,7 @@ mod drift;
 mod estimate;
 mod field;
 mod greedy;
+mod hyper;
 mod inverse;
 mod measured;
 mod regions;

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Network, Regions, Training, fill_without_data, linearise, regional_ceps
 from truearm.core_set import Selection
-from truearm.fitting import Hyper, Task, fit_rows
+from truearm.fitting import Hyper, KnownHyper, Task, fit_rows
 from truearm.measurements import Measurements
 from truearm.models import VARIABLE
 from truearm.options import Options
@@ -99,7 +99,7 @@ def variable_scheme(made: Experiment, kept: Kept) -> Scheme:
     columns = {f"q{j + 1}": made.readings[:, j] for j in range(made.readings.shape[1])}
     columns |= dict(zip("xyz", made.points.T, strict=True))
     data = Measurements.from_dataframe(pd.DataFrame(columns | {"group": "measured"}))
-    fits = fit_rows(task, data, kept.hyper)
+    fits = fit_rows(task, data, KnownHyper(kept.hyper))
     model, robot = fits.models(made.identified)[VARIABLE], made.arm.robot
     if fits.variable is None:
         raise AssertionError("the variable model was asked for")

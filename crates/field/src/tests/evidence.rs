@@ -34,7 +34,9 @@ fn check_gradient(training: &Training, hyper: &Hyper) {
 
 fn check_value(training: &Training, hyper: &Hyper) {
     let cancel = Cancel::default();
-    let found = Evidence::new(training, &cancel).score(hyper).unwrap().value;
+    let evidence = Evidence::new(training, &cancel);
+    let found = evidence.score(hyper).unwrap().value;
+    assert_eq!(evidence.value(hyper).unwrap(), found, "without the gradient");
     let wanted = Oracle::new(training, hyper, Exact(training, hyper)).evidence();
     assert!((found - wanted).abs() < 1e-6 * wanted.abs(), "{found} instead of {wanted}");
 }

@@ -39,6 +39,8 @@ pub fn options(arm: &Arm, set: &MeasurementSet) -> Result<(ConstantFit, FieldOpt
         features: Vec::new(),
         feature_values: Vec::new(),
         hyper: None,
+        near: None,
+        rough: false,
         cancel: Cancel::default(),
     };
     Ok((constant, options))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from truearm.fitting import Fits, Hyper, Task, fit_rows
+from truearm.fitting import Fits, Hyper, KnownHyper, Task, fit_rows
 from truearm.intervals import interval_coverage
 from truearm.models import VARIABLE
 from truearm.studies.accuracy.fitted import Fitted, FittedArm
@@ -40,5 +40,5 @@ def _part(task: Task, prepared: Prepared, hyper: Hyper, off: Sequence[str]) -> F
     changed = {
         name: [SWITCHED_OFF] * len(values) if name in off else values for name, values in hyper.items()
     }
-    fits: Fits = fit_rows(task, prepared.train, changed)
+    fits: Fits = fit_rows(task, prepared.train, KnownHyper(changed))
     return FittedArm(fits.models(task.arm)[VARIABLE])
