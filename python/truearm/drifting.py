@@ -32,7 +32,7 @@ FEWEST_ROWS: Final = 30
 OVERWHELMING: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
 NOTICEABLE: Final = 0.1
-"""A drift, or a change of one, whose root mean square is less, in standard deviations of what is left, is let be."""
+"""A drift, or a change of one, of a smaller root mean square, in deviations of what is left, is let be."""
 MOST_LOOKS: Final = 2
 """A fit takes some of a drift for what varies with the pose: the next one, without it, shows the rest."""
 SAMPLED: Final = 200
