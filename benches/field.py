@@ -106,7 +106,7 @@ def run():
         f"Fitted to {measurements()[1]}, {TRAINING} training rows; the growth with poses to a virtual UR10. "
         "The peer learns what the constant model leaves, with an anisotropic kernel, noise, and "
         f"{RESTARTS} restarts; ours is for constants, hyper-parameters, field and set-up, with validation, "
-        "and is made twice: the first fit shows that the set-up drifted."
+        "and begins with a rough fit that shows how the set-up drifted."
     ]
     return Results("Variable calibration", comparisons, series, remarks)
 
