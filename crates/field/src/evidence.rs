@@ -87,7 +87,7 @@ impl<'a> Evidence<'a> {
     pub fn value(&self, hyper: &Hyper) -> Result<f64, FieldError> {
         let projection = self.projection(hyper)?;
         let (_, value) = self.explained(&projection, &projection.root());
-        Ok(value - deviations(hyper).map(|(_, z, _)| 0.5 * z * z).sum::<f64>())
+        Ok(deviations(hyper).fold(value, |value, (_, z, _)| value - 0.5 * z * z))
     }
 
     /// What pulls at the rows, P r (R,): their residual over the covariance that it has under the hyper-parameters.
