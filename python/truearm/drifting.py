@@ -19,7 +19,7 @@ from truearm.details import DriftDetails
 from truearm.errors import Notice
 from truearm.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
 from truearm.measurements import Measurements
-from truearm.models import VARIABLE
+from truearm.models import CONSTANT, VARIABLE
 from truearm.unexplained import unexplained
 from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
@@ -33,10 +33,25 @@ OVERWHELMING: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
 NOTICEABLE: Final = 0.1
 """A drift, or a change of one, of a smaller root mean square, in deviations of what is left, is let be."""
-MOST_LOOKS: Final = 2
+MOST_LOOKS: Final = 3
 """A fit takes some of a drift for what varies with the pose: the next one, without it, shows the rest."""
+ROUGHLY: Final = 1000
+"""Training rows at the most that are looked at: a curve over the session needs no more."""
 SAMPLED: Final = 200
 """Rows of a set-up whose places are compared with one another: as many as a curve of its lengths needs."""
+
+
+def _evenly(length: int, count: int) -> Rows:
+    """Indices of so many of `length` rows at the most, from the first to the last."""
+    return np.unique(np.linspace(0, length - 1, count).astype(np.int64))
+
+
+def _some_of_each(group: NDArray[np.str_], count: int) -> Rows:
+    """Indices of about so many rows, ascending, with enough of each group to look for its drift."""
+    names = np.unique(group)
+    share = max(count // len(names), FEWEST_ROWS)
+    rows = [np.flatnonzero(group == name) for name in names]
+    return np.sort(np.concatenate([own[_evenly(len(own), share)] for own in rows]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +84,7 @@ class Drift:
         for group in data.groups:
             own = self.moved[data.group == group]
             if own.any():
-                some = own[np.unique(np.linspace(0, len(own) - 1, SAMPLED).astype(np.int64))]
-                spans[group] = float(pdist(some).max(initial=0.0))
+                spans[group] = float(pdist(own[_evenly(len(own), SAMPLED)]).max(initial=0.0))
         return spans
 
 
@@ -88,19 +102,24 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
     Returns:
         The fits, with the time of all that it took, and the drift at every row of `data`.
     """
-    drift, rows = Drift.none(data), data.select(train)
     if task.options.drift == NO_DRIFT or task.options.model != VARIABLE:
-        return fit_rows(task, rows), drift
-    fits = fit_rows(task, rows, KnownHyper(rough=True))
-    for look in range(MOST_LOOKS):
-        with task.stages("looking for what drifted"):
-            found = _drift_of(task, fits, drift, (data, train))
-        if found is None and look > 0:
+        return fit_rows(task, data.select(train)), Drift.none(data)
+    drift, some = Drift.none(data), train[_some_of_each(data.group[train], ROUGHLY)]
+    known, spent = KnownHyper(rough=True), {CONSTANT: 0.0, VARIABLE: 0.0}
+    for _ in range(MOST_LOOKS):
+        rough = fit_rows(task, drift.taken_out(data).select(some), known)
+        known, spent = KnownHyper(near=rough.variable, rough=True), _both(spent, rough.seconds)
+        found = _drift_of(task, rough, drift, (data, some))
+        if found is None:
             break
-        drift, spent = drift if found is None else found, fits.seconds
-        fits = fit_rows(task, drift.taken_out(data).select(train), KnownHyper(near=fits.variable))
-        fits = replace(fits, seconds={name: value + spent[name] for name, value in fits.seconds.items()})
-    return fits, drift
+        drift = found
+    fits = fit_rows(task, drift.taken_out(data).select(train), replace(known, rough=False))
+    return replace(fits, seconds=_both(spent, fits.seconds)), drift
+
+
+def _both(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
+    """Seconds of two fits together."""
+    return {name: value + first[name] for name, value in second.items()}
 
 
 def _drift_of(task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, Rows]) -> Drift | None:
@@ -114,20 +133,20 @@ def _drift_of(task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, R
     left, weight = _residuals_in_world(task, fits.variable, data.select(train))
     left += before.moved[train]
     moved = before.moved.copy()
-    for group in task.groups:
-        every = np.flatnonzero(data.group == group)
-        own = np.flatnonzero((data.group[train] == group) & (weight > 0.0))
-        if len(own) < FEWEST_ROWS:
-            continue
-        known = before.progress[train[own]]
-        wanted = np.concatenate([before.progress[every], known])
-        with core_errors(data):
+    with task.stages("looking for what drifted"), core_errors(data):
+        for group in task.groups:
+            every = np.flatnonzero(data.group == group)
+            own = np.flatnonzero((data.group[train] == group) & (weight > 0.0))
+            if len(own) < FEWEST_ROWS:
+                continue
+            known = before.progress[train[own]]
+            wanted = np.concatenate([before.progress[every], known])
             found, noise, _, gain = find_drift(known, left[own], weight[own], wanted)
-        if gain <= OVERWHELMING:
-            found = np.zeros_like(found)
-        change = found[len(every) :] - before.moved[train[own]]
-        if np.sqrt(np.square(change).mean()) > NOTICEABLE * noise:
-            moved[every] = found[: len(every)]
+            if gain <= OVERWHELMING:
+                found = np.zeros_like(found)
+            change = found[len(every) :] - before.moved[train[own]]
+            if np.sqrt(np.square(change).mean()) > NOTICEABLE * noise:
+                moved[every] = found[: len(every)]
     return None if np.array_equal(moved, before.moved) else Drift(moved, before.progress)
 
 

@@ -26,7 +26,7 @@ const BATCH: usize = 64;
 pub struct DataSpace {
     pub model: Model,
     excited: Vec<Excited>,
-    projection: Projection,
+    pub(crate) projection: Projection,
 }
 
 impl DataSpace {

@@ -124,10 +124,13 @@ pub fn fit_field(
         if !judged.judgement.reweigh(&mut training) {
             break;
         }
-        let posterior = if options.rough || (large && !judged.judgement.spoils()) {
+        let Judged { posterior, judgement, .. } = judged;
+        let posterior = if options.rough || (large && !judgement.spoils()) {
             // Where few rows of many change, hyper-parameters stay.
-            judged.posterior.reweighed(training.weight.clone(), &options.cancel)?
+            posterior.reweighed(training.weight.clone(), &options.cancel)?
         } else {
+            // Two posteriors of many rows take gigabytes.
+            drop(posterior);
             hyper = search.cleaned(&training, hyper)?;
             search.posterior(&training, &hyper)?
         };
@@ -183,6 +186,9 @@ struct Search<'a> {
 impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         if let Some(hyper) = &self.options.hyper {
+            let large = part_of(training, ROWS_FOR_POLISH, 0).lifted(hyper.up)?;
+            self.evidence = Evidence::new(&large, &self.options.cancel).value(hyper)?;
+            self.evaluations += 1;
             return Ok(hyper.clone());
         }
         let begun = match self.options.near.clone() {
@@ -192,7 +198,11 @@ impl Search<'_> {
             }
             None => self.searched(training, noise)?,
         };
-        if self.options.rough { Ok(begun) } else { self.finished(training, begun) }
+        match (self.options.rough, self.options.near.is_some()) {
+            (true, true) => self.again(&middle_of(training), begun),
+            (true, false) => Ok(begun),
+            (false, _) => self.finished(training, begun),
+        }
     }
 
     /// Hyper-parameters for all poses from those that a search found.

@@ -138,7 +138,9 @@ impl Posterior {
         match self {
             Self::Weight(space) => Ok(Self::Weight(Box::new(space.reweighed(weight)?))),
             Self::Data(space) => {
-                let mut model = space.model;
+                let DataSpace { mut model, projection, .. } = *space;
+                // Gigabytes where rows are many.
+                drop(projection);
                 model.training.weight = weight;
                 Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)))
             }
