@@ -169,6 +169,30 @@ def test_rows_that_are_stated_to_be_noisy_hide_nothing(measured, settled):
     assert ta.calibrate(arm.robot, stated, refit=False).validation.drift is not None
 
 
+def test_outliers_hide_nothing(measured):
+    """One row in thirty, off by a few millimetres."""
+    arm, _, data = measured
+    wild = np.arange(ROWS) % 30 == 7
+    far = np.random.default_rng(3).normal(scale=3e-3, size=(ROWS, 1, 3)) * wild[:, None, None]
+    calibration = ta.calibrate(arm.robot, replace(data, targets=data.targets + far), refit=False)
+    rows = rows_of(calibration)
+    assert np.corrcoef(rows.moved[:, 2], warming(ROWS)[rows.data.rows - 1, 2])[0, 1] > 0.9
+
+
+def test_small_set_ups_leave_their_share_of_the_looks_to_others():
+    group = np.array(["a"] * 5000 + ["b"] * 5 + ["c"] * 5 + ["d"] * 400)
+    chosen = group[drifting.some_of_each(group, 1000)]
+    assert dict(zip(*np.unique(chosen, return_counts=True), strict=True)) == {
+        "a": 590,
+        "b": 5,
+        "c": 5,
+        "d": 400,
+    }
+    assert np.array_equal(drifting.some_of_each(group[4900:], 1000), np.arange(510))
+    many = np.repeat(np.arange(200).astype(str), 100)
+    assert len(drifting.some_of_each(many, 1000)) == 200 * 2 * drifting.FEWEST_ROWS
+
+
 def test_several_targets_of_which_some_were_not_measured_move_together(measured):
     arm, _, data = measured
     two = np.repeat(data.targets, 2, axis=1)

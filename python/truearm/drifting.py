@@ -46,12 +46,23 @@ def _evenly(length: int, count: int) -> Rows:
     return np.unique(np.linspace(0, length - 1, count).astype(np.int64))
 
 
-def _some_of_each(group: NDArray[np.str_], count: int) -> Rows:
-    """Indices of about so many rows, ascending, with enough of each group to look for its drift."""
-    names = np.unique(group)
-    share = max(count // len(names), FEWEST_ROWS)
+def some_of_each(group: NDArray[np.str_], count: int) -> Rows:
+    """Indices of so many rows, ascending, shared out among groups; more where each would have too few."""
+    names, sizes = np.unique(group, return_counts=True)
+    share = max(_share(sorted(sizes.tolist()), count), 2 * FEWEST_ROWS)
     rows = [np.flatnonzero(group == name) for name in names]
     return np.sort(np.concatenate([own[_evenly(len(own), share)] for own in rows]))
+
+
+def _share(sizes: Sequence[int], count: int) -> int:
+    """What each group may have of so many rows, of ascending sizes: what small ones leave others get."""
+    left = count
+    for k, size in enumerate(sizes):
+        fair = left // (len(sizes) - k)
+        if size > fair:
+            return fair
+        left -= size
+    return sizes[-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +115,7 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
     """
     if task.options.drift == NO_DRIFT or task.options.model != VARIABLE:
         return fit_rows(task, data.select(train)), Drift.none(data)
-    drift, some = Drift.none(data), train[_some_of_each(data.group[train], ROUGHLY)]
+    drift, some = Drift.none(data), train[some_of_each(data.group[train], ROUGHLY)]
     known, spent = KnownHyper(rough=True), {CONSTANT: 0.0, VARIABLE: 0.0}
     for _ in range(MOST_LOOKS):
         rough = fit_rows(task, drift.taken_out(data).select(some), known)

@@ -49,6 +49,7 @@ pub struct FieldOptions {
 pub struct Start {
     hyper: Hyper,
     curvature: Curvature,
+    evidence: f64,
 }
 
 /// A variable calibration.
@@ -79,7 +80,8 @@ pub struct FieldFit {
 impl FieldFit {
     /// For a fit to nearly the same measurements.
     pub fn start(&self) -> Start {
-        Start { hyper: self.hyper.clone(), curvature: self.curvature.clone() }
+        let (hyper, curvature) = (self.hyper.clone(), self.curvature.clone());
+        Start { hyper, curvature, evidence: self.evidence }
     }
 
     /// For standard deviations.
@@ -120,12 +122,12 @@ pub fn fit_field(
     let mut judged = search.judge(search.posterior(&training, &hyper)?)?;
     training = judged.posterior.training().clone();
     let large = training.row_count() > ROWS_FOR_POLISH;
-    for _ in 0..if large || options.rough { 1 } else { REWEIGHTINGS } {
+    for _ in 0..if large { 1 } else { REWEIGHTINGS } {
         if !judged.judgement.reweigh(&mut training) {
             break;
         }
         let Judged { posterior, judgement, .. } = judged;
-        let posterior = if options.rough || (large && !judgement.spoils()) {
+        let posterior = if (options.rough || large) && !judgement.spoils() {
             // Where few rows of many change, hyper-parameters stay.
             posterior.reweighed(training.weight.clone(), &options.cancel)?
         } else {
@@ -186,14 +188,11 @@ struct Search<'a> {
 impl Search<'_> {
     fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         if let Some(hyper) = &self.options.hyper {
-            let large = part_of(training, ROWS_FOR_POLISH, 0).lifted(hyper.up)?;
-            self.evidence = Evidence::new(&large, &self.options.cancel).value(hyper)?;
-            self.evaluations += 1;
             return Ok(hyper.clone());
         }
         let begun = match self.options.near.clone() {
             Some(near) => {
-                self.curvature = near.curvature;
+                (self.curvature, self.evidence) = (near.curvature, near.evidence);
                 near.hyper
             }
             None => self.searched(training, noise)?,
@@ -210,7 +209,7 @@ impl Search<'_> {
         hyper.waves = self.waves(training, &hyper)?;
         hyper = self.widened(training, &hyper)?;
         let part = training.row_count() > middle_of(training).row_count();
-        if part || !hyper.waves.is_empty() || self.options.near.is_some() {
+        if part || !hyper.waves.is_empty() {
             hyper = self.again(training, hyper)?;
         }
         let large = part_of(training, ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
@@ -234,6 +233,9 @@ impl Search<'_> {
     fn cleaned(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
         if self.options.hyper.is_some() {
             return Ok(hyper);
+        }
+        if self.options.rough {
+            return self.again(&middle_of(training), hyper);
         }
         let hyper = self.again(training, hyper)?;
         let waves = self.waves(training, &hyper)?;

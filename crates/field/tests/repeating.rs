@@ -65,18 +65,22 @@ fn threads_do_not_change_weight_space() {
 #[test]
 fn a_fit_that_begins_at_a_rough_one_ends_where_one_from_nothing_does() {
     let arm = six_axes(Truth::BENDING);
-    let set = Measure::poses(320).of(&arm);
-    let (constant, mut options) = options(&arm, &set).unwrap();
-    let mut fitted = |near, rough| {
-        (options.near, options.rough) = (near, rough);
-        fit_from(&arm, &set, constant.clone(), options.clone()).unwrap().field
-    };
-    let whole = fitted(None, false);
-    let rough = fitted(None, true);
-    assert!(rough.wide.is_none() && rough.evaluations < whole.evaluations);
-    let finished = fitted(Some(rough.start()), false);
-    assert!(bits(&finished) == bits(&whole));
-    assert!(finished.evaluations + rough.evaluations == whole.evaluations);
+    // More rows than a search is made on, and fewer.
+    for poses in [320, 80] {
+        let set = Measure::poses(poses).of(&arm);
+        let (constant, mut options) = options(&arm, &set).unwrap();
+        let mut fitted = |near, rough| {
+            (options.near, options.rough) = (near, rough);
+            fit_from(&arm, &set, constant.clone(), options.clone()).unwrap().field
+        };
+        let whole = fitted(None, false);
+        let rough = fitted(None, true);
+        assert!(rough.wide.is_none() && rough.evaluations <= whole.evaluations);
+        let finished = fitted(Some(rough.start()), false);
+        let [finished, whole] = [finished, whole].map(|field| (bits(&field), field.evaluations));
+        assert!(finished.0 == whole.0, "{poses} poses");
+        assert_eq!(finished.1 + rough.evaluations, whole.1);
+    }
 }
 
 #[test]
