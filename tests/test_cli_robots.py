@@ -141,7 +141,7 @@ def test_strange_numbers_are_warned_of(tmp_path, capsys):
         (
             ["import", "raw.csv", "-o", "out.csv", "--joint-unit", "grad"],
             2,
-            '"grad" is not known. Either rad or deg',
+            '"grad" is not known. Known are "rad" and "deg"',
         ),
         (["import", "raw.csv", "-o", "out.csv", "--decimal", ";"], 2, '";" is not known'),
         (["import", "raw.csv", "-o", "out.csv", "--delimiter", "ab"], 2, '"ab" is no delimiter'),
@@ -184,6 +184,7 @@ def test_import_writes_what_it_says(tmp_path, capsys):
         "rows": 2,
         "columns": ["q1", "q2", "x", "y", "z", "t"],
         "left_out": [],
+        "rows_alone": [],
     }
 
 

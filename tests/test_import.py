@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
-from truearm.importing import ImportPlan, import_table, unused_columns
+from truearm.importing import ImportPlan, import_table
 from truearm.measurements import Measurements
+from truearm.raw_tables import Marks
 from truearm.rotation_columns import RotationColumns
 
 IPA_OPTIONS = [
@@ -38,7 +39,10 @@ def write(folder: Path, text: str, encoding: str = "utf-8") -> Path:
 
 
 def plan(**changes: Any) -> ImportPlan:
-    return ImportPlan(**{"columns": COLUMNS, "joint_unit": "deg", "length_unit": "mm", **changes})
+    """The plan of PLAIN with changes, those of its marks among them."""
+    marks = {name: changes.pop(name) for name in Marks.__dataclass_fields__ if name in changes}
+    given = {"columns": COLUMNS, "joint_unit": "deg", "length_unit": "mm", **changes}
+    return ImportPlan(**given, marks=Marks(**marks))
 
 
 def test_the_public_series_equals_its_conversion(shared_data: Path, tmp_path: Path) -> None:
@@ -53,7 +57,7 @@ def test_the_public_series_equals_its_conversion(shared_data: Path, tmp_path: Pa
 
 
 def test_units_and_columns(tmp_path: Path) -> None:
-    table = import_table(write(tmp_path, PLAIN), plan())
+    table = import_table(write(tmp_path, PLAIN), plan()).frame
     assert list(table.columns) == ["q1", "q2", "x", "y", "z"]
     np.testing.assert_allclose(table["q1"], [np.pi / 2, -np.pi / 2])
     np.testing.assert_array_equal(table["y"], [2.0, 2.5])
@@ -61,14 +65,14 @@ def test_units_and_columns(tmp_path: Path) -> None:
 
 def test_units_behind_columns_come_first(tmp_path: Path) -> None:
     path = write(tmp_path, PLAIN)
-    table = import_table(path, plan(columns={**COLUMNS, "q2": "J2:mm"}))
+    table = import_table(path, plan(columns={**COLUMNS, "q2": "J2:mm"})).frame
     assert list(table.columns) == ["q1", "q2_m", "x", "y", "z"]
     np.testing.assert_array_equal(table["q2_m"], [0.045, 0.0])
 
 
 def test_columns_with_our_names_need_no_mapping(tmp_path: Path) -> None:
     path = write(tmp_path, "q1_deg,x_mm,y_mm,z_mm,group,qw,qx,qy,qz\n90,1,2,3,a,1,0,0,0\n")
-    table = import_table(path, ImportPlan())
+    table = import_table(path, ImportPlan()).frame
     assert list(table.columns) == ["q1", "x", "y", "z", "qw", "qx", "qy", "qz", "group"]
     np.testing.assert_allclose(table.loc[0, ["q1", "x"]].to_numpy(dtype=float), [np.pi / 2, 0.001])
 
@@ -82,17 +86,23 @@ def test_columns_with_our_names_need_no_mapping(tmp_path: Path) -> None:
         ("Station 1\nsome words, and more\n" + PLAIN, {"skip_lines": 2}),
         (PLAIN.replace("\n", "\r\n"), {}),
         ("\ufeff" + PLAIN, {}),
+        (PLAIN.replace("\n", "\n# a remark, of two fields\n"), {"comment": "#"}),
+        (PLAIN.replace(",", "   ").replace("\n", " \n  "), {"delimiter": " "}),
+        (
+            PLAIN.replace("1000", "39.37007874015748").replace("1500", "59.05511811023622"),
+            {"columns": {**COLUMNS, "x": "px:in"}},
+        ),
     ],
 )
 def test_marks_and_preambles(tmp_path: Path, text: str, changes: Any) -> None:
-    table = import_table(write(tmp_path, text), plan(**changes))
+    table = import_table(write(tmp_path, text), plan(**changes)).frame
     np.testing.assert_array_equal(table["x"], [1.0, 1.5])
 
 
 def test_other_encodings(tmp_path: Path) -> None:
     path = write(tmp_path, PLAIN.replace("J1", "J1 [°]"), "latin-1")
     columns = {**COLUMNS, "q1": "J1 [°]"}
-    assert len(import_table(path, plan(columns=columns, encoding="latin-1"))) == 2
+    assert len(import_table(path, plan(columns=columns, encoding="latin-1")).frame) == 2
     with pytest.raises(InputError, match="line 1 holds bytes that are not UTF-8. .*--encoding cp1252"):
         import_table(path, plan(columns=columns))
     with pytest.raises(UsageError, match='"klingon" is no known encoding'):
@@ -139,7 +149,7 @@ def test_missing_orientations_stay_missing(tmp_path: Path) -> None:
     rotation = RotationColumns.parse("euler:ZYX:deg=rx,ry,rz")
     table = import_table(
         write(tmp_path, text), ImportPlan(rotation=rotation, joint_unit="rad", length_unit="m")
-    )
+    ).frame
     assert table["qw"].isna().tolist() == [False, True]
     assert len(Measurements.from_dataframe(table)) == 2
 
@@ -148,8 +158,10 @@ def test_what_is_left_out_is_told(tmp_path: Path) -> None:
     path = write(
         tmp_path, PLAIN.replace("J1", "note,J1").replace("\n90", "\na,90").replace("\n-90", "\nb,-90")
     )
-    assert unused_columns(path, plan()) == ["note"]
-    assert import_table(path, plan(keep={"remark": "note"}))["remark"].tolist() == ["a", "b"]
+    assert import_table(path, plan()).unused == ["note"]
+    kept = import_table(path, plan(keep={"remark": "note"}))
+    assert kept.frame["remark"].tolist() == ["a", "b"]
+    assert kept.unused == []
 
 
 BAD: dict[str, tuple[str, dict[str, Any], str]] = {
@@ -170,7 +182,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "text": (
         PLAIN.replace("1500", "n/a"),
         {"decimal": "."},
-        'column "px" holds "n/a" in row 2. It must hold numbers',
+        'column "px" holds "n/a" in row 2. It must hold numbers.*--missing TEXT',
     ),
     "no joint unit": (
         PLAIN,
@@ -180,7 +192,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "no length unit": (
         PLAIN,
         {"length_unit": None},
-        'unit of column "x" is not stated. Give --length-unit m or mm',
+        'unit of column "x" is not stated. Give --length-unit in or m or mm',
     ),
     "misspelt column": (
         PLAIN,
@@ -205,7 +217,7 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "angle as a length": (
         PLAIN,
         {"columns": {**COLUMNS, "x": "px:deg"}},
-        'column "x" is said to be in deg: "px:deg". "x" is in m or mm. Write --map x=COLUMN:mm',
+        'column "x" is said to be in deg: "px:deg". "x" has one of the units in, m, mm. Write --map x=',
     ),
     "angle in a header": ("q1_deg,x_deg,y_mm,z_mm\n1,2,3,4\n", {"columns": {}}, '"x" is said to be in deg'),
     "unit of a word": (PLAIN, {"keep": {}, "columns": {**COLUMNS, "group": "J1:mm"}}, '"group" has no unit'),
@@ -219,7 +231,11 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         {"delimiter": ";", "decimal": ","},
         "no points. Write the numbers without marks between thousands.$",
     ),
-    "joint unit": (PLAIN, {"joint_unit": "grad"}, '--joint-unit: "grad" is not known. Either rad or deg'),
+    "joint unit": (
+        PLAIN,
+        {"joint_unit": "grad"},
+        '--joint-unit: "grad" is not known. Known are "rad" and "deg"',
+    ),
     "decimal mark": (PLAIN, {"decimal": ";"}, '--decimal: ";" is not known'),
     "lines above the header": (
         "Hall 4; cell 2\n" + PLAIN.replace(",", ";"),
@@ -241,6 +257,88 @@ def test_wrong_plans_are_explained(tmp_path: Path, case: str) -> None:
     path = write(tmp_path, text)
     with pytest.raises(InputError, match=message):
         import_table(path, plan(**changes))
+
+
+def test_cells_that_say_that_nothing_was_measured(tmp_path: Path) -> None:
+    text = PLAIN.replace("J2", "J2,p2x,p2y,p2z").replace(",45", ",45,N/A,-,n/a").replace(",0,", ",0,1,2,3,")
+    columns = {**COLUMNS, "x2": "p2x", "y2": "p2y", "z2": "p2z"}
+    table = import_table(write(tmp_path, text), plan(columns=columns, missing=("n/a", "-"))).frame
+    assert table["y2"].isna().tolist() == [True, False]
+    assert table["z2"][1] == 0.003
+
+
+JOINTS = "nr,J1,J2,T\n1,90,45,20\n2,-90,0,21\n3,10,20,22\n"
+POINTS = "point,px,py,pz,T\n2.0,1500,2500,3500,30\n1.0,1000,2000,3000,31\n7.0,0,0,0,32\n"
+
+
+def pair(folder: Path, joints: str = JOINTS, points: str = POINTS) -> tuple[Path, Path]:
+    paths = folder / "joints.csv", folder / "points.csv"
+    for path, text in zip(paths, (joints, points), strict=True):
+        path.write_text(text)
+    return paths
+
+
+def test_two_tables_are_joined_by_what_both_say(tmp_path: Path) -> None:
+    joints, points = pair(tmp_path)
+    kept = {"before": "T", "after": "T of points.csv"}
+    found = import_table(joints, plan(second=points, on="nr=point", keep=kept))
+    pd.testing.assert_frame_equal(
+        found.frame,
+        pd.DataFrame(
+            {
+                "q1": [np.pi / 2, -np.pi / 2], "q2": [np.pi / 4, 0.0], "x": [1.0, 1.5], "y": [2.0, 2.5],
+                "z": [3.0, 3.5], "before": [20.0, 21.0], "after": [31.0, 30.0],
+            }
+        ),
+    )  # fmt: skip
+    assert found.unused == []
+    assert found.alone == [f'1 row of {joints} (nr "3")', f'1 row of {points} (point "7.0")']
+
+
+def test_two_tables_are_joined_row_by_row(tmp_path: Path) -> None:
+    joints, points = pair(tmp_path)
+    found = import_table(joints, plan(second=points))
+    assert found.frame["x"].tolist() == [1.5, 1.0, 0.0]
+    assert found.unused == ["nr", "T", "point", "T of points.csv"]
+
+
+@pytest.mark.parametrize(
+    ("joints", "points", "on", "message"),
+    [
+        (JOINTS, POINTS + "8,1,1,1,1\n", None, "3 rows, and 4 in .*points.csv. .*--on COLUMN"),
+        (JOINTS, POINTS, "nr", 'points.csv: there is no column "nr"'),
+        (JOINTS, POINTS, "Nr=point", 'joints.csv: there is no column "Nr". Did you mean "nr"'),
+        (JOINTS, POINTS.replace("7.0", "2"), "nr=point", 'column "point" says "2" in rows 1 and 3'),
+        (JOINTS.replace("\n3", "\n"), POINTS, "nr=point", 'column "nr" is empty in row 3'),
+        (JOINTS, POINTS, "T", 'no value of "T" is in "T" of .*begins with "20", the other with "30"'),
+    ],
+)
+def test_tables_that_cannot_be_joined_are_explained(
+    tmp_path: Path, joints: str, points: str, on: str | None, message: str
+) -> None:
+    first, second = pair(tmp_path, joints, points)
+    with pytest.raises(InputError, match=message):
+        import_table(first, plan(second=second, on=on))
+
+
+def test_a_column_to_join_by_asks_for_a_second_table(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--on: there is one table only. Name the other: --with FILE"):
+        import_table(write(tmp_path, PLAIN), plan(on="nr"))
+
+
+def test_a_user_joins_two_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    joints, points = pair(tmp_path)
+    output = tmp_path / "m.csv"
+    mapped = [word for ours, theirs in COLUMNS.items() for word in ("--map", f"{ours}={theirs}")]
+    options = [*mapped, "--joint-unit", "deg", "--length-unit", "mm"]
+    command = ["import", str(joints), "--with", str(points), "--on", "nr=point", *options, "-o"]
+    assert main([*command, str(output)]) == 0
+    assert "Left out, as they are not in the other table: 1 row of" in " ".join(
+        capsys.readouterr().out.split()
+    )
+    assert len(pd.read_csv(output)) == 2
+    assert main([*command, str(points)]) == 2
+    assert points.read_text() == POINTS
 
 
 @pytest.mark.parametrize(

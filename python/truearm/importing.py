@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -11,22 +11,16 @@ from numpy.typing import NDArray
 
 from truearm.columns import DISTANCE, JOINT, QUATERNION, SIGMA, TARGET, WORDS
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
-from truearm.files import decode_text, read_bytes
 from truearm.measurements import Measurements
-from truearm.reading import DELIMITERS, Table, check_is_table, quoted_delimiter, split_table
+from truearm.raw_tables import Marks, existing_column, join_tables, read_raw
+from truearm.reading import Table
 from truearm.rotation_columns import RotationColumns
-from truearm.units import ANGLE_UNITS, LENGTH_UNITS, to_si
+from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
 
 Floats = NDArray[np.float64]
 
-UNITS: Final = LENGTH_UNITS + ANGLE_UNITS
-DECIMAL_MARKS: Final = (".", ",")
-STATE_ENCODING: Final = (
-    "State what it is: --encoding cp1252 for most files of Windows in western Europe, --encoding utf-16 for "
-    '"Unicode text" of a spreadsheet'
-)
+UNITS: Final = STATED_LENGTH_UNITS + ANGLE_UNITS
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
-UNEVEN: Final = "Correct or remove them; --skip-lines leaves out lines above the header"
 
 
 @dataclass(frozen=True)
@@ -39,11 +33,10 @@ class ImportPlan:
         keep: Their column, with or without unit, of each further column to keep.
         rotation: Columns of the orientation, unless they are qw, qx, qy, qz in `columns`.
         joint_unit: Unit of joints whose column states none: "rad" or "deg".
-        length_unit: Unit of positions, sigma and distances that state none: "m" or "mm".
-        delimiter: Mark between fields; None takes commas where the file is plainly made of them.
-        decimal: Decimal mark, "." or ","; None takes points.
-        skip_lines: Lines before the header.
-        encoding: Encoding of the text.
+        length_unit: Unit of positions, sigma and distances that state none: "m", "mm" or "in".
+        marks: How the table is written, and the second one if there is one.
+        second: A second table, with columns that the first has not.
+        on: The column that says which of their rows belong together, as in join_tables.
     """
 
     columns: Mapping[str, str] = field(default_factory=dict)
@@ -51,38 +44,52 @@ class ImportPlan:
     rotation: RotationColumns | None = None
     joint_unit: str | None = None
     length_unit: str | None = None
-    delimiter: str | None = None
-    decimal: str | None = None
-    skip_lines: int = 0
-    encoding: str = "utf-8"
+    marks: Marks = field(default_factory=Marks)
+    second: Path | None = None
+    on: str | None = None
 
     def __post_init__(self) -> None:
         choices = (
             ("--joint-unit", self.joint_unit, ANGLE_UNITS),
-            ("--length-unit", self.length_unit, LENGTH_UNITS),
-            ("--decimal", self.decimal, DECIMAL_MARKS),
+            ("--length-unit", self.length_unit, STATED_LENGTH_UNITS),
         )
         for option, value, known in choices:
             if value is not None and value not in known:
                 raise UsageError(
-                    f'"{value}" is not known', where=option, rule=f"Either {known[0]} or {known[1]}"
+                    f'"{value}" is not known', where=option, rule=f"Known are {list_names(known)}"
                 )
+        if self.on is not None and self.second is None:
+            raise UsageError("there is one table only", where="--on", way_out="Name the other: --with FILE")
 
 
-def import_table(path: Path, plan: ImportPlan) -> pd.DataFrame:
-    """Read a table as `plan` says it is, as a table that Measurements.from_dataframe takes.
+class Imported(NamedTuple):
+    """What came in.
 
-    Returns:
-        Joints, positions, orientation and what was kept, in rad and m, all rows. The column of a joint that
-        is given as a length says so: q3_m.
+    Attributes:
+        frame: Joints, positions, orientation and what was kept, in rad and m, all rows. The column of a joint
+            that is given as a length says so: q3_m.
+        unused: Their columns that nothing was taken from.
+        alone: In words, rows of two tables that are in one of them only.
+    """
+
+    frame: pd.DataFrame
+    unused: list[str]
+    alone: list[str]
+
+
+def import_table(path: Path, plan: ImportPlan) -> Imported:
+    """Read a table as `plan` says it is, as one that Measurements.from_dataframe takes.
 
     Raises:
-        InputError: If the file is not what the plan says, or the measurements break a rule.
+        InputError: If a file is not what the plan says, or the measurements break a rule.
         UsageError: If the plan names columns that are not there, or leaves a unit open.
     """
-    table = _read(path, plan)
+    table, alone = read_raw(path, plan.marks), list[str]()
+    if plan.second is not None:
+        table, alone = join_tables(table, read_raw(plan.second, plan.marks), plan.on)
     columns: dict[str, Floats | NDArray[np.str_]] = {}
-    for ours, theirs in _all_columns(table, plan).items():
+    named = _all_columns(table, plan)
+    for ours, theirs in named.items():
         unit = _unit(table, ours, theirs, plan)
         columns[_written(ours, unit)] = _converted(table, ours, theirs, plan, unit)
     if plan.rotation is not None:
@@ -94,70 +101,21 @@ def import_table(path: Path, plan: ImportPlan) -> pd.DataFrame:
     if not columns:
         raise InputError(
             "none of its columns has a name of ours",
-            where=str(path),
+            where=table.where,
             rule=f"They are {', '.join(table.names)}",
             way_out="Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on",
         )
     frame = pd.DataFrame(columns)
-    Measurements.from_dataframe(frame, name=str(path))
-    return frame
+    Measurements.from_dataframe(frame, name=table.where)
+    return Imported(frame, _unused(table, named, plan), alone)
 
 
-def unused_columns(path: Path, plan: ImportPlan) -> list[str]:
-    """Their columns that nothing is taken from."""
-    table = _read(path, plan)
-    mentioned = [*_all_columns(table, plan).values(), *plan.keep.values()]
-    used = {_split_unit(table, theirs)[0] for theirs in mentioned}
+def _unused(table: Table, named: Mapping[str, str], plan: ImportPlan) -> list[str]:
+    used = {_split_unit(table, theirs)[0] for theirs in (*named.values(), *plan.keep.values())}
     used |= set(plan.rotation.columns) if plan.rotation else set()
+    if plan.on is not None:
+        used |= set(plan.on.split("=")[:1])
     return [name for name in table.names if name not in used]
-
-
-def _read(path: Path, plan: ImportPlan) -> Table:
-    where = str(path)
-    content = read_bytes(path)
-    if plan.encoding.casefold() in ("utf-8", "utf8"):
-        text = decode_text(content, where=where, way_out=STATE_ENCODING)
-    else:
-        text = _decode(content, plan.encoding, where)
-    lines = text.splitlines(keepends=True)
-    if plan.skip_lines >= len(lines) > 0:
-        raise UsageError(f"{plan.skip_lines} lines to skip, the file has {len(lines)}", where=where)
-    text = "".join(lines[plan.skip_lines :])
-    check_is_table(text, where=where)
-    delimiter = plan.delimiter or _plain_delimiter(text, where)
-    if delimiter == plan.decimal:
-        raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
-    return split_table(text, delimiter, where=where, uneven=UNEVEN)
-
-
-def _decode(content: bytes, encoding: str, where: str) -> str:
-    try:
-        return content.decode(encoding)
-    except LookupError:
-        raise UsageError(f'"{encoding}" is no known encoding', where="--encoding") from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"the text is not {encoding}: {error.reason}", where=where, way_out=STATE_ENCODING
-        ) from None
-
-
-def _plain_delimiter(text: str, where: str) -> str:
-    header = text.lstrip().splitlines()[0]
-    counts = {mark: header.count(mark) for mark in DELIMITERS}
-    best = max(counts, key=lambda mark: counts[mark])
-    if counts[best] == 0:
-        raise UsageError(
-            f'the header is one field: "{header[:60]}"',
-            where=where,
-            way_out="Say what is between fields with --delimiter, and --skip-lines if the header is lower",
-        )
-    if best != ",":
-        raise UsageError(
-            f"its fields seem to be separated by {DELIMITERS[best]}",
-            where=where,
-            way_out=f"If so, give --delimiter {quoted_delimiter(best)}",
-        )
-    return best
 
 
 def _all_columns(table: Table, plan: ImportPlan) -> dict[str, str]:
@@ -192,11 +150,11 @@ def _unit(table: Table, ours: str, theirs: str, plan: ImportPlan) -> str:
         UsageError: If it is not stated, or is one that no such column has.
     """
     _, unit = _split_unit(table, theirs)
-    known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else LENGTH_UNITS
+    known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else STATED_LENGTH_UNITS
     if ours in WORDS + QUATERNION:
         known = ()
     if unit and unit not in known:
-        kind = f"is in {' or '.join(known)}" if known else "has no unit"
+        kind = f"has one of the units {', '.join(known)}" if known else "has no unit"
         raise UsageError(
             f'column "{ours}" is said to be in {unit}: "{theirs}"',
             where=table.where,
@@ -208,23 +166,25 @@ def _unit(table: Table, ours: str, theirs: str, plan: ImportPlan) -> str:
 
 def _written(ours: str, unit: str) -> str:
     """Name of a column that is written in SI: joints are angles unless their names say otherwise."""
-    return f"{ours}_m" if unit in LENGTH_UNITS and JOINT.fullmatch(ours) else ours
+    return f"{ours}_m" if unit in STATED_LENGTH_UNITS and JOINT.fullmatch(ours) else ours
 
 
 def _stated_unit(ours: str, plan: ImportPlan) -> str:
     is_joint = JOINT.fullmatch(ours) is not None
     unit = plan.joint_unit if is_joint else plan.length_unit
     if unit is None:
-        option, units = ("--joint-unit", ANGLE_UNITS) if is_joint else ("--length-unit", LENGTH_UNITS)
+        option, units = ("--joint-unit", ANGLE_UNITS) if is_joint else ("--length-unit", STATED_LENGTH_UNITS)
         raise UsageError(
             f'the unit of column "{ours}" is not stated',
-            way_out=f"Give {option} {' or '.join(units)}, or name it: --map {ours}=COLUMN:{units[1]}",
+            way_out=f"Give {option} {' or '.join(units)}, or name it: --map {ours}=COLUMN:{units[-1]}",
         )
     return unit
 
 
 def _orientation(table: Table, rotation: RotationColumns, plan: ImportPlan) -> dict[str, Floats]:
-    values = np.column_stack([_numbers(table, _existing(table, name), plan) for name in rotation.columns])
+    values = np.column_stack(
+        [_numbers(table, existing_column(table, name), plan) for name in rotation.columns]
+    )
     quaternions = rotation.quaternions(values)
     return {name: quaternions[:, k] for k, name in enumerate(QUATERNION)}
 
@@ -242,8 +202,8 @@ def _kept(table: Table, ours: str, theirs: str, plan: ImportPlan) -> Floats | ND
 
 
 def _numbers(table: Table, name: str, plan: ImportPlan) -> Floats:
-    if plan.decimal != ",":
-        return table.numbers(name) if plan.decimal else _numbers_or_hint(table, name)
+    if plan.marks.decimal != ",":
+        return table.numbers(name) if plan.marks.decimal else _numbers_or_hint(table, name)
     cells = table.texts(name)
     pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
     if pointed:
@@ -277,19 +237,8 @@ def _split_unit(table: Table, theirs: str) -> tuple[str, str]:
     """Their column and the unit behind it, "" where there is none."""
     name, mark, unit = theirs.rpartition(":")
     if mark and unit in UNITS and theirs not in table.columns:
-        return _existing(table, name), unit
-    return _existing(table, theirs), ""
-
-
-def _existing(table: Table, name: str) -> str:
-    if name not in table.columns:
-        raise UsageError(
-            f'there is no column "{name}"',
-            where=table.where,
-            rule=did_you_mean(name, table.names),
-            way_out=f"Its columns are {', '.join(table.names)}",
-        )
-    return name
+        return existing_column(table, name), unit
+    return existing_column(table, theirs), ""
 
 
 def _check_is_ours(ours: str) -> None:

@@ -98,7 +98,10 @@ class Table:
         return values
 
     def _no_number(self, name: str, row: int, cell: str) -> InputError:
-        way_out = "Correct the cell"
+        way_out = (
+            "Correct the cell; an empty one says that nothing was measured, and "
+            "truearm import --missing TEXT empties those that say so"
+        )
         if "," in cell and "." not in cell:
             way_out = 'If this is a decimal comma, convert the file with: truearm import --decimal ","'
         return InputError(

@@ -9,6 +9,7 @@ from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest
 from truearm.errors import UsageError, count_of, typed
 from truearm.files import refuse_own_input, write_whole
+from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
 
 DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
@@ -37,10 +38,25 @@ def command(
         ),
     ] = None,
     joint_unit: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of the joints.")] = None,
-    length_unit: Annotated[str | None, typer.Option(metavar="mm|m", help="Unit of positions.")] = None,
-    delimiter: Annotated[str | None, typer.Option(help='Mark between fields: ";", tab, ...')] = None,
+    length_unit: Annotated[str | None, typer.Option(metavar="mm|m|in", help="Unit of positions.")] = None,
+    second: Annotated[
+        Path | None, typer.Option("--with", metavar="FILE", help="A second table, with further columns.")
+    ] = None,
+    on: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COLUMN[=ITS]",
+            help="The column that says which rows of the two belong together; row by row without.",
+        ),
+    ] = None,
+    delimiter: Annotated[str | None, typer.Option(help='Mark between fields: ";", tab, space, ...')] = None,
     decimal: Annotated[str | None, typer.Option(help='Decimal mark: "." or ",".')] = None,
     skip_lines: Annotated[int, typer.Option(min=0, help="Lines above the header.")] = 0,
+    comment: Annotated[str, typer.Option(metavar="MARK", help="What lines of remarks begin with.")] = "",
+    missing: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TEXT", help="What cells say where nothing was measured; repeat."),
+    ] = None,
     encoding: Annotated[str, typer.Option(help="Encoding of the text.")] = "utf-8",
     as_json: AsJson = False,
 ) -> None:
@@ -51,32 +67,35 @@ def command(
     Examples:
       truearm import raw.csv -o m.csv --joint-unit deg --length-unit mm
       truearm import raw.txt -o m.csv --map q1=J1:deg --map x=px:mm
+      truearm import joints.csv --with tracker.csv --on point -o m.csv
     """
-    from truearm.importing import ImportPlan, import_table, unused_columns
+    from truearm.importing import ImportPlan, import_table
+    from truearm.raw_tables import Marks
     from truearm.rotation_columns import RotationColumns
 
-    refuse_own_input(output, raw)
+    refuse_own_input(output, raw, second)
     plan = ImportPlan(
         columns=_pairs(columns or [], "--map"),
         keep=_pairs(keep or [], "--keep"),
         rotation=RotationColumns.parse(rotation) if rotation else None,
         joint_unit=joint_unit,
         length_unit=length_unit,
-        delimiter=_delimiter(delimiter),
-        decimal=decimal,
-        skip_lines=skip_lines,
-        encoding=encoding,
+        marks=Marks(_delimiter(delimiter), decimal, skip_lines, comment, tuple(missing or ()), encoding),
+        second=second,
+        on=on,
     )
-    frame = import_table(raw, plan)
-    left_out = unused_columns(raw, plan)
+    frame, left_out, alone = import_table(raw, plan)
     write_whole(output, frame.to_csv(index=False, lineterminator="\n"))
     if as_json:
         names = [str(name) for name in frame.columns]
-        print_json({"output": str(output), "rows": len(frame), "columns": names, "left_out": left_out})
+        said = {"output": str(output), "rows": len(frame), "columns": names}
+        print_json({**said, "left_out": left_out, "rows_alone": alone})
         return
     say_wrapped(f"{output}: {count_of(len(frame), 'row')}, {', '.join(frame.columns)}.")
     if left_out:
         say_wrapped(f"Left out: {', '.join(left_out)}. Keep them with --keep.")
+    for rows in alone:
+        say_wrapped(f"Left out, as they are not in the other table: {rows}.")
     suggest(f"truearm calibrate ROBOT {typed(output)} -o result")
 
 
@@ -86,10 +105,8 @@ def _pairs(options: list[str], option: str) -> dict[str, str]:
     for text in options:
         ours, mark, theirs = text.partition("=")
         if not mark and option == "--keep":
-            ours, theirs = (
-                text.rpartition(":")[0] if text.endswith((":mm", ":deg", ":m", ":rad")) else text,
-                text,
-            )
+            name, _, unit = text.rpartition(":")
+            ours, theirs = name if name and unit in STATED_LENGTH_UNITS + ANGLE_UNITS else text, text
         if not ours or not theirs:
             raise UsageError(f'"{text}" is no pair of columns', where=option, rule="Write OURS=THEIRS")
         if ours in pairs:
