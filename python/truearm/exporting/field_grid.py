@@ -78,8 +78,9 @@ def grid_table(
     """A row for each point of the grid, the last joint running fastest.
 
     Columns: the readings; `dx_mm` to `rz_mrad`, from the nominal flange to the calibrated one in the base
-    frame, translation and rotation vector; `std_mm`, the largest standard deviation of its coordinates;
-    and for each link what is added to its nominal parameters, `theta1_deg`, `d1_mm` and so on.
+    frame, translation and rotation vector; `std_mm`, the standard deviation of the calibrated flange's place,
+    root of the sum of the variances of x, y, z; and for each link what is added to its nominal parameters,
+    `theta1_deg`, `d1_mm` and so on.
 
     Raises:
         WorkError: If the calibration has no field.
@@ -104,7 +105,7 @@ def grid_table(
     table |= dict(zip(SHIFTS, _shifts(flange_poses(robot, q), calibrated).T, strict=True))
     if with_std:
         std = calibration.position_std(q, tool=np.eye(4), features=features)
-        table["std_mm"] = std.max(axis=1) * MM_PER_METRE
+        table["std_mm"] = np.linalg.norm(std, axis=1) * MM_PER_METRE
     added = calibration.parameters(q, features=features) - robot.table
     return pd.DataFrame(table | _corrections(added))
 
@@ -161,7 +162,9 @@ def _columns_in_words(columns: Sequence[str], calibration: Calibration) -> list[
         "axes of the base",
     ]
     if "std_mm" in columns:
-        said.append("std_mm: the largest standard deviation of the three coordinates of the flange")
+        said.append(
+            "std_mm: standard deviation of the flange's place, root of the sum of the variances of x, y, z"
+        )
     first = next((name for name in columns[count + len(SHIFTS) :] if name != "std_mm"), None)
     if first is not None:
         order = LINK_ORDER[calibration.robot.convention]
