@@ -25,7 +25,8 @@ HEAD = """# Performance
 
 Measured by `make bench BENCH=--write`, which writes this page; truearm and its peers ran in one process after
 the other on the same machine and were checked to give the same answers. One thread unless it says otherwise,
-medians of repeated calls. A ratio says how many times faster truearm is than the peer beside it.
+medians of repeated calls. A ratio says how many times faster truearm is than the peer beside it; what is to
+reach is the goal that the project set itself.
 """
 
 

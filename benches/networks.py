@@ -72,7 +72,7 @@ def run():
     cells, grades = numpy_active(trained)
     peer_update = seconds_of(lambda: numpy_epoch(weights, cells, grades, wanted), repeats=3) / PATTERNS
     output, update = "FCMAC output, 27 cells x 15, random inputs", "one training update, 27 cells x 15"
-    before = "hand-written Rust, measured before"
+    before = "hand-written Rust, timed apart"
     comparisons = [
         Comparison(output, "NumPy, vectorised", ours["output"], peer_output, OUTPUT_TARGET),
         Comparison(output, before, ours["output"], OUTPUT_CEILING_S, CEILING_TARGET),

@@ -123,7 +123,7 @@ def run():
     name = f"{CHOSEN} of {CANDIDATES} poses, 27 parameters"
     comparisons = [
         Comparison(name, "NumPy, rank-3 updates", ours["choice"], peer, CHOICE_TARGET),
-        Comparison(name, "hand-written Rust, measured before", ours["choice"], CHOICE_SECONDS),
+        Comparison(name, "hand-written Rust, timed apart", ours["choice"], CHOICE_SECONDS),
         Comparison(
             f"region of a point among {REGIONS}",
             "the 50 ns allowed",

@@ -28,10 +28,10 @@ HEAD = """# Results on real arms
 Position error in mm on rows that took no part in fitting or choosing, from public measurements made by
 others. `make figures FIGURES="--data DIR"` runs the command line on them and writes this page. Nominal,
 constant and variable each have their own frame and target fitted to the same rows. The first table is for
-seed 7, the second shows how much the choice of held-out rows matters, and which share of the held-out
+seed 7; the second shows how much the choice of held-out rows matters, and which share of the held-out
 coordinates lies within the 95 % intervals that were given for them. Where set-ups moved while they were
 measured that is [taken out](../explanations/drift.md) of the rows, the held-out ones too; the third table has
-the errors with it left in.
+the errors with it left in. The mean to reach is the goal that the project set itself.
 
 The data, q1 ... q6 in rad and x y z in m, from their authors' repositories:
 

@@ -184,7 +184,7 @@ def test_import_writes_what_it_says(tmp_path, capsys):
         "rows": 2,
         "columns": ["q1", "q2", "x", "y", "z", "t"],
         "left_out": [],
-        "rows_alone": [],
+        "rows_left_out": [],
     }
 
 

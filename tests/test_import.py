@@ -86,7 +86,7 @@ def test_columns_with_our_names_need_no_mapping(tmp_path: Path) -> None:
         ("Station 1\nsome words, and more\n" + PLAIN, {"skip_lines": 2}),
         (PLAIN.replace("\n", "\r\n"), {}),
         ("\ufeff" + PLAIN, {}),
-        (PLAIN.replace("\n", "\n# a remark, of two fields\n"), {"comment": "#"}),
+        (PLAIN.replace("\n", "\n# a remark, of two fields\n"), {"comments": ("#", "//")}),
         (PLAIN.replace(",", "   ").replace("\n", " \n  "), {"delimiter": " "}),
         (
             PLAIN.replace("1000", "39.37007874015748").replace("1500", "59.05511811023622"),
@@ -271,6 +271,9 @@ JOINTS = "nr,J1,J2,T\n1,90,45,20\n2,-90,0,21\n3,10,20,22\n"
 POINTS = "point,px,py,pz,T\n2.0,1500,2500,3500,30\n1.0,1000,2000,3000,31\n7.0,0,0,0,32\n"
 
 
+STAMPS = "t,J1,J2\n20251123001500001,90,45\n20251123001500011,-90,0\n"
+
+
 def pair(folder: Path, joints: str = JOINTS, points: str = POINTS) -> tuple[Path, Path]:
     paths = folder / "joints.csv", folder / "points.csv"
     for path, text in zip(paths, (joints, points), strict=True):
@@ -292,7 +295,61 @@ def test_two_tables_are_joined_by_what_both_say(tmp_path: Path) -> None:
         ),
     )  # fmt: skip
     assert found.unused == []
-    assert found.alone == [f'1 row of {joints} (nr "3")', f'1 row of {points} (point "7.0")']
+    assert found.left_out == [
+        f'1 row of {joints} (nr "3"), as they are not in the other table',
+        f'1 row of {points} (point "7.0"), as they are not in the other table',
+    ]
+
+
+def test_keys_are_what_they_say_and_no_numbers(tmp_path: Path) -> None:
+    """Point 10 of station 1 is not point 1, whatever 1.10 is as a number; 007 is 7."""
+    joints = "id,J1,J2\n1.1,10,1\n1.2,20,2\n007,30,3\n"
+    points = "id,px,py,pz\n1.10,0,0,0\n1.2,2,2,2\n7,3,3,3\n"
+    found = import_table(pair(tmp_path, joints, points)[0], plan(second=tmp_path / "points.csv", on="id"))
+    assert found.frame["x"].tolist() == [0.002, 0.003]
+
+
+def test_each_table_has_its_own_marks(tmp_path: Path) -> None:
+    points = "Station 1\n" + POINTS.replace(".0,", "|").replace(",", ";").replace("|", ";").replace(
+        "1500;", "1500,5;"
+    )
+    joints, second = pair(tmp_path, points=points)
+    marks = Marks(delimiter=";", decimal=",", skip_lines=1)
+    found = import_table(joints, plan(second=second, second_marks=marks, on="nr=point"))
+    assert found.frame["x"].tolist() == [1.0, 1.5005]
+
+
+def test_rows_in_which_nothing_was_measured_are_left_out(tmp_path: Path) -> None:
+    text = PLAIN + "10,20,n/a,n/a,n/a\n"
+    found = import_table(write(tmp_path, text), plan(missing=("n/a",)))
+    assert len(found.frame) == 2
+    assert [words.split(" of ")[0] for words in found.left_out] == ["row 3"]
+    assert "nothing was measured" in found.left_out[0]
+
+
+def test_errors_name_the_row_of_the_file(tmp_path: Path) -> None:
+    joints, points = pair(tmp_path, points=POINTS.replace("2000", "two"))
+    with pytest.raises(InputError, match=r'points.csv: column "py" holds "two" in row 2'):
+        import_table(joints, plan(second=points, on="nr=point"))
+
+
+def test_columns_that_both_have_are_not_guessed(tmp_path: Path) -> None:
+    joints, points = pair(tmp_path, "q1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n", "x_mm,y_mm,z_mm\n6,7,8\n")
+    both = ImportPlan(second=points)
+    with pytest.raises(
+        UsageError, match='"x_mm" is in both files. .*--map x=x_mm:mm, .*"x_mm of points.csv"'
+    ):
+        import_table(joints, both)
+    mapped = {axis: f"{axis}_mm of points.csv:mm" for axis in "xyz"}
+    assert import_table(joints, ImportPlan(columns=mapped, second=points)).frame["y"].tolist() == [0.007]
+    with pytest.raises(UsageError, match='column "px" is taken for two of ours'):
+        import_table(write(tmp_path, PLAIN), plan(columns={**COLUMNS, "y": "px"}))
+
+
+def test_a_mark_of_utf_8_is_believed(tmp_path: Path) -> None:
+    path = write(tmp_path, "\ufeff" + PLAIN)
+    with pytest.raises(UsageError, match="its first bytes say that it is UTF-8, not cp1252"):
+        import_table(path, plan(encoding="cp1252"))
 
 
 def test_two_tables_are_joined_row_by_row(tmp_path: Path) -> None:
@@ -308,7 +365,14 @@ def test_two_tables_are_joined_row_by_row(tmp_path: Path) -> None:
         (JOINTS, POINTS + "8,1,1,1,1\n", None, "3 rows, and 4 in .*points.csv. .*--on COLUMN"),
         (JOINTS, POINTS, "nr", 'points.csv: there is no column "nr"'),
         (JOINTS, POINTS, "Nr=point", 'joints.csv: there is no column "Nr". Did you mean "nr"'),
-        (JOINTS, POINTS.replace("7.0", "2"), "nr=point", 'column "point" says "2" in rows 1 and 3'),
+        (
+            JOINTS,
+            POINTS.replace("7.0", "2"),
+            "nr=point",
+            'column "point" says "2.0" in row 1 and "2" in row 3',
+        ),
+        (JOINTS.replace("nr", "point"), POINTS, None, '"point" says "1" in row 1, and "2" in .*--on point'),
+        (STAMPS, STAMPS.replace("J", "p").replace("001,", "002,").replace("011,", "012,"), "t", 'no value of "t" is in "t"'),
         (JOINTS.replace("\n3", "\n"), POINTS, "nr=point", 'column "nr" is empty in row 3'),
         (JOINTS, POINTS, "T", 'no value of "T" is in "T" of .*begins with "20", the other with "30"'),
     ],
@@ -333,9 +397,8 @@ def test_a_user_joins_two_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     options = [*mapped, "--joint-unit", "deg", "--length-unit", "mm"]
     command = ["import", str(joints), "--with", str(points), "--on", "nr=point", *options, "-o"]
     assert main([*command, str(output)]) == 0
-    assert "Left out, as they are not in the other table: 1 row of" in " ".join(
-        capsys.readouterr().out.split()
-    )
+    said = " ".join(capsys.readouterr().out.split())
+    assert '(nr "3"), as they are not in the other table.' in said
     assert len(pd.read_csv(output)) == 2
     assert main([*command, str(points)]) == 2
     assert points.read_text() == POINTS

@@ -10,17 +10,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.columns import DISTANCE, JOINT, QUATERNION, SIGMA, TARGET, WORDS
-from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.errors import InputError, UsageError, did_you_mean, list_names, list_rows
 from truearm.measurements import Measurements
-from truearm.raw_tables import Marks, existing_column, join_tables, read_raw
-from truearm.reading import Table
+from truearm.raw_tables import Marks, RawTable, join_tables, read_raw
 from truearm.rotation_columns import RotationColumns
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
 
 Floats = NDArray[np.float64]
 
 UNITS: Final = STATED_LENGTH_UNITS + ANGLE_UNITS
-NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
 
 
 @dataclass(frozen=True)
@@ -34,8 +32,9 @@ class ImportPlan:
         rotation: Columns of the orientation, unless they are qw, qx, qy, qz in `columns`.
         joint_unit: Unit of joints whose column states none: "rad" or "deg".
         length_unit: Unit of positions, sigma and distances that state none: "m", "mm" or "in".
-        marks: How the table is written, and the second one if there is one.
+        marks: How the table is written.
         second: A second table, with columns that the first has not.
+        second_marks: How it is written; as the first without.
         on: The column that says which of their rows belong together, as in join_tables.
     """
 
@@ -46,6 +45,7 @@ class ImportPlan:
     length_unit: str | None = None
     marks: Marks = field(default_factory=Marks)
     second: Path | None = None
+    second_marks: Marks | None = None
     on: str | None = None
 
     def __post_init__(self) -> None:
@@ -66,15 +66,15 @@ class Imported(NamedTuple):
     """What came in.
 
     Attributes:
-        frame: Joints, positions, orientation and what was kept, in rad and m, all rows. The column of a joint
-            that is given as a length says so: q3_m.
+        frame: Joints, positions, orientation and what was kept, in rad and m, all rows in which something was
+            measured. The column of a joint that is given as a length says so: q3_m.
         unused: Their columns that nothing was taken from.
-        alone: In words, rows of two tables that are in one of them only.
+        left_out: In words, rows and remarks that nothing was taken from.
     """
 
     frame: pd.DataFrame
     unused: list[str]
-    alone: list[str]
+    left_out: list[str]
 
 
 def import_table(path: Path, plan: ImportPlan) -> Imported:
@@ -84,20 +84,20 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
         InputError: If a file is not what the plan says, or the measurements break a rule.
         UsageError: If the plan names columns that are not there, or leaves a unit open.
     """
-    table, alone = read_raw(path, plan.marks), list[str]()
+    table = read_raw(path, plan.marks)
     if plan.second is not None:
-        table, alone = join_tables(table, read_raw(plan.second, plan.marks), plan.on)
+        table = join_tables(table, read_raw(plan.second, plan.second_marks or plan.marks), plan.on)
     columns: dict[str, Floats | NDArray[np.str_]] = {}
     named = _all_columns(table, plan)
     for ours, theirs in named.items():
         unit = _unit(table, ours, theirs, plan)
-        columns[_written(ours, unit)] = _converted(table, ours, theirs, plan, unit)
+        columns[_written(ours, unit)] = _converted(table, ours, theirs, unit)
     if plan.rotation is not None:
-        columns |= _orientation(table, plan.rotation, plan)
+        columns |= _orientation(table, plan.rotation)
     for ours, theirs in plan.keep.items():
         if ours in columns:
             raise UsageError(f'column "{ours}" is named twice', where="--keep")
-        columns[ours] = _kept(table, ours, theirs, plan)
+        columns[ours] = _kept(table, ours, theirs)
     if not columns:
         raise InputError(
             "none of its columns has a name of ours",
@@ -105,12 +105,25 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
             rule=f"They are {', '.join(table.names)}",
             way_out="Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on",
         )
-    frame = pd.DataFrame(columns)
+    frame, empty = _with_measurements(pd.DataFrame(columns), table)
     Measurements.from_dataframe(frame, name=table.where)
-    return Imported(frame, _unused(table, named, plan), alone)
+    left_out = [f"{rows}, as they are not in the other table" for rows in table.alone]
+    left_out += [f"{lines}, as remarks" for lines in table.remarks]
+    return Imported(frame, _unused(table, named, plan), [*left_out, *empty])
 
 
-def _unused(table: Table, named: Mapping[str, str], plan: ImportPlan) -> list[str]:
+def _with_measurements(frame: pd.DataFrame, table: RawTable) -> tuple[pd.DataFrame, list[str]]:
+    """The rows in which something was measured if there are any, and in words those in which nothing was."""
+    places = [name for name in frame.columns if TARGET.fullmatch(str(name)) or DISTANCE.fullmatch(str(name))]
+    measured = frame[places].notna().any(axis=1)
+    if measured.all() or not measured.any():
+        return frame, []
+    rows = list_rows((np.flatnonzero(~measured) + 1).tolist())
+    words = f"{rows} of {table.where}, as nothing was measured"
+    return frame[measured].reset_index(drop=True), [words]
+
+
+def _unused(table: RawTable, named: Mapping[str, str], plan: ImportPlan) -> list[str]:
     used = {_split_unit(table, theirs)[0] for theirs in (*named.values(), *plan.keep.values())}
     used |= set(plan.rotation.columns) if plan.rotation else set()
     if plan.on is not None:
@@ -118,10 +131,14 @@ def _unused(table: Table, named: Mapping[str, str], plan: ImportPlan) -> list[st
     return [name for name in table.names if name not in used]
 
 
-def _all_columns(table: Table, plan: ImportPlan) -> dict[str, str]:
+def _all_columns(table: RawTable, plan: ImportPlan) -> dict[str, str]:
     """Their column of each of ours: those of the plan, and those that have our names already."""
     for ours in plan.columns:
         _check_is_ours(ours)
+    mapped = [_split_unit(table, theirs)[0] for ours, theirs in plan.columns.items() if ours not in WORDS]
+    twice = [name for name in dict.fromkeys(mapped) if mapped.count(name) > 1]
+    if twice:
+        raise UsageError(f'column "{twice[0]}" is taken for two of ours', where="--map")
     taken = {_split_unit(table, theirs)[0] for theirs in plan.columns.values()}
     taken |= {_split_unit(table, theirs)[0] for theirs in plan.keep.values()}
     named = dict(plan.columns)
@@ -129,21 +146,31 @@ def _all_columns(table: Table, plan: ImportPlan) -> dict[str, str]:
         bare, _, unit = name.rpartition("_")
         ours = bare if unit in UNITS and _is_ours(bare) else name
         if name not in taken and _is_ours(ours) and ours not in named:
+            _refuse_twin(table, name, f"{ours}={name}{'' if ours == name else f':{unit}'}")
             named[ours] = name if ours == name else f"{name}:{unit}"
     return dict(sorted(named.items(), key=lambda item: _order(item[0])))
 
 
-def _converted(
-    table: Table, ours: str, theirs: str, plan: ImportPlan, unit: str
-) -> Floats | NDArray[np.str_]:
+def _refuse_twin(table: RawTable, name: str, mapping: str) -> None:
+    """Raise UsageError if the other file has a column of that name too."""
+    twin = table.twin(name)
+    if twin is not None:
+        raise UsageError(
+            f'"{name}" is in both files',
+            where=table.where,
+            way_out=f'Say which is meant: --map {mapping}, or that of the second, "{twin}"',
+        )
+
+
+def _converted(table: RawTable, ours: str, theirs: str, unit: str) -> Floats | NDArray[np.str_]:
     name, _ = _split_unit(table, theirs)
     if ours in WORDS:
         return table.texts(name)
-    values = _numbers(table, name, plan)
+    values = table.numbers(name)
     return to_si(values, unit) if unit else values
 
 
-def _unit(table: Table, ours: str, theirs: str, plan: ImportPlan) -> str:
+def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
     """Unit of a column; "" where it has none.
 
     Raises:
@@ -181,64 +208,30 @@ def _stated_unit(ours: str, plan: ImportPlan) -> str:
     return unit
 
 
-def _orientation(table: Table, rotation: RotationColumns, plan: ImportPlan) -> dict[str, Floats]:
-    values = np.column_stack(
-        [_numbers(table, existing_column(table, name), plan) for name in rotation.columns]
-    )
+def _orientation(table: RawTable, rotation: RotationColumns) -> dict[str, Floats]:
+    values = np.column_stack([table.numbers(table.existing(name)) for name in rotation.columns])
     quaternions = rotation.quaternions(values)
     return {name: quaternions[:, k] for k, name in enumerate(QUATERNION)}
 
 
-def _kept(table: Table, ours: str, theirs: str, plan: ImportPlan) -> Floats | NDArray[np.str_]:
+def _kept(table: RawTable, ours: str, theirs: str) -> Floats | NDArray[np.str_]:
     if _is_ours(ours):
         raise UsageError(f'"{ours}" is a measurement column', where="--keep", way_out="Give it with --map")
     name, unit = _split_unit(table, theirs)
     if unit:
-        return to_si(_numbers(table, name, plan), unit)
+        return to_si(table.numbers(name), unit)
     try:
-        return _numbers(table, name, plan)
+        return table.numbers(name)
     except InputError:
         return table.texts(name)
 
 
-def _numbers(table: Table, name: str, plan: ImportPlan) -> Floats:
-    if plan.marks.decimal != ",":
-        return table.numbers(name) if plan.marks.decimal else _numbers_or_hint(table, name)
-    cells = table.texts(name)
-    pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
-    if pointed:
-        cell = cells[pointed[0] - 1]
-        raise InputError(
-            f'column "{name}" holds "{cell}" in row {pointed[0]}',
-            where=table.where,
-            rule="With a decimal comma there must be no points",
-            way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out --decimal",
-        )
-    return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count).numbers(name)
-
-
-def _numbers_or_hint(table: Table, name: str) -> Floats:
-    try:
-        return table.numbers(name)
-    except InputError as error:
-        commas = [cell for cell in table.texts(name) if "," in cell]
-        if not commas:
-            raise
-        both = "." in commas[0] or commas[0].count(",") > 1
-        raise UsageError(
-            f'column "{name}" holds "{commas[0]}"',
-            where=table.where,
-            rule="A number has one mark, the decimal one" if both else "",
-            way_out=NO_THOUSANDS if both else 'If this is a decimal comma, give --decimal ","',
-        ) from error
-
-
-def _split_unit(table: Table, theirs: str) -> tuple[str, str]:
+def _split_unit(table: RawTable, theirs: str) -> tuple[str, str]:
     """Their column and the unit behind it, "" where there is none."""
     name, mark, unit = theirs.rpartition(":")
-    if mark and unit in UNITS and theirs not in table.columns:
-        return existing_column(table, name), unit
-    return existing_column(table, theirs), ""
+    if mark and unit in UNITS and theirs not in table.parts:
+        return table.existing(name), unit
+    return table.existing(theirs), ""
 
 
 def _check_is_ours(ours: str) -> None:

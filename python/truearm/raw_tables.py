@@ -1,8 +1,8 @@
 """Tables as other programs write them: marks, remarks and gaps as they are stated, one file or two."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -11,17 +11,22 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
 from truearm.files import decode_text, read_bytes
-from truearm.reading import DELIMITERS, Table, check_is_table, quoted_delimiter, split_table
+from truearm.reading import DELIMITERS, Table, Texts, check_is_table, quoted_delimiter, split_table
 
+Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 DECIMAL_MARKS: Final = (".", ",")
+UTF_8: Final = ("utf-8", "utf8", "utf-8-sig")
+BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 BLANK: Final = " "
 BLANKS: Final = re.compile(r"[ \t]+")
+WHOLE: Final = re.compile(r"0*(\d+)(?:\.0*)?")
 STATE_ENCODING: Final = (
     "State what it is: --encoding cp1252 for most files of Windows in western Europe, --encoding utf-16 for "
     '"Unicode text" of a spreadsheet'
 )
+NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
 UNEVEN: Final = (
     "Correct or remove them; --skip-lines leaves out lines above the header, --comment those of remarks"
 )
@@ -37,7 +42,7 @@ class Marks:
             plainly made of them.
         decimal: Decimal mark, "." or ","; None takes points.
         skip_lines: Lines before the header.
-        comment: What lines begin with that are remarks; "" where there are none.
+        comments: What lines begin with that are remarks.
         missing: What cells say, besides nothing, where nothing was measured; case does not count.
         encoding: Encoding of the text.
     """
@@ -45,7 +50,7 @@ class Marks:
     delimiter: str | None = None
     decimal: str | None = None
     skip_lines: int = 0
-    comment: str = ""
+    comments: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     encoding: str = "utf-8"
 
@@ -58,76 +63,140 @@ class Marks:
             )
 
 
-class Joined(NamedTuple):
-    """Two tables as one.
+class Part(NamedTuple):
+    """A column of one file, some of its rows.
 
     Attributes:
-        table: Rows that are in both, in the order of the first.
-        alone: In words, which rows are in one of them only.
+        table: The file's table.
+        name: The column's name in it.
+        rows: Which of its rows (n,), from 0.
+        decimal: Its decimal mark.
     """
 
     table: Table
-    alone: list[str]
+    name: str
+    rows: Integers
+    decimal: str | None
+
+    def texts(self) -> Texts:
+        """Its cells (n,)."""
+        return self.table.texts(self.name)[self.rows]
+
+    def numbers(self) -> Floats:
+        """Its numbers (n,), NaN where a cell is empty.
+
+        Raises:
+            InputError: If a cell of the file is no number; names the file and its row.
+        """
+        if self.decimal == ",":
+            return _with_points(self.table, self.name).numbers(self.name)[self.rows]
+        try:
+            return self.table.numbers(self.name)[self.rows]
+        except InputError as error:
+            hint = None if self.decimal else _hint(self.table, self.name)
+            raise (hint or error) from None
 
 
-def read_raw(path: Path, marks: Marks) -> Table:
+@dataclass(frozen=True)
+class RawTable:
+    """Columns of one file or two.
+
+    Attributes:
+        where: The file or files, for messages.
+        parts: Each column.
+        row_count: Number of rows.
+        alone: In words, which rows of two files are in one of them only.
+        remarks: In words, how many lines were left out as remarks.
+    """
+
+    where: str
+    parts: Mapping[str, Part]
+    row_count: int
+    alone: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns in their order."""
+        return list(self.parts)
+
+    def texts(self, name: str) -> Texts:
+        """A column as text."""
+        return self.parts[name].texts()
+
+    def numbers(self, name: str) -> Floats:
+        """A column as numbers, as in Part.numbers."""
+        return self.parts[name].numbers()
+
+    def twin(self, name: str) -> str | None:
+        """The column of the second file that has this name there, None without one."""
+        return next((key for key, part in self.parts.items() if part.name == name != key), None)
+
+    def existing(self, name: str) -> str:
+        """The name itself.
+
+        Raises:
+            UsageError: If there is no such column.
+        """
+        if name not in self.parts:
+            raise UsageError(
+                f'there is no column "{name}"',
+                where=self.where,
+                rule=did_you_mean(name, self.names),
+                way_out=f"Its columns are {', '.join(self.names)}",
+            )
+        return name
+
+
+def read_raw(path: Path, marks: Marks) -> RawTable:
     """The table in a file.
 
     Raises:
         InputError: If the file is not what the marks say.
-        UsageError: If marks contradict one another, or are missing.
+        UsageError: If marks contradict one another or the file, or are missing.
     """
     where = str(path)
-    content = read_bytes(path)
-    if marks.encoding.casefold() in ("utf-8", "utf8"):
-        text = decode_text(content, where=where, way_out=STATE_ENCODING)
-    else:
-        text = _decode(content, marks.encoding, where)
-    lines = text.splitlines(keepends=True)
+    lines = _text(path, marks.encoding).splitlines(keepends=True)
     if marks.skip_lines >= len(lines) > 0:
         raise UsageError(f"{marks.skip_lines} lines to skip, the file has {len(lines)}", where=where)
-    lines = lines[marks.skip_lines :]
-    if marks.comment:
-        lines = [line for line in lines if not line.lstrip().startswith(marks.comment)]
-    text = "".join(lines)
+    below = lines[marks.skip_lines :]
+    kept = [line for line in below if not (marks.comments and line.lstrip().startswith(marks.comments))]
+    text = "".join(kept)
     check_is_table(text, where=where)
     delimiter = marks.delimiter or _plain_delimiter(text, where)
     if delimiter == marks.decimal:
         raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
     if delimiter == BLANK:
         text = "\n".join(BLANKS.sub(BLANK, line.strip()) for line in text.splitlines())
-    return _without(split_table(text, delimiter, where=where, uneven=UNEVEN), marks.missing)
+    table = _without(split_table(text, delimiter, where=where, uneven=UNEVEN), marks.missing)
+    rows = np.arange(table.row_count)
+    parts = {name: Part(table, name, rows, marks.decimal) for name in table.names}
+    left_out = len(below) - len(kept)
+    remarks = [f"{count_of(left_out, 'line')} of {where}"] if left_out else []
+    return RawTable(where, parts, table.row_count, remarks=remarks)
 
 
-def join_tables(first: Table, second: Table, on: str | None) -> Joined:
-    """Rows of two tables that belong together.
+def join_tables(first: RawTable, second: RawTable, on: str | None) -> RawTable:
+    """Rows of two tables that belong together, in the order of the first.
 
     Args:
         first: One table.
         second: The other. A column of a name that the first has too is called "NAME of FILE".
         on: The column that says what belongs together, "NAME" or "NAME=ITS NAME IN THE SECOND"; None takes
-            the rows one by one.
+            the rows one by one. Its cells have to say the same, zeros before whole numbers apart.
 
     Raises:
         InputError: If a value of `on` is missing or there twice, or no row belongs to another; without `on`,
-            if one has more rows.
+            if one has more rows, or a column of both shows that their order differs.
         UsageError: If a table has no such column.
     """
     if on is None:
-        if first.row_count != second.row_count:
-            raise InputError(
-                f"{count_of(first.row_count, 'row')}, and {second.row_count} in {second.where}",
-                where=first.where,
-                rule="Row by row, both must have as many",
-                way_out="Name the column that says which belong together: --on COLUMN",
-            )
+        _check_order(first, second)
         rows = np.arange(first.row_count)
-        return Joined(_side_by_side(first, second, rows, rows, ""), [])
+        return _side_by_side(first, second, (rows, rows), "", [])
     name, mark, other = on.partition("=")
     theirs = other if mark else name
-    sides = ((first, existing_column(first, name)), (second, existing_column(second, theirs)))
-    numeric = all(table.is_numeric(column) for table, column in sides)
-    keys, others = (_keys(table, column, numeric=numeric) for table, column in sides)
+    keys, others = _keys(first, first.existing(name)), _keys(second, second.existing(theirs))
     places = {key: row for row, key in enumerate(others)}
     both = [row for row, key in enumerate(keys) if key in places]
     if not both:
@@ -137,31 +206,13 @@ def join_tables(first: Table, second: Table, on: str | None) -> Joined:
             rule=f'It begins with "{first.texts(name)[0]}", the other with "{second.texts(theirs)[0]}"',
             way_out="Name columns that say which rows belong together: --on COLUMN=ITS_OTHER_NAME",
         )
-    table = _side_by_side(
-        first, second, np.array(both), np.array([places[keys[row]] for row in both]), theirs
-    )
     known = set(keys)
     alone = [
         *_alone(first, name, [row for row, key in enumerate(keys) if key not in places]),
         *_alone(second, theirs, [row for row, key in enumerate(others) if key not in known]),
     ]
-    return Joined(table, alone)
-
-
-def existing_column(table: Table, name: str) -> str:
-    """The name itself.
-
-    Raises:
-        UsageError: If the table has no such column.
-    """
-    if name not in table.columns:
-        raise UsageError(
-            f'there is no column "{name}"',
-            where=table.where,
-            rule=did_you_mean(name, table.names),
-            way_out=f"Its columns are {', '.join(table.names)}",
-        )
-    return name
+    rows = np.array(both)
+    return _side_by_side(first, second, (rows, np.array([places[keys[row]] for row in both])), theirs, alone)
 
 
 def _without(table: Table, missing: Sequence[str]) -> Table:
@@ -176,18 +227,47 @@ def _without(table: Table, missing: Sequence[str]) -> Table:
     return Table(table.where, columns, table.row_count)
 
 
-def _keys(table: Table, name: str, *, numeric: bool) -> list[str]:
-    """What tells the rows apart; of numbers the value counts, not how they are written."""
+def _check_order(first: RawTable, second: RawTable) -> None:
+    """Raise InputError if rows cannot belong together one by one."""
+    if first.row_count != second.row_count:
+        raise InputError(
+            f"{count_of(first.row_count, 'row')}, and {second.row_count} in {second.where}",
+            where=first.where,
+            rule="Row by row, both must have as many",
+            way_out="Name the column that says which belong together: --on COLUMN",
+        )
+    for name in first.names:
+        if name not in second.parts:
+            continue
+        ours, theirs = ([_key(cell) for cell in table.texts(name).tolist()] for table in (first, second))
+        told_apart = len(set(ours)) == len(ours) == len(set(theirs))
+        if told_apart and ours != theirs and 2 * len(set(ours) & set(theirs)) > len(ours):
+            row = next(k for k, (one, other) in enumerate(zip(ours, theirs, strict=True)) if one != other)
+            raise InputError(
+                f'"{name}" says "{ours[row]}" in row {row + 1}, and "{theirs[row]}" in {second.where}',
+                where=first.where,
+                rule="Row by row, both must be in the same order",
+                way_out=f"Join them by it: --on {name}",
+            )
+
+
+def _key(cell: str) -> str:
+    """What a cell says, without zeros before a whole number."""
+    whole = WHOLE.fullmatch(cell)
+    return whole[1] if whole else cell
+
+
+def _keys(table: RawTable, name: str) -> list[str]:
+    """What tells the rows apart."""
     said: list[str] = table.texts(name).tolist()
-    keys = [repr(float(key)) if numeric and key else key for key in said]
+    keys = [_key(cell) for cell in said]
     rows: dict[str, int] = {}
     for row, key in enumerate(keys, start=1):
         if not key or key in rows:
-            what = (
-                f'says "{said[row - 1]}" in rows {rows[key]} and {row}' if key else f"is empty in row {row}"
-            )
+            before = rows.get(key, row)
+            twice = f'says "{said[before - 1]}" in row {before} and "{said[row - 1]}" in row {row}'
             raise InputError(
-                f'column "{name}" {what}',
+                f'column "{name}" {twice if key else f"is empty in row {row}"}',
                 where=table.where,
                 rule="Rows are told apart by it",
                 way_out="Correct it, or leave out --on where the rows of both files are in the same order",
@@ -196,17 +276,20 @@ def _keys(table: Table, name: str, *, numeric: bool) -> list[str]:
     return keys
 
 
-def _side_by_side(first: Table, second: Table, rows: Integers, others: Integers, key: str) -> Table:
-    columns = {name: column[rows] for name, column in first.columns.items()}
-    for name, column in second.columns.items():
+def _side_by_side(
+    first: RawTable, second: RawTable, rows: tuple[Integers, Integers], key: str, alone: list[str]
+) -> RawTable:
+    parts = {name: part._replace(rows=part.rows[rows[0]]) for name, part in first.parts.items()}
+    for name, part in second.parts.items():
         if name == key:
             continue
-        here = name if name not in first.columns else f"{name} of {Path(second.where).name}"
-        columns[here] = column[others]
-    return Table(f"{first.where} with {second.where}", columns, len(rows))
+        here = name if name not in first.parts else f"{name} of {Path(second.where).name}"
+        parts[here] = part._replace(rows=part.rows[rows[1]])
+    where = f"{first.where} with {second.where}, rows as joined"
+    return RawTable(where, parts, len(rows[0]), alone, [*first.remarks, *second.remarks])
 
 
-def _alone(table: Table, name: str, rows: Sequence[int]) -> list[str]:
+def _alone(table: RawTable, name: str, rows: Sequence[int]) -> list[str]:
     """In words, rows of a table that the other has not."""
     if not rows:
         return []
@@ -216,7 +299,43 @@ def _alone(table: Table, name: str, rows: Sequence[int]) -> list[str]:
     return [f"{count_of(len(rows), 'row')} of {table.where} ({name} {named}{more})"]
 
 
-def _decode(content: bytes, encoding: str, where: str) -> str:
+def _with_points(table: Table, name: str) -> Table:
+    """A column with decimal commas as one with points."""
+    cells = table.texts(name)
+    pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
+    if pointed:
+        cell = cells[pointed[0] - 1]
+        raise InputError(
+            f'column "{name}" holds "{cell}" in row {pointed[0]}',
+            where=table.where,
+            rule="With a decimal comma there must be no points",
+            way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out --decimal",
+        )
+    return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count)
+
+
+def _hint(table: Table, name: str) -> UsageError | None:
+    """What is said of a column with commas in its numbers; None of others."""
+    commas = [cell for cell in table.texts(name).tolist() if "," in cell]
+    if not commas:
+        return None
+    both = "." in commas[0] or commas[0].count(",") > 1
+    return UsageError(
+        f'column "{name}" holds "{commas[0]}"',
+        where=table.where,
+        rule="A number has one mark, the decimal one" if both else "",
+        way_out=NO_THOUSANDS if both else 'If this is a decimal comma, give --decimal ","',
+    )
+
+
+def _text(path: Path, encoding: str) -> str:
+    where, content = str(path), read_bytes(path)
+    if encoding.casefold() in UTF_8:
+        return decode_text(content, where=where, way_out=STATE_ENCODING)
+    if content.startswith(BYTE_ORDER_MARK):
+        raise UsageError(
+            f"its first bytes say that it is UTF-8, not {encoding}", where=where, way_out="State that: utf-8"
+        )
     try:
         return content.decode(encoding)
     except LookupError:

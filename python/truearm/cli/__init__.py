@@ -31,7 +31,7 @@ COMMANDS: Final = (
     Entry("serve", "truearm.cli.serve", "Correct set-points that come over TCP."),
     Entry("export", "truearm.cli.export", "A calibration as URDF, D-H table or samples."),
     Entry("compensate", "truearm.cli.compensate", "Rewrite a robot program for the calibrated arm."),
-    Entry("study", "truearm.cli.study", "The paper's simulations, run again."),
+    Entry("study", "truearm.cli.study", "Simulations and comparisons to run again."),
 )
 HELP: Final = """Robot arm calibration with Denavit-Hartenberg parameters that vary over the workspace.
 

@@ -1,5 +1,6 @@
 """`truearm import`: other people's tables as measurement files."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -40,7 +41,8 @@ def command(
     joint_unit: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of the joints.")] = None,
     length_unit: Annotated[str | None, typer.Option(metavar="mm|m|in", help="Unit of positions.")] = None,
     second: Annotated[
-        Path | None, typer.Option("--with", metavar="FILE", help="A second table, with further columns.")
+        list[Path] | None,
+        typer.Option("--with", metavar="FILE", help="A second table, with further columns."),
     ] = None,
     on: Annotated[
         str | None,
@@ -52,7 +54,15 @@ def command(
     delimiter: Annotated[str | None, typer.Option(help='Mark between fields: ";", tab, space, ...')] = None,
     decimal: Annotated[str | None, typer.Option(help='Decimal mark: "." or ",".')] = None,
     skip_lines: Annotated[int, typer.Option(min=0, help="Lines above the header.")] = 0,
-    comment: Annotated[str, typer.Option(metavar="MARK", help="What lines of remarks begin with.")] = "",
+    with_delimiter: Annotated[str | None, typer.Option(help="--delimiter of the second table.")] = None,
+    with_decimal: Annotated[str | None, typer.Option(help="--decimal of the second table.")] = None,
+    with_skip_lines: Annotated[
+        int | None, typer.Option(min=0, help="--skip-lines of the second table.")
+    ] = None,
+    with_encoding: Annotated[str | None, typer.Option(help="--encoding of the second table.")] = None,
+    comment: Annotated[
+        list[str] | None, typer.Option(metavar="MARK", help="What lines of remarks begin with; repeat.")
+    ] = None,
     missing: Annotated[
         list[str] | None,
         typer.Option(metavar="TEXT", help="What cells say where nothing was measured; repeat."),
@@ -73,29 +83,43 @@ def command(
     from truearm.raw_tables import Marks
     from truearm.rotation_columns import RotationColumns
 
-    refuse_own_input(output, raw, second)
+    others = second or []
+    if len(others) > 1:
+        raise UsageError("more than two tables", where="--with", way_out="Join two first, then the third")
+    refuse_own_input(output, raw, *others)
+    marks = Marks(
+        _delimiter(delimiter), decimal, skip_lines, tuple(comment or ()), tuple(missing or ()), encoding
+    )
+    second_marks = replace(
+        marks,
+        delimiter=_delimiter(with_delimiter) or marks.delimiter,
+        decimal=with_decimal or decimal,
+        skip_lines=skip_lines if with_skip_lines is None else with_skip_lines,
+        encoding=with_encoding or encoding,
+    )
     plan = ImportPlan(
         columns=_pairs(columns or [], "--map"),
         keep=_pairs(keep or [], "--keep"),
         rotation=RotationColumns.parse(rotation) if rotation else None,
         joint_unit=joint_unit,
         length_unit=length_unit,
-        marks=Marks(_delimiter(delimiter), decimal, skip_lines, comment, tuple(missing or ()), encoding),
-        second=second,
+        marks=marks,
+        second=others[0] if others else None,
+        second_marks=second_marks,
         on=on,
     )
-    frame, left_out, alone = import_table(raw, plan)
+    frame, unused, left_out = import_table(raw, plan)
     write_whole(output, frame.to_csv(index=False, lineterminator="\n"))
     if as_json:
         names = [str(name) for name in frame.columns]
         said = {"output": str(output), "rows": len(frame), "columns": names}
-        print_json({**said, "left_out": left_out, "rows_alone": alone})
+        print_json({**said, "left_out": unused, "rows_left_out": left_out})
         return
     say_wrapped(f"{output}: {count_of(len(frame), 'row')}, {', '.join(frame.columns)}.")
-    if left_out:
-        say_wrapped(f"Left out: {', '.join(left_out)}. Keep them with --keep.")
-    for rows in alone:
-        say_wrapped(f"Left out, as they are not in the other table: {rows}.")
+    if unused:
+        say_wrapped(f"Left out: {', '.join(unused)}. Keep them with --keep.")
+    for what in left_out:
+        say_wrapped(f"Left out: {what}.")
     suggest(f"truearm calibrate ROBOT {typed(output)} -o result")
 
 

@@ -45,7 +45,10 @@ def command(
     seed: Annotated[int, typer.Option(help="Seed of the draw of frame rows.")] = SEED,
     frame_rows: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Rows of MEASUREMENTS that find frame and tool.  [default: a third]"),
+        typer.Option(
+            metavar="N",
+            help="Rows of MEASUREMENTS that find frame and tool.  [default: a third, 400 at most]",
+        ),
     ] = None,
     length_unit: LengthUnit = None,
     angle_unit: AngleUnit = None,

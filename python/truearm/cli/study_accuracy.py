@@ -68,7 +68,7 @@ def command(
     All methods get the same training rows and are judged on the same held-out rows: first whole parts that
     are left out (tails of each joint, clusters of joint space, groups equal in some columns, another target
     on the tool), then random rows. Settings of a method are looked for by cross-validation on its training
-    rows. Needs scikit-learn and lightgbm: pip install truearm[study].
+    rows. Needs scikit-learn and lightgbm: pip install ".[study]".
 
     Writes DIR/accuracy.json, DIR/accuracy.md and learning curves as PNG and SVG. Every result is kept in
     DIR/results.jsonl as soon as it is there; the same command goes on where it was interrupted. The workers

@@ -61,7 +61,7 @@ def check_scheduler(scheduler: str) -> None:
         raise InputError(
             "dask.distributed is not installed",
             where=scheduler,
-            way_out='Install it with: pip install "truearm[fleet]"; or leave the scheduler out',
+            way_out='Install it with: pip install ".[fleet]" in the source; or leave the scheduler out',
         ) from None
     try:
         with ThreadPoolExecutor(1) as aside:  # a notebook's thread runs a loop already

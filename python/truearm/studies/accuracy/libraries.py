@@ -18,7 +18,7 @@ def require(libraries: Iterable[str]) -> None:
         raise UsageError(
             f"{list_names(missing)} is not installed",
             rule="Some of the compared methods are fitted by it",
-            way_out="Install it with: pip install truearm[study]; or leave those methods out with --methods",
+            way_out='Install it with: pip install ".[study]" in the source; or leave them out with --methods',
         )
 
 

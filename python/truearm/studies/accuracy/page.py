@@ -95,10 +95,11 @@ def _means(summary: Summary) -> Iterable[str]:
 def _means_table(groups: Mapping[str, Mapping[str, Any]], sizes: Sequence[str]) -> str:
     there = [size for size in sizes if size in groups]
     detailed = next(size for size in DETAILED + tuple(there) if size in groups)
-    lowest = {size: min(_mean(found) for found in groups[size]["methods"].values()) for size in there}
+    shown = [name for name in TITLES if FAMILIES[name] != "block"]
+    lowest = {size: min(_mean(groups[size]["methods"].get(name, {})) for name in shown) for size in there}
     rows = []
-    for name in TITLES:
-        if FAMILIES[name] == "block" or not any(name in groups[size]["methods"] for size in there):
+    for name in shown:
+        if not any(name in groups[size]["methods"] for size in there):
             continue
         means = [_mean_cell(groups[size]["methods"].get(name, {}), lowest[size]) for size in there]
         rows.append((TITLES[name], *means, *_details(groups[detailed]["methods"].get(name, {}))))
