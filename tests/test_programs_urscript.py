@@ -254,6 +254,13 @@ end
     assert program.moves.follows.tolist() == [False, False, False, False]
 
 
+def test_the_body_of_an_if_is_entered_from_before_it(robot):
+    move = "movej([0.1, -1.5, 1.5, -1.5, -1.5, 0])\n"
+    text = f"{move}if (get_digital_in(0)):\n{move}{move}elif (get_digital_in(1)):\n{move}end\n{move}"
+    program = read(UR, f"{text}if (x):\n{move}end\n", robot)
+    assert program.moves.follows.tolist() == [False, True, True, False, False, True]
+
+
 def test_without_set_tcp_the_frames_file_has_it(robot):
     text = f"movej([0.3, -1.3, 1.4, -1.7, -1.5, 0.4])\nmovel(p[{pose_text(robot, Q1)}])\n"
     assert "give it in a file of --frames" in reasons(rewritten(UR, text, robot))[0][2]

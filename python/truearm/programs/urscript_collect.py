@@ -241,7 +241,8 @@ class Collected:
         """What is only known when all was read: calls of the program's own functions, indirect uses."""
         own = {step.name for step in self._steps if step.kind in FUNCTIONS}
         self._steps = [step for step in self._steps if step.kind != "call" or step.name in own]
-        self.breaks.extend(step.at for step in self._steps if step.kind not in ("tcp", "payload"))
+        # The body of an `if` is entered from before it; what follows it, and its other branches, may not be.
+        self.breaks.extend(step.at for step in self._steps if step.kind not in ("tcp", "payload", "if"))
         moved_to = set(_names([motion.target for motion in self.motions]))
         pending = list(self._made_of)
         while pending:
