@@ -372,7 +372,12 @@ def test_two_tables_are_joined_row_by_row(tmp_path: Path) -> None:
             'column "point" says "2.0" in row 1 and "2" in row 3',
         ),
         (JOINTS.replace("nr", "point"), POINTS, None, '"point" says "1" in row 1, and "2" in .*--on point'),
-        (STAMPS, STAMPS.replace("J", "p").replace("001,", "002,").replace("011,", "012,"), "t", 'no value of "t" is in "t"'),
+        (
+            STAMPS,
+            STAMPS.replace("J", "p").replace("001,", "002,").replace("011,", "012,"),
+            "t",
+            'no value of "t" is in "t"',
+        ),
         (JOINTS.replace("\n3", "\n"), POINTS, "nr=point", 'column "nr" is empty in row 3'),
         (JOINTS, POINTS, "T", 'no value of "T" is in "T" of .*begins with "20", the other with "30"'),
     ],

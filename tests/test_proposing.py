@@ -7,6 +7,7 @@ import truearm as ta
 from tests.remastered import remastered
 from truearm._core import CoreError, choose_informative
 from truearm.proposing import Candidates, acceptance_poses, next_poses
+from truearm.proposing.acceptance import standard_errors
 from truearm.simulation import VirtualArm
 from truearm.updating import UpdateOptions
 
@@ -84,6 +85,14 @@ def test_acceptance_poses_lie_apart_and_notice_small_changes(known):
     shift[2] = 1.5 * found.noticed["joint3"]
     told = ta.update(calibration, remastered(arm, candidates.readings[found.rows], shift, seed=8))
     assert told.offsets[2].moved
+
+
+@pytest.mark.parametrize("freedom", [1, 4, 9])
+def test_a_change_of_so_many_standard_errors_is_noticed_in_95_of_100_cases(freedom):
+    drawn = np.random.default_rng(0).normal(size=(40_000, freedom))
+    limit = np.quantile(np.square(drawn).sum(axis=1), 0.99)
+    drawn[:, 0] += standard_errors(freedom, 0.01)
+    assert abs((np.square(drawn).sum(axis=1) > limit).mean() - 0.95) < 0.01
 
 
 def test_what_is_noticed_hardly_depends_on_how_far_things_may_have_moved(known):

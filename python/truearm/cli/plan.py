@@ -204,9 +204,12 @@ def _print_proposed(proposed: "Proposed", output: Path) -> None:
             'and keep the column "group", which says so.'
         )
         return
+    if not told["noticed"]:
+        say("So few poses tell of no change: 10 to 20 are a good number.")
+        return
     say("Smallest change that is noticed in 95 of 100 cases:")
     rows = [[name, f"{value:.4f}"] for name, value in told["noticed"].items()]
-    print_table(("offset of joint in deg (mm), tool in mm", ""), rows)
+    print_table(("offset of joint in deg (mm), tool in mm (worst direction)", ""), rows)
 
 
 def _motion(seconds: "dict[str, float]") -> str:

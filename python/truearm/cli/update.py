@@ -178,6 +178,8 @@ def _print(found: "Update") -> None:
     for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
         for motion in motions:
             say(f"{name} of {motion.group}: {_motion(motion)}.")
+    if any(motion.moved for motion in found.tools):
+        say("If it is another target, or was taken off, give --new-tool: that is no change of the arm.")
     print_table(
         ("error at left-out poses, mm", "mean", "RMS", "largest"),
         [

@@ -6,6 +6,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import chi2, ncx2
 
 from truearm._core import choose_telling
 from truearm.identified import IdentifiedArm
@@ -22,8 +24,10 @@ PAYLOAD_RAD: Final = 3e-4
 """What another payload bends a joint by where its weight has the longest lever."""
 APART: Final = 0.5
 """Chosen points are at least this part as far apart as so many that fill the workspace evenly."""
-NOTICED: Final = 2.576 + 1.645
-"""Standard errors of a change that a test at 1 % notices in 95 of 100 cases."""
+NOTICED: Final = 0.95
+"""Share of the cases in which a change is to be noticed."""
+TOLD: Final = 0.5
+"""A change is told where the rows leave less than this share of its prior's deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +113,27 @@ def _noticed(
 ) -> dict[str, float]:
     """Smallest changes by name that would be noticed, as in Acceptance."""
     found: dict[str, float] = {}
+    tested = [k for k, name in enumerate(names) if name.startswith("joint") or name == "tool"]
+    errors = standard_errors(int((std[tested] < TOLD).sum()), options.level)
     for k, name in enumerate(names):
-        if name.startswith("joint") and std[k] < 0.5:
+        if name.startswith("joint") and std[k] < TOLD:
             prismatic = arm.robot.joints[int(name.removeprefix("joint")) - 1] == "prismatic"
             unit = MM_PER_METRE if prismatic else 1.0 / RADIANS_PER_DEGREE
-            found[name] = float(NOTICED * std[k] * arm_std(arm, name, options) * unit)
+            found[name] = float(errors * std[k] * arm_std(arm, name, options) * unit)
     tool = [k for k, name in enumerate(names) if name == "tool"][:3]
-    if tool and max(std[tool]) < 0.5:
-        found["tool"] = float(NOTICED * max(std[tool]) * options.tool_mm)
+    if tool and max(std[tool]) < TOLD:
+        found["tool"] = float(errors * max(std[tool]) * options.tool_mm)
     return found
+
+
+def standard_errors(freedom: int, level: float) -> float:
+    """Standard errors of one change that a test of `freedom` changes together notices often enough.
+
+    Such a test says whether a calibration still holds. Its sum of squares is then of the noncentral
+    chi-squared distribution.
+    """
+    if freedom == 0:
+        return float("inf")
+    limit = chi2.isf(level, freedom)
+    squares = brentq(lambda found: ncx2.sf(limit, freedom, found) - NOTICED, 1e-6, 10.0 * limit + 100.0)
+    return float(np.sqrt(squares))
