@@ -89,7 +89,7 @@ def real_table(schemes: Path, arm: str) -> str:
     for scheme, title in SCHEMES.items():
         found = json.loads((schemes / f"{arm}-{scheme}.json").read_text())
         rows.append(row(title, found, found["options"]["model"]))
-    rows.append(row("variable model, the default", variable, "variable"))
+    rows.append(row("variable model, `--drift none`", variable, "variable"))
     head = f"| {ARMS[arm]} | mean / RMS / max | of repeatability | regions |\n|---|---|---|---|"
     return "\n".join([head, *rows])
 
