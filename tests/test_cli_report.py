@@ -65,9 +65,11 @@ def test_json_alone_on_stdout(folder, capsys):
 
 def test_other_measurements_get_their_chapter(folder, capsys):
     assert main(["report", "arm.calib", "later.csv"]) == 0
-    capsys.readouterr()
+    printed = capsys.readouterr().out
     assert main(["evaluate", "arm.calib", "later.csv", "--json"]) == 0
     judged = json.loads(capsys.readouterr().out)
+    assert "On later.csv:" in printed
+    assert f"{judged['errors']['constant']['mean_mm']:.3f}" in printed
     page = words_of((folder / "arm.html").read_text())
     assert "On other measurements" in page
     assert f"later.csv: {judged['n_judged']} rows judged" in page

@@ -216,6 +216,15 @@ def test_the_report_and_the_diff():
     assert sum(line.startswith("-  CONST robtarget") for line in diff) == 2
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_a_diff_shows_text_as_it_was_written(encoding):
+    text = module(TWO, points().replace("\n", " ! Prüfling\n")).encode(encoding)
+    path = Path("demo.mod")
+    program = language_of(path).read([Source(path, text)], ABB, Frames())
+    diff = list(unified_diff(rewrite(program, models(ABB), Choices(), mark="compensated by truearm")))
+    assert any("Prüfling" in line for line in diff)
+
+
 def test_a_large_programs_diff_is_told_line_by_line():
     body = "\n".join(
         f"MoveAbsJ [[{n % 50},10,20,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1,fine,tG;" for n in range(2500)

@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
-from truearm.errors import UsageError, typed
+from truearm.errors import UsageError, count_of, typed
 from truearm.files import write_whole
 
 if TYPE_CHECKING:
@@ -64,6 +64,7 @@ def command(
       truearm report result/calibration.calib another_day.csv -o report.pdf
     """
     from truearm.calibration import Calibration
+    from truearm.cli.error_tables import print_errors
     from truearm.reporting.pdf import browser
 
     target = _beside(calibration) if output is None else output
@@ -79,6 +80,9 @@ def command(
         print_json({"report": str(target), **made.to_dict()})
         return
     say_wrapped(made.verdict)
+    if other is not None:
+        say(f"On {', '.join(file.name for file in files)}:")
+        print_errors(other.errors, count_of(other.n_judged, "row"))
     if made.advice:
         say("What would help most next:")
         for entry in made.advice:

@@ -62,10 +62,18 @@ def table_rows(done: Rewritten, most: int) -> Iterator[tuple[str, ...]]:
 def unified_diff(done: Rewritten) -> Iterator[str]:
     """The lines of a unified diff of all files, without their ends."""
     for source, content in zip(done.program.sources, done.contents, strict=True):
-        before, after = source.text.splitlines(), content.decode("latin-1").splitlines()
+        before, after = (_shown(text).splitlines() for text in (source.content, content))
         name = source.path.name
         for line in _diff(before, after, name):
             yield line.rstrip("\r\n")
+
+
+def _shown(content: bytes) -> str:
+    """The text as people read it: UTF-8 where it is that, as any other bytes mean Latin-1."""
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def _diff(before: list[str], after: list[str], name: str) -> Iterator[str]:
