@@ -17,6 +17,7 @@ are in rad and lengths in m where no unit is in a name. Shapes are in parenthese
 """
 MODULES = {
     "truearm": (),
+    "truearm.scheme_options": ("SchemeOptions",),
     "truearm.simulation": ("VirtualArm", "Imperfections"),
     "truearm.inverse": ("Inverse",),
     "truearm.planning": (),
@@ -25,6 +26,9 @@ MODULES = {
     "truearm.framing": (),
     "truearm.streaming": ("CorrectionStream", "StreamOptions"),
     "truearm.cell": (),
+    "truearm.cell.conformance": ("check_robot", "check_sensor", "ConformanceError"),
+    "truearm.fleet": (),
+    "truearm.workers": ("run_tasks",),
 }
 SECTION = re.compile(r"^(Args|Attributes|Raises|Returns|Yields):$")
 ITEM = re.compile(r"^ {4}(\*{0,2}[\w., ]+): (.*)$")
