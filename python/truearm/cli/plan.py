@@ -238,7 +238,11 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
     )
     before, after = plan.choice.before, plan.choice.after
     kappa = f"{before['kappa']:.1f} at random, {after['kappa']:.1f} chosen"
-    say_wrapped(f"Condition number {kappa} (columns at 300 mm).")
+    times = after["o1"] / before["o1"]
+    say_wrapped(
+        f"They determine the parameters {times:.2f} times as well as poses at random, in the geometric mean "
+        f"(index O1). Condition number {kappa} (columns at 300 mm)."
+    )
     say(_motion(plan.seconds))
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]
     say("Expected standard deviation of the calibrated position:")
