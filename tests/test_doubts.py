@@ -6,6 +6,7 @@ from itertools import permutations, product
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -87,6 +88,16 @@ def test_points_of_other_rows_are_doubted():
     table[points] = np.roll(table[points].to_numpy(), 1, axis=0)
     shifted = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
     assert "row by row" in notice_of(shifted, "no_help")
+
+
+def test_points_that_a_controller_computed_are_doubted():
+    robot = ta.Robot.load("ur10")
+    readings = VirtualArm(robot, seed=4).poses(60)
+    columns = [*(f"q{k}" for k in range(1, 7)), *"xyz"]
+    table = pd.DataFrame(np.column_stack([readings, robot.position(readings).round(6)]), columns=columns)
+    found = ta.calibrate(robot, ta.Measurements.from_dataframe(table), model="constant")
+    assert "what a controller computes from its joints" in notice_of(found, "computed")
+    assert not notice_of(found, "no_help")
 
 
 def measured_otherwise(name, turned=(), coupled=None, mirrored=False):

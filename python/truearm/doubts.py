@@ -26,6 +26,8 @@ LARGE_MM: Final = 10.0
 """No arm that fits its table misses by so much once it is calibrated."""
 LARGE_MRAD: Final = 50.0
 """Nor turns its tool by so much more or less."""
+COMPUTED_MM: Final = 0.02
+"""No real arm is where its nominal model has it to within this."""
 MOST_NAMED: Final = 4
 UPRIGHT: Final = (0.0, 0.0, 1.0)
 NO_HELP: Final = "no_help"
@@ -42,6 +44,8 @@ def doubts(
 ) -> list[Notice]:
     """What speaks against a calibration whose model `best` is used."""
     before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
+    if before < COMPUTED_MM:
+        return [_computed(before)]
     return [
         *no_help(before, after, f"mean error on {validation.judged} rows"),
         *_turns_otherwise(validation, best),
@@ -97,6 +101,15 @@ def no_help(before_mm: float, after_mm: float, what: str) -> list[Notice]:
         f"{before_mm:.4g} mm. Do not use it until the reason is found. {CHECKS}."
     )
     return [Notice(NO_HELP, text)]
+
+
+def _computed(before_mm: float) -> Notice:
+    text = (
+        f"The nominal arm has its target where these points are, within {before_mm:.2g} mm: they seem to be "
+        "what a controller computes from its joints, not what was measured. Nothing can be learnt from them. "
+        "Give the points of an instrument that looks at the arm from outside."
+    )
+    return Notice("computed", text)
 
 
 def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:
