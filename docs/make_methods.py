@@ -59,6 +59,8 @@ Every method but the first begins with the constant calibration, frame and targe
 Settings of the others - space, kernel, number of neighbours, layers, ridge - are found by fourfold
 cross-validation on at most 500 of the training poses, of Gaussian processes by likelihood on at most 400;
 then the method is fitted to all of them.
+
+In the tables of means the lowest is in bold, and so are those within 3 % of it.
 """
 BEHIND = """The table has the means that are more than 3 % above the lowest of the others, from 100 training
 poses on.

@@ -211,7 +211,7 @@ def test_sets_need_an_arm_and_names_of_their_own(file, tmp_path, capsys):
 
 def test_a_missing_library_is_named_with_what_installs_it(monkeypatch):
     monkeypatch.setattr(libraries, "find_spec", lambda _: None)
-    with pytest.raises(UsageError, match=r"pip install truearm\[study\]"):
+    with pytest.raises(UsageError, match=r'pip install "\.\[study\]"'):
         libraries.require(["lightgbm", ""])
     libraries.require([""])
 

@@ -172,5 +172,5 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
 
 def test_without_dask_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r'pip install "truearm\[fleet\]"'):
+    with pytest.raises(InputError, match=r'pip install "\.\[fleet\]"'):
         check_workers("tcp://127.0.0.1:8786")
