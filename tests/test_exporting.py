@@ -406,7 +406,20 @@ def test_what_cannot_be_exported_is_refused(ur10, to, options, error, message):
 
 
 @pytest.mark.parametrize(
-    "grid", ["q1", "q1=", "q9=3", "q1=1:2", "q1=1:2:0", "q1=a:b:3", "q1=nan", "q0=1", "q1=0:9:3000000"]
+    "grid",
+    [
+        "q1",
+        "q1=",
+        "q9=3",
+        "q1=1:2",
+        "q1=1:2:0",
+        "q1=1:2:1",
+        "q1=400",
+        "q1=a:b:3",
+        "q1=nan",
+        "q0=1",
+        "q1=0:9:3000000",
+    ],
 )
 def test_bad_grids_are_refused(variable, grid):
     with pytest.raises(UsageError, match="--grid"):

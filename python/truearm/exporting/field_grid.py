@@ -16,6 +16,7 @@ from truearm.errors import InputError, UsageError, WorkError
 from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import UNLIMITED, flange_poses
 from truearm.parameters import KINDS
+from truearm.robot import Robot
 from truearm.summary import WAVE, describe_blocks
 from truearm.units import MM_PER_METRE, to_si
 
@@ -28,6 +29,8 @@ SHIFTS: Final = ("dx_mm", "dy_mm", "dz_mm", "rx_mrad", "ry_mrad", "rz_mrad")
 DISPLAYED: Final = {"revolute": "deg", "prismatic": "mm"}
 DIGITS: Final = "%.9g"
 SHOWN: Final = ".6g"
+ROUNDED: Final = 1e-6
+"""What readings at a limit are beyond it by rounding, deg or mm."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ def grid_axes(calibration: Calibration, stated: str | None = None) -> list[Axis]
             it each joint has five readings over its range.
 
     Raises:
-        UsageError: If it cannot be read.
+        UsageError: If it cannot be read, or leaves a joint's limits.
     """
     ranges = _ranges(calibration)
     if stated is None:
@@ -64,8 +67,20 @@ def grid_axes(calibration: Calibration, stated: str | None = None) -> list[Axis]
         number, axis = _axis(part)
         if not 1 <= number <= len(axes):
             raise UsageError(f"there is no q{number}", where="--grid", rule=f"The arm has {len(axes)} joints")
+        _check_limits(calibration.robot, number, axis)
         axes[number - 1] = axis
     return axes
+
+
+def _check_limits(robot: Robot, number: int, axis: Axis) -> None:
+    unit = DISPLAYED[robot.joints[number - 1]]
+    low, high = (float(limit) / to_si(1.0, unit) for limit in robot.limits[number - 1])
+    if not low - ROUNDED <= min(axis.low, axis.high) <= max(axis.low, axis.high) <= high + ROUNDED:
+        raise UsageError(
+            f"q{number} from {axis.low:{SHOWN}} to {axis.high:{SHOWN}} {unit}",
+            where="--grid",
+            rule=f"Its limits are {low:{SHOWN}} to {high:{SHOWN}} {unit}",
+        )
 
 
 def grid_table(
@@ -183,11 +198,13 @@ def _axis(text: str) -> tuple[int, Axis]:
             raise ValueError(text)
         number, low = int(found[1]), float(found[2])
         axis = Axis(low, low, 1) if found[3] is None else Axis(low, float(found[3]), int(found[4]))
-        if axis.count < 1 or not np.isfinite([axis.low, axis.high]).all():
+        if axis.count < (1 if axis.low == axis.high else 2) or not np.isfinite([axis.low, axis.high]).all():
             raise ValueError(text)
     except ValueError:
         raise UsageError(
-            f'"{text}" is no axis of a grid', where="--grid", rule="qJ=FROM:TO:COUNT or qJ=VALUE, deg or mm"
+            f'"{text}" is no axis of a grid',
+            where="--grid",
+            rule="qJ=FROM:TO:COUNT, two readings at least, or qJ=VALUE; deg or mm",
         ) from None
     return number, axis
 
