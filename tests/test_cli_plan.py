@@ -117,6 +117,11 @@ def test_poses_are_proposed_from_a_calibration(asked, purpose, said, calib, here
         assert set(found["noticed"]) >= {"joint2", "joint3"}
 
 
+def test_too_few_poses_to_tell_anything_are_named(calib, here, capsys):
+    assert main(["plan", "--acceptance", "1", "--from", calib, "-o", "a.csv"]) == 0
+    assert "So few poses tell of no change" in capsys.readouterr().out
+
+
 def test_poses_of_a_cell_are_proposed_that_it_can_measure(calib, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cell.toml").write_text(cell_text())

@@ -185,6 +185,7 @@ def test_import_writes_what_it_says(tmp_path, capsys):
         "columns": ["q1", "q2", "x", "y", "z", "t"],
         "left_out": [],
         "rows_left_out": [],
+        "remarks": [],
     }
 
 

@@ -1,5 +1,6 @@
 """Other people's tables come in as they are said to be, and only then."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -336,14 +337,79 @@ def test_errors_name_the_row_of_the_file(tmp_path: Path) -> None:
 def test_columns_that_both_have_are_not_guessed(tmp_path: Path) -> None:
     joints, points = pair(tmp_path, "q1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n", "x_mm,y_mm,z_mm\n6,7,8\n")
     both = ImportPlan(second=points)
-    with pytest.raises(
-        UsageError, match='"x_mm" is in both files. .*--map x=x_mm:mm, .*"x_mm of points.csv"'
-    ):
+    either = '--map "x=x_mm:mm" or --map "x=x_mm of points.csv:mm"'
+    with pytest.raises(UsageError, match=f'are all "x". Say which is meant: {either}'):
         import_table(joints, both)
     mapped = {axis: f"{axis}_mm of points.csv:mm" for axis in "xyz"}
     assert import_table(joints, ImportPlan(columns=mapped, second=points)).frame["y"].tolist() == [0.007]
     with pytest.raises(UsageError, match='column "px" is taken for two of ours'):
         import_table(write(tmp_path, PLAIN), plan(columns={**COLUMNS, "y": "px"}))
+
+
+def test_a_column_with_a_unit_and_one_without_are_not_guessed(tmp_path: Path) -> None:
+    joints, points = pair(tmp_path, "q1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n", "x,y,z\n6,7,8\n")
+    with pytest.raises(UsageError, match='"x_mm:mm" and "x" are all "x"'):
+        import_table(joints, ImportPlan(second=points, length_unit="mm"))
+
+
+def test_blanks_within_quotes_stay(tmp_path: Path) -> None:
+    text = 'J1 J2  px py pz "a  note"\n90 45   1000 2000 3000 "as  is"\n'
+    kept = import_table(write(tmp_path, text), plan(delimiter=" ", keep={"note": "a  note"}))
+    assert kept.frame["note"].tolist() == ["as  is"]
+
+
+def test_what_is_kept_of_the_keys_is_text(tmp_path: Path) -> None:
+    joints = JOINTS.replace("\n1,", "\n1.1,").replace("\n2,", "\n1.10,")
+    points = POINTS.replace("1.0,", "1.1,").replace("2.0,", "1.10,")
+    found = import_table(
+        pair(tmp_path, joints, points)[0],
+        plan(second=tmp_path / "points.csv", on="nr=point", keep={"nr": "nr"}),
+    )
+    assert found.frame["nr"].tolist() == ["1.1", "1.10"]
+
+
+def test_columns_that_tell_no_rows_apart_may_differ(tmp_path: Path) -> None:
+    joints = "side,J1,J2\nleft,90,45\nleft,-90,0\nright,10,20\n"
+    points = "side,px,py,pz\nright,1,1,1\nleft,2,2,2\nleft,3,3,3\n"
+    found = import_table(pair(tmp_path, joints, points)[0], plan(second=tmp_path / "points.csv"))
+    assert found.frame["x"].tolist() == [0.001, 0.002, 0.003]
+
+
+def test_a_user_says_how_each_table_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    joints = tmp_path / "joints.csv"
+    joints.write_text("# made by hand\n" + JOINTS)
+    points = tmp_path / "points.txt"
+    points.write_bytes(
+        "Prüfling\npoint;px;py;pz\n1;1000,5;2000;3000\n# lost\n2;1500;2500;3500\n".encode("cp1252")
+    )
+    mapped = [word for ours, theirs in COLUMNS.items() for word in ("--map", f"{ours}={theirs}")]
+    options = [*mapped, "--joint-unit", "deg", "--length-unit", "mm", "--comment", "#", "--json"]
+    command = ["import", str(joints), "-o", str(tmp_path / "m.csv"), "--on", "nr=point", *options]
+    other = [
+        "--with-delimiter",
+        ";",
+        "--with-decimal",
+        ",",
+        "--with-skip-lines",
+        "1",
+        "--with-encoding",
+        "cp1252",
+    ]
+    assert main([*command, "--with", str(points), *other]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert pd.read_csv(tmp_path / "m.csv")["x"].tolist() == [1.0005, 1.5]
+    assert told["rows_left_out"] == [f'1 row of {joints} (nr "3"), as they are not in the other table']
+    assert told["remarks"] == [f"1 line of {path}, as remarks" for path in (joints, points)]
+    for wrong, words in (
+        ([*other], "--with-...: there is one table only"),
+        (["--with", str(points), "--with", str(joints)], "--with: more than two tables"),
+        (["--with", str(points), *other[2:]], "If so, give --with-delimiter"),
+        (["--with", str(points), "--with-delimiter", "ab"], "--with-delimiter: "),
+        (["--with", str(points), "--with-decimal", ";"], "--with-decimal: "),
+        (["--with", str(points), "--comment", ""], "--comment: "),
+    ):
+        assert main([*command, *wrong]) == 2
+        assert words in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_mark_of_utf_8_is_believed(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def doubts(
     """What speaks against a calibration whose model `best` is used."""
     before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
     if before < COMPUTED_MM:
-        return [_computed(before)]
+        return [_computed()]
     return [
         *no_help(before, after, f"mean error on {validation.judged} rows"),
         *_turns_otherwise(validation, best),
@@ -103,9 +103,9 @@ def no_help(before_mm: float, after_mm: float, what: str) -> list[Notice]:
     return [Notice(NO_HELP, text)]
 
 
-def _computed(before_mm: float) -> Notice:
+def _computed() -> Notice:
     text = (
-        f"The nominal arm has its target where these points are, within {before_mm:.2g} mm: they seem to be "
+        f"The nominal arm has its target where these points are, within {COMPUTED_MM:g} mm: they seem to be "
         "what a controller computes from its joints, not what was measured. Nothing can be learnt from them. "
         "Give the points of an instrument that looks at the arm from outside."
     )

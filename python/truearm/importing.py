@@ -1,6 +1,6 @@
 """Other people's tables as measurement tables: what is in them is stated, never guessed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -69,12 +69,14 @@ class Imported(NamedTuple):
         frame: Joints, positions, orientation and what was kept, in rad and m, all rows in which something was
             measured. The column of a joint that is given as a length says so: q3_m.
         unused: Their columns that nothing was taken from.
-        left_out: In words, rows and remarks that nothing was taken from.
+        left_out: In words, rows that nothing was taken from.
+        remarks: In words, lines that are remarks.
     """
 
     frame: pd.DataFrame
     unused: list[str]
     left_out: list[str]
+    remarks: list[str]
 
 
 def import_table(path: Path, plan: ImportPlan) -> Imported:
@@ -97,7 +99,7 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
     for ours, theirs in plan.keep.items():
         if ours in columns:
             raise UsageError(f'column "{ours}" is named twice', where="--keep")
-        columns[ours] = _kept(table, ours, theirs)
+        columns[ours] = _kept(table, ours, theirs, plan)
     if not columns:
         raise InputError(
             "none of its columns has a name of ours",
@@ -106,10 +108,11 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
             way_out="Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on",
         )
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
-    Measurements.from_dataframe(frame, name=table.where)
-    left_out = [f"{rows}, as they are not in the other table" for rows in table.alone]
-    left_out += [f"{lines}, as remarks" for lines in table.remarks]
-    return Imported(frame, _unused(table, named, plan), [*left_out, *empty])
+    without = ", rows without a measurement left out" if empty else ""
+    Measurements.from_dataframe(frame, name=f"{table.where}{without}")
+    alone = [f"{rows}, as they are not in the other table" for rows in table.alone]
+    remarks = [f"{lines}, as remarks" for lines in table.remarks]
+    return Imported(frame, _unused(table, named, plan), [*alone, *empty], remarks)
 
 
 def _with_measurements(frame: pd.DataFrame, table: RawTable) -> tuple[pd.DataFrame, list[str]]:
@@ -127,7 +130,7 @@ def _unused(table: RawTable, named: Mapping[str, str], plan: ImportPlan) -> list
     used = {_split_unit(table, theirs)[0] for theirs in (*named.values(), *plan.keep.values())}
     used |= set(plan.rotation.columns) if plan.rotation else set()
     if plan.on is not None:
-        used |= set(plan.on.split("=")[:1])
+        used |= {plan.on.partition("=")[0]}
     return [name for name in table.names if name not in used]
 
 
@@ -142,24 +145,28 @@ def _all_columns(table: RawTable, plan: ImportPlan) -> dict[str, str]:
     taken = {_split_unit(table, theirs)[0] for theirs in plan.columns.values()}
     taken |= {_split_unit(table, theirs)[0] for theirs in plan.keep.values()}
     named = dict(plan.columns)
-    for name in table.names:
-        bare, _, unit = name.rpartition("_")
-        ours = bare if unit in UNITS and _is_ours(bare) else name
+    found: dict[str, list[str]] = {}
+    for name, part in table.parts.items():
+        bare, _, unit = part.name.rpartition("_")
+        has_unit = unit in UNITS and _is_ours(bare)
+        ours = bare if has_unit else part.name
         if name not in taken and _is_ours(ours) and ours not in named:
-            _refuse_twin(table, name, f"{ours}={name}{'' if ours == name else f':{unit}'}")
-            named[ours] = name if ours == name else f"{name}:{unit}"
+            found.setdefault(ours, []).append(f"{name}:{unit}" if has_unit else name)
+    _refuse_several(table, found)
+    named |= {ours: theirs[0] for ours, theirs in found.items()}
     return dict(sorted(named.items(), key=lambda item: _order(item[0])))
 
 
-def _refuse_twin(table: RawTable, name: str, mapping: str) -> None:
-    """Raise UsageError if the other file has a column of that name too."""
-    twin = table.twin(name)
-    if twin is not None:
-        raise UsageError(
-            f'"{name}" is in both files',
-            where=table.where,
-            way_out=f'Say which is meant: --map {mapping}, or that of the second, "{twin}"',
-        )
+def _refuse_several(table: RawTable, found: Mapping[str, Sequence[str]]) -> None:
+    """Raise UsageError if several columns have a name of one of ours."""
+    for ours, theirs in found.items():
+        if len(theirs) > 1:
+            ways = " or ".join(f'--map "{ours}={each}"' for each in theirs)
+            raise UsageError(
+                f'{list_names(theirs)} are all "{ours}"',
+                where=table.where,
+                way_out=f"Say which is meant: {ways}",
+            )
 
 
 def _converted(table: RawTable, ours: str, theirs: str, unit: str) -> Floats | NDArray[np.str_]:
@@ -214,12 +221,14 @@ def _orientation(table: RawTable, rotation: RotationColumns) -> dict[str, Floats
     return {name: quaternions[:, k] for k, name in enumerate(QUATERNION)}
 
 
-def _kept(table: RawTable, ours: str, theirs: str) -> Floats | NDArray[np.str_]:
+def _kept(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> Floats | NDArray[np.str_]:
     if _is_ours(ours):
         raise UsageError(f'"{ours}" is a measurement column', where="--keep", way_out="Give it with --map")
     name, unit = _split_unit(table, theirs)
     if unit:
         return to_si(table.numbers(name), unit)
+    if plan.on is not None and name == plan.on.partition("=")[0]:
+        return table.texts(name)
     try:
         return table.numbers(name)
     except InputError:

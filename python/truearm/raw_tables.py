@@ -1,5 +1,6 @@
 """Tables as other programs write them: marks, remarks and gaps as they are stated, one file or two."""
 
+import codecs
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,10 +19,9 @@ Integers = NDArray[np.int64]
 
 DECIMAL_MARKS: Final = (".", ",")
 UTF_8: Final = ("utf-8", "utf8", "utf-8-sig")
-BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 BLANK: Final = " "
 BLANKS: Final = re.compile(r"[ \t]+")
-WHOLE: Final = re.compile(r"0*(\d+)(?:\.0*)?")
+WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
 STATE_ENCODING: Final = (
     "State what it is: --encoding cp1252 for most files of Windows in western Europe, --encoding utf-16 for "
     '"Unicode text" of a spreadsheet'
@@ -45,6 +45,7 @@ class Marks:
         comments: What lines begin with that are remarks.
         missing: What cells say, besides nothing, where nothing was measured; case does not count.
         encoding: Encoding of the text.
+        options: What the options begin with that state these, for messages.
     """
 
     delimiter: str | None = None
@@ -53,14 +54,17 @@ class Marks:
     comments: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     encoding: str = "utf-8"
+    options: str = "--"
 
     def __post_init__(self) -> None:
         if self.decimal is not None and self.decimal not in DECIMAL_MARKS:
             raise UsageError(
                 f'"{self.decimal}" is not known',
-                where="--decimal",
+                where=f"{self.options}decimal",
                 rule=f"Either {DECIMAL_MARKS[0]} or {DECIMAL_MARKS[1]}",
             )
+        if "" in self.comments:
+            raise UsageError("every line begins with nothing", where="--comment", rule="Name a mark")
 
 
 class Part(NamedTuple):
@@ -70,13 +74,13 @@ class Part(NamedTuple):
         table: The file's table.
         name: The column's name in it.
         rows: Which of its rows (n,), from 0.
-        decimal: Its decimal mark.
+        marks: How the file is written.
     """
 
     table: Table
     name: str
     rows: Integers
-    decimal: str | None
+    marks: Marks
 
     def texts(self) -> Texts:
         """Its cells (n,)."""
@@ -88,12 +92,12 @@ class Part(NamedTuple):
         Raises:
             InputError: If a cell of the file is no number; names the file and its row.
         """
-        if self.decimal == ",":
+        if self.marks.decimal == ",":
             return _with_points(self.table, self.name).numbers(self.name)[self.rows]
         try:
             return self.table.numbers(self.name)[self.rows]
         except InputError as error:
-            hint = None if self.decimal else _hint(self.table, self.name)
+            hint = None if self.marks.decimal else _hint(self.table, self.name, self.marks.options)
             raise (hint or error) from None
 
 
@@ -128,10 +132,6 @@ class RawTable:
         """A column as numbers, as in Part.numbers."""
         return self.parts[name].numbers()
 
-    def twin(self, name: str) -> str | None:
-        """The column of the second file that has this name there, None without one."""
-        return next((key for key, part in self.parts.items() if part.name == name != key), None)
-
     def existing(self, name: str) -> str:
         """The name itself.
 
@@ -156,21 +156,21 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
         UsageError: If marks contradict one another or the file, or are missing.
     """
     where = str(path)
-    lines = _text(path, marks.encoding).splitlines(keepends=True)
+    lines = _text(path, marks).splitlines(keepends=True)
     if marks.skip_lines >= len(lines) > 0:
         raise UsageError(f"{marks.skip_lines} lines to skip, the file has {len(lines)}", where=where)
     below = lines[marks.skip_lines :]
     kept = [line for line in below if not (marks.comments and line.lstrip().startswith(marks.comments))]
     text = "".join(kept)
     check_is_table(text, where=where)
-    delimiter = marks.delimiter or _plain_delimiter(text, where)
+    delimiter = marks.delimiter or _plain_delimiter(text, where, marks.options)
     if delimiter == marks.decimal:
         raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
     if delimiter == BLANK:
-        text = "\n".join(BLANKS.sub(BLANK, line.strip()) for line in text.splitlines())
+        text = "\n".join(map(_with_single_blanks, kept))
     table = _without(split_table(text, delimiter, where=where, uneven=UNEVEN), marks.missing)
     rows = np.arange(table.row_count)
-    parts = {name: Part(table, name, rows, marks.decimal) for name in table.names}
+    parts = {name: Part(table, name, rows, marks) for name in table.names}
     left_out = len(below) - len(kept)
     remarks = [f"{count_of(left_out, 'line')} of {where}"] if left_out else []
     return RawTable(where, parts, table.row_count, remarks=remarks)
@@ -183,7 +183,8 @@ def join_tables(first: RawTable, second: RawTable, on: str | None) -> RawTable:
         first: One table.
         second: The other. A column of a name that the first has too is called "NAME of FILE".
         on: The column that says what belongs together, "NAME" or "NAME=ITS NAME IN THE SECOND"; None takes
-            the rows one by one. Its cells have to say the same, zeros before whole numbers apart.
+            the rows one by one. Its cells have to say the same, zeros before whole numbers and behind their
+            point apart.
 
     Raises:
         InputError: If a value of `on` is missing or there twice, or no row belongs to another; without `on`,
@@ -252,7 +253,7 @@ def _check_order(first: RawTable, second: RawTable) -> None:
 
 
 def _key(cell: str) -> str:
-    """What a cell says, without zeros before a whole number."""
+    """What a cell says, without zeros before a whole number and behind its point."""
     whole = WHOLE.fullmatch(cell)
     return whole[1] if whole else cell
 
@@ -284,6 +285,8 @@ def _side_by_side(
         if name == key:
             continue
         here = name if name not in first.parts else f"{name} of {Path(second.where).name}"
+        if here in parts:
+            raise UsageError(f'"{here}" is a column of both tables', where=first.where, way_out="Rename one")
         parts[here] = part._replace(rows=part.rows[rows[1]])
     where = f"{first.where} with {second.where}, rows as joined"
     return RawTable(where, parts, len(rows[0]), alone, [*first.remarks, *second.remarks])
@@ -314,7 +317,7 @@ def _with_points(table: Table, name: str) -> Table:
     return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count)
 
 
-def _hint(table: Table, name: str) -> UsageError | None:
+def _hint(table: Table, name: str, options: str) -> UsageError | None:
     """What is said of a column with commas in its numbers; None of others."""
     commas = [cell for cell in table.texts(name).tolist() if "," in cell]
     if not commas:
@@ -324,29 +327,35 @@ def _hint(table: Table, name: str) -> UsageError | None:
         f'column "{name}" holds "{commas[0]}"',
         where=table.where,
         rule="A number has one mark, the decimal one" if both else "",
-        way_out=NO_THOUSANDS if both else 'If this is a decimal comma, give --decimal ","',
+        way_out=NO_THOUSANDS if both else f'If this is a decimal comma, give {options}decimal ","',
     )
 
 
-def _text(path: Path, encoding: str) -> str:
-    where, content = str(path), read_bytes(path)
+def _with_single_blanks(line: str) -> str:
+    """A line with one blank between fields; those within quotes stay."""
+    parts = line.strip().split('"')
+    return '"'.join(part if k % 2 else BLANKS.sub(BLANK, part) for k, part in enumerate(parts))
+
+
+def _text(path: Path, marks: Marks) -> str:
+    where, content, encoding = str(path), read_bytes(path), marks.encoding
     if encoding.casefold() in UTF_8:
         return decode_text(content, where=where, way_out=STATE_ENCODING)
-    if content.startswith(BYTE_ORDER_MARK):
+    if content.startswith(codecs.BOM_UTF8):
         raise UsageError(
             f"its first bytes say that it is UTF-8, not {encoding}", where=where, way_out="State that: utf-8"
         )
     try:
         return content.decode(encoding)
     except LookupError:
-        raise UsageError(f'"{encoding}" is no known encoding', where="--encoding") from None
+        raise UsageError(f'"{encoding}" is no known encoding', where=f"{marks.options}encoding") from None
     except UnicodeDecodeError as error:
         raise InputError(
             f"the text is not {encoding}: {error.reason}", where=where, way_out=STATE_ENCODING
         ) from None
 
 
-def _plain_delimiter(text: str, where: str) -> str:
+def _plain_delimiter(text: str, where: str, options: str) -> str:
     header = text.lstrip().splitlines()[0]
     counts = {mark: header.count(mark) for mark in DELIMITERS}
     best = max(counts, key=lambda mark: counts[mark])
@@ -354,12 +363,13 @@ def _plain_delimiter(text: str, where: str) -> str:
         raise UsageError(
             f'the header is one field: "{header[:60]}"',
             where=where,
-            way_out="Say what is between fields with --delimiter, and --skip-lines if the header is lower",
+            way_out=f"Say what is between fields with {options}delimiter, and {options}skip-lines if the "
+            "header is lower",
         )
     if best != ",":
         raise UsageError(
             f"its fields seem to be separated by {DELIMITERS[best]}",
             where=where,
-            way_out=f"If so, give --delimiter {quoted_delimiter(best)}",
+            way_out=f"If so, give {options}delimiter {quoted_delimiter(best)}",
         )
     return best

@@ -85,17 +85,27 @@ def command(
 
     others = second or []
     if len(others) > 1:
-        raise UsageError("more than two tables", where="--with", way_out="Join two first, then the third")
+        raise UsageError("more than two tables", where="--with", rule="Two are joined")
+    if not others and any(
+        stated is not None for stated in (with_delimiter, with_decimal, with_skip_lines, with_encoding)
+    ):
+        raise UsageError("there is one table only", where="--with-...", way_out="Name the other: --with FILE")
     refuse_own_input(output, raw, *others)
     marks = Marks(
-        _delimiter(delimiter), decimal, skip_lines, tuple(comment or ()), tuple(missing or ()), encoding
+        _delimiter(delimiter, "--delimiter"),
+        decimal,
+        skip_lines,
+        tuple(comment or ()),
+        tuple(missing or ()),
+        encoding,
     )
     second_marks = replace(
         marks,
-        delimiter=_delimiter(with_delimiter) or marks.delimiter,
+        delimiter=_delimiter(with_delimiter, "--with-delimiter") or marks.delimiter,
         decimal=with_decimal or decimal,
         skip_lines=skip_lines if with_skip_lines is None else with_skip_lines,
         encoding=with_encoding or encoding,
+        options="--with-",
     )
     plan = ImportPlan(
         columns=_pairs(columns or [], "--map"),
@@ -108,17 +118,17 @@ def command(
         second_marks=second_marks,
         on=on,
     )
-    frame, unused, left_out = import_table(raw, plan)
+    frame, unused, left_out, remarks = import_table(raw, plan)
     write_whole(output, frame.to_csv(index=False, lineterminator="\n"))
     if as_json:
         names = [str(name) for name in frame.columns]
         said = {"output": str(output), "rows": len(frame), "columns": names}
-        print_json({**said, "left_out": unused, "rows_left_out": left_out})
+        print_json({**said, "left_out": unused, "rows_left_out": left_out, "remarks": remarks})
         return
     say_wrapped(f"{output}: {count_of(len(frame), 'row')}, {', '.join(frame.columns)}.")
     if unused:
         say_wrapped(f"Left out: {', '.join(unused)}. Keep them with --keep.")
-    for what in left_out:
+    for what in (*left_out, *remarks):
         say_wrapped(f"Left out: {what}.")
     suggest(f"truearm calibrate ROBOT {typed(output)} -o result")
 
@@ -139,7 +149,7 @@ def _pairs(options: list[str], option: str) -> dict[str, str]:
     return pairs
 
 
-def _delimiter(text: str | None) -> str | None:
+def _delimiter(text: str | None, option: str) -> str | None:
     if text is None:
         return None
     mark = DELIMITER_WORDS.get(text, text)
@@ -148,7 +158,7 @@ def _delimiter(text: str | None) -> str | None:
 
         raise UsageError(
             f'"{text}" is no delimiter',
-            where="--delimiter",
+            where=option,
             rule=f"One mark, such as {quoted_delimiter(';')} or tab",
         )
     return mark

@@ -179,7 +179,9 @@ def _print(found: "Update") -> None:
         for motion in motions:
             say(f"{name} of {motion.group}: {_motion(motion)}.")
     if any(motion.moved for motion in found.tools):
-        say("If it is another target, or was taken off, give --new-tool: that is no change of the arm.")
+        say_wrapped(
+            "If it is another target, or was taken off, give --new-tool: that is no change of the arm."
+        )
     print_table(
         ("error at left-out poses, mm", "mean", "RMS", "largest"),
         [

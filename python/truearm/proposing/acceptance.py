@@ -113,16 +113,17 @@ def _noticed(
 ) -> dict[str, float]:
     """Smallest changes by name that would be noticed, as in Acceptance."""
     found: dict[str, float] = {}
-    tested = [k for k, name in enumerate(names) if name.startswith("joint") or name == "tool"]
-    errors = standard_errors(int((std[tested] < TOLD).sum()), options.level)
+    tool = [] if options.new_tool else [k for k, name in enumerate(names) if name == "tool"]
+    tested = [*tool, *(k for k, name in enumerate(names) if name.startswith("joint"))]
+    # In an update the test of a change shares the level with that of the field.
+    errors = standard_errors(int((std[tested] < TOLD).sum()), options.level / 2.0)
     for k, name in enumerate(names):
         if name.startswith("joint") and std[k] < TOLD:
             prismatic = arm.robot.joints[int(name.removeprefix("joint")) - 1] == "prismatic"
             unit = MM_PER_METRE if prismatic else 1.0 / RADIANS_PER_DEGREE
             found[name] = float(errors * std[k] * arm_std(arm, name, options) * unit)
-    tool = [k for k, name in enumerate(names) if name == "tool"][:3]
-    if tool and max(std[tool]) < TOLD:
-        found["tool"] = float(errors * max(std[tool]) * options.tool_mm)
+    if tool and max(std[tool[:3]]) < TOLD:
+        found["tool"] = float(errors * max(std[tool[:3]]) * options.tool_mm)
     return found
 
 
