@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,9 @@ from truearm.cli.console import print_json, say_wrapped, suggest
 from truearm.errors import UsageError, count_of, typed
 from truearm.files import refuse_own_input, write_whole
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
+
+if TYPE_CHECKING:
+    from truearm.importing import Imported
 
 DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "space": " "}
 
@@ -83,14 +86,9 @@ def command(
     from truearm.raw_tables import Marks
     from truearm.rotation_columns import RotationColumns
 
-    others = second or []
-    if len(others) > 1:
-        raise UsageError("more than two tables", where="--with", rule="Two are joined")
-    if not others and any(
-        stated is not None for stated in (with_delimiter, with_decimal, with_skip_lines, with_encoding)
-    ):
-        raise UsageError("there is one table only", where="--with-...", way_out="Name the other: --with FILE")
-    refuse_own_input(output, raw, *others)
+    stated = (with_delimiter, with_decimal, with_skip_lines, with_encoding)
+    other = _other(second or [], asked=any(mark is not None for mark in stated))
+    refuse_own_input(output, raw, other)
     marks = Marks(
         _delimiter(delimiter, "--delimiter"),
         decimal,
@@ -114,12 +112,26 @@ def command(
         joint_unit=joint_unit,
         length_unit=length_unit,
         marks=marks,
-        second=others[0] if others else None,
+        second=other,
         second_marks=second_marks,
         on=on,
     )
-    frame, unused, left_out, remarks = import_table(raw, plan)
-    write_whole(output, frame.to_csv(index=False, lineterminator="\n"))
+    imported = import_table(raw, plan)
+    write_whole(output, imported.frame.to_csv(index=False, lineterminator="\n"))
+    _tell(imported, output, as_json=as_json)
+
+
+def _other(second: list[Path], *, asked: bool) -> Path | None:
+    """The second table, None without one; `asked` tells whether it is said how it is written."""
+    if len(second) > 1:
+        raise UsageError("more than two tables", where="--with", rule="Two are joined")
+    if asked and not second:
+        raise UsageError("there is one table only", where="--with-...", way_out="Name the other: --with FILE")
+    return second[0] if second else None
+
+
+def _tell(imported: "Imported", output: Path, *, as_json: bool) -> None:
+    frame, unused, left_out, remarks = imported
     if as_json:
         names = [str(name) for name in frame.columns]
         said = {"output": str(output), "rows": len(frame), "columns": names}
