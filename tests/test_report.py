@@ -1,6 +1,7 @@
 """The report of a calibration: its numbers are those of summary.json, and it needs nothing but itself."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import plotly.graph_objects as go
@@ -214,6 +215,16 @@ def test_advice_follows_from_the_data(calibrations, reports):
     found = report(ta.calibrate(robot.robot, ta.Measurements.from_dataframe(data), model="constant"))
     assert found.advice[0].kind == "outliers"
     assert "row 5" in found.advice[0].words
+
+
+def test_a_variable_model_that_does_worse_is_not_said_to_gain(calibrations):
+    whole = calibrations["variable"].without_rows()
+    errors = whole.validation.holdout
+    swapped = {**errors, "variable": errors["constant"], "constant": errors["variable"]}
+    worse = replace(whole, validation=replace(whole.validation, holdout=swapped))
+    told = {advice.kind: advice.words for advice in report(worse).advice}
+    assert "does not hold where it was judged" in told["constant_better"]
+    assert "constant_suffices" not in told
 
 
 @pytest.mark.parametrize(("step_deg", "wanted"), [(10.0, "between_the_grid"), (0.01, "noise_floor")])

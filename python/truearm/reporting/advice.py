@@ -227,6 +227,14 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
             "deviations."
         )
         yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
+    elif facts.best == VARIABLE and SAME * mean > constant:
+        left, before = short(mean, constant)
+        words = (
+            f"The mean error is {left} mm with the variable model and {before} mm with constant parameters: "
+            "what it learnt does not hold where it was judged. Measure poses there, or stay with --model "
+            "constant."
+        )
+        yield Advice("constant_better", "Constant parameters do better.", words, mean)
     elif facts.best == VARIABLE and mean > SAME * constant:
         left, before = short(mean, constant)
         words = (
