@@ -20,6 +20,14 @@ def small_calibration(model, **more):
     return ta.calibrate(arm.robot, arm.measure(arm.poses(POSES)), model=model, **more)
 
 
+def write_arm_and_later(folder):
+    """A small calibration, arm.calib, and other measurements of its arm, later.csv."""
+    small_calibration("constant").save(folder / "arm.calib")
+    arm = VirtualArm.paper(seed=2)
+    arm.measure_table(arm.poses(40, seed=3), seed=3).to_csv(folder / "later.csv", index=False)
+    return folder
+
+
 def figures_of(page):
     """What the page's script draws: palettes, layout and figures."""
     return json.loads(re.findall(r'<script type="application/json" id="figures">(.*?)</script>', page)[0])

@@ -7,20 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.report_support import small_calibration, words_of
+from tests.report_support import words_of, write_arm_and_later
 from truearm.cli import main
-from truearm.simulation import VirtualArm
 
 PROGRAM = str(Path(sys.executable).parent / "truearm")
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("report")
-    small_calibration("constant").save(folder / "arm.calib")
-    arm = VirtualArm.paper(seed=2)
-    arm.measure_table(arm.poses(40, seed=3), seed=3).to_csv(folder / "later.csv", index=False)
-    return folder
+    return write_arm_and_later(tmp_path_factory.mktemp("report"))
 
 
 @pytest.fixture

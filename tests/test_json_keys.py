@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.report_support import small_calibration
+from tests.report_support import write_arm_and_later
 from truearm.cli import main
-from truearm.simulation import VirtualArm
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "json.md"
 ROW = re.compile(r"^\| `(?P<command>truearm [^`]*)`[^|]* \| (?P<keys>.*) \|$", re.MULTILINE)
@@ -30,11 +29,7 @@ ARGUMENTS = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("json")
-    small_calibration("constant").save(folder / "arm.calib")
-    arm = VirtualArm.paper(seed=2)
-    arm.measure_table(arm.poses(40, seed=3), seed=3).to_csv(folder / "later.csv", index=False)
-    return folder
+    return write_arm_and_later(tmp_path_factory.mktemp("json"))
 
 
 @pytest.mark.parametrize("command", ARGUMENTS)

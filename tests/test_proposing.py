@@ -93,6 +93,7 @@ def test_a_change_of_so_many_standard_errors_is_noticed_in_95_of_100_cases(freed
     limit = np.quantile(np.square(drawn).sum(axis=1), 0.99)
     drawn[:, 0] += standard_errors(freedom, 0.01)
     assert abs((np.square(drawn).sum(axis=1) > limit).mean() - 0.95) < 0.01
+    assert standard_errors(freedom, 0.96) == 0.0
 
 
 def test_what_is_noticed_hardly_depends_on_how_far_things_may_have_moved(known):

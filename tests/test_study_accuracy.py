@@ -101,6 +101,7 @@ def test_a_method_that_cannot_be_fitted_says_why_and_stops_no_other(file, tmp_pa
     text = (out / "accuracy.md").read_text()
     assert "Could not be fitted" in text
     assert "15 measured values in 5 training rows" in text
+    assert str(file.parent) not in text
 
 
 @pytest.mark.parametrize(

@@ -22,14 +22,7 @@ UTF_8: Final = ("utf-8", "utf8", "utf-8-sig")
 BLANK: Final = " "
 BLANKS: Final = re.compile(r"[ \t]+")
 WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
-STATE_ENCODING: Final = (
-    "State what it is: --encoding cp1252 for most files of Windows in western Europe, --encoding utf-16 for "
-    '"Unicode text" of a spreadsheet'
-)
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
-UNEVEN: Final = (
-    "Correct or remove them; --skip-lines leaves out lines above the header, --comment those of remarks"
-)
 NAMED: Final = 5
 
 
@@ -93,7 +86,8 @@ class Part(NamedTuple):
             InputError: If a cell of the file is no number; names the file and its row.
         """
         if self.marks.decimal == ",":
-            return _with_points(self.table, self.name).numbers(self.name)[self.rows]
+            pointed = _with_points(self.table, self.name, self.marks.options)
+            return pointed.numbers(self.name)[self.rows]
         try:
             return self.table.numbers(self.name)[self.rows]
         except InputError as error:
@@ -168,7 +162,11 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
         raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
     if delimiter == BLANK:
         text = "\n".join(map(_with_single_blanks, kept))
-    table = _without(split_table(text, delimiter, where=where, uneven=UNEVEN), marks.missing)
+    uneven = (
+        f"Correct or remove them; {marks.options}skip-lines leaves out lines above the header, "
+        "--comment those of remarks"
+    )
+    table = _without(split_table(text, delimiter, where=where, uneven=uneven), marks.missing)
     rows = np.arange(table.row_count)
     parts = {name: Part(table, name, rows, marks) for name in table.names}
     left_out = len(below) - len(kept)
@@ -302,7 +300,7 @@ def _alone(table: RawTable, name: str, rows: Sequence[int]) -> list[str]:
     return [f"{count_of(len(rows), 'row')} of {table.where} ({name} {named}{more})"]
 
 
-def _with_points(table: Table, name: str) -> Table:
+def _with_points(table: Table, name: str, options: str) -> Table:
     """A column with decimal commas as one with points."""
     cells = table.texts(name)
     pointed = [row for row, cell in enumerate(cells, start=1) if "." in cell]
@@ -312,7 +310,7 @@ def _with_points(table: Table, name: str) -> Table:
             f'column "{name}" holds "{cell}" in row {pointed[0]}',
             where=table.where,
             rule="With a decimal comma there must be no points",
-            way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out --decimal",
+            way_out=NO_THOUSANDS if "," in cell else f"{NO_THOUSANDS}, or leave out {options}decimal",
         )
     return Table(table.where, {name: np.char.replace(cells, ",", ".")}, table.row_count)
 
@@ -339,8 +337,12 @@ def _with_single_blanks(line: str) -> str:
 
 def _text(path: Path, marks: Marks) -> str:
     where, content, encoding = str(path), read_bytes(path), marks.encoding
+    state = (
+        f"State what it is: {marks.options}encoding cp1252 for most files of Windows in western Europe, "
+        f'{marks.options}encoding utf-16 for "Unicode text" of a spreadsheet'
+    )
     if encoding.casefold() in UTF_8:
-        return decode_text(content, where=where, way_out=STATE_ENCODING)
+        return decode_text(content, where=where, way_out=state)
     if content.startswith(codecs.BOM_UTF8):
         raise UsageError(
             f"its first bytes say that it is UTF-8, not {encoding}", where=where, way_out="State that: utf-8"
@@ -350,9 +352,7 @@ def _text(path: Path, marks: Marks) -> str:
     except LookupError:
         raise UsageError(f'"{encoding}" is no known encoding', where=f"{marks.options}encoding") from None
     except UnicodeDecodeError as error:
-        raise InputError(
-            f"the text is not {encoding}: {error.reason}", where=where, way_out=STATE_ENCODING
-        ) from None
+        raise InputError(f"the text is not {encoding}: {error.reason}", where=where, way_out=state) from None
 
 
 def _plain_delimiter(text: str, where: str, options: str) -> str:

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
+from truearm.cli import import_options as option
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest
 from truearm.errors import UsageError, count_of, typed
@@ -19,58 +18,25 @@ DELIMITER_WORDS = {"tab": "\t", "\\t": "\t", "comma": ",", "semicolon": ";", "sp
 
 
 def command(
-    raw: Annotated[Path, typer.Argument(metavar="RAW", help="The table to bring in.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The measurement file to write.")],
-    columns: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--map", metavar="OURS=THEIRS[:UNIT]", help="q1=J1, x=px:mm, sigma=..., group=...; repeat."
-        ),
-    ] = None,
-    keep: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="[NEW=]THEIRS[:UNIT]", help="A further column to keep, in SI if a unit is given."
-        ),
-    ] = None,
-    rotation: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND=COLUMNS",
-            help="euler:XYZ:deg=RX,RY,RZ (capitals moving, small letters fixed axes), "
-            "vector:rad=RX,RY,RZ or quaternion:xyzw=A,B,C,D.",
-        ),
-    ] = None,
-    joint_unit: Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of the joints.")] = None,
-    length_unit: Annotated[str | None, typer.Option(metavar="mm|m|in", help="Unit of positions.")] = None,
-    second: Annotated[
-        list[Path] | None,
-        typer.Option("--with", metavar="FILE", help="A second table, with further columns."),
-    ] = None,
-    on: Annotated[
-        str | None,
-        typer.Option(
-            metavar="COLUMN[=ITS]",
-            help="The column that says which rows of the two belong together; row by row without.",
-        ),
-    ] = None,
-    delimiter: Annotated[str | None, typer.Option(help='Mark between fields: ";", tab, space, ...')] = None,
-    decimal: Annotated[str | None, typer.Option(help='Decimal mark: "." or ",".')] = None,
-    skip_lines: Annotated[int, typer.Option(min=0, help="Lines above the header.")] = 0,
-    with_delimiter: Annotated[str | None, typer.Option(help="--delimiter of the second table.")] = None,
-    with_decimal: Annotated[str | None, typer.Option(help="--decimal of the second table.")] = None,
-    with_skip_lines: Annotated[
-        int | None, typer.Option(min=0, help="--skip-lines of the second table.")
-    ] = None,
-    with_encoding: Annotated[str | None, typer.Option(help="--encoding of the second table.")] = None,
-    comment: Annotated[
-        list[str] | None, typer.Option(metavar="MARK", help="What lines of remarks begin with; repeat.")
-    ] = None,
-    missing: Annotated[
-        list[str] | None,
-        typer.Option(metavar="TEXT", help="What cells say where nothing was measured; repeat."),
-    ] = None,
-    encoding: Annotated[str, typer.Option(help="Encoding of the text.")] = "utf-8",
+    raw: option.Raw,
+    output: option.Output,
+    columns: option.Columns = None,
+    keep: option.Keep = None,
+    rotation: option.Rotation = None,
+    joint_unit: option.JointUnit = None,
+    length_unit: option.LengthUnit = None,
+    second: option.Second = None,
+    on: option.On = None,
+    delimiter: option.Delimiter = None,
+    decimal: option.Decimal = None,
+    skip_lines: option.SkipLines = 0,
+    with_delimiter: option.WithDelimiter = None,
+    with_decimal: option.WithDecimal = None,
+    with_skip_lines: option.WithSkipLines = None,
+    with_encoding: option.WithEncoding = None,
+    comment: option.Comments = None,
+    missing: option.Missing = None,
+    encoding: option.Encoding = "utf-8",
     as_json: AsJson = False,
 ) -> None:
     """Write a measurement file in rad and m from a table with other columns, units or marks.

@@ -135,6 +135,8 @@ def standard_errors(freedom: int, level: float) -> float:
     """
     if freedom == 0:
         return float("inf")
+    if level >= NOTICED:
+        return 0.0
     limit = chi2.isf(level, freedom)
     squares = brentq(lambda found: ncx2.sf(limit, freedom, found) - NOTICED, 1e-6, 10.0 * limit + 100.0)
     return float(np.sqrt(squares))

@@ -1,5 +1,6 @@
 """The page of the study: who is first where, all means, what each block adds, and what it costs."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from statistics import median
 from typing import Any, Final
@@ -188,7 +189,7 @@ def _failures(summary: Summary) -> Iterable[str]:
     failed: dict[tuple[str, str], int] = {}
     for record in summary["results"]:
         if "failed" in record:
-            key = (record["method"], record["failed"])
+            key = (record["method"], _without_folders(record["failed"], record["set"]))
             failed[key] = failed.get(key, 0) + 1
     if failed:
         yield "## Could not be fitted"
@@ -196,6 +197,11 @@ def _failures(summary: Summary) -> Iterable[str]:
             ("method", "results", "why"),
             [(TITLES[name], str(count), why) for (name, why), count in failed.items()],
         )
+
+
+def _without_folders(why: str, name: str) -> str:
+    """A message without the folders of the set's file: where a reader has it is another matter."""
+    return re.sub(rf"\S*[/\\](?={re.escape(name)}\.)", "", why)
 
 
 def _by_set_and_split(summary: Summary) -> dict[tuple[str, str], dict[str, Mapping[str, Any]]]:
