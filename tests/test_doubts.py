@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from itertools import permutations, product
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from truearm.grids import grid_steps
 from truearm.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
 from truearm.simulation import VirtualArm
-from truearm.turning_sense import check_turns
 
 
 def notice_of(calibration, kind):
@@ -284,65 +282,6 @@ def test_what_is_no_robot_and_no_measurements_is_said(tmp_path):
         found.save(tmp_path)
     with pytest.raises(ta.InputError, match="one waypoint has"):
         ta.Compensator(found).correct(arm.poses(2))
-
-
-QUATERNION = ["qw", "qx", "qy", "qz"]
-
-
-def posed(seed=4, count=60):
-    arm = VirtualArm(ta.Robot.load("ur10"), seed=seed)
-    table = arm.measure_table(arm.poses(count), orientation=True)
-    return arm.robot, table
-
-
-def with_quaternions(table, quaternions):
-    columns = dict(zip(QUATERNION, quaternions.T, strict=True))
-    return ta.Measurements.from_dataframe(table.assign(**columns))
-
-
-@pytest.mark.parametrize(
-    ("order", "sense", "words"),
-    [
-        ([1, 2, 3, 0], 1.0, "hold x y z w, where qw qx qy qz are named"),
-        ([3, 0, 1, 2], 1.0, "hold z w x y, where qw qx qy qz are named"),
-        ([2, 3, 0, 1], -1.0, "hold y z w x, where .* and turn the other way"),
-        ([0, 1, 2, 3], -1.0, "turn the other way: target_from_world"),
-        ([1, 2, 3, 0], -1.0, "x y z w, where .* and turn the other way"),
-    ],
-)
-def test_quaternions_in_another_order_or_sense_are_refused(order, sense, words):
-    robot, table = posed()
-    good = ta.Measurements.from_dataframe(table)
-    ta.calibrate(robot, good, model="constant")
-    found = table[QUATERNION].to_numpy() * [1.0, sense, sense, sense]
-    wrong = with_quaternions(table, found[:, order])
-    with pytest.raises(ta.InputError, match=f"{words}.*--use position"):
-        ta.calibrate(robot, wrong, model="constant")
-    calibration = ta.calibrate(robot, wrong, model="constant", use="position")
-    assert calibration.validation.holdout["constant"].position.mean < 1.0
-    with pytest.raises(ta.InputError, match=words):
-        ta.evaluate(ta.calibrate(robot, good, model="constant"), wrong)
-
-
-def test_every_order_of_a_quaternion_is_recognised():
-    robot, table = posed()
-    found = table[QUATERNION].to_numpy()
-    check_turns(with_quaternions(table, found), robot)
-    for order, sense in list(product(permutations(range(4)), (1.0, -1.0)))[1:]:
-        wrong = with_quaternions(table, (found * [1.0, sense, sense, sense])[:, order])
-        said = " ".join("wxyz"[part] for part in order)
-        told = "they turn" if order == (0, 1, 2, 3) else f"hold {said}, where qw qx qy qz are named"
-        with pytest.raises(ta.InputError, match=told) as caught:
-            check_turns(wrong, robot)
-        assert ("turn the other way" in str(caught.value)) == (sense < 0.0)
-
-
-def test_orientations_in_an_unknown_convention_are_doubted():
-    robot, table = posed()
-    random = np.random.default_rng(1).normal(size=(len(table), 4))
-    random /= np.linalg.norm(random, axis=1, keepdims=True)
-    found = ta.calibrate(robot, with_quaternions(table, random), model="constant")
-    assert "convention of Euler angles" in notice_of(found, "orientation_misfit")
 
 
 def test_a_tool_that_is_no_rigid_motion_is_refused():

@@ -215,10 +215,10 @@ def test_a_drift_that_only_the_first_look_shows_is_let_be(measured, monkeypatch)
     arm, steady, _ = measured
     looks = []
 
-    def shown(progress, left, weight, wanted):
+    def shown(progress, left, weight, wanted, most_steps):
         looks.append(len(left))
         moved = np.outer(wanted - 0.5, [0.0, 0.0, 1e-3])
-        return (moved, 1e-4, 1.0, 20.0) if len(looks) == 1 else (moved, 1e-4, 1.0, 0.0)
+        return (moved, 1e-4, [], 20.0) if len(looks) == 1 else (moved, 1e-4, [], 0.0)
 
     monkeypatch.setattr(drifting, "find_drift", shown)
     calibration = ta.calibrate(arm.robot, steady, refit=False)
@@ -227,6 +227,28 @@ def test_a_drift_that_only_the_first_look_shows_is_let_be(measured, monkeypatch)
     undisturbed = ta.calibrate(arm.robot, steady, refit=False, drift="none").validation.holdout
     found = calibration.validation.holdout["variable"].position.mean
     assert found == pytest.approx(undisturbed["variable"].position.mean, rel=0.05)
+
+
+@pytest.mark.parametrize("after", [40, 110])
+def test_what_was_bumped_is_told_with_its_rows(measured, tmp_path, after):
+    arm, _, data = measured
+    bump = np.outer(np.arange(ROWS) >= after, [0.0, 4e-4, 3e-4])
+    calibration = ta.calibrate(arm.robot, moved(data, bump))
+    left_in = ta.calibrate(arm.robot, moved(data, bump), drift="none")
+    assert held_mean(calibration) < 0.5 * held_mean(left_in)
+    ((jump,),) = drift_of(calibration).jumps.values()
+    before, behind = (int(row) for row in re.findall(r"row (\d+)", jump.between))
+    assert before <= after < behind <= before + 8
+    assert jump.mm == pytest.approx(0.5, rel=0.25)
+    (notice,) = [notice for notice in calibration.notices if notice.kind == "drift"]
+    assert jump.words in str(notice)
+    assert "was touched" in str(notice)
+    made = report(calibration)
+    assert jump.words in {advice.kind: advice.words for advice in made.advice}["gave_way"]
+    (says,) = [says for title, says in made.figures if title.startswith("How the set-up moved")]
+    assert jump.words in says
+    calibration.save(tmp_path / "a.calib")
+    assert ta.Calibration.load(tmp_path / "a.calib").validation.drift == drift_of(calibration)
 
 
 def test_a_file_of_before_does_not_claim_it(settled):

@@ -165,10 +165,34 @@ def test_what_is_left_out_is_told(tmp_path: Path) -> None:
     assert kept.unused == []
 
 
+NUMBERS = "90,45,0,1000,2000,3000\n-90,0,7,1500,2500,3500\n"
+NAMES = ("J1", "J2", "-", "px", "py", "pz")
+
+
+@pytest.mark.parametrize("delimiter", [None, ";", " "])
+def test_a_table_without_a_header_is_given_names(tmp_path: Path, delimiter: str | None) -> None:
+    text = NUMBERS.replace(",", delimiter or ",")
+    found = import_table(write(tmp_path, text), plan(delimiter=delimiter, names=NAMES))
+    named = import_table(write(tmp_path, PLAIN), plan())
+    pd.testing.assert_frame_equal(found.frame, named.frame)
+    assert found.unused == []
+
+
+def test_the_command_names_columns_of_both_tables(tmp_path: Path) -> None:
+    joints, points, output = (tmp_path / name for name in ("joints.txt", "points.txt", "m.csv"))
+    joints.write_text("a;90;45\nb;-90;0\n")
+    points.write_text("b 1500 2500 3500\na 1000 2000 3000\n")
+    ours = ["import", str(joints), "--columns", "id,q1,q2", "--delimiter", ";", "--on", "id"]
+    theirs = ["--with", str(points), "--with-columns", "id, x, y, z", "--with-delimiter", "space"]
+    units = ["--joint-unit", "deg", "--length-unit", "mm"]
+    assert main([*ours, *theirs, *units, "-o", str(output)]) == 0
+    np.testing.assert_allclose(pd.read_csv(output)[["x", "y", "z"]], [[1.0, 2.0, 3.0], [1.5, 2.5, 3.5]])
+
+
 BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "semicolons": (PLAIN.replace(",", ";"), {}, 'separated by semicolons. If so, give --delimiter ";"'),
     "tabs": (PLAIN.replace(",", "\t"), {}, "separated by tabs. If so, give --delimiter tab"),
-    "one field": (PLAIN.replace(",", " "), {}, 'the header is one field: "J1 J2 px py pz".*--delimiter'),
+    "one field": (PLAIN.replace(",", " "), {}, 'the first line is one field: "J1 J2 px py pz".*--delimiter'),
     "decimal comma": (
         PLAIN.replace(",", ";").replace("90;", "90,5;"),
         {"delimiter": ";"},
@@ -212,6 +236,14 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     ),
     "keeping a joint": (PLAIN, {"keep": {"q3": "J1"}}, '"q3" is a measurement column. Give it with --map'),
     "skipping all": (PLAIN, {"skip_lines": 3}, "3 lines to skip, the file has 3"),
+    "numbers only": (NUMBERS, {}, "first line holds numbers only.*truearm import FILE --columns q1,q2"),
+    "too few names": (NUMBERS, {"names": ("J1", "J2")}, "--columns: 2 names, the first line .* has 6 fields"),
+    "names and a header": (
+        PLAIN,
+        {"names": ("a", "b", "c", "d", "e")},
+        'first line .* is "J1,pz".*--skip-lines 1',
+    ),
+    "a name too little": (NUMBERS, {"names": ("J1", "")}, 'a name is missing. "-" leaves a column out'),
     "page": ("<html></html>", {}, "an HTML page"),
     "empty": ("", {}, "the file is empty"),
     "NaN": (PLAIN.replace("1500", "nan"), {}, '"px" holds NaN or infinite values in row 2'),

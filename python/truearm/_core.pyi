@@ -651,7 +651,8 @@ def find_drift(
     residual: NDArray[np.float64],
     weight: NDArray[np.float64],
     wanted: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], float, float, float]:
+    most_steps: int,
+) -> tuple[NDArray[np.float64], float, list[float], float]:
     """How a set-up moved while it was measured.
 
     Args:
@@ -659,11 +660,12 @@ def find_drift(
         residual: What is left of it (n, 3), m.
         weight: What its noise variance is divided by (n,), positive.
         wanted: When to tell how far it had moved (t,).
+        most_steps: How often it may have moved at once.
 
     Returns:
         Displacements (t, 3), m, whose mean over the measured rows is zero; standard deviation of a
-        coordinate that is left at weight one, m; length scale in sessions; logarithm of the evidence over
-        that of no drift.
+        coordinate that is left at weight one, m; when it moved at once, ascending, in the middle between two
+        rows (s,); logarithm of the evidence over that of no drift.
 
     Raises:
         CoreError: There are fewer than two rows, or a value is not finite, or a weight not positive.

@@ -1,7 +1,7 @@
 """What a fit found beside the parameters themselves."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -67,21 +67,54 @@ class VariableDetails:
 
 
 @dataclass(frozen=True)
+class Jump:
+    """A displacement of a set-up at once.
+
+    Attributes:
+        between: The two measured rows between which it came, in words.
+        mm: How far.
+    """
+
+    between: str
+    mm: float
+
+    @property
+    def words(self) -> str:
+        """How far, and where."""
+        return f"{self.mm:.2g} mm of it at once, between {self.between}"
+
+
+@dataclass(frozen=True)
 class DriftDetails:
     """What the set-ups moved while they were measured, which was taken out of the measurements.
 
     Attributes:
         moved_mm: How far apart each set-up that moved has been, at the most.
         left_in_mean_mm: Mean held-out position error of each model with the drift left in.
+        jumps: Where each set-up moved at once.
     """
 
     moved_mm: Mapping[str, float]
     left_in_mean_mm: Mapping[str, float]
+    jumps: Mapping[str, tuple[Jump, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "DriftDetails":
+        """From the values of `to_dict`, or of one that knew no jumps."""
+        jumps = {
+            group: tuple(Jump(**jump) for jump in found) for group, found in values.get("jumps", {}).items()
+        }
+        return cls(values["moved_mm"], values["left_in_mean_mm"], jumps)
+
+    def way(self, group: str) -> str:
+        """How far a set-up moved, and what of it at once."""
+        parts = [f"{self.moved_mm[group]:.2g} mm", *(jump.words for jump in self.jumps.get(group, ()))]
+        return ", ".join(parts)
 
     @property
     def words(self) -> str:
         """What was taken out, and what the errors would be without that."""
-        spans = ", ".join(f"{group} moved by {span:.2g} mm" for group, span in self.moved_mm.items())
+        spans = ", ".join(f"{group} moved by {self.way(group)}" for group in self.moved_mm)
         means = ", ".join(f"{name} {mean:.3f}" for name, mean in self.left_in_mean_mm.items())
         return (
             f"What the set-up moved while it was measured is taken out ({spans}). With it left in, the means "

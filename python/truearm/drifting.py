@@ -6,7 +6,7 @@ is fitted first; a drift is what the rest of the rows, in the order of measuring
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.spatial.distance import pdist
 
 from truearm._core import FieldFit, Setup, find_drift
 from truearm.defaults import NO_DRIFT
-from truearm.details import DriftDetails
+from truearm.details import DriftDetails, Jump
 from truearm.errors import Notice
 from truearm.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
 from truearm.measurements import Measurements
@@ -33,7 +33,7 @@ OVERWHELMING: Final = 10.0
 """Gain in the logarithm of the evidence from which there is one."""
 NOTICEABLE: Final = 0.1
 """A drift, or a change of one, of a smaller root mean square, in deviations of what is left, is let be."""
-MOST_LOOKS: Final = 3
+MOST_LOOKS: Final = 4
 """A fit takes some of a drift for what varies with the pose: the next one, without it, shows the rest."""
 ROUGHLY: Final = 1000
 """Training rows at the most that are looked at: a curve over the session needs no more."""
@@ -72,10 +72,12 @@ class Drift:
     Attributes:
         moved: Displacement in world of each row from where its set-up was on average (n, 3), m.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,).
+        jumps: Of each set-up the pairs of rows, from 0, between which it moved at once.
     """
 
     moved: Floats
     progress: Floats
+    jumps: Mapping[str, Sequence[tuple[int, int]]] = field(default_factory=dict)
 
     @classmethod
     def none(cls, data: Measurements) -> "Drift":
@@ -117,10 +119,10 @@ def fit_settled(task: Task, data: Measurements, train: Rows) -> tuple[Fits, Drif
         return fit_rows(task, data.select(train)), Drift.none(data)
     drift, some = Drift.none(data), train[some_of_each(data.group[train], ROUGHLY)]
     known, spent = KnownHyper(rough=True), {CONSTANT: 0.0, VARIABLE: 0.0}
-    for _ in range(MOST_LOOKS):
+    for look in range(MOST_LOOKS):
         rough = fit_rows(task, drift.taken_out(data).select(some), known)
         known, spent = KnownHyper(near=rough.variable, rough=True), _both(spent, rough.seconds)
-        found = _drift_of(task, rough, drift, (data, some))
+        found = _drift_of(task, rough, drift, (data, some), most_steps=look + 1)
         if found is None:
             break
         drift = found
@@ -133,7 +135,9 @@ def _both(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, 
     return {name: value + first[name] for name, value in second.items()}
 
 
-def _drift_of(task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, Rows]) -> Drift | None:
+def _drift_of(
+    task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, Rows], *, most_steps: int
+) -> Drift | None:
     """The drift that the variable fit shows; None where it is that which it was made without, or next to it.
 
     `rows` are all rows and those of them that were fitted.
@@ -143,7 +147,7 @@ def _drift_of(task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, R
     data, train = rows
     left, weight = _residuals_in_world(task, fits.variable, data.select(train))
     left += before.moved[train]
-    moved = before.moved.copy()
+    moved, jumps = before.moved.copy(), dict(before.jumps)
     with task.stages("looking for what drifted"), core_errors(data):
         for group in task.groups:
             every = np.flatnonzero(data.group == group)
@@ -152,13 +156,21 @@ def _drift_of(task: Task, fits: Fits, before: Drift, rows: tuple[Measurements, R
                 continue
             known = before.progress[train[own]]
             wanted = np.concatenate([before.progress[every], known])
-            found, noise, _, gain = find_drift(known, left[own], weight[own], wanted)
+            found, noise, steps, gain = find_drift(known, left[own], weight[own], wanted, most_steps)
             if gain <= OVERWHELMING:
-                found = np.zeros_like(found)
+                found, steps = np.zeros_like(found), []
             change = found[len(every) :] - before.moved[train[own]]
             if np.sqrt(np.square(change).mean()) > NOTICEABLE * noise:
                 moved[every] = found[: len(every)]
-    return None if np.array_equal(moved, before.moved) else Drift(moved, before.progress)
+                jumps[group] = [_around(step, known, train[own]) for step in steps]
+    return None if np.array_equal(moved, before.moved) else Drift(moved, before.progress, jumps)
+
+
+def _around(step: float, progress: Floats, rows: Rows) -> tuple[int, int]:
+    """The last of some rows before a step of the progress, and the first behind it."""
+    behind = progress > step
+    first = np.where(behind, progress, np.inf).argmin()
+    return int(rows[np.where(behind, -np.inf, progress).argmax()]), int(rows[first])
 
 
 def _residuals_in_world(task: Task, fit: FieldFit, data: Measurements) -> tuple[Floats, Floats]:
@@ -223,17 +235,30 @@ def drift_details(
         distance = np.linalg.norm(errors[name].position + in_base, axis=1)
         left_in[name] = float(MM_PER_METRE * np.nanmean(distance))
     spans = {group: MM_PER_METRE * span for group, span in drift.spans(data).items()}
-    return DriftDetails(spans, left_in)
+    jumps = {
+        group: tuple(_jump(data, drift, rows) for rows in drift.jumps[group])
+        for group in spans
+        if drift.jumps.get(group)
+    }
+    return DriftDetails(spans, left_in, jumps)
+
+
+def _jump(data: Measurements, drift: Drift, rows: tuple[int, int]) -> Jump:
+    names = [data.row_names(np.arange(len(data)) == row) for row in rows]
+    far_m = np.linalg.norm(drift.moved[rows[1]] - drift.moved[rows[0]])
+    return Jump(" and ".join(names), float(MM_PER_METRE * far_m))
 
 
 def drift_notices(details: DriftDetails | None) -> list[Notice]:
     """A notice where set-ups moved."""
     if details is None:
         return []
-    spans = [f"{group} by {span:.2g} mm" for group, span in details.moved_mm.items()]
+    ways = [f"{group} by {details.way(group)}" for group in details.moved_mm]
+    slowly = "Arms and instruments that warm up do so."
+    at_once = "Something gave way there: a target or a tripod that was touched, play in a joint."
     text = (
-        f"The set-up moved while it was measured, whatever the pose: {', '.join(spans)}. Arms and "
-        "instruments that warm up do so. It is taken out of all measurements, the held-out ones too. Rows "
-        "are taken to be in the order of measuring: if they are not, give --drift none."
+        f"The set-up moved while it was measured, whatever the pose: {'; '.join(ways)}. "
+        f"{at_once if details.jumps else slowly} It is taken out of all measurements, the held-out ones too. "
+        "Rows are taken to be in the order of measuring: if they are not, give --drift none."
     )
     return [Notice("drift", text)]

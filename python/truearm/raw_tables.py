@@ -1,6 +1,7 @@
 """Tables as other programs write them: marks, remarks and gaps as they are stated, one file or two."""
 
 import codecs
+import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +21,9 @@ Integers = NDArray[np.int64]
 DECIMAL_MARKS: Final = (".", ",")
 UTF_8: Final = ("utf-8", "utf8", "utf-8-sig")
 BLANK: Final = " "
+UNNAMED: Final = "-"
 BLANKS: Final = re.compile(r"[ \t]+")
+NUMBER: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?")
 WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
 NAMED: Final = 5
@@ -38,6 +41,7 @@ class Marks:
         comments: What lines begin with that are remarks.
         missing: What cells say, besides nothing, where nothing was measured; case does not count.
         encoding: Encoding of the text.
+        names: Names of the columns of a table without a header, "-" for those to leave out; () with one.
         options: What the options begin with that state these, for messages.
     """
 
@@ -47,6 +51,7 @@ class Marks:
     comments: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     encoding: str = "utf-8"
+    names: tuple[str, ...] = ()
     options: str = "--"
 
     def __post_init__(self) -> None:
@@ -56,8 +61,17 @@ class Marks:
                 where=f"{self.options}decimal",
                 rule=f"Either {DECIMAL_MARKS[0]} or {DECIMAL_MARKS[1]}",
             )
+        if "" in self.names:
+            raise UsageError(
+                "a name is missing", where=f"{self.options}columns", rule='"-" leaves a column out'
+            )
         if "" in self.comments:
             raise UsageError("every line begins with nothing", where="--comment", rule="Name a mark")
+
+    @property
+    def unnamed(self) -> dict[str, None]:
+        """What columns are called that are left out, in their order."""
+        return {f"{UNNAMED} {k}": None for k, name in enumerate(self.names, 1) if name == UNNAMED}
 
 
 class Part(NamedTuple):
@@ -162,13 +176,15 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
         raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
     if delimiter == BLANK:
         text = "\n".join(map(_with_single_blanks, kept))
+    if marks.names:
+        text = _header(marks, text, delimiter, where) + text
     uneven = (
         f"Correct or remove them; {marks.options}skip-lines leaves out lines above the header, "
         "--comment those of remarks"
     )
     table = _without(split_table(text, delimiter, where=where, uneven=uneven), marks.missing)
     rows = np.arange(table.row_count)
-    parts = {name: Part(table, name, rows, marks) for name in table.names}
+    parts = {name: Part(table, name, rows, marks) for name in table.names if name not in marks.unnamed}
     left_out = len(below) - len(kept)
     remarks = [f"{count_of(left_out, 'line')} of {where}"] if left_out else []
     return RawTable(where, parts, table.row_count, remarks=remarks)
@@ -212,6 +228,33 @@ def join_tables(first: RawTable, second: RawTable, on: str | None) -> RawTable:
     ]
     rows = np.array(both)
     return _side_by_side(first, second, (rows, np.array([places[keys[row]] for row in both])), theirs, alone)
+
+
+def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
+    """The line of names above the rows of a text that has none.
+
+    Raises:
+        UsageError: If it has another number of columns, or plainly a header.
+    """
+    first = next(csv.reader([text.lstrip().splitlines()[0]], delimiter=delimiter))
+    option = f"{marks.options}columns"
+    if len(first) != len(marks.names):
+        raise UsageError(
+            f"{count_of(len(marks.names), 'name')}, the first line of {where} has "
+            f"{count_of(len(first), 'field')}",
+            where=option,
+            way_out=f"Name them all, {UNNAMED} for those to leave out",
+        )
+    if not any(NUMBER.fullmatch(cell.strip()) for cell in first):
+        raise UsageError(
+            f'the first line of {where} is "{first[0]}{delimiter}{first[-1]}"',
+            where=option,
+            rule="They are the names of a table without a header",
+            way_out=f"Leave {option} out, or skip the header: {marks.options}skip-lines 1",
+        )
+    unnamed = iter(marks.unnamed)
+    names = [next(unnamed) if name == UNNAMED else name for name in marks.names]
+    return delimiter.join(f'"{name}"' for name in names) + "\n"
 
 
 def _without(table: Table, missing: Sequence[str]) -> Table:
@@ -361,7 +404,7 @@ def _plain_delimiter(text: str, where: str, options: str) -> str:
     best = max(counts, key=lambda mark: counts[mark])
     if counts[best] == 0:
         raise UsageError(
-            f'the header is one field: "{header[:60]}"',
+            f'the first line is one field: "{header[:60]}"',
             where=where,
             way_out=f"Say what is between fields with {options}delimiter, and {options}skip-lines if the "
             "header is lower",

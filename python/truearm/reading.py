@@ -239,6 +239,7 @@ def _check_header(header: Sequence[str], where: str) -> None:
             "the first line holds numbers only",
             where=where,
             rule="The first line must name the columns, such as q1,q2,q3,q4,q5,q6,x,y,z",
+            way_out="Bring the file in with names: truearm import FILE --columns q1,q2,...,x,y,z ...",
         )
     empty = [position for position, name in enumerate(header, start=1) if not name]
     if empty:

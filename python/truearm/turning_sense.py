@@ -1,4 +1,4 @@
-"""Whether measured orientations can be of a given robot: the order and the sense of their quaternions."""
+"""Whether measured orientations can be of a given robot, and how they would have to be read."""
 
 from itertools import permutations, product
 from typing import Final
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
+from truearm.euler_orders import otherwise_read, twin
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
@@ -19,6 +20,11 @@ positions that are off by this part of their spread."""
 FIT: Final = 0.05
 """Those that are off by less are: no arm is off by 0.05 rad or a twentieth of its reach."""
 FEWEST_POSES: Final = 6
+MOST_POSES: Final = 60
+"""Poses at the most that other kinds of angles are tried on."""
+AS_WELL: Final = 1.5
+"""Kinds fit as well whose misfits are within this factor of the least."""
+MOST_NAMED: Final = 2
 AXES: Final = 3
 
 COMPONENTS: Final = "wxyz"
@@ -30,7 +36,8 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
     """Check that the tool turns and moves as the nominal arm's does, whatever frame and tool are.
 
     Raises:
-        InputError: If it does not, and does so once the quaternions are read in another order or sense.
+        InputError: If it does not, and does so once the quaternions are read in another order or
+            sense, or the angles that they were made from are of another kind.
     """
     turned = measurements.orientations
     if turned is None:
@@ -42,27 +49,53 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
         )
         if seen.sum() < FEWEST_POSES:
             continue
-        rows, quaternions = measurements.select(seen), turned[seen]
+        rows, poses = measurements.select(seen), (points[seen], turned[seen])
         flanges = robot.pose(rows.readings)
-        if _misfit(flanges, points[seen], quaternions) < MISFIT:
+        if _misfit(flanges, *poses) < MISFIT:
             continue
-        for held, conjugate in READINGS:
-            sense = np.where((np.arange(4) > 0) & conjugate, -1.0, 1.0)
-            if _misfit(flanges, points[seen], quaternions[:, np.argsort(held)] * sense) < FIT:
-                raise InputError(
-                    f"the quaternions do not turn as {robot.name} does; {_words(held, conjugate)}",
-                    where=f"{', '.join(rows.files)}, group {group}",
-                    rule="qw qx qy qz, w first, turn vectors of the target into the world",
-                    way_out="Put the columns right (truearm import), or use positions alone: --use position",
-                )
+        ways = [_other_columns(flanges, *poses), _other_angles(flanges, *poses)]
+        if any(ways):
+            fitting = ", or if ".join(filter(None, ways))
+            raise InputError(
+                f"the orientations do not turn as {robot.name} does. They would if {fitting}",
+                where=f"{', '.join(rows.files)}, group {group}",
+                rule="qw qx qy qz, w first, turn vectors of the target into the world",
+                way_out="Put that right (truearm import --rotation), or use positions alone: --use position",
+            )
+
+
+def _other_columns(flanges: Floats, points: Floats, quaternions: Floats) -> str:
+    """In words, the order and sense of the quaternions that fit; "" where none does."""
+    for held, conjugate in READINGS:
+        sense = np.where((np.arange(4) > 0) & conjugate, -1.0, 1.0)
+        if _misfit(flanges, points, quaternions[:, np.argsort(held)] * sense) < FIT:
+            return _words(held, conjugate)
+    return ""
+
+
+def _other_angles(flanges: Floats, points: Floats, quaternions: Floats) -> str:
+    """In words, what the numbers are that orientations were made from, so that they fit; "" if nothing."""
+    some = np.linspace(0, len(points) - 1, min(len(points), MOST_POSES)).astype(np.int64)
+    flanges, points, quaternions = flanges[some], points[some], quaternions[some]
+    found: dict[tuple[str, str], float] = {}
+    for taken, meant, other in otherwise_read(quaternions):
+        off = _misfit(flanges, points, other)
+        found[taken, meant] = min(off, found.get((taken, meant), off))
+    least = min(found.values())
+    if least >= FIT:
+        return ""
+    fitting = [kinds for kinds, off in found.items() if off <= AS_WELL * least][:MOST_NAMED]
+    ways = [way for taken, meant in fitting for way in ((taken, meant), (twin(taken), twin(meant)))]
+    pairs = ", or those for ".join(f"{taken} are {meant}" for taken, meant in dict.fromkeys(ways))
+    return f"the angles that were taken for {pairs} (capitals: moving axes, small letters: fixed axes)"
 
 
 def _words(held: tuple[int, ...], conjugate: bool) -> str:
     """A reading in words: what its columns hold, and how it turns."""
-    order = f"their columns hold {' '.join(COMPONENTS[part] for part in held)}, where qw qx qy qz are named"
-    turn = "turn the other way: target_from_world, where world_from_target is wanted"
+    order = f"the columns qw qx qy qz hold {' '.join(COMPONENTS[part] for part in held)}"
+    turn = "they turn the other way: target_from_world, where world_from_target is wanted"
     if held == (0, 1, 2, 3):
-        return f"they {turn}"
+        return turn
     return f"{order}, and {turn}" if conjugate else order
 
 

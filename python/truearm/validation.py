@@ -173,7 +173,7 @@ class Validation:
             coverage_95=content["coverage_95"],
             left_out=content.get("left_out", False),
             n_planned=content.get("n_planned", 0),
-            drift=DriftDetails(**content["drift"]) if content.get("drift") else None,
+            drift=DriftDetails.from_dict(content["drift"]) if content.get("drift") else None,
         )
 
 

@@ -2,9 +2,10 @@
 //!
 //! Arms and instruments warm up, tripods settle. What is left when a model has said all it knows then depends on when it was
 //! measured, whatever the pose. A drift is a displacement, the same for all poses, that varies with the progress of
-//! the session: cells over one line, whose prior's amplitude and length the evidence chooses. The frame of the set-up
-//! takes its mean, so the likelihood is the restricted one (Patterson and Thompson 1971): with features G of the rows less
-//! their mean, eigenvalues e of `G^T G`, z the products of its eigenvectors with `G^T r`, and v the ratio of the drift's
+//! the session: cells over one line, whose prior's amplitude and length the evidence chooses, and steps where a tripod
+//! was bumped or something slipped, with the same amplitude, one at a time as long as the evidence asks for them. The
+//! frame of the set-up takes its mean, so the likelihood is the restricted one (Patterson and Thompson 1971): with features
+//! G of the rows less their mean, eigenvalues e of `G^T G`, z the products of its eigenvectors with `G^T r`, and v the ratio of the drift's
 //! variance to that of the noise, `s^2 = (r^T r - sum v z^2 / (1 + v e)) / N` and `log L = -1/2 (N log s^2 + 3 sum log(1 + v e))`.
 
 use faer::{Mat, Side};
@@ -22,10 +23,10 @@ pub struct Drift {
     pub moved: Vec<f64>,
     /// Standard deviation of a coordinate that is left, at weight one, m.
     pub noise: f64,
-    /// Length scale, in sessions.
-    pub length: f64,
     /// Logarithm of the evidence over that of no drift.
     pub gain: f64,
+    /// Progress at which it moved at once, ascending (s,): in the middle between two measured rows.
+    pub steps: Vec<f64>,
 }
 
 /// Lengths that are tried, in sessions: a tenth is as fine as some ten poses could tell from noise.
@@ -41,6 +42,10 @@ const FACTOR: f64 = 1.2;
 const PER_LENGTH: f64 = 3.0;
 const DEGREE: usize = 3;
 const COORDINATES: usize = 3;
+/// Gain in the logarithm of the evidence, the choice of its place paid for, from which there is a step.
+const STEP_GAIN: f64 = 10.0;
+/// Rows before and behind a step: fewer are outliers.
+const BESIDE: usize = 5;
 
 /// What is left of the rows of a session.
 #[derive(Debug, Clone, Copy)]
@@ -73,11 +78,12 @@ impl Left<'_> {
     }
 }
 
-/// The drift that residuals show over the progress of their session; told at `wanted` (t,).
+/// The drift that residuals show over the progress of their session, with so many steps at the most; told at `wanted`
+/// (t,).
 ///
 /// # Errors
 /// [`FieldError::Length`], [`FieldError::NotFinite`], and [`FieldError::NotPositiveDefinite`] where the cells' prior fails.
-pub fn find_drift(left: Left, wanted: &[f64]) -> Result<Drift, FieldError> {
+pub fn find_drift(left: Left, wanted: &[f64], most_steps: usize) -> Result<Drift, FieldError> {
     left.check()?;
     if !wanted.iter().all(|value| value.is_finite()) {
         return Err(FieldError::NotFinite { what: "progress at which a drift is asked for" });
@@ -85,16 +91,43 @@ pub fn find_drift(left: Left, wanted: &[f64]) -> Result<Drift, FieldError> {
     let rows = left.progress.len();
     let right = Mat::from_fn(rows, COORDINATES, |i, k| left.residual[COORDINATES * i + k]);
     let right = centred(right, left.weight).0;
+    let order = ascending(left.progress);
+    let places = (order.len().max(2 * BESIDE) - 2 * BESIDE + 1) as f64;
+    let mut found = best_curve(&left, &right, &[])?;
+    while found.0.steps.len() < most_steps {
+        let Some(step) = found.0.next_step(&left, &right, &found.1, &order) else { break };
+        let steps: Vec<f64> = found.0.steps.iter().copied().chain([step]).collect();
+        let other = best_curve(&left, &right, &steps)?;
+        if other.1.evidence - places.ln() <= found.1.evidence + STEP_GAIN {
+            break;
+        }
+        found = other;
+    }
+    let (curve, choice) = found;
+    let mut drift = curve.drift(&choice, wanted);
+    drift.gain -= curve.steps.len() as f64 * places.ln();
+    Ok(drift)
+}
+
+/// Indices of values in ascending order.
+fn ascending(values: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    order
+}
+
+/// The curve, with steps at the given places, whose length and ratio have the largest evidence.
+fn best_curve(left: &Left, right: &Mat<f64>, steps: &[f64]) -> Result<(Curve, Choice), FieldError> {
+    let rows = left.progress.len();
     let mut best: Option<(Curve, Choice)> = None;
     for length in LENGTHS {
-        let curve = Curve::new(&left, &right, length).ok_or(FieldError::NotPositiveDefinite { rows })?;
+        let curve = Curve::new(left, right, length, steps).ok_or(FieldError::NotPositiveDefinite { rows })?;
         let choice = curve.choose();
         if best.as_ref().is_none_or(|(_, known)| choice.evidence > known.evidence) {
             best = Some((curve, choice));
         }
     }
-    let (curve, choice) = best.ok_or(FieldError::NotFinite { what: "progress and residuals of a drift" })?;
-    Ok(curve.drift(&choice, wanted))
+    best.ok_or(FieldError::NotFinite { what: "progress and residuals of a drift" })
 }
 
 /// The residual over features of one length.
@@ -102,8 +135,11 @@ struct Curve {
     length: f64,
     cells: CellKernel,
     root: Root,
+    steps: Vec<f64>,
     /// Mean of the rows' features, (f,).
     mean: Vec<f64>,
+    /// Features of the rows less their mean, each row times the root of its weight, (n, f).
+    features: Mat<f64>,
     /// Eigenvectors (f, f) and eigenvalues (f,) of `G^T G`.
     vectors: Mat<f64>,
     values: Vec<f64>,
@@ -123,13 +159,14 @@ struct Choice {
 }
 
 impl Curve {
-    fn new(left: &Left, right: &Mat<f64>, length: f64) -> Option<Self> {
+    fn new(left: &Left, right: &Mat<f64>, length: f64, steps: &[f64]) -> Option<Self> {
         let input = Input::line(1.0);
         let scaled = input.scale * length;
         let axis = Axis::covering(input, [0.0, 1.0].into_iter(), scaled, PER_LENGTH, DEGREE);
         let cells = CellKernel::new(axis, |distance| Shape::Matern.at(distance, scaled));
         let root = Root::new(&cells)?;
-        let features: Vec<Vec<f64>> = left.progress.iter().map(|&at| root.features(&cells, at)).collect();
+        let features: Vec<Vec<f64>> =
+            left.progress.iter().map(|&at| features(&root, &cells, steps, at)).collect();
         let (rows, width) = (features.len(), features[0].len());
         let (features, mean) = centred(Mat::from_fn(rows, width, |i, k| features[i][k]), left.weight);
         let gram = transposed_product(features.as_ref(), features.as_ref());
@@ -140,7 +177,8 @@ impl Curve {
         let projected = transposed_product(vectors.as_ref(), products.as_ref());
         let square = right.squared_norm_l2();
         let freedom = (COORDINATES * (rows - 1)) as f64;
-        Some(Self { length, cells, root, mean, vectors, values, projected, square, freedom })
+        let steps = steps.to_vec();
+        Some(Self { length, cells, root, steps, mean, features, vectors, values, projected, square, freedom })
     }
 
     /// Logarithm of the likelihood at a ratio of variances, and the noise's variance.
@@ -180,15 +218,84 @@ impl Curve {
         let weights = &self.vectors * shrunk;
         let mut moved = Vec::with_capacity(COORDINATES * wanted.len());
         for &at in wanted {
-            let features = self.root.features(&self.cells, at);
+            let features = features(&self.root, &self.cells, &self.steps, at);
             let of = |c: usize| -> f64 {
                 let pairs = features.iter().zip(&self.mean).enumerate();
                 pairs.map(|(k, (feature, mean))| (feature - mean) * weights[(k, c)]).sum()
             };
             moved.extend((0..COORDINATES).map(of));
         }
-        Drift { moved, noise: choice.noise, length: self.length, gain: choice.gain }
+        let mut steps = self.steps.clone();
+        steps.sort_by(f64::total_cmp);
+        Drift { moved, noise: choice.noise, gain: choice.gain, steps }
     }
+
+    /// Where one more step has the largest evidence, the ratio and the noise left as they are.
+    ///
+    /// With `C = I + v G G^T` a step h of the same variance adds `3/2 (z^2 v / (s^2 (1 + v q)) - log(1 + v q))`
+    /// per coordinate, `q = h^T C^-1 h` and `z = h^T C^-1 r`; `G^T h`, `r^T h` and `h^T h` are sums over the rows behind it.
+    fn next_step(&self, left: &Left, right: &Mat<f64>, choice: &Choice, order: &[usize]) -> Option<f64> {
+        let total: f64 = left.weight.iter().sum();
+        let (mut behind, mut sums, mut products) = (total, [0.0; COORDINATES], vec![0.0; self.values.len()]);
+        let mut best: Option<(f64, f64)> = None;
+        for (count, pair) in order.windows(2).enumerate() {
+            let (row, next) = (pair[0], pair[1]);
+            let root = left.weight[row].sqrt();
+            behind -= left.weight[row];
+            sums.iter_mut().enumerate().for_each(|(c, sum)| *sum -= root * right[(row, c)]);
+            products.iter_mut().enumerate().for_each(|(k, sum)| *sum -= root * self.features[(row, k)]);
+            let place = 0.5 * (left.progress[row] + left.progress[next]);
+            let tied = left.progress[row] == left.progress[next];
+            if tied || !self.has_room(left, order, (count + 1, place)) {
+                continue;
+            }
+            let gain = self.gain_of_step(choice, behind * (total - behind) / total, (&sums, &products));
+            if best.is_none_or(|(most, _)| gain > most) {
+                best = Some((gain, place));
+            }
+        }
+        best.map(|(_, place)| place)
+    }
+
+    /// Whether enough rows are before and behind a step, and between it and the others.
+    fn has_room(&self, left: &Left, order: &[usize], (before, place): (usize, f64)) -> bool {
+        let between = |other: f64| {
+            let (low, high) = (other.min(place), other.max(place));
+            left.progress.iter().filter(|at| (low..high).contains(*at)).count()
+        };
+        before >= BESIDE
+            && order.len() - before >= BESIDE
+            && self.steps.iter().all(|&other| between(other) >= BESIDE)
+    }
+
+    /// Gain in the logarithm of the evidence from a step of a square, with its products with residuals and features.
+    fn gain_of_step(
+        &self,
+        choice: &Choice,
+        square: f64,
+        (sums, products): (&[f64; COORDINATES], &[f64]),
+    ) -> f64 {
+        let along: Vec<f64> = (0..self.values.len())
+            .map(|k| products.iter().enumerate().map(|(j, value)| self.vectors[(j, k)] * value).sum())
+            .collect();
+        let shrink = |k: usize| choice.ratio / (1.0 + choice.ratio * self.values[k]);
+        let inner = square - along.iter().enumerate().map(|(k, a)| shrink(k) * a * a).sum::<f64>();
+        let known = 1.0 + choice.ratio * inner;
+        let gain = |(c, sum): (usize, &f64)| {
+            let explained: f64 =
+                along.iter().enumerate().map(|(k, a)| shrink(k) * a * self.projected[(k, c)]).sum();
+            let pull = (sum - explained) / choice.noise;
+            0.5 * (choice.ratio * pull * pull / known - known.ln())
+        };
+        sums.iter().enumerate().map(gain).sum()
+    }
+}
+
+/// Features of a progress: those of the cells, then of each step whether it is behind.
+fn features(root: &Root, cells: &CellKernel, steps: &[f64], at: f64) -> Vec<f64> {
+    let mut features = root.features(cells, at);
+    features.extend(steps.iter().map(|&step| f64::from(u8::from(at > step))));
+    features
 }
 
 /// Rows less their weighted mean, each times the root of its weight, and this mean.
@@ -215,7 +322,7 @@ mod tests {
 
     fn found_in(residual: &[f64], weight: &[f64]) -> Drift {
         let progress = progress();
-        find_drift(Left { progress: &progress, residual, weight }, &progress).unwrap()
+        find_drift(Left { progress: &progress, residual, weight }, &progress, 3).unwrap()
     }
 
     fn progress() -> Vec<f64> {
@@ -265,6 +372,64 @@ mod tests {
         }
     }
 
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(30))]
+
+        /// A tripod that is bumped while it warms up, by six times the noise in one coordinate.
+        #[test]
+        fn a_step_is_found_where_it_is(seed in 0_u64..1000, after in 8_usize..ROWS - 8) {
+            let stepped = |row: usize| if row > after { 1.2e-4 } else { 0.0 };
+            let truth: Vec<f64> = progress().iter().flat_map(|&at| warming(at)).collect();
+            let truth = truth.iter().enumerate();
+            let truth = truth.map(|(k, value)| if k % 3 == 1 { stepped(k / 3) } else { *value });
+            let residual: Vec<f64> = truth.zip(noise(seed)).map(|(a, b)| a + 2e-5 * b).collect();
+            let found = found_in(&residual, &[1.0; ROWS]);
+            let expected = (after as f64 + 0.5) / (ROWS - 1) as f64;
+            let rows = |at: f64| (at - expected) * (ROWS - 1) as f64;
+            prop_assert!(found.steps.len() == 1 && rows(found.steps[0]).abs() < 1.5, "{:?}", found.steps);
+            let jump = found.moved[3 * (after + 3) + 1] - found.moved[3 * (after - 2) + 1];
+            prop_assert!((jump / 1.2e-4 - 1.0).abs() < 0.25, "{jump}");
+        }
+
+        #[test]
+        fn what_drifts_slowly_has_no_step(seed in 0_u64..1000) {
+            let truth: Vec<f64> = progress().iter().flat_map(|&at| warming(at)).collect();
+            let residual: Vec<f64> = truth.iter().zip(noise(seed)).map(|(a, b)| a + 2e-5 * b).collect();
+            prop_assert!(found_in(&residual, &[1.0; ROWS]).steps.is_empty());
+        }
+
+        /// The gain of one more step is that of the evidence with it, at the same ratio and noise.
+        #[test]
+        fn the_gain_of_a_step_is_that_of_the_evidence(seed in 0_u64..1000, after in 8_usize..ROWS - 8) {
+            let (progress, residual) = (progress(), noise(seed));
+            let weight: Vec<f64> = (0..ROWS).map(|row| 1.0 / (1 + row % 4) as f64).collect();
+            let left = Left { progress: &progress, residual: &residual, weight: &weight };
+            let right = Mat::from_fn(ROWS, COORDINATES, |i, k| residual[COORDINATES * i + k]);
+            let (right, _) = centred(right, &weight);
+            let place = (after as f64 + 0.5) / (ROWS - 1) as f64;
+            let without = Curve::new(&left, &right, 0.4, &[]).unwrap();
+            let with = Curve::new(&left, &right, 0.4, &[place]).unwrap();
+            let choice = Choice { evidence: 0.0, gain: 0.0, ratio: 0.3, noise: 1.1 };
+            let value = |curve: &Curve| {
+                let variance = curve.likelihood(choice.ratio).1;
+                let determinant: f64 =
+                    curve.values.iter().map(|value| (choice.ratio * value).ln_1p()).sum();
+                -0.5 * (variance * curve.freedom / choice.noise.powi(2) + COORDINATES as f64 * determinant)
+            };
+            let total: f64 = weight.iter().sum();
+            let behind: f64 = weight[after + 1..].iter().sum();
+            let rows = after + 1..ROWS;
+            let over = |of: &dyn Fn(usize) -> f64| -> f64 {
+                rows.clone().map(|i| weight[i].sqrt() * of(i)).sum()
+            };
+            let sums = std::array::from_fn(|c| over(&|i| right[(i, c)]));
+            let products: Vec<f64> =
+                (0..without.values.len()).map(|k| over(&|i| without.features[(i, k)])).collect();
+            let gain = without.gain_of_step(&choice, behind * (total - behind) / total, (&sums, &products));
+            prop_assert!((gain - (value(&with) - value(&without))).abs() < 1e-6 * (1.0 + gain.abs()));
+        }
+    }
+
     /// A third of the rows with noise that is fifty times as large, and said to be.
     #[test]
     fn rows_that_are_known_to_be_noisy_hide_nothing() {
@@ -285,10 +450,10 @@ mod tests {
         let measured = Mat::from_fn(ROWS, COORDINATES, |i, k| residual[COORDINATES * i + k]);
         let (right, _) = centred(measured.clone(), &weight);
         let left = Left { progress: &progress, residual: &residual, weight: &weight };
-        let curve = Curve::new(&left, &right, 0.2).unwrap();
+        let curve = Curve::new(&left, &right, 0.2, &[0.31]).unwrap();
         let (value, variance) = curve.likelihood(0.3);
         let features: Vec<Vec<f64>> =
-            progress.iter().map(|&at| curve.root.features(&curve.cells, at)).collect();
+            progress.iter().map(|&at| super::features(&curve.root, &curve.cells, &[0.31], at)).collect();
         let dot =
             |i: usize, j: usize| -> f64 { features[i].iter().zip(&features[j]).map(|(a, b)| a * b).sum() };
         let own = |i: usize, j: usize| if i == j { 1.0 / weight[i] } else { 0.0 };
@@ -315,7 +480,7 @@ mod tests {
     #[test]
     fn rows_that_do_not_belong_together_are_refused() {
         let refused = |progress: &[f64], residual: &[f64], weight: &[f64]| {
-            find_drift(Left { progress, residual, weight }, &[]).is_err()
+            find_drift(Left { progress, residual, weight }, &[], 0).is_err()
         };
         assert!(!refused(&[0.0, 1.0], &[0.0; 6], &[1.0; 2]));
         assert!(refused(&[0.0, 1.0], &[0.0; 5], &[1.0; 2]));

@@ -103,7 +103,8 @@ const PRODUCT_LENGTH: Range = range(2.0, 0.6, 20.0, 0.7);
 const MOST_WAVES: usize = 100;
 const MOST_CYCLES: f64 = 1e4;
 const NOISE_LOW: f64 = 0.001 * MILLI;
-const NOISE_HIGH: f64 = 10.0 * MILLI;
+/// Orientations that are noted in another way than stated are no nearer than a radian, and must not spoil the positions.
+const NOISE_HIGH: f64 = 1000.0 * MILLI;
 
 /// Positions of the hyper-parameters in the vector of logarithms; products follow, then noise.
 pub const AT_CONSTANT: usize = 0;

@@ -6,8 +6,8 @@ use truearm_field::{Left, find_drift as found_drift};
 
 use crate::door::quick;
 
-/// Displacements (t, 3), the noise that is left, the length scale, and the gain in evidence.
-type Found<'py> = (Bound<'py, PyArray2<f64>>, f64, f64, f64);
+/// Displacements (t, 3), the noise that is left, the progress of steps (s,), and the gain in evidence.
+type Found<'py> = (Bound<'py, PyArray2<f64>>, f64, Vec<f64>, f64);
 
 /// How a set-up moved, see the stub.
 #[pyfunction]
@@ -17,10 +17,11 @@ pub fn find_drift<'py>(
     residual: PyReadonlyArray2<'py, f64>,
     weight: PyReadonlyArray1<'py, f64>,
     wanted: PyReadonlyArray1<'py, f64>,
+    most_steps: usize,
 ) -> PyResult<Found<'py>> {
     let (weight, wanted) = (weight.as_slice()?, wanted.as_slice()?);
     let left = Left { progress: progress.as_slice()?, residual: residual.as_slice()?, weight };
-    let found = quick(py, || found_drift(left, wanted))?;
+    let found = quick(py, || found_drift(left, wanted, most_steps))?;
     let moved: Bound<'py, PyArray1<f64>> = found.moved.into_pyarray(py);
-    Ok((moved.reshape([wanted.len(), 3])?, found.noise, found.length, found.gain))
+    Ok((moved.reshape([wanted.len(), 3])?, found.noise, found.steps, found.gain))
 }

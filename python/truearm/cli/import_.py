@@ -27,9 +27,11 @@ def command(
     length_unit: option.LengthUnit = None,
     second: option.Second = None,
     on: option.On = None,
+    names: option.Names = None,
     delimiter: option.Delimiter = None,
     decimal: option.Decimal = None,
     skip_lines: option.SkipLines = 0,
+    with_names: option.WithNames = None,
     with_delimiter: option.WithDelimiter = None,
     with_decimal: option.WithDecimal = None,
     with_skip_lines: option.WithSkipLines = None,
@@ -47,12 +49,13 @@ def command(
       truearm import raw.csv -o m.csv --joint-unit deg --length-unit mm
       truearm import raw.txt -o m.csv --map q1=J1:deg --map x=px:mm
       truearm import joints.csv --with tracker.csv --on point -o m.csv
+      truearm import raw.txt -o m.csv --columns x,y,z,-,q1,q2,q3,q4,q5,q6
     """
     from truearm.importing import ImportPlan, import_table
     from truearm.raw_tables import Marks
     from truearm.rotation_columns import RotationColumns
 
-    stated = (with_delimiter, with_decimal, with_skip_lines, with_encoding)
+    stated = (with_names, with_delimiter, with_decimal, with_skip_lines, with_encoding)
     other = _other(second or [], asked=any(mark is not None for mark in stated))
     refuse_own_input(output, raw, other)
     marks = Marks(
@@ -62,9 +65,11 @@ def command(
         tuple(comment or ()),
         tuple(missing or ()),
         encoding,
+        _names(names),
     )
     second_marks = replace(
         marks,
+        names=_names(with_names),
         delimiter=_delimiter(with_delimiter, "--with-delimiter") or marks.delimiter,
         decimal=with_decimal or decimal,
         skip_lines=skip_lines if with_skip_lines is None else with_skip_lines,
@@ -94,6 +99,10 @@ def _other(second: list[Path], *, asked: bool) -> Path | None:
     if asked and not second:
         raise UsageError("there is one table only", where="--with-...", way_out="Name the other: --with FILE")
     return second[0] if second else None
+
+
+def _names(text: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
 def _tell(imported: "Imported", output: Path, *, as_json: bool) -> None:

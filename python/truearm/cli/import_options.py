@@ -36,9 +36,21 @@ On: TypeAlias = Annotated[
         help="The column that says which rows of the two belong together; row by row without.",
     ),
 ]
+Names: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="NAME,NAME",
+        help="Names of the columns of a table without a header; - for those to leave out.",
+    ),
+]
 Delimiter: TypeAlias = Annotated[str | None, typer.Option(help='Mark between fields: ";", tab, space, ...')]
 Decimal: TypeAlias = Annotated[str | None, typer.Option(help='Decimal mark: "." or ",".')]
 SkipLines: TypeAlias = Annotated[int, typer.Option(min=0, help="Lines above the header.")]
+WithNames: TypeAlias = Annotated[
+    str | None,
+    typer.Option("--with-columns", metavar="NAME,NAME", help="--columns of the second table."),
+]
 WithDelimiter: TypeAlias = Annotated[str | None, typer.Option(help="--delimiter of the second table.")]
 WithDecimal: TypeAlias = Annotated[str | None, typer.Option(help="--decimal of the second table.")]
 WithSkipLines: TypeAlias = Annotated[

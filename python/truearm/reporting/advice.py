@@ -119,8 +119,14 @@ def _warm_up(facts: Facts) -> Iterator[Advice]:
     words = (
         f"The set-up moved by {moved} mm while it was measured. That is known and taken out: the mean error "
         f"is {mean} mm, and {left} mm with it left in. Whether arm or measuring device moved, these data do "
-        "not tell: let both warm up before they are used, and measure a fixed point now and then."
+        "not tell: "
     )
+    if drift.jumps:
+        places = "; ".join(f"{group}, {jump.words}" for group, own in drift.jumps.items() for jump in own)
+        words += f"look at target, tripod and joints where it did so at once ({places})."
+        yield Advice("gave_way", "Find what gave way.", words, left_in - steady)
+        return
+    words += "let both warm up before they are used, and measure a fixed point now and then."
     yield Advice("warm_up", "Let the set-up warm up.", words, left_in - steady)
 
 

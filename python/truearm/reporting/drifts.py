@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.details import DriftDetails
 from truearm.fitted_rows import FittedRows
 from truearm.reporting.charts import axis, legend, line, points, running_median
 from truearm.reporting.facts import Facts
@@ -32,12 +33,14 @@ def drifts(facts: Facts) -> Iterator[Figure]:
         return
     groups = sorted(drift.moved_mm, key=lambda group: -drift.moved_mm[group])
     for group in groups[:MOST_SHOWN]:
-        yield _drift(facts, rows, (rows.moved, rows.progress), (group, drift.moved_mm[group]))
+        yield _drift(facts, rows, (rows.moved, rows.progress), group, drift)
 
 
-def _drift(facts: Facts, rows: FittedRows, found: tuple[Floats, Floats], of: tuple[str, float]) -> Figure:
-    """The figure of a set-up: `found` are displacement (n, 3) and progress (n,), `of` its name and span."""
-    (moved_m, progress), (group, span_mm) = found, of
+def _drift(
+    facts: Facts, rows: FittedRows, found: tuple[Floats, Floats], group: str, drift: DriftDetails
+) -> Figure:
+    """The figure of a set-up; `found` are displacement (n, 3) and progress (n,) of all rows."""
+    moved_m, progress = found
     own = np.flatnonzero(rows.data.group == group)
     own = own[np.argsort(progress[own])]
     place = np.arange(1.0, len(own) + 1.0)
@@ -51,10 +54,12 @@ def _drift(facts: Facts, rows: FittedRows, found: tuple[Floats, Floats], of: tup
         traces.append(points(middles, medians, manner, name=f"{name}, medians of rows", marker=marker))
         traces.append(line(place, moved[:, k], manner, name=name))
     half = _rows_to_half(moved)
-    span = short(span_mm)[0]
+    span = short(drift.moved_mm[group])[0]
+    at_once = "".join(f", {jump.words}" for jump in drift.jumps.get(group, ()))
     return Figure(
         f"How the set-up moved: {group}",
-        f"Positions measured at the same pose moved by up to {span} mm in the frame of the measuring device, "
+        f"Positions measured at the same pose moved by up to {span} mm in the frame of the measuring device"
+        f"{at_once}, "
         f"half of the way from where it began within the first {half} of {len(own)} rows. Points are medians "
         f"of what the {facts.best} model leaves of some rows with nothing taken out; the lines were taken "
         "out of all rows, the held-out ones too.",

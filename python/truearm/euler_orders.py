@@ -1,0 +1,64 @@
+"""Orientations made from Euler angles or rotation vectors that were taken for those of another kind."""
+
+import warnings
+from collections.abc import Iterator
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from truearm.rotations import quaternion_from_euler, quaternion_from_rotation_vector
+
+Floats = NDArray[np.float64]
+
+USUAL: Final = ("XYZ", "ZYX", "ZYZ", "ZXZ")
+ORDERS: Final = ("".join(axes) for axes in product("XYZ", repeat=3) if axes[0] != axes[1] != axes[2])
+MOVING: Final = tuple(dict.fromkeys([*USUAL, *ORDERS]))
+FIXED: Final = tuple(order.lower() for order in MOVING)
+VECTOR: Final = "rotation vector"
+TURN: Final = 2.0 * np.pi
+
+
+def otherwise_read(quaternions: Floats) -> Iterator[tuple[str, str, Floats]]:
+    """Orientations (n, 4), w first, as they are if the numbers that they were made from mean something else.
+
+    About fixed axes the same turns have their angles in the opposite order (`twin`), so that moving axes
+    stand for both in what the numbers were taken for, the usual ones first. Several numbers give one turn:
+    both sets of Euler angles are tried, and rotation vectors of more than half a turn.
+
+    Yields:
+        What they were taken for, and what they are then: "XYZ" about moving axes, "xyz" about fixed ones, or
+        "rotation vector"; and the quaternions (n, 4), w first.
+    """
+    rotation = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
+    for taken in (*MOVING, VECTOR):
+        for numbers in _numbers(rotation, taken):
+            for meant in (*FIXED, *MOVING):
+                if meant != taken:
+                    yield taken, meant, quaternion_from_euler(numbers, meant)
+            if taken != VECTOR:
+                yield taken, VECTOR, quaternion_from_rotation_vector(numbers)
+
+
+def twin(kind: str) -> str:
+    """The kind that makes the same orientations of the same numbers in the opposite order."""
+    return kind if kind == VECTOR else kind[::-1].swapcase()
+
+
+def _numbers(rotation: Rotation, kind: str) -> tuple[Floats, Floats]:
+    """Three numbers (n, 3), rad, that make the orientations, and three others."""
+    if kind == VECTOR:
+        vectors = rotation.as_rotvec()
+        angle = np.linalg.norm(vectors, axis=1, keepdims=True)
+        return vectors, vectors * (1.0 - TURN / np.maximum(angle, np.finfo(float).tiny))
+    with warnings.catch_warnings():
+        # Where the first and the third axis are parallel any of their angles will do.
+        warnings.simplefilter("ignore", UserWarning)
+        first, middle, last = rotation.as_euler(kind).T  # type: ignore[call-overload]  # `kind` is one of its names
+    other = -middle if kind[0] == kind[2] else np.pi - middle
+    return (
+        np.column_stack([first, middle, last]),
+        np.column_stack([first + np.pi, other, last + np.pi]),
+    )

@@ -1,0 +1,113 @@
+"""Orientations that are noted in another way than stated: order and sense of quaternions, kinds of angles."""
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import truearm as ta
+from truearm.euler_orders import VECTOR, twin
+from truearm.rotations import quaternion_from_euler
+from truearm.simulation import VirtualArm
+from truearm.turning_sense import check_turns
+
+QUATERNION = ["qw", "qx", "qy", "qz"]
+
+
+def posed(seed=4, count=60):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=seed)
+    table = arm.measure_table(arm.poses(count), orientation=True)
+    return arm.robot, table
+
+
+def with_quaternions(table, quaternions):
+    columns = dict(zip(QUATERNION, quaternions.T, strict=True))
+    return ta.Measurements.from_dataframe(table.assign(**columns))
+
+
+@pytest.mark.parametrize(
+    ("order", "sense", "words"),
+    [
+        ([1, 2, 3, 0], 1.0, "qw qx qy qz hold x y z w"),
+        ([3, 0, 1, 2], 1.0, "qw qx qy qz hold z w x y"),
+        ([2, 3, 0, 1], -1.0, "hold y z w x, and they turn the other way"),
+        ([0, 1, 2, 3], -1.0, "turn the other way: target_from_world"),
+        ([1, 2, 3, 0], -1.0, "hold x y z w, and they turn the other way"),
+    ],
+)
+def test_quaternions_in_another_order_or_sense_are_refused(order, sense, words):
+    robot, table = posed()
+    good = ta.Measurements.from_dataframe(table)
+    ta.calibrate(robot, good, model="constant")
+    found = table[QUATERNION].to_numpy() * [1.0, sense, sense, sense]
+    wrong = with_quaternions(table, found[:, order])
+    with pytest.raises(ta.InputError, match=f"{words}.*--use position"):
+        ta.calibrate(robot, wrong, model="constant")
+    calibration = ta.calibrate(robot, wrong, model="constant", use="position")
+    assert calibration.validation.holdout["constant"].position.mean < 1.0
+    with pytest.raises(ta.InputError, match=words):
+        ta.evaluate(ta.calibrate(robot, good, model="constant"), wrong)
+
+
+def test_every_order_of_a_quaternion_is_recognised():
+    robot, table = posed()
+    found = table[QUATERNION].to_numpy()
+    check_turns(with_quaternions(table, found), robot)
+    for order, sense in list(product(permutations(range(4)), (1.0, -1.0)))[1:]:
+        wrong = with_quaternions(table, (found * [1.0, sense, sense, sense])[:, order])
+        said = " ".join("wxyz"[part] for part in order)
+        told = "if they turn" if order == (0, 1, 2, 3) else f"hold {said}"
+        with pytest.raises(ta.InputError, match=told) as caught:
+            check_turns(wrong, robot)
+        assert ("turn the other way" in str(caught.value)) == (sense < 0.0)
+
+
+@pytest.mark.parametrize(
+    ("meant", "taken"),
+    [
+        ("xyz", "XYZ"),
+        ("XYZ", "xyz"),
+        ("ZYX", "XYZ"),
+        ("xyz", "zyx"),
+        ("ZYZ", "ZYX"),
+        ("XYZ", "rotation vector"),
+        ("rotation vector", "XYZ"),
+    ],
+)
+def test_angles_of_another_kind_are_recognised(meant, taken):
+    """Numbers that a file has of one kind, imported as those of another; without large second numbers."""
+    robot, table = posed(count=400)
+    rotation = Rotation.from_quat(np.roll(table[QUATERNION].to_numpy(), -1, axis=1))
+    numbers = rotation.as_rotvec() if meant == VECTOR else rotation.as_euler(meant)
+    few = (np.abs(numbers[:, 1]) < np.pi / 2) & (np.linalg.norm(numbers, axis=1) < np.pi)
+    made = Rotation.from_rotvec(numbers) if taken == VECTOR else Rotation.from_euler(taken, numbers)
+    wrong = with_quaternions(table[few], np.roll(made.as_quat(), 1, axis=1)[few])
+    named = rf"for ([\w ]+ are [\w ]+, or those for )*{taken} are {meant}\b"
+    with pytest.raises(ta.InputError, match=named):
+        check_turns(wrong, robot)
+
+
+@pytest.mark.parametrize("kind", ["XYZ", "zyx", "ZXZ", VECTOR])
+def test_other_kinds_of_numbers_hold_their_twins(kind):
+    """The numbers of a kind in the opposite order are those of its twin."""
+    angles = np.random.default_rng(2).uniform(-1.0, 1.0, (5, 3))
+    if kind == VECTOR:
+        assert twin(kind) == kind
+    else:
+        twins = quaternion_from_euler(angles[:, ::-1], twin(kind))
+        assert quaternion_from_euler(angles, kind) == pytest.approx(twins)
+
+
+def test_orientations_in_an_unknown_convention_are_doubted():
+    """They do not spoil the positions."""
+    robot, table = posed()
+    random = np.random.default_rng(1).normal(size=(len(table), 4))
+    random /= np.linalg.norm(random, axis=1, keepdims=True)
+    found = ta.calibrate(robot, with_quaternions(table, random))
+    assert "convention of Euler angles" in str(
+        next(notice for notice in found.notices if notice.kind == "orientation_misfit")
+    )
+    alone = ta.calibrate(robot, ta.Measurements.from_dataframe(table), use="position")
+    both = (calibration.validation.holdout["variable"].position.mean for calibration in (found, alone))
+    assert next(both) < 1.2 * next(both)
