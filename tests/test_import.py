@@ -1,6 +1,5 @@
 """Other people's tables come in as they are said to be, and only then."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from tests.import_support import COLUMNS, PLAIN, plan, write
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
 from truearm.importing import ImportPlan, import_table
 from truearm.measurements import Measurements
-from truearm.raw_tables import Marks
 from truearm.rotation_columns import RotationColumns
 
 IPA_OPTIONS = [
@@ -29,21 +28,6 @@ IPA_OPTIONS = [
     *("--keep", "std_x_m=measurement_std_x:mm", "--keep", "std_y_m=measurement_std_y:mm"),
     *("--keep", "std_z_m=measurement_std_z:mm"),
 ]
-PLAIN = "J1,J2,px,py,pz\n90,45,1000,2000,3000\n-90,0,1500,2500,3500\n"
-COLUMNS = {"q1": "J1", "q2": "J2", "x": "px", "y": "py", "z": "pz"}
-
-
-def write(folder: Path, text: str, encoding: str = "utf-8") -> Path:
-    path = folder / "raw.txt"
-    path.write_bytes(text.encode(encoding))
-    return path
-
-
-def plan(**changes: Any) -> ImportPlan:
-    """The plan of PLAIN with changes, those of its marks among them."""
-    marks = {name: changes.pop(name) for name in Marks.__dataclass_fields__ if name in changes}
-    given = {"columns": COLUMNS, "joint_unit": "deg", "length_unit": "mm", **changes}
-    return ImportPlan(**given, marks=Marks(**marks))
 
 
 def test_the_public_series_equals_its_conversion(shared_data: Path, tmp_path: Path) -> None:
@@ -178,17 +162,6 @@ def test_a_table_without_a_header_is_given_names(tmp_path: Path, delimiter: str 
     assert found.unused == []
 
 
-def test_the_command_names_columns_of_both_tables(tmp_path: Path) -> None:
-    joints, points, output = (tmp_path / name for name in ("joints.txt", "points.txt", "m.csv"))
-    joints.write_text("a;90;45\nb;-90;0\n")
-    points.write_text("b 1500 2500 3500\na 1000 2000 3000\n")
-    ours = ["import", str(joints), "--columns", "id,q1,q2", "--delimiter", ";", "--on", "id"]
-    theirs = ["--with", str(points), "--with-columns", "id, x, y, z", "--with-delimiter", "space"]
-    units = ["--joint-unit", "deg", "--length-unit", "mm"]
-    assert main([*ours, *theirs, *units, "-o", str(output)]) == 0
-    np.testing.assert_allclose(pd.read_csv(output)[["x", "y", "z"]], [[1.0, 2.0, 3.0], [1.5, 2.5, 3.5]])
-
-
 BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "semicolons": (PLAIN.replace(",", ";"), {}, 'separated by semicolons. If so, give --delimiter ";"'),
     "tabs": (PLAIN.replace(",", "\t"), {}, "separated by tabs. If so, give --delimiter tab"),
@@ -300,58 +273,6 @@ def test_cells_that_say_that_nothing_was_measured(tmp_path: Path) -> None:
     assert table["z2"][1] == 0.003
 
 
-JOINTS = "nr,J1,J2,T\n1,90,45,20\n2,-90,0,21\n3,10,20,22\n"
-POINTS = "point,px,py,pz,T\n2.0,1500,2500,3500,30\n1.0,1000,2000,3000,31\n7.0,0,0,0,32\n"
-
-
-STAMPS = "t,J1,J2\n20251123001500001,90,45\n20251123001500011,-90,0\n"
-
-
-def pair(folder: Path, joints: str = JOINTS, points: str = POINTS) -> tuple[Path, Path]:
-    paths = folder / "joints.csv", folder / "points.csv"
-    for path, text in zip(paths, (joints, points), strict=True):
-        path.write_text(text)
-    return paths
-
-
-def test_two_tables_are_joined_by_what_both_say(tmp_path: Path) -> None:
-    joints, points = pair(tmp_path)
-    kept = {"before": "T", "after": "T of points.csv"}
-    found = import_table(joints, plan(second=points, on="nr=point", keep=kept))
-    pd.testing.assert_frame_equal(
-        found.frame,
-        pd.DataFrame(
-            {
-                "q1": [np.pi / 2, -np.pi / 2], "q2": [np.pi / 4, 0.0], "x": [1.0, 1.5], "y": [2.0, 2.5],
-                "z": [3.0, 3.5], "before": [20.0, 21.0], "after": [31.0, 30.0],
-            }
-        ),
-    )  # fmt: skip
-    assert found.unused == []
-    assert found.left_out == [
-        f'1 row of {joints} (nr "3"), as they are not in the other table',
-        f'1 row of {points} (point "7.0"), as they are not in the other table',
-    ]
-
-
-def test_keys_are_what_they_say_and_no_numbers(tmp_path: Path) -> None:
-    """Point 10 of station 1 is not point 1, whatever 1.10 is as a number; 007 is 7."""
-    joints = "id,J1,J2\n1.1,10,1\n1.2,20,2\n007,30,3\n"
-    points = "id,px,py,pz\n1.10,0,0,0\n1.2,2,2,2\n7,3,3,3\n"
-    found = import_table(pair(tmp_path, joints, points)[0], plan(second=tmp_path / "points.csv", on="id"))
-    assert found.frame["x"].tolist() == [0.002, 0.003]
-
-
-def test_each_table_has_its_own_marks(tmp_path: Path) -> None:
-    points = "Station 1\n" + POINTS.replace(".0,", "|").replace(",", ";").replace("|", ";").replace(
-        "1500;", "1500,5;"
-    )
-    joints, second = pair(tmp_path, points=points)
-    marks = Marks(delimiter=";", decimal=",", skip_lines=1)
-    found = import_table(joints, plan(second=second, second_marks=marks, on="nr=point"))
-    assert found.frame["x"].tolist() == [1.0, 1.5005]
-
-
 def test_rows_in_which_nothing_was_measured_are_left_out(tmp_path: Path) -> None:
     text = PLAIN + "10,20,n/a,n/a,n/a\n"
     found = import_table(write(tmp_path, text), plan(missing=("n/a",)))
@@ -360,151 +281,16 @@ def test_rows_in_which_nothing_was_measured_are_left_out(tmp_path: Path) -> None
     assert "nothing was measured" in found.left_out[0]
 
 
-def test_errors_name_the_row_of_the_file(tmp_path: Path) -> None:
-    joints, points = pair(tmp_path, points=POINTS.replace("2000", "two"))
-    with pytest.raises(InputError, match=r'points.csv: column "py" holds "two" in row 2'):
-        import_table(joints, plan(second=points, on="nr=point"))
-
-
-def test_columns_that_both_have_are_not_guessed(tmp_path: Path) -> None:
-    joints, points = pair(tmp_path, "q1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n", "x_mm,y_mm,z_mm\n6,7,8\n")
-    both = ImportPlan(second=points)
-    either = '--map "x=x_mm:mm" or --map "x=x_mm of points.csv:mm"'
-    with pytest.raises(UsageError, match=f'are all "x". Say which is meant: {either}'):
-        import_table(joints, both)
-    mapped = {axis: f"{axis}_mm of points.csv:mm" for axis in "xyz"}
-    assert import_table(joints, ImportPlan(columns=mapped, second=points)).frame["y"].tolist() == [0.007]
-    with pytest.raises(UsageError, match='column "px" is taken for two of ours'):
-        import_table(write(tmp_path, PLAIN), plan(columns={**COLUMNS, "y": "px"}))
-
-
-def test_a_column_with_a_unit_and_one_without_are_not_guessed(tmp_path: Path) -> None:
-    joints, points = pair(tmp_path, "q1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n", "x,y,z\n6,7,8\n")
-    with pytest.raises(UsageError, match='"x_mm:mm" and "x" are all "x"'):
-        import_table(joints, ImportPlan(second=points, length_unit="mm"))
-
-
 def test_blanks_within_quotes_stay(tmp_path: Path) -> None:
     text = 'J1 J2  px py pz "a  note"\n90 45   1000 2000 3000 "as  is"\n'
     kept = import_table(write(tmp_path, text), plan(delimiter=" ", keep={"note": "a  note"}))
     assert kept.frame["note"].tolist() == ["as  is"]
 
 
-def test_what_is_kept_of_the_keys_is_text(tmp_path: Path) -> None:
-    joints = JOINTS.replace("\n1,", "\n1.1,").replace("\n2,", "\n1.10,")
-    points = POINTS.replace("1.0,", "1.1,").replace("2.0,", "1.10,")
-    found = import_table(
-        pair(tmp_path, joints, points)[0],
-        plan(second=tmp_path / "points.csv", on="nr=point", keep={"nr": "nr"}),
-    )
-    assert found.frame["nr"].tolist() == ["1.1", "1.10"]
-
-
-def test_columns_that_tell_no_rows_apart_may_differ(tmp_path: Path) -> None:
-    joints = "side,J1,J2\nleft,90,45\nleft,-90,0\nright,10,20\n"
-    points = "side,px,py,pz\nright,1,1,1\nleft,2,2,2\nleft,3,3,3\n"
-    found = import_table(pair(tmp_path, joints, points)[0], plan(second=tmp_path / "points.csv"))
-    assert found.frame["x"].tolist() == [0.001, 0.002, 0.003]
-
-
-def test_a_user_says_how_each_table_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    joints = tmp_path / "joints.csv"
-    joints.write_text("# made by hand\n" + JOINTS)
-    points = tmp_path / "points.txt"
-    points.write_bytes(
-        "Prüfling\npoint;px;py;pz\n1;1000,5;2000;3000\n# lost\n2;1500;2500;3500\n".encode("cp1252")
-    )
-    mapped = [word for ours, theirs in COLUMNS.items() for word in ("--map", f"{ours}={theirs}")]
-    options = [*mapped, "--joint-unit", "deg", "--length-unit", "mm", "--comment", "#", "--json"]
-    command = ["import", str(joints), "-o", str(tmp_path / "m.csv"), "--on", "nr=point", *options]
-    other = [
-        "--with-delimiter",
-        ";",
-        "--with-decimal",
-        ",",
-        "--with-skip-lines",
-        "1",
-        "--with-encoding",
-        "cp1252",
-    ]
-    assert main([*command, "--with", str(points), *other]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert pd.read_csv(tmp_path / "m.csv")["x"].tolist() == [1.0005, 1.5]
-    assert told["rows_left_out"] == [f'1 row of {joints} (nr "3"), as they are not in the other table']
-    assert told["remarks"] == [f"1 line of {path}, as remarks" for path in (joints, points)]
-    for wrong, words in (
-        ([*other], "--with-...: there is one table only"),
-        (["--with", str(points), "--with", str(joints)], "--with: more than two tables"),
-        (["--with", str(points), *other[2:]], "If so, give --with-delimiter"),
-        (["--with", str(points), "--with-delimiter", "ab"], "--with-delimiter: "),
-        (["--with", str(points), "--with-decimal", ";"], "--with-decimal: "),
-        (["--with", str(points), "--comment", ""], "--comment: "),
-    ):
-        assert main([*command, *wrong]) == 2
-        assert words in " ".join(capsys.readouterr().err.split())
-
-
 def test_a_mark_of_utf_8_is_believed(tmp_path: Path) -> None:
     path = write(tmp_path, "\ufeff" + PLAIN)
     with pytest.raises(UsageError, match="its first bytes say that it is UTF-8, not cp1252"):
         import_table(path, plan(encoding="cp1252"))
-
-
-def test_two_tables_are_joined_row_by_row(tmp_path: Path) -> None:
-    joints, points = pair(tmp_path)
-    found = import_table(joints, plan(second=points))
-    assert found.frame["x"].tolist() == [1.5, 1.0, 0.0]
-    assert found.unused == ["nr", "T", "point", "T of points.csv"]
-
-
-@pytest.mark.parametrize(
-    ("joints", "points", "on", "message"),
-    [
-        (JOINTS, POINTS + "8,1,1,1,1\n", None, "3 rows, and 4 in .*points.csv. .*--on COLUMN"),
-        (JOINTS, POINTS, "nr", 'points.csv: there is no column "nr"'),
-        (JOINTS, POINTS, "Nr=point", 'joints.csv: there is no column "Nr". Did you mean "nr"'),
-        (
-            JOINTS,
-            POINTS.replace("7.0", "2"),
-            "nr=point",
-            'column "point" says "2.0" in row 1 and "2" in row 3',
-        ),
-        (JOINTS.replace("nr", "point"), POINTS, None, '"point" says "1" in row 1, and "2" in .*--on point'),
-        (
-            STAMPS,
-            STAMPS.replace("J", "p").replace("001,", "002,").replace("011,", "012,"),
-            "t",
-            'no value of "t" is in "t"',
-        ),
-        (JOINTS.replace("\n3", "\n"), POINTS, "nr=point", 'column "nr" is empty in row 3'),
-        (JOINTS, POINTS, "T", 'no value of "T" is in "T" of .*begins with "20", the other with "30"'),
-    ],
-)
-def test_tables_that_cannot_be_joined_are_explained(
-    tmp_path: Path, joints: str, points: str, on: str | None, message: str
-) -> None:
-    first, second = pair(tmp_path, joints, points)
-    with pytest.raises(InputError, match=message):
-        import_table(first, plan(second=second, on=on))
-
-
-def test_a_column_to_join_by_asks_for_a_second_table(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--on: there is one table only. Name the other: --with FILE"):
-        import_table(write(tmp_path, PLAIN), plan(on="nr"))
-
-
-def test_a_user_joins_two_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    joints, points = pair(tmp_path)
-    output = tmp_path / "m.csv"
-    mapped = [word for ours, theirs in COLUMNS.items() for word in ("--map", f"{ours}={theirs}")]
-    options = [*mapped, "--joint-unit", "deg", "--length-unit", "mm"]
-    command = ["import", str(joints), "--with", str(points), "--on", "nr=point", *options, "-o"]
-    assert main([*command, str(output)]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert '(nr "3"), as they are not in the other table.' in said
-    assert len(pd.read_csv(output)) == 2
-    assert main([*command, str(points)]) == 2
-    assert points.read_text() == POINTS
 
 
 @pytest.mark.parametrize(
