@@ -478,7 +478,7 @@ def test_a_target_that_no_held_out_row_holds_is_said():
     held = np.random.default_rng(7).permutation(60)[42:]
     table.loc[held, ["x", "y", "z"]] = np.nan
     with pytest.raises(ta.InputError, match="target 1 was measured in none of 18 rows"):
-        ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+        ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant", use="position")
 
 
 def test_points_and_orientations_may_be_missing_here_and_there():

@@ -202,6 +202,24 @@ def test_several_targets_of_which_some_were_not_measured_move_together(measured)
     assert np.corrcoef(rows.moved[:, 2], warming(ROWS)[rows.data.rows - 1, 2])[0, 1] > 0.9
 
 
+def test_errors_are_told_at_the_first_target_that_a_row_holds(measured):
+    """Where each row holds one of three, all rows are judged."""
+    arm, steady, _ = measured
+    points = np.full((ROWS, 3, 3), np.nan)
+    which = np.arange(ROWS) % 3
+    tools = np.array([[0.0, 0.0, 0.0], [0.05, 0.0, 0.02], [0.0, 0.06, 0.03]])
+    turns = np.array([arm.robot.pose(row[None])[0, :3, :3] for row in steady.readings])
+    shifts = np.einsum("nij,nj->ni", arm.world_from_base[:3, :3] @ turns, tools[which])
+    points[np.arange(ROWS), which] = steady.targets[:, 0] + shifts
+    spread = replace(steady, targets=points)
+    found = ta.calibrate(arm.robot, spread, refit=False)
+    alone = ta.calibrate(arm.robot, steady, refit=False)
+    held, errors = found.validation.n_holdout, found.validation.holdout["variable"].position
+    assert held == alone.validation.n_holdout
+    assert errors.mean < errors.rms < errors.max
+    assert errors.mean < 1.5 * held_mean(alone)
+
+
 def test_what_is_left_in_is_what_an_evaluation_finds(measured):
     """Of the held-out rows as they were measured, with frames and targets as they are."""
     arm, _, data = measured

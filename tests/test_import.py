@@ -162,6 +162,17 @@ def test_a_table_without_a_header_is_given_names(tmp_path: Path, delimiter: str 
     assert found.unused == []
 
 
+def test_rows_of_one_target_each(tmp_path: Path) -> None:
+    text = "J1,J2,px,py,pz,nest\n90,45,1,2,3,3\n-90,0,4,5,6,1\n0,10,7,8,9,3\n"
+    columns = {**COLUMNS, "target": "nest"}
+    found = import_table(write(tmp_path, text), plan(columns=columns, length_unit="m"))
+    assert list(found.frame) == ["q1", "q2", "x", "y", "z", "x2", "y2", "z2", "x3", "y3", "z3"]
+    assert found.unused == []
+    points = Measurements.from_dataframe(found.frame).targets
+    assert np.argwhere(np.isfinite(points).all(axis=2)).tolist() == [[0, 2], [1, 0], [2, 2]]
+    np.testing.assert_array_equal(points[[0, 1, 2], [2, 0, 2]], [[1, 2, 3], [4, 5, 6], [7, 8, 9]])
+
+
 BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "semicolons": (PLAIN.replace(",", ";"), {}, 'separated by semicolons. If so, give --delimiter ";"'),
     "tabs": (PLAIN.replace(",", "\t"), {}, "separated by tabs. If so, give --delimiter tab"),
@@ -215,6 +226,16 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         PLAIN,
         {"names": ("a", "b", "c", "d", "e")},
         'first line .* is "J1,pz".*--skip-lines 1',
+    ),
+    "half a target": (
+        PLAIN.replace("J1", "n,J1").replace("\n9", "\n1,9").replace("\n-", "\n1.5,-"),
+        {"columns": {**COLUMNS, "target": "n"}},
+        "the target of row 2 is 1.5. Targets are counted from 1",
+    ),
+    "targets twice": (
+        PLAIN.replace("J1", "n,x2,J1").replace("\n9", "\n1,0,9").replace("\n-", "\n1,0,-"),
+        {"columns": {**COLUMNS, "target": "n"}},
+        "columns of several points.*says of which target",
     ),
     "a name too little": (NUMBERS, {"names": ("J1", "")}, 'a name is missing. "-" leaves a column out'),
     "page": ("<html></html>", {}, "an HTML page"),

@@ -7,11 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import truearm as ta
 from tests.import_support import COLUMNS, PLAIN, plan, write
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
 from truearm.importing import ImportPlan, import_table
 from truearm.raw_tables import Marks
+from truearm.simulation import VirtualArm
 
 
 def test_the_command_names_columns_of_both_tables(tmp_path: Path) -> None:
@@ -190,6 +192,26 @@ def test_tables_that_cannot_be_joined_are_explained(
 def test_a_column_to_join_by_asks_for_a_second_table(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--on: there is one table only. Name the other: --with FILE"):
         import_table(write(tmp_path, PLAIN), plan(on="nr"))
+
+
+def test_a_target_that_was_never_measured_takes_no_part(tmp_path: Path) -> None:
+    """Reflectors numbered 2 and 3, one a row."""
+    arm = VirtualArm.paper(seed=2)
+    data = arm.measure(arm.poses(60))
+    frame = pd.DataFrame(data.readings, columns=[f"q{k + 1}" for k in range(5)])
+    frame[["x", "y", "z"]] = data.targets[:, 0]
+    frame["nest"] = 2 + np.arange(60) % 2
+    frame.to_csv(tmp_path / "raw.csv", index=False)
+    stated = ImportPlan(columns={"target": "nest"}, joint_unit="rad", length_unit="m")
+    found = import_table(tmp_path / "raw.csv", stated)
+    points = ta.Measurements.from_dataframe(found.frame, joints=arm.robot.joints)
+    calibration = ta.calibrate(arm.robot, points, model="constant")
+    assert calibration.validation.n_holdout == 18
+    position = calibration.validation.holdout["constant"].position
+    assert (
+        position.mean
+        < 1.2 * ta.calibrate(arm.robot, data, model="constant").validation.holdout["constant"].position.mean
+    )
 
 
 def test_a_user_joins_two_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

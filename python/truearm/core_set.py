@@ -66,6 +66,21 @@ def select(data: Measurements, use: Use | None, judge_target: int = FIRST_TARGET
     return Selection(targets, orientation=use == "pose", judge=judge)
 
 
+def first_measured(data: Measurements, selection: Selection) -> Rows:
+    """Which of the fitted targets, by its place among them, is the first that was measured in each row (n,).
+
+    It is where the row's error is told; 0 where none was measured.
+    """
+    seen = np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2)
+    return np.asarray(seen.argmax(axis=1))
+
+
+def most_measured(data: Measurements, selection: Selection) -> int:
+    """The fitted target, an index from 0, that most rows hold."""
+    held = np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2).sum(axis=0)
+    return selection.targets[int(held.argmax())]
+
+
 def core_set(
     robot: Robot,
     data: Measurements,

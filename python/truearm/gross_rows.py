@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
+from truearm.core_set import first_measured
 from truearm.errors import Notice, WorkError, list_outliers
 from truearm.fitting import Task
 from truearm.held_rows import HeldRows
@@ -67,17 +68,23 @@ class Expected:
 
     @cached_property
     def errors(self) -> Floats:
-        """Measured minus predicted (n, 3) at the first target, base frame, m; NaN where not measured."""
+        """Measured minus predicted (n, 3) at the first target of each row, base frame, m; NaN where none."""
         task, setup = self.task, self.model.setup
         return row_errors(task.arm, self.data, task.selection, task.groups, self.parameters, setup).position
 
     @cached_property
+    def tools(self) -> Floats:
+        """Points (n, 3) on the flange at which the rows are judged, m."""
+        numbers = [self.task.groups.index(name) for name in self.data.group]
+        return self.model.setup.targets[numbers, first_measured(self.data, self.task.selection)]
+
+    @cached_property
     def jacobian(self) -> Floats:
-        """Derivatives (n, 3, p) of the first target by motions of base and tool, as far as they are found."""
+        """Derivatives (n, 3, p) of these targets by motions of base and tool, as far as they are found."""
         joints = self.task.arm.robot.joints_from_readings(self.data.readings)
         flange = self.task.arm.flange_chain.pose(joints, np.ascontiguousarray(self.parameters))
-        turned, numbers = flange[:, :3, :3], [self.task.groups.index(name) for name in self.data.group]
-        points = flange[:, :3, 3] + np.einsum("nij,nj->ni", turned, self.model.setup.targets[numbers, 0])
+        turned = flange[:, :3, :3]
+        points = flange[:, :3, 3] + np.einsum("nij,nj->ni", turned, self.tools)
         parts = [rigid_motion(points)] if self.finds_frame else []
         parts += [turned] if self.finds_tool else []
         return np.concatenate(parts, axis=2) if parts else np.empty((len(points), AXES, 0))
@@ -92,7 +99,7 @@ class Expected:
         noise = noise_mm(self.calibration) / MM_PER_METRE
         squares = AXES * (noise**2 + own**2)
         reading = self.data.readings[row : row + 1]
-        tool = self.model.setup.targets[self.task.groups.index(self.data.group[row]), 0]
+        tool = self.tools[row]
         names = self.task.options.features
         features = {name: self.data.features[name].to_numpy()[row : row + 1] for name in names}
         try:

@@ -19,6 +19,10 @@ from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
 Floats = NDArray[np.float64]
 
 UNITS: Final = STATED_LENGTH_UNITS + ANGLE_UNITS
+WHICH: Final = "target"
+"""Which of several points on the tool was measured in a row, from 1, where x, y, z are of one each."""
+POINT: Final = ("x", "y", "z")
+MOST_TARGETS: Final = 100
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,8 @@ class ImportPlan:
 
     Attributes:
         columns: Their column of each of ours (q1, x, x2, sigma, group, ...); a unit may stand behind
-            it, as in "J1:deg". Columns that have our names already need not be named.
+            it, as in "J1:deg". Columns that have our names already need not be named. "target" is the column
+            that says by a number from 1 which point on the tool x, y, z are of in each row.
         keep: Their column, with or without unit, of each further column to keep.
         rotation: Columns of the orientation, unless they are qw, qx, qy, qz in `columns`.
         joint_unit: Unit of joints whose column states none: "rad" or "deg".
@@ -107,12 +112,45 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
             rule=f"They are {', '.join(table.names)}",
             way_out="Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on",
         )
+    if WHICH in columns:
+        columns = _by_target(columns, table)
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
     without = ", rows without a measurement left out" if empty else ""
     Measurements.from_dataframe(frame, name=f"{table.where}{without}")
     alone = [f"{rows}, as they are not in the other table" for rows in table.alone]
     remarks = [f"{lines}, as remarks" for lines in table.remarks]
     return Imported(frame, _unused(table, named, plan), [*alone, *empty], remarks)
+
+
+def _by_target(
+    columns: Mapping[str, Floats | NDArray[np.str_]], table: RawTable
+) -> dict[str, Floats | NDArray[np.str_]]:
+    """Columns of points with those of further targets: x2, y2, z2 for rows whose target is 2, and so on."""
+    which = np.asarray(columns[WHICH], dtype=np.float64)
+    others = {name: values for name, values in columns.items() if name != WHICH}
+    several = [name for name in others if TARGET.fullmatch(name) and name not in POINT]
+    if several or not set(POINT) <= set(others):
+        raise UsageError(
+            f"there {'are columns of several points' if several else 'is no point'}",
+            where=table.where,
+            rule=f'"{WHICH}" says of which target x, y, z are',
+        )
+    wrong = ~np.isin(which, np.arange(1, MOST_TARGETS + 1))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(
+            f"the target of row {row + 1} is {which[row]:g}",
+            where=table.where,
+            rule=f"Targets are counted from 1, to {MOST_TARGETS} at the most",
+        )
+    spread = {}
+    for number in range(1, int(which.max()) + 1):
+        for axis in POINT:
+            spread[axis if number == 1 else f"{axis}{number}"] = np.where(
+                which == number, others[axis], np.nan
+            )
+    joints = {name: values for name, values in others.items() if JOINT.fullmatch(name)}
+    return joints | spread | {name: values for name, values in others.items() if name not in joints | spread}
 
 
 def _with_measurements(frame: pd.DataFrame, table: RawTable) -> tuple[pd.DataFrame, list[str]]:
@@ -185,7 +223,7 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
     """
     _, unit = _split_unit(table, theirs)
     known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else STATED_LENGTH_UNITS
-    if ours in WORDS + QUATERNION:
+    if ours in (*WORDS, *QUATERNION, WHICH):
         known = ()
     if unit and unit not in known:
         kind = f"has one of the units {', '.join(known)}" if known else "has no unit"
@@ -244,10 +282,10 @@ def _split_unit(table: RawTable, theirs: str) -> tuple[str, str]:
 
 
 def _check_is_ours(ours: str) -> None:
-    if _is_ours(ours):
+    if _is_ours(ours) or ours == WHICH:
         return
     bare, _, unit = ours.rpartition("_")
-    known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "distance", *WORDS]
+    known = ["q1", "x", "y", "z", "x2", *QUATERNION, "sigma", "distance", WHICH, *WORDS]
     rule = did_you_mean(ours, known) or f"Known are {list_names(known)} and their like"
     way_out = "Further columns are kept with --keep"
     if unit in UNITS and _is_ours(bare):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, Setup, residuals
-from truearm.core_set import Selection, core_set
+from truearm.core_set import Selection, core_set, first_measured
 from truearm.details import DriftDetails
 from truearm.errors import InputError, count_of
 from truearm.identified import IdentifiedArm
@@ -73,7 +73,8 @@ class RowErrors:
     """Errors of one model, row by row, measured minus predicted in the base frame; NaN where not measured.
 
     Attributes:
-        position: At the judged target (n, 3), m; of distances (d, 1).
+        position: At the judged target (n, 3), m, of several fitted ones at the first that a row holds; of
+            distances (d, 1).
         orientation: Rotation vectors (n, 3), rad; None where orientation took no part.
     """
 
@@ -185,35 +186,46 @@ def row_errors(
     parameters: Floats,
     setup: Setup,
 ) -> RowErrors:
-    """Errors of a model at the first target of the set-up and, if selected, of the orientation.
+    """Errors of a model at the first target that each row holds and, if selected, of the orientation.
 
     Args:
         arm: The arm.
         data: Rows to judge, n of them.
-        selection: What was fitted; its first target is judged.
+        selection: What was fitted; the first of its targets that was measured in a row is judged there.
         groups: Names of the set-ups, in the order of `setup`.
         parameters: Parameters (L, 5), or (n, L, 5) of each row.
         setup: Frames and targets of the groups.
 
     Raises:
-        InputError: If no row holds the target.
+        InputError: If no row holds a target.
     """
     problem = Problem(arm.flange_chain, core_set(arm.robot, data, selection, groups), [], arm.world_is_known)
     left = residuals(problem, np.ascontiguousarray(parameters), setup)
     if selection.distances:
-        return RowErrors(left[:, :1].copy())
-    seen = np.isfinite(data.targets[:, selection.targets[0]]).all(axis=1)
+        return RowErrors(at_first_measured(left, data, selection))
+    seen = np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
     if not seen.any():
         raise InputError(
             f"target {selection.targets[0] + 1} was measured in none of {len(data)} rows to judge",
             where=", ".join(data.files),
             way_out="Judge at another target, or measure it at more poses",
         )
-    position = _where_seen(np.asarray(seen), left[:, :3])
+    position = _where_seen(np.asarray(seen.any(axis=1)), at_first_measured(left, data, selection))
     if not selection.orientation or data.orientations is None:
         return RowErrors(position)
     turned = np.isfinite(data.orientations).all(axis=1)
     return RowErrors(position, _where_seen(np.asarray(turned), left[:, -3:]))
+
+
+def at_first_measured(residuals: Floats, data: Measurements, selection: Selection) -> Floats:
+    """Of residuals (n, m), three columns a fitted target, those of the first that each row holds (n, 3).
+
+    Of distances (n, 1) the whole.
+    """
+    if selection.distances:
+        return residuals[:, :1].copy()
+    points = residuals[:, : 3 * len(selection.targets)].reshape(len(data), -1, 3)
+    return points[np.arange(len(data)), first_measured(data, selection)]
 
 
 def _where_seen(seen: NDArray[np.bool_], errors: Floats) -> Floats:

@@ -14,6 +14,7 @@ from truearm.reporting.numbers import listed, short
 from truearm.reporting.parts import Figure
 from truearm.reporting.style import colour_of, marker_of
 from truearm.units import MM_PER_METRE
+from truearm.validation import at_first_measured
 
 Floats = NDArray[np.float64]
 
@@ -46,7 +47,8 @@ def _drift(
     place = np.arange(1.0, len(own) + 1.0)
     moved = MM_PER_METRE * moved_m[own]
     frame = facts.calibration.model.setup.frames[facts.calibration.groups.index(group), :3, :3]
-    left = moved + MM_PER_METRE * rows.residual[own, :3] @ frame.T
+    residual = at_first_measured(rows.residual[own], rows.data.select(own), facts.calibration.selection)
+    left = moved + MM_PER_METRE * residual @ frame.T
     traces = []
     for k, (name, manner) in enumerate(COORDINATES):
         _, middles, medians = running_median(place, left[:, k], BINS, FEWEST)

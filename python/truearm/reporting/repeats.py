@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.core_set import most_measured
 from truearm.errors import count_of
 from truearm.reporting.charts import axis
 from truearm.reporting.drifts import drifts
@@ -42,12 +43,14 @@ class Repeats:
 
     @classmethod
     def of(cls, facts: Facts) -> "Repeats | None":
-        """Those of the rows that were fitted, judged points that were measured; None where there are none."""
+        """Those of the rows that were fitted, at the target that most hold; None where there are none."""
         rows, selection = facts.calibration.rows, facts.calibration.selection
         if rows is None or selection.distances:
             return None
         data = rows.data
-        seen = np.flatnonzero(np.isfinite(data.targets[:, selection.targets[0]]).all(axis=1))
+        target = most_measured(data, selection)
+        first = 3 * selection.targets.index(target)
+        seen = np.flatnonzero(np.isfinite(data.targets[:, target]).all(axis=1))
         order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
         approach = np.zeros((len(order), data.joint_count))
         for source in data.files:
@@ -59,7 +62,7 @@ class Repeats:
         again = np.bincount(place)[place] > 1
         if not again.any():
             return None
-        return cls(place[again], rows.residual[order][again, :3], approach[again])
+        return cls(place[again], rows.residual[order][again, first : first + 3], approach[again])
 
     def distances_mm(self) -> Floats:
         """Distance of each row from the centre of its pose (n,), mm, as unbiased as n rows a pose allow."""

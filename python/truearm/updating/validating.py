@@ -14,7 +14,7 @@ from truearm.measurements import Measurements
 from truearm.models import NOMINAL, ArmModel
 from truearm.updating.estimating import Estimate, folds, left_out
 from truearm.updating.scene import Scene
-from truearm.validation import RowErrors, row_errors
+from truearm.validation import RowErrors, at_first_measured, row_errors
 
 Floats = NDArray[np.float64]
 
@@ -40,11 +40,11 @@ def left_out_errors(
 
 
 def errors_at_left_out(scene: Scene, found: Estimate, spread: Floats, free: NDArray[np.bool_]) -> RowErrors:
-    """Errors of the model that predicts: of the first target, and of the orientation."""
+    """Errors of the model that predicts: of the first target that each row holds, and of the orientation."""
     left = np.full(scene.seen.shape, np.nan)
     left[scene.seen] = left_out(found.linear, spread, scene.unknowns.std, free)
     turned = left[:, -TURN:] if scene.task.selection.orientation else None
-    return RowErrors(left[:, :TURN], turned)
+    return RowErrors(at_first_measured(left, scene.data, scene.task.selection), turned)
 
 
 def _others(name: str, model: ArmModel, scene: Scene, found: Estimate, spread: Floats) -> RowErrors:
