@@ -225,18 +225,19 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "names and a header": (
         PLAIN,
         {"names": ("a", "b", "c", "d", "e")},
-        'first line .* is "J1,pz".*--skip-lines 1',
+        'first line .* holds no number: "J1,J2,px,py,pz".*--skip-lines 1',
     ),
     "half a target": (
         PLAIN.replace("J1", "n,J1").replace("\n9", "\n1,9").replace("\n-", "\n1.5,-"),
         {"columns": {**COLUMNS, "target": "n"}},
-        "the target of row 2 is 1.5. Targets are counted from 1",
+        "the target of row 2 is 1.5. Targets are counted from 1.*leave the point of this row empty",
     ),
     "targets twice": (
         PLAIN.replace("J1", "n,x2,J1").replace("\n9", "\n1,0,9").replace("\n-", "\n1,0,-"),
         {"columns": {**COLUMNS, "target": "n"}},
         "columns of several points.*says of which target",
     ),
+    "no names": (NUMBERS, {"names": ("-",) * 6}, "all columns are left out. Name those to bring in"),
     "a name too little": (NUMBERS, {"names": ("J1", "")}, 'a name is missing. "-" leaves a column out'),
     "page": ("<html></html>", {}, "an HTML page"),
     "empty": ("", {}, "the file is empty"),

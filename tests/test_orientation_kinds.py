@@ -73,6 +73,7 @@ def test_every_order_of_a_quaternion_is_recognised():
         ("ZYZ", "ZYX"),
         ("XYZ", "rotation vector"),
         ("rotation vector", "XYZ"),
+        ("rotation vector", "zyx"),
     ],
 )
 def test_angles_of_another_kind_are_recognised(meant, taken):
@@ -88,15 +89,11 @@ def test_angles_of_another_kind_are_recognised(meant, taken):
         check_turns(wrong, robot)
 
 
-@pytest.mark.parametrize("kind", ["XYZ", "zyx", "ZXZ", VECTOR])
-def test_other_kinds_of_numbers_hold_their_twins(kind):
-    """The numbers of a kind in the opposite order are those of its twin."""
+@pytest.mark.parametrize("order", ["XYZ", "zyx", "ZXZ"])
+def test_angles_in_the_opposite_order_are_those_of_the_twin(order):
     angles = np.random.default_rng(2).uniform(-1.0, 1.0, (5, 3))
-    if kind == VECTOR:
-        assert twin(kind) == kind
-    else:
-        twins = quaternion_from_euler(angles[:, ::-1], twin(kind))
-        assert quaternion_from_euler(angles, kind) == pytest.approx(twins)
+    twins = quaternion_from_euler(angles[:, ::-1], twin(order))
+    assert quaternion_from_euler(angles, order) == pytest.approx(twins)
 
 
 def test_orientations_in_an_unknown_convention_are_doubted():

@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.core_set import most_measured
 from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.measurements import Measurements
@@ -100,7 +99,7 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     """
     if task.selection.distances:
         return []
-    target, robot = most_measured(data, task.selection), task.arm.robot
+    target, robot = data.most_held(task.selection.targets), task.arm.robot
     rows = _some_rows(task, data, target)
     if len(rows) < FEWEST_ROWS:
         return []

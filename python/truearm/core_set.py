@@ -75,12 +75,6 @@ def first_measured(data: Measurements, selection: Selection) -> Rows:
     return np.asarray(seen.argmax(axis=1))
 
 
-def most_measured(data: Measurements, selection: Selection) -> int:
-    """The fitted target, an index from 0, that most rows hold."""
-    held = np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2).sum(axis=0)
-    return selection.targets[int(held.argmax())]
-
-
 def core_set(
     robot: Robot,
     data: Measurements,

@@ -114,7 +114,7 @@ class DriftDetails:
     @property
     def words(self) -> str:
         """What was taken out, and what the errors would be without that."""
-        spans = ", ".join(f"{group} moved by {self.way(group)}" for group in self.moved_mm)
+        spans = "; ".join(f"{group} moved by {self.way(group)}" for group in self.moved_mm)
         means = ", ".join(f"{name} {mean:.3f}" for name, mean in self.left_in_mean_mm.items())
         return (
             f"What the set-up moved while it was measured is taken out ({spans}). With it left in, the means "

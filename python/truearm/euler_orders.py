@@ -14,7 +14,7 @@ from truearm.rotations import quaternion_from_euler, quaternion_from_rotation_ve
 Floats = NDArray[np.float64]
 
 USUAL: Final = ("XYZ", "ZYX", "ZYZ", "ZXZ")
-ORDERS: Final = ("".join(axes) for axes in product("XYZ", repeat=3) if axes[0] != axes[1] != axes[2])
+ORDERS: Final = tuple("".join(axes) for axes in product("XYZ", repeat=3) if axes[0] != axes[1] != axes[2])
 MOVING: Final = tuple(dict.fromkeys([*USUAL, *ORDERS]))
 FIXED: Final = tuple(order.lower() for order in MOVING)
 VECTOR: Final = "rotation vector"
@@ -26,7 +26,7 @@ def otherwise_read(quaternions: Floats) -> Iterator[tuple[str, str, Floats]]:
 
     About fixed axes the same turns have their angles in the opposite order (`twin`), so that moving axes
     stand for both in what the numbers were taken for, the usual ones first. Several numbers give one turn:
-    both sets of Euler angles are tried, and rotation vectors of more than half a turn.
+    both sets of Euler angles are tried, each for all orientations, and rotation vectors beyond half a turn.
 
     Yields:
         What they were taken for, and what they are then: "XYZ" about moving axes, "xyz" about fixed ones, or
@@ -40,11 +40,19 @@ def otherwise_read(quaternions: Floats) -> Iterator[tuple[str, str, Floats]]:
                     yield taken, meant, quaternion_from_euler(numbers, meant)
             if taken != VECTOR:
                 yield taken, VECTOR, quaternion_from_rotation_vector(numbers)
+                yield twin(taken), VECTOR, quaternion_from_rotation_vector(numbers[:, ::-1])
 
 
-def twin(kind: str) -> str:
-    """The kind that makes the same orientations of the same numbers in the opposite order."""
-    return kind if kind == VECTOR else kind[::-1].swapcase()
+def with_twin(taken: str, meant: str) -> list[tuple[str, str]]:
+    """A way to read numbers otherwise, and the one that is the same for numbers in the opposite order."""
+    if VECTOR in (taken, meant):
+        return [(taken, meant)]
+    return [(taken, meant), (twin(taken), twin(meant))]
+
+
+def twin(order: str) -> str:
+    """The order of Euler angles that makes the same of the same numbers in the opposite order."""
+    return order[::-1].swapcase()
 
 
 def _numbers(rotation: Rotation, kind: str) -> tuple[Floats, Floats]:

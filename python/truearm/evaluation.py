@@ -44,7 +44,8 @@ class EvaluationOptions:
         frame_rows: Rows of each set-up that find its frame and tool; a third by default, 400 at most.
         keep_tool: Whether the tool stays as it was calibrated, so that the rows find the frame alone.
         keep_frames: Whether the set-ups are those of the calibration, so that all rows are judged.
-        judge_target: Measured target, from 1, at which errors are judged.
+        judge_target: Measured target, from 1, at which errors are judged. Where several were fitted, a row
+            without the first is judged at the next that it holds.
     """
 
     seed: int = SEED

@@ -95,8 +95,11 @@ def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:
 
 
 def _marks(data: Measurements) -> list[bytes]:
-    """What tells each row (n,) from others: its readings, and its first point if there is one."""
-    return [row.tobytes() for row in np.hstack([data.readings, data.targets[:, :1].reshape(len(data), -1)])]
+    """What tells each row (n,) from others: its readings and its points, up to the last that it holds."""
+    points = data.targets.reshape(len(data), -1)
+    counts = (np.isfinite(points) * np.arange(1, points.shape[1] + 1)).max(axis=1, initial=0)
+    rows = zip(data.readings, points, counts.tolist(), strict=True)
+    return [readings.tobytes() + own[:count].tobytes() for readings, own, count in rows]
 
 
 def sides(count: int, split: Split) -> NDArray[np.int64]:

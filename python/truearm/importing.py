@@ -31,8 +31,8 @@ class ImportPlan:
 
     Attributes:
         columns: Their column of each of ours (q1, x, x2, sigma, group, ...); a unit may stand behind
-            it, as in "J1:deg". Columns that have our names already need not be named. "target" is the column
-            that says by a number from 1 which point on the tool x, y, z are of in each row.
+            it, as in "J1:deg". Columns that have our names already need not be named, but for "target": the
+            column that says by a number from 1 which point on the tool x, y, z are of in each row.
         keep: Their column, with or without unit, of each further column to keep.
         rotation: Columns of the orientation, unless they are qw, qx, qy, qz in `columns`.
         joint_unit: Unit of joints whose column states none: "rad" or "deg".
@@ -112,7 +112,7 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
             rule=f"They are {', '.join(table.names)}",
             way_out="Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on",
         )
-    if WHICH in columns:
+    if WHICH in plan.columns:
         columns = _by_target(columns, table)
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
     without = ", rows without a measurement left out" if empty else ""
@@ -135,16 +135,18 @@ def _by_target(
             where=table.where,
             rule=f'"{WHICH}" says of which target x, y, z are',
         )
-    wrong = ~np.isin(which, np.arange(1, MOST_TARGETS + 1))
+    measured = np.isfinite(np.column_stack([others[axis] for axis in POINT]).astype(np.float64)).any(axis=1)
+    wrong = measured & ~np.isin(which, np.arange(1, MOST_TARGETS + 1))
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(
-            f"the target of row {row + 1} is {which[row]:g}",
+            f"the target of row {row + 1} is {'not stated' if np.isnan(which[row]) else f'{which[row]:g}'}",
             where=table.where,
             rule=f"Targets are counted from 1, to {MOST_TARGETS} at the most",
+            way_out="Correct it, or leave the point of this row empty",
         )
     spread = {}
-    for number in range(1, int(which.max()) + 1):
+    for number in range(1, int(np.max(which[measured], initial=1)) + 1):
         for axis in POINT:
             spread[axis if number == 1 else f"{axis}{number}"] = np.where(
                 which == number, others[axis], np.nan

@@ -292,6 +292,12 @@ class Measurements:
             digest.update(np.ascontiguousarray(self.features[column], dtype=np.float64).tobytes())
         return digest.hexdigest()
 
+    def most_held(self, among: Sequence[int] | None = None) -> int:
+        """The target, an index from 0, that most rows hold, of all or `among` some."""
+        places = list(range(self.target_count)) if among is None else list(among)
+        held = np.isfinite(self.targets[:, places]).all(axis=2).sum(axis=0)
+        return places[int(held.argmax())]
+
     def row_names(self, mask: NDArray[np.bool_]) -> str:
         """The rows of a mask (n,) in words, by their numbers in their files."""
         chosen = self.select(mask)

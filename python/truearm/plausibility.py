@@ -144,8 +144,8 @@ def _check_alike(measurements: Measurements) -> None:
             f"all {len(measurements)} poses are alike", where=where, rule="Joints must vary", way_out=way_out
         )
     points = measurements.targets.reshape(len(measurements), -1)
-    measured = points[:, np.isfinite(points).all(axis=0)]
-    if measured.size and (np.ptp(measured, axis=0) == 0.0).all():
+    measured = points[:, np.isfinite(points).sum(axis=0) > 1]
+    if measured.size and (np.nanmax(measured, axis=0) == np.nanmin(measured, axis=0)).all():
         raise InputError(
             f"all {len(measurements)} measured positions are equal though the joints vary",
             where=where,
@@ -158,10 +158,11 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
 
     Where the points are in world does not matter, and medians forgive single gross errors.
     """
-    seen = np.isfinite(group.targets[:, :1]).all(axis=(1, 2))
+    points = group.targets[:, group.most_held()]
+    seen = np.isfinite(points).all(axis=1)
     if seen.sum() < 2:
         return
-    nominal, measured = _spread(robot.position(group.readings[seen])), _spread(group.targets[seen, 0])
+    nominal, measured = _spread(robot.position(group.readings[seen])), _spread(points[seen])
     where = f"{', '.join(group.files)}, group {name}"
     found = (
         f"half of the measured points lie more than {measured:.4g} m from their middle, "
@@ -213,8 +214,9 @@ def _check_inches(rows: Measurements, robot: Robot, found: str, where: str) -> N
 
 def _misfit(rows: Measurements, robot: Robot, factor: float) -> float:
     """How far points times `factor` are from those of the nominal arm, over their spread."""
-    points = factor * rows.targets
-    return misfit_m(robot, replace(rows, targets=points)) / max(_spread(points[:, 0]), ALIKE_RAD_OR_M)
+    points, target = factor * rows.targets, rows.most_held()
+    misfit = misfit_m(robot, replace(rows, targets=points), target)
+    return misfit / max(_spread(points[:, target]), ALIKE_RAD_OR_M)
 
 
 def _check_distances(measurements: Measurements, robot: Robot) -> None:

@@ -2,6 +2,7 @@
 
 import codecs
 import csv
+import io
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,8 @@ NUMBER: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?")
 WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
 NAMED: Final = 5
+SHOWN: Final = 60
+"""Characters of a line that are shown in a message."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +239,10 @@ def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
     Raises:
         UsageError: If it has another number of columns, or plainly a header.
     """
-    first = next(csv.reader([text.lstrip().splitlines()[0]], delimiter=delimiter))
+    try:
+        first = next(fields for fields in csv.reader(io.StringIO(text), delimiter=delimiter) if fields)
+    except csv.Error as error:
+        raise InputError(f"not CSV: {error}", where=where) from None
     option = f"{marks.options}columns"
     if len(first) != len(marks.names):
         raise UsageError(
@@ -247,13 +253,15 @@ def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
         )
     if not any(NUMBER.fullmatch(cell.strip()) for cell in first):
         raise UsageError(
-            f'the first line of {where} is "{first[0]}{delimiter}{first[-1]}"',
+            f'the first line of {where} holds no number: "{delimiter.join(first)[:SHOWN]}"',
             where=option,
-            rule="They are the names of a table without a header",
-            way_out=f"Leave {option} out, or skip the header: {marks.options}skip-lines 1",
+            rule="It names the columns of a table without a header",
+            way_out=f"Leave it out, or skip the header: {marks.options}skip-lines 1",
         )
+    if not set(marks.names) - {UNNAMED}:
+        raise UsageError("all columns are left out", where=option, rule="Name those to bring in")
     unnamed = iter(marks.unnamed)
-    names = [next(unnamed) if name == UNNAMED else name for name in marks.names]
+    names = [next(unnamed) if name == UNNAMED else name.replace('"', '""') for name in marks.names]
     return delimiter.join(f'"{name}"' for name in names) + "\n"
 
 
@@ -404,7 +412,7 @@ def _plain_delimiter(text: str, where: str, options: str) -> str:
     best = max(counts, key=lambda mark: counts[mark])
     if counts[best] == 0:
         raise UsageError(
-            f'the first line is one field: "{header[:60]}"',
+            f'the first line is one field: "{header[:SHOWN]}"',
             where=where,
             way_out=f"Say what is between fields with {options}delimiter, and {options}skip-lines if the "
             "header is lower",

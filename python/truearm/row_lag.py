@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.conventions import BETTER, NEAR_M
-from truearm.core_set import most_measured
 from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.measurements import Measurements
@@ -29,7 +28,7 @@ def fits_shifted(task: Task, data: Measurements) -> list[Notice]:
     """
     if task.selection.distances:
         return []
-    target = most_measured(data, task.selection)
+    target = data.most_held(task.selection.targets)
     rows = max((np.flatnonzero(data.group == group) for group in task.groups), key=len)
     inner = rows[max(LAGS) : -max(LAGS)]
     inner = inner[np.isfinite(data.targets[inner, target]).all(axis=1)]

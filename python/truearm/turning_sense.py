@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
-from truearm.euler_orders import otherwise_read, twin
+from truearm.euler_orders import otherwise_read, with_twin
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
@@ -42,7 +42,7 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
     turned = measurements.orientations
     if turned is None:
         return
-    points = measurements.targets[:, 0]
+    points = measurements.targets[:, measurements.most_held()]
     for group in measurements.groups:
         seen = (
             (measurements.group == group) & np.isfinite(turned).all(axis=1) & np.isfinite(points).all(axis=1)
@@ -85,7 +85,7 @@ def _other_angles(flanges: Floats, points: Floats, quaternions: Floats) -> str:
     if least >= FIT:
         return ""
     fitting = [kinds for kinds, off in found.items() if off <= AS_WELL * least][:MOST_NAMED]
-    ways = [way for taken, meant in fitting for way in ((taken, meant), (twin(taken), twin(meant)))]
+    ways = [way for taken, meant in fitting for way in with_twin(taken, meant)]
     pairs = ", or those for ".join(f"{taken} are {meant}" for taken, meant in dict.fromkeys(ways))
     return f"the angles that were taken for {pairs} (capitals: moving axes, small letters: fixed axes)"
 

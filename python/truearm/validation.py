@@ -44,7 +44,8 @@ class Errors:
     """Errors of one model.
 
     Attributes:
-        position: Of the judged target (or of the distances), mm.
+        position: Of the judged target, of several fitted ones of the first that a row holds (or of the
+            distances), mm.
         orientation: Of the tool, mrad; None where it was not measured.
     """
 
@@ -205,8 +206,9 @@ def row_errors(
         return RowErrors(at_first_measured(left, data, selection))
     seen = np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
     if not seen.any():
+        listed = ", ".join(str(target + 1) for target in selection.targets)
         raise InputError(
-            f"target {selection.targets[0] + 1} was measured in none of {len(data)} rows to judge",
+            f"target {listed} was measured in none of {len(data)} rows to judge",
             where=", ".join(data.files),
             way_out="Judge at another target, or measure it at more poses",
         )

@@ -24,7 +24,12 @@ HoldoutRange: TypeAlias = Annotated[
     typer.Option(metavar="qJ:low|high:SHARE", help="Hold out the rows with the lowest or highest readings."),
 ]
 JudgeTarget: TypeAlias = Annotated[
-    int, typer.Option(metavar="K", help="Judge at this target; another than 1 takes no part in the fit.")
+    int,
+    typer.Option(
+        metavar="K",
+        help="Judge at this target; another than 1 takes no part in the fit. Of several that do, rows "
+        "without the first are judged at the next that they hold.",
+    ),
 ]
 Model: TypeAlias = Annotated[
     str,

@@ -102,7 +102,7 @@ def _other(second: list[Path], *, asked: bool) -> Path | None:
 
 
 def _names(text: str | None) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",")) if text else ()
+    return tuple(name.strip() for name in text.split(",")) if text is not None else ()
 
 
 def _tell(imported: "Imported", output: Path, *, as_json: bool) -> None:

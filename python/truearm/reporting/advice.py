@@ -122,8 +122,11 @@ def _warm_up(facts: Facts) -> Iterator[Advice]:
         "not tell: "
     )
     if drift.jumps:
-        places = "; ".join(f"{group}, {jump.words}" for group, own in drift.jumps.items() for jump in own)
-        words += f"look at target, tripod and joints where it did so at once ({places})."
+        jumps = [(group, jump) for group, own in drift.jumps.items() for jump in own]
+        places = "; ".join(
+            f"{group}, between {jump.between}, {short(jump.mm)[0]} mm" for group, jump in jumps
+        )
+        words += f"look at target, tripod and joints where it did so at once: {places}."
         yield Advice("gave_way", "Find what gave way.", words, left_in - steady)
         return
     words += "let both warm up before they are used, and measure a fixed point now and then."

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.core_set import most_measured
 from truearm.errors import count_of
+from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
 from truearm.reporting.drifts import drifts
 from truearm.reporting.facts import Facts
@@ -48,14 +48,11 @@ class Repeats:
         if rows is None or selection.distances:
             return None
         data = rows.data
-        target = most_measured(data, selection)
+        target = data.most_held(selection.targets)
         first = 3 * selection.targets.index(target)
         seen = np.flatnonzero(np.isfinite(data.targets[:, target]).all(axis=1))
         order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
-        approach = np.zeros((len(order), data.joint_count))
-        for source in data.files:
-            mine = data.sources[order] == source
-            approach[mine] = approach_in_sequence(data.readings[order][mine])
+        approach = _approach(data)[order]
         rounded = np.round(data.readings[order] / SAME_READING)
         _, group = np.unique(data.group[order], return_inverse=True)
         _, place = np.unique(np.column_stack([group, rounded]), axis=0, return_inverse=True)
@@ -182,3 +179,13 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
         "The order of the rows is taken for the order of measuring.",
     )
     return [table]
+
+
+def _approach(data: Measurements) -> Floats:
+    """Signs (n, N) of each joint's last movement, the rows of each file one after another."""
+    approach = np.zeros((len(data), data.joint_count))
+    for source in data.files:
+        own = np.flatnonzero(data.sources == source)
+        own = own[np.argsort(data.rows[own], kind="stable")]
+        approach[own] = approach_in_sequence(data.readings[own])
+    return approach
