@@ -151,8 +151,8 @@ def _by_target(
             spread[axis if number == 1 else f"{axis}{number}"] = np.where(
                 which == number, others[axis], np.nan
             )
-    joints = {name: values for name, values in others.items() if JOINT.fullmatch(name)}
-    return joints | spread | {name: values for name, values in others.items() if name not in joints | spread}
+    ordered = {name: values for name, values in others.items() if JOINT.fullmatch(name)} | spread
+    return ordered | {name: values for name, values in others.items() if name not in ordered}
 
 
 def _with_measurements(frame: pd.DataFrame, table: RawTable) -> tuple[pd.DataFrame, list[str]]:

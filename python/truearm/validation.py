@@ -206,7 +206,7 @@ def row_errors(
         return RowErrors(at_first_measured(left, data, selection))
     seen = np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
     if not seen.any():
-        listed = ", ".join(str(target + 1) for target in selection.targets)
+        listed = " or ".join(str(target + 1) for target in selection.targets)
         raise InputError(
             f"target {listed} was measured in none of {len(data)} rows to judge",
             where=", ".join(data.files),

@@ -1,12 +1,13 @@
 //! How a set-up moved while it was measured.
 //!
-//! Arms and instruments warm up, tripods settle. What is left when a model has said all it knows then depends on when it was
-//! measured, whatever the pose. A drift is a displacement, the same for all poses, that varies with the progress of
-//! the session: cells over one line, whose prior's amplitude and length the evidence chooses, and steps where a tripod
-//! was bumped or something slipped, with the same amplitude, one at a time as long as the evidence asks for them. The
-//! frame of the set-up takes its mean, so the likelihood is the restricted one (Patterson and Thompson 1971): with features
-//! G of the rows less their mean, eigenvalues e of `G^T G`, z the products of its eigenvectors with `G^T r`, and v the ratio of the drift's
-//! variance to that of the noise, `s^2 = (r^T r - sum v z^2 / (1 + v e)) / N` and `log L = -1/2 (N log s^2 + 3 sum log(1 + v e))`.
+//! Arms and instruments warm up, tripods settle. What is left when a model has said all it knows then depends on when
+//! it was measured, whatever the pose. A drift is a displacement, the same for all poses, that varies with the progress
+//! of the session: cells over one line, whose prior's amplitude and length the evidence chooses, and steps where a
+//! tripod was bumped or something slipped, with the same amplitude, one at a time as long as the evidence asks for
+//! them. The frame of the set-up takes its mean, so the likelihood is the restricted one (Patterson and Thompson 1971):
+//! with features G of the rows less their mean, eigenvalues e of `G^T G`, z the products of its eigenvectors with
+//! `G^T r`, and v the ratio of the drift's variance to that of the noise, `s^2 = (r^T r - sum v z^2 / (1 + v e)) / N`
+//! and `log L = -1/2 (N log s^2 + 3 sum log(1 + v e))`.
 
 use faer::{Mat, Side};
 use truearm_estimate::dense::transposed_product;
@@ -314,4 +315,5 @@ fn centred(mut matrix: Mat<f64>, weight: &[f64]) -> (Mat<f64>, Vec<f64>) {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may stop")]
+#[path = "tests/drift.rs"]
 mod tests;
