@@ -129,6 +129,22 @@ def test_rotation_vectors_and_quaternions(triple: tuple[float, float, float]) ->
     np.testing.assert_array_equal(last, [[w, x, y, z]])
 
 
+def test_rotation_matrices_row_by_row(tmp_path: Path) -> None:
+    turn = Rotation.from_euler("ZYX", [30.0, -20.0, 70.0], degrees=True)
+    numbers = ",".join(f"{number:.4f}" for number in turn.as_matrix().reshape(-1))
+    names = [f"r{i}{j}" for i in "123" for j in "123"]
+    rotation = RotationColumns.parse(f"matrix={','.join(names)}")
+    text = f"q1,x,y,z,{','.join(names)}\n0,1,2,3,{numbers}\n1,1,2,3{9 * ','}\n"
+    given = ImportPlan(rotation=rotation, joint_unit="rad", length_unit="m")
+    table = import_table(write(tmp_path, text), given).frame
+    x, y, z, w = table.loc[0, ["qx", "qy", "qz", "qw"]]
+    assert (Rotation.from_quat([x, y, z, w]).inv() * turn).magnitude() < 1e-4
+    assert table["qw"].isna().tolist() == [False, True]
+    mirrored = text.replace(numbers, numbers.replace("-", "", 1))
+    with pytest.raises(InputError, match="the nine numbers of row 1 are no rotation matrix.*row by row"):
+        import_table(write(tmp_path, mirrored), given)
+
+
 def test_missing_orientations_stay_missing(tmp_path: Path) -> None:
     text = "q1,x,y,z,rx,ry,rz\n0,1,2,3,10,20,30\n1,1,2,3,,,\n"
     rotation = RotationColumns.parse("euler:ZYX:deg=rx,ry,rz")

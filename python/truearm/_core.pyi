@@ -14,6 +14,17 @@ ANGLE_ARM_M: float
 NORMAL_95: float
 """95 % of a standard normal variable lies within this."""
 
+def same_poses(joints: NDArray[np.float64], group: NDArray[np.int64]) -> NDArray[np.int64]:
+    """For each row (n,) the first of those of its group that were measured at its pose.
+
+    Args:
+        joints: Joint values (n, N), rad or m; those of one pose lie within 3e-4 of one another's.
+        group: Number of each row's set-up (n,).
+
+    Raises:
+        CoreError: If the lengths differ.
+    """
+
 class CoreError(ValueError):
     """The core refused its input; the message says the value, the rule and the way out."""
 

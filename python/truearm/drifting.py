@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 
-from truearm._core import FieldFit, Setup, find_drift
+from truearm._core import FieldFit, Setup, find_drift, same_poses
 from truearm.defaults import NO_DRIFT
 from truearm.details import DriftDetails, Jump
 from truearm.errors import Notice
@@ -152,18 +152,41 @@ def _drift_of(
         for group in task.groups:
             every = np.flatnonzero(data.group == group)
             own = np.flatnonzero((data.group[train] == group) & (weight > 0.0))
-            if len(own) < FEWEST_ROWS:
+            times = before.progress[train[own]]
+            visits = _visits(times, data.select(train[own]).readings)
+            if len(np.unique(visits)) < FEWEST_ROWS:
                 continue
-            known = before.progress[train[own]]
-            wanted = np.concatenate([before.progress[every], known])
-            found, noise, steps, gain = find_drift(known, left[own], weight[own], wanted, most_steps)
+            known, seen = _of_visits(times, visits), _of_visits(left[own], visits)
+            wanted = np.concatenate([before.progress[every], times])
+            found, noise, steps, gain = find_drift(
+                known, seen, _of_visits(weight[own], visits), wanted, most_steps
+            )
             if gain <= OVERWHELMING:
                 found, steps = np.zeros_like(found), []
             change = found[len(every) :] - before.moved[train[own]]
             if np.sqrt(np.square(change).mean()) > NOTICEABLE * noise:
                 moved[every] = found[: len(every)]
-                jumps[group] = [_around(step, known, train[own]) for step in steps]
+                jumps[group] = [_around(step, times, train[own]) for step in steps]
     return None if np.array_equal(moved, before.moved) else Drift(moved, before.progress, jumps)
+
+
+def _visits(progress: Floats, readings: Floats) -> Rows:
+    """For each row (n,) the number of its visit: shots of a pose one after the other are one.
+
+    They share what no model explains of the pose, which is no sign that rows after each other are alike.
+    """
+    order = np.argsort(progress, kind="stable")
+    poses = same_poses(readings, np.zeros(len(readings), dtype=np.int64))
+    visits = np.empty(len(order), dtype=np.int64)
+    visits[order] = np.cumsum(np.diff(poses[order], prepend=-1) != 0) - 1
+    return visits
+
+
+def _of_visits(values: Floats, visits: Rows) -> Floats:
+    """Mean of the values (n, ...) of each visit's rows."""
+    sums = np.zeros((visits.max() + 1, *values.shape[1:]))
+    np.add.at(sums, visits, values)
+    return (sums.T / np.bincount(visits)).T
 
 
 def _around(step: float, progress: Floats, rows: Rows) -> tuple[int, int]:

@@ -6,8 +6,13 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import UsageError
-from truearm.rotations import check_euler_sequence, quaternion_from_euler, quaternion_from_rotation_vector
+from truearm.errors import InputError, UsageError, list_rows
+from truearm.rotations import (
+    check_euler_sequence,
+    quaternion_from_euler,
+    quaternion_from_matrix,
+    quaternion_from_rotation_vector,
+)
 from truearm.units import ANGLE_UNITS, to_si
 
 Floats = NDArray[np.float64]
@@ -16,7 +21,10 @@ FORMS: Final = (
     "euler:XYZ:deg=RX,RY,RZ (capitals: moving axes; small letters: fixed axes)",
     "vector:rad=RX,RY,RZ (rotation vector)",
     "quaternion:wxyz=A,B,C,D (or xyzw)",
+    "matrix=R11,R12,R13,R21,R22,R23,R31,R32,R33 (row by row)",
 )
+ROUNDED: Final = 0.02
+"""So far from unit length and right angles are a rotation matrix's columns with few decimals, at the most."""
 
 
 @dataclass(frozen=True)
@@ -24,13 +32,13 @@ class RotationColumns:
     """Columns that hold world_from_target.
 
     Attributes:
-        kind: "euler", "vector" (rotation vector) or "quaternion".
+        kind: "euler", "vector" (rotation vector), "quaternion" or "matrix".
         order: Axes of Euler angles, as in "XYZ"; order of the parts of a quaternion, "wxyz" or "xyzw".
-        unit: "rad" or "deg"; "" for a quaternion.
+        unit: "rad" or "deg"; "" for a quaternion or a matrix.
         columns: Names of the columns, in that order.
     """
 
-    kind: Literal["euler", "vector", "quaternion"]
+    kind: Literal["euler", "vector", "quaternion", "matrix"]
     order: str
     unit: str
     columns: tuple[str, ...]
@@ -52,17 +60,41 @@ class RotationColumns:
                 return cls("vector", "", unit, columns)
             case ["quaternion", order] if order in ("wxyz", "xyzw") and len(columns) == 4:
                 return cls("quaternion", order, "", columns)
+            case ["matrix"] if len(columns) == 9:
+                return cls("matrix", "", "", columns)
         raise UsageError(f'"{text}" is no rotation', where="--rotation", rule=f"Write {'; '.join(FORMS)}")
 
     def quaternions(self, values: Floats) -> Floats:
-        """Quaternions (n, 4), w first, of the columns' values (n, 3) or (n, 4); NaN rows stay NaN."""
+        """Quaternions (n, 4), w first, of the columns' values (n, 3), (n, 4) or (n, 9); NaN rows stay NaN.
+
+        Raises:
+            InputError: If what should be a rotation matrix is none.
+        """
         if self.kind == "quaternion":
             return values if self.order == "wxyz" else values[:, [3, 0, 1, 2]]
-        angles = to_si(values, self.unit)
-        given = np.isfinite(angles).all(axis=1)
+        given = np.isfinite(values).all(axis=1)
         quaternions = np.full((len(values), 4), np.nan)
+        if self.kind == "matrix":
+            quaternions[given] = quaternion_from_matrix(_rotations(values[given], np.flatnonzero(given)))
+            return quaternions
+        angles = to_si(values, self.unit)
         if self.kind == "euler":
             quaternions[given] = quaternion_from_euler(angles[given], self.order)
         else:
             quaternions[given] = quaternion_from_rotation_vector(angles[given])
         return quaternions
+
+
+def _rotations(values: Floats, rows: NDArray[np.int64]) -> Floats:
+    """Rotations (n, 3, 3) of numbers (n, 9) that are found to be some; `rows` (n,) are their places."""
+    matrices = values.reshape(-1, 3, 3)
+    apart = np.abs(matrices.transpose(0, 2, 1) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    bad = (apart > ROUNDED) | (np.linalg.det(matrices) < 0.0)
+    if bad.any():
+        raise InputError(
+            f"the nine numbers of {list_rows((rows[bad] + 1).tolist())} are no rotation matrix",
+            where="--rotation",
+            rule="Its columns have length one, stand at right angles and form a right-handed frame",
+            way_out="Name the columns row by row: matrix=R11,R12,R13,R21,...",
+        )
+    return matrices

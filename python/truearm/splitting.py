@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from truearm._core import same_poses
 from truearm.columns import VALIDATE
 from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
@@ -71,7 +72,8 @@ class SplitRule:
     held out instead, all of them, and the training rows follow in the same way. A stated share, `split_by`
     and `holdout_range` come first.
 
-    Rows with the same joint vector, and the two rows of a pair, stay together, on the side of the first.
+    Rows with the same joint vector, rows after one another that were read within 0.3 mrad or mm of one
+    pose, and the two rows of a pair, stay together, on the side of the first.
 
     Attributes:
         holdout: Part of the rows that is held out, between 0 and 1.
@@ -253,7 +255,7 @@ def _first_of_kin(data: Measurements) -> Rows:
     """For each row (n,) the first row that must stay on the same side."""
     count = len(data)
     _, alike = np.unique(data.readings, axis=0, return_inverse=True)
-    links = [alike.reshape(-1)]
+    links = [alike.reshape(-1), _shots(data)]
     if data.pair is not None:
         _, pair = np.unique(data.pair, return_inverse=True)
         alone = data.pair == ""
@@ -263,6 +265,13 @@ def _first_of_kin(data: Measurements) -> Rows:
         kin = _components(kin, other)
     _, first, index = np.unique(kin, return_index=True, return_inverse=True)
     return np.asarray(first[index.reshape(-1)], dtype=np.int64)
+
+
+def _shots(data: Measurements) -> Rows:
+    """Number of each row's visit to a pose (n,): rows after one another that were read at the same one."""
+    _, files = np.unique(data.sources, return_inverse=True)
+    pose = same_poses(np.ascontiguousarray(data.readings), files.reshape(-1).astype(np.int64))
+    return np.cumsum(np.diff(pose, prepend=-1) != 0)
 
 
 def _components(a: Rows, b: Rows) -> Rows:

@@ -256,8 +256,7 @@ impl PoseGradient<'_> {
         for row in rows {
             sums.fill::<I>(by_column, row, first);
             self.weights(row, first, &mut weights);
-            let own_variance = training.noise_variance(row, [0.0; 2]);
-            let noise = training.noise_variance(row, self.hyper.noise) - own_variance;
+            let noise = training.noise_slope(row, self.hyper.noise);
             shares.noise[usize::from(training.is_orientation[row])] += weights[row - first] * noise;
             add_products(&mut shares.constant, &sums.constant, &weights, 1.0);
             for (share, sums) in shares.classes.iter_mut().zip(&sums.classes) {

@@ -7,8 +7,9 @@ use crate::bank::Bank;
 use crate::evidence::Evidence;
 use crate::extrapolation::extrapolation_factor;
 use crate::hyper::{Hyper, Wave};
+use crate::joined::joined;
 use crate::kernel::Input;
-use crate::linear::training;
+use crate::linear::{input_values, training};
 use crate::optimise::{Curvature, Limits};
 use crate::outliers::{self, Judgement};
 use crate::posterior::{Posterior, Solution};
@@ -68,8 +69,10 @@ pub struct FieldFit {
     pub evaluations: usize,
     /// Residuals of all poses (n, m), base frame.
     pub residuals: Vec<f64>,
-    /// Judgement of every pose by the others.
+    /// Judgement of every pose by the others; shots of the same pose share it.
     pub judgement: Judgement,
+    /// Which of the posterior's poses each measured one is a shot of, (n,).
+    pub pose_of: Vec<usize>,
     /// The posterior that the field was taken from.
     pub posterior: Posterior,
     /// The posterior under widened amplitudes, where it is another one.
@@ -82,6 +85,13 @@ impl FieldFit {
     pub fn start(&self) -> Start {
         let (hyper, curvature) = (self.hyper.clone(), self.curvature.clone());
         Start { hyper, curvature, evidence: self.evidence }
+    }
+
+    /// Weight of every measured pose, (n,); one where nothing was measured.
+    pub fn weights(&self) -> Vec<f64> {
+        let training = self.posterior.training();
+        let of = |&pose: &usize| training.rows(pose).next().map_or(1.0, |row| training.weight[row]);
+        self.pose_of.iter().map(of).collect()
     }
 
     /// For standard deviations.
@@ -115,7 +125,7 @@ pub fn fit_field(
     options: &FieldOptions,
 ) -> Result<FieldFit, FieldError> {
     let point = Point { parameters: &constant.parameters, setup: &constant.setup };
-    let mut training = training(problem, point, options)?;
+    let (mut training, pose_of) = rows(problem, point, options)?;
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
     let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0, curvature: None };
     let mut hyper = search.first(&training, noise)?;
@@ -139,7 +149,8 @@ pub fn fit_field(
         judged = search.judge(posterior)?;
     }
     let Judged { posterior, solution, judgement } = judged;
-    let refined = relinearised(problem, point, &posterior, solution)?;
+    let values = input_values(problem, options);
+    let refined = relinearised(problem, point, &posterior, &values, solution)?;
     let wide = if options.rough { None } else { posterior.widened(options.degree, &options.cancel)? };
     Ok(FieldFit {
         parameters: refined.parameters,
@@ -149,7 +160,8 @@ pub fn fit_field(
         evidence: search.evidence,
         evaluations: search.evaluations,
         residuals: refined.residuals,
-        judgement,
+        judgement: judgement.of_shots(&pose_of),
+        pose_of,
         posterior,
         wide,
         curvature: search.curvature,
@@ -166,9 +178,19 @@ pub fn restore(
     options: &FieldOptions,
     hyper: Hyper,
 ) -> Result<Posterior, FieldError> {
-    let posterior =
-        Posterior::new(training(problem, point, options)?, hyper, options.degree, &options.cancel)?;
+    let (training, _) = rows(problem, point, options)?;
+    let posterior = Posterior::new(training, hyper, options.degree, &options.cancel)?;
     Ok(posterior.widened(options.degree, &options.cancel)?.unwrap_or(posterior))
+}
+
+/// The rows of a problem linearised at a point, shots of the same pose as one, and which pose each measured one went into.
+fn rows(
+    problem: &Problem,
+    point: Point,
+    options: &FieldOptions,
+) -> Result<(Training, Vec<usize>), FieldError> {
+    let set = problem.measurements;
+    Ok(joined(training(problem, point, options)?, &set.group, set.rows_per_pose()))
 }
 
 struct Judged {

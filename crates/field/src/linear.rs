@@ -39,6 +39,7 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
         residual: Vec::new(),
         variance: Vec::new(),
         weight: Vec::new(),
+        shot: [0.0; 2],
         source: Vec::new(),
         is_orientation: Vec::new(),
     };
@@ -84,7 +85,7 @@ fn push_row(
     training.residual.push(linear.residual[at] + known);
     training.variance.push(if orientation { 0.0 } else { set.sigma[pose].powi(2) });
     training.weight.push(set.weight[pose]);
-    training.source.push(at);
+    training.source.push(vec![at]);
     training.is_orientation.push(orientation);
 }
 
@@ -114,8 +115,8 @@ fn joint_inputs(problem: &Problem) -> Vec<Input> {
     (0..problem.chain.joint_count()).map(input).collect()
 }
 
-/// Joint values, then features, of every pose.
-fn input_values(problem: &Problem, options: &FieldOptions) -> Vec<f64> {
+/// Joint values, then features, of every pose, (n, I).
+pub fn input_values(problem: &Problem, options: &FieldOptions) -> Vec<f64> {
     let set = problem.measurements;
     let features = options.features.len();
     (0..set.pose_count())

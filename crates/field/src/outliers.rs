@@ -33,7 +33,7 @@ pub const QUANTILE_95: f64 = 1.959_963_984_540_054;
 
 /// Quantile of the chi-squared distribution at a standard normal quantile (Wilson and Hilferty 1931), at odds of one in a
 /// million up to 8 % too large.
-fn chi_squared(freedom: f64, normal_quantile: f64) -> f64 {
+pub fn chi_squared(freedom: f64, normal_quantile: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     freedom * (1.0 - spread + normal_quantile * spread.sqrt()).powi(3)
 }
@@ -102,6 +102,14 @@ impl Judgement {
             }
         }
         changed
+    }
+
+    /// The same for shots, each of the pose that `pose_of` (n,) says.
+    pub fn of_shots(&self, pose_of: &[usize]) -> Judgement {
+        let of = |values: &[f64]| pose_of.iter().map(|&pose| values[pose]).collect::<Vec<f64>>();
+        let score = of(&self.score);
+        let outliers = (0..score.len()).filter(|&shot| score[shot] > 1.0).collect();
+        Judgement { distance: of(&self.distance), outliers, score, inflation: self.inflation }
     }
 
     /// Whether hyper-parameters that were found with the outliers among the poses cannot stay.

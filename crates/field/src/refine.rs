@@ -19,6 +19,7 @@ pub struct Refined {
 }
 
 /// Gauss-Newton on the exact model with the factor of the linear one: the remainder is of second order in the CEPs.
+/// `values` (n, I) are the inputs of all measured poses.
 ///
 /// # Errors
 /// [`FieldError`] of the posterior, the bank and the residuals.
@@ -26,16 +27,19 @@ pub fn relinearised(
     problem: &Problem,
     point: Point,
     posterior: &Posterior,
+    values: &[f64],
     mut solution: Solution,
 ) -> Result<Refined, FieldError> {
-    let mut refined = apply(problem, point, posterior, &solution)?;
+    let mut refined = apply(problem, point, posterior, values, &solution)?;
     for _ in 0..RELINEARISATIONS {
         let explained = explained(posterior, &solution)?;
+        let left = |shots: &Vec<usize>| {
+            shots.iter().map(|&at| refined.residuals[at]).sum::<f64>() / shots.len() as f64
+        };
         let source = posterior.training().source.iter();
-        let linear: Vec<f64> =
-            source.zip(&explained).map(|(&at, part)| refined.residuals[at] + part).collect();
+        let linear: Vec<f64> = source.zip(&explained).map(|(shots, part)| left(shots) + part).collect();
         solution = posterior.solve(&linear)?;
-        refined = apply(problem, point, posterior, &solution)?;
+        refined = apply(problem, point, posterior, values, &solution)?;
     }
     Ok(refined)
 }
@@ -67,6 +71,7 @@ fn apply(
     problem: &Problem,
     point: Point,
     posterior: &Posterior,
+    values: &[f64],
     solution: &Solution,
 ) -> Result<Refined, FieldError> {
     let training = posterior.training();
@@ -80,7 +85,7 @@ fn apply(
     let setup = layout.step_setup(point.setup, &step);
     let poses = problem.measurements.pose_count();
     let mut varying: Vec<f64> = std::iter::repeat_n(&parameters, poses).flatten().copied().collect();
-    solution.bank.add(&training.values, &mut varying)?;
+    solution.bank.add(values, &mut varying)?;
     let residuals = residuals(problem, Point { parameters: &varying, setup: &setup })?;
     Ok(Refined { parameters, bank: solution.bank.clone(), setup, residuals })
 }

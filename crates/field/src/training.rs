@@ -79,8 +79,10 @@ pub struct Training {
     pub variance: Vec<f64>,
     /// Weight of each row, (R,): the noise variance is divided by it.
     pub weight: Vec<f64>,
-    /// Place of each row among the residuals (n, m) of all measurements, (R,).
-    pub source: Vec<usize>,
+    /// Variance of a single shot's noise, of positions and orientations, where poses were measured several times.
+    pub shot: [f64; 2],
+    /// Places of each row among the residuals (n, m) of all measurements, whose mean it is: one for each shot, (R,).
+    pub source: Vec<Vec<usize>>,
     /// Whether a row is an orientation (else a position), (R,).
     pub is_orientation: Vec<bool>,
 }
@@ -116,10 +118,24 @@ impl Training {
         &self.jacobian[row * self.columns.len()..(row + 1) * self.columns.len()]
     }
 
-    /// Variance of a row's noise, given the noise of positions and orientations.
+    /// Variance of a row's noise, given the noise that single shots of positions and orientations have.
     pub fn noise_variance(&self, row: usize, noise: [f64; 2]) -> f64 {
-        let noise = noise[usize::from(self.is_orientation[row])];
-        (noise * noise + self.variance[row]) / self.weight[row]
+        let (noise, averaged) = self.noise_of_mean(row, noise);
+        (noise - averaged + self.variance[row]) / self.weight[row]
+    }
+
+    /// What it grows by with the logarithm of the noise's variance.
+    pub fn noise_slope(&self, row: usize, noise: [f64; 2]) -> f64 {
+        let kind = usize::from(self.is_orientation[row]);
+        let (square, averaged) = self.noise_of_mean(row, noise);
+        (if self.shot[kind] < square { square } else { square - averaged }) / self.weight[row]
+    }
+
+    /// The square of the noise, and what its part of single shots loses in their mean.
+    fn noise_of_mean(&self, row: usize, noise: [f64; 2]) -> (f64, f64) {
+        let kind = usize::from(self.is_orientation[row]);
+        let square = noise[kind] * noise[kind];
+        (square, self.shot[kind].min(square) * (1.0 - 1.0 / self.source[row].len() as f64))
     }
 
     /// The same with levers of heights along `up`, a direction in the base frame.
@@ -175,7 +191,8 @@ impl Training {
             residual: take(&self.residual, 1),
             variance: take(&self.variance, 1),
             weight: take(&self.weight, 1),
-            source: rows.iter().map(|&row| self.source[row]).collect(),
+            shot: self.shot,
+            source: rows.iter().map(|&row| self.source[row].clone()).collect(),
             is_orientation: rows.iter().map(|&row| self.is_orientation[row]).collect(),
         }
     }

@@ -147,9 +147,7 @@ impl FieldFit {
     /// Weight of each pose in the fit, (n,).
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let training = self.core.posterior.training();
-        let of_pose = |pose| training.rows(pose).next().map_or(1.0, |row| training.weight[row]);
-        vector(py, &(0..training.pose_count()).map(of_pose).collect::<Vec<f64>>())
+        vector(py, &self.core.weights())
     }
 
     /// The posterior of the fit itself.

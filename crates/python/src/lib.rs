@@ -19,6 +19,7 @@ mod hyper;
 mod inverse;
 mod measured;
 mod regions;
+mod shots;
 mod stream;
 mod text;
 
@@ -69,6 +70,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;
     module.add_function(wrap_pyfunction!(field::fit_field, module)?)?;
     module.add_function(wrap_pyfunction!(drift::find_drift, module)?)?;
+    module.add_function(wrap_pyfunction!(shots::same_poses, module)?)?;
     module.add_function(wrap_pyfunction!(text::find_bytes, module)?)?;
     module.add_function(wrap_pyfunction!(text::scan_lines, module)?)?;
     module.add_function(wrap_pyfunction!(text::read_numbers, module)?)?;

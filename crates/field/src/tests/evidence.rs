@@ -3,7 +3,7 @@
 use truearm_estimate::{Cancel, EstimateError};
 
 use super::oracle::{Exact, Oracle};
-use super::sets::{hyper, line_inputs, poses_in_two_groups, positions};
+use super::sets::{hyper, line_inputs, poses_in_two_groups, positions, several_shots};
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
@@ -51,6 +51,17 @@ fn gradient_with_positions() {
 fn gradient_with_poses_of_two_groups_and_rows_of_their_own_sigma_and_weight() {
     let training = poses_in_two_groups(18);
     check_gradient(&training, &hyper(&training, 6));
+}
+
+#[test]
+fn gradient_and_value_with_several_shots_of_poses() {
+    let training = several_shots(18);
+    assert_eq!(training.pose_count(), 18);
+    check_value(&training, &hyper(&training, 6));
+    check_gradient(&training, &hyper(&training, 6));
+    // As quiet as single shots: nothing is left to the poses.
+    let quiet = Hyper { noise: [0.4 * training.shot[0].sqrt(), 1e-4], ..hyper(&training, 6) };
+    check_gradient(&training, &quiet);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 mod common;
 mod evidence;
 mod greedy;
+mod joined;
 mod oracle;
 mod posterior;
 mod sets;

@@ -2,9 +2,10 @@
 
 use truearm_estimate::{MeasurementSet, Point, Setup};
 
-use super::common::{Arm, Measure, Truth, options, problem, scara, six_axes};
+use super::common::{Arm, Measure, Truth, options, problem, scara, shots, six_axes, subset};
 use crate::fit::FieldOptions;
 use crate::hyper::{Hyper, Wave};
+use crate::joined::joined;
 use crate::kernel::Input;
 use crate::linear::training;
 use crate::training::Training;
@@ -43,6 +44,23 @@ pub fn poses_in_two_groups(poses: usize) -> Training {
     set.rotations[9 * 7..9 * 8].fill(f64::NAN);
     set.weight[9] = 0.0;
     rows_of(&arm, &set, |_| ())
+}
+
+/// Some poses with one shot, the others with three.
+pub fn several_shots(poses: usize) -> Training {
+    let arm = six_axes(Truth::BENDING);
+    let set = Measure::poses(poses).of(&arm);
+    let once: Vec<usize> = (0..poses).filter(|pose| pose % 3 == 0).collect();
+    let often: Vec<usize> = (0..poses).filter(|pose| pose % 3 > 0).collect();
+    let mut all = shots(&subset(&set, &once), 1, 0.0, 0.0, 1);
+    let more = shots(&subset(&set, &often), 3, 0.0, 2e-5, 2);
+    let groups = [&all.group[..], &more.group].concat();
+    all.joints.extend(&more.joints);
+    all.targets.extend(&more.targets);
+    all.sigma.extend(&more.sigma);
+    all.weight.extend(&more.weight);
+    all.group.extend(&more.group);
+    joined(rows_of(&arm, &all, |_| ()), &groups, all.rows_per_pose()).0
 }
 
 /// A prismatic joint and a feature.

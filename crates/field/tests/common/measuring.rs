@@ -101,3 +101,13 @@ pub fn subset(set: &MeasurementSet, poses: &[usize]) -> MeasurementSet {
         ..set.clone()
     }
 }
+
+/// Each pose of a set of positions so many times, one after the other: readings and targets scatter by their noise.
+pub fn shots(set: &MeasurementSet, count: usize, still: f64, noise: f64, seed: u64) -> MeasurementSet {
+    let again: Vec<usize> = (0..set.pose_count()).flat_map(|pose| vec![pose; count]).collect();
+    let mut all = subset(set, &again);
+    let mut random = Random::new(seed);
+    all.joints.iter_mut().for_each(|q| *q += random.normals::<1>(still)[0]);
+    all.targets.iter_mut().for_each(|x| *x += random.normals::<1>(noise)[0]);
+    all
+}

@@ -14,7 +14,7 @@ mod pipeline;
 mod random;
 
 pub use arms::{Arm, Truth, scara, seven_axes, six_axes};
-pub use measuring::{Measure, subset};
+pub use measuring::{Measure, shots, subset};
 pub use pipeline::{
     Fitted, deviations, fit, fit_from, fitted, options, problem, root_mean_square, spans, with_threads,
 };

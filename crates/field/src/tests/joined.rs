@@ -1,0 +1,80 @@
+//! Shots of the same pose count as one.
+
+use super::common::{Measure, Truth, deviations, fit, root_mean_square, shots, six_axes, subset};
+use super::sets::rows_of;
+use crate::joined::joined;
+
+const STILL: f64 = 2e-5;
+
+#[test]
+fn shots_are_joined_to_their_mean() {
+    let arm = six_axes(Truth::BENDING);
+    let once = Measure { groups: 2, ..Measure::poses(30) }.of(&arm);
+    let often = shots(&once, 4, 0.0, 1e-5, 3);
+    let (found, pose_of) = joined(rows_of(&arm, &often, |_| ()), &often.group, often.rows_per_pose());
+    assert_eq!(pose_of, (0..120).map(|shot| shot / 4).collect::<Vec<usize>>());
+    let all = rows_of(&arm, &often, |_| ());
+    for pose in 0..30 {
+        for (k, row) in found.rows(pose).enumerate() {
+            let of_shots = (0..4).map(|shot| all.residual[all.rows(4 * pose + shot).start + k]);
+            assert!((found.residual[row] - of_shots.sum::<f64>() / 4.0).abs() < 1e-15);
+            assert_eq!(found.source[row].len(), 4);
+        }
+    }
+    // 30 x 3 x 3 differences know the shots' variance to 9 %; it is the least likely one that is taken.
+    let share = found.shot[0] / 1e-10;
+    assert!((0.6..1.05).contains(&share), "{share}");
+    let (noise, mean) = (3e-5_f64, found.noise_variance(0, [3e-5, 0.0]));
+    assert!((mean - (noise * noise - 0.75 * found.shot[0])).abs() < 1e-18);
+}
+
+#[test]
+fn nothing_changes_where_poses_were_measured_once() {
+    let arm = six_axes(Truth::BENDING);
+    let set = Measure::poses(40).of(&arm);
+    let (found, pose_of) = joined(rows_of(&arm, &set, |_| ()), &set.group, set.rows_per_pose());
+    assert_eq!(pose_of, (0..40).collect::<Vec<usize>>());
+    assert_eq!(found.residual, rows_of(&arm, &set, |_| ()).residual);
+    assert_eq!(found.shot, [0.0; 2]);
+}
+
+#[test]
+fn readings_that_scatter_are_one_pose_and_others_are_not() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = shots(&Measure::poses(30).of(&arm), 3, STILL, 1e-5, 4);
+    set.joints[6 * 4] += 1e-3;
+    set.group_count = 2;
+    set.group[8] = 1;
+    set.group[9..].iter_mut().step_by(2).for_each(|group| *group = 1);
+    set.weight[5] = 0.0;
+    let (found, pose_of) = joined(rows_of(&arm, &set, |_| ()), &set.group, set.rows_per_pose());
+    assert_eq!(pose_of[..9], [0, 0, 0, 1, 2, 3, 4, 4, 5]);
+    assert!(found.rows(3).is_empty(), "a row without weight");
+}
+
+#[test]
+fn a_shot_that_its_others_contradict_stands_apart() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = shots(&Measure::poses(60).of(&arm), 3, STILL, 1e-5, 5);
+    set.targets[3 * 31] += 1e-3;
+    let (_, pose_of) = joined(rows_of(&arm, &set, |_| ()), &set.group, set.rows_per_pose());
+    assert_eq!(pose_of[30..33], [10, 11, 10]);
+    let fit = fit(&arm, &set).unwrap();
+    assert_eq!(fit.field.judgement.outliers, [31]);
+    let weights = fit.field.weights();
+    assert!(weights[31] < 0.01 && weights[30] == 1.0);
+}
+
+#[test]
+fn shots_do_not_pass_what_poses_scatter_off_as_the_fields() {
+    let arm = six_axes(Truth { own: 2e-5, ..Truth::BENDING });
+    let scatter = 4e-5;
+    let test = Measure { noise: 0.0, seed: 99, ..Measure::poses(300) }.of(&arm);
+    let once = Measure { noise: scatter, ..Measure::poses(60) }.of(&arm);
+    let all = fit(&arm, &shots(&once, 4, STILL, 1e-6, 6)).unwrap();
+    let left = |fit| root_mean_square(&deviations(&arm, fit, &test).1);
+    let single = fit(&arm, &subset(&once, &(0..60).collect::<Vec<usize>>())).unwrap();
+    assert!((0.6..1.4).contains(&(all.field.hyper.noise[0] / scatter)), "{:?}", all.field.hyper.noise);
+    let (all, single) = (left(&all), left(&single));
+    assert!(all < 1.05 * single, "{all} from four shots of each pose, {single} from one");
+}

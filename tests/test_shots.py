@@ -1,0 +1,87 @@
+"""Instruments that are read several times at each pose."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import truearm as ta
+from tests.report_support import words_of
+from truearm._core import CoreError, same_poses
+from truearm.measurements import Measurements
+from truearm.reporting.report import report
+from truearm.simulation import Imperfections, VirtualArm
+from truearm.splitting import SplitRule, split_rows
+from truearm.summary import noise_mm
+
+POSES, SHOTS = 60, 3
+NOT_REPEATED_MM, OF_A_SHOT_M, STILL_RAD = 0.04, 2e-6, 2e-5
+
+
+def shots_of(once, seed=5):
+    """Each row so many times, with the noise of a shot and of readings of an arm that stands still."""
+    rng = np.random.default_rng(seed)
+    table = once.loc[once.index.repeat(SHOTS)].reset_index(drop=True)
+    joints = [name for name in table.columns if name.startswith("q")]
+    table[joints] += STILL_RAD * rng.normal(size=(len(table), len(joints)))
+    table[["x", "y", "z"]] += OF_A_SHOT_M * rng.normal(size=(len(table), 3))
+    return Measurements.from_dataframe(table, name="shots")
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return VirtualArm.paper(seed=6, imperfections=Imperfections(noise_mm=NOT_REPEATED_MM))
+
+
+@pytest.fixture(scope="module")
+def measured(arm):
+    once = arm.measure_table(arm.poses(POSES))
+    return Measurements.from_dataframe(once, name="once"), shots_of(once)
+
+
+@pytest.fixture(scope="module")
+def calibration(arm, measured):
+    return ta.calibrate(arm.robot, measured[1])
+
+
+def test_rows_of_one_pose_are_known_by_their_readings():
+    joints = np.array([[0.0, 1.0], [2.0, 1.0], [2e-4, 1.0 - 2e-4], [4e-4, 1.0], [2.0, 1.0]])
+    found = same_poses(joints, np.zeros(5, dtype=np.int64))
+    np.testing.assert_array_equal(found, [0, 1, 0, 3, 1])
+    apart = same_poses(joints, np.array([0, 0, 1, 0, 1]))
+    np.testing.assert_array_equal(apart, [0, 1, 2, 3, 4])
+    with pytest.raises(CoreError, match="groups of rows"):
+        same_poses(joints, np.zeros(4, dtype=np.int64))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_shots_stay_on_one_side(measured, seed):
+    split = split_rows(measured[1], SplitRule(seed=seed))
+    assert not set(split.train // SHOTS) & set(split.holdout // SHOTS)
+
+
+def test_a_pose_that_is_come_back_to_later_is_split_like_others(arm):
+    once = arm.measure_table(arm.poses(POSES))
+    joints = [name for name in once.columns if name.startswith("q")]
+    again = once.assign(**{name: once[name] + STILL_RAD for name in joints})
+    split = split_rows(Measurements.from_dataframe(pd.concat([once, again])), SplitRule())
+    assert set(split.train % POSES) & set(split.holdout % POSES)
+
+
+def test_what_the_arm_did_not_repeat_is_not_taken_for_the_field(arm, measured, calibration):
+    test = arm.measure(arm.poses(400, seed=9), seed=9)
+
+    def error(found):
+        return ta.evaluate(found, test).errors["variable"].position.mean
+
+    assert error(calibration) < 1.05 * error(ta.calibrate(arm.robot, measured[0]))
+    assert noise_mm(calibration) == pytest.approx(NOT_REPEATED_MM, rel=0.5)
+
+
+def test_shots_that_share_what_is_left_are_no_drift(calibration):
+    assert calibration.validation.drift is None
+
+
+def test_the_report_tells_how_shots_repeat(calibration):
+    words = words_of(report(calibration).html)
+    assert "No pose was measured twice" not in words
+    assert "approached from both sides" not in words, "readings that scatter are no movement"
