@@ -225,7 +225,8 @@ def rewrite(
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
     )
-    known: Bools = np.isfinite(solved.q @ np.ones(solved.q.shape[1]))
+    # A product with ones would leave threads of BLAS that spin for a while in the way of the corrections.
+    known: Bools = np.isfinite(np.einsum("ij->i", solved.q))
     known[list(solved.reasons)] = False
     known &= uses.moved
     state = _State(program, uses, models, solved.q, known)
