@@ -104,7 +104,7 @@ impl<'a> RowBuilder<'a> {
                 LaneParameters::Each(&lanes)
             }
         };
-        chain.sweep::<I>(packet.joints, parameters, columns, &mut sweep.frame, &mut sweep.screws);
+        chain.sweep_again::<I>(packet.joints, parameters, columns, &mut sweep.frame, &mut sweep.screws);
     }
 
     fn lanes_of_parameters(&self, packet: &Packet) -> Vec<Lane> {

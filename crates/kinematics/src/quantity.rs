@@ -138,7 +138,7 @@ impl Quantity for Jacobian<'_> {
         rows: &mut [f64],
     ) {
         let mut frame = LaneFrame::splat(&Transform::IDENTITY);
-        chain.sweep::<I>(joints, parameters, self.columns, &mut frame, &mut scratch.screws);
+        chain.sweep_again::<I>(joints, parameters, self.columns, &mut frame, &mut scratch.screws);
         store_lanes::<I>(Screw::lanes(&scratch.screws), &scratch.order, rows);
     }
 }

@@ -183,7 +183,9 @@ fn some_columns_are_those_of_all() {
         #[inline(always)]
         fn run<I: Isa>(self) -> Vec<Screw> {
             let shared = SharedParameters::new(&self.0.nominal());
-            let mut screws = vec![Screw::ZERO; self.2.len()];
+            // Of other columns before.
+            let used = [Lane::splat(7.0); 3];
+            let mut screws = vec![Screw { angular: used, linear: used }; self.2.len()];
             let mut frame = LaneFrame::splat(&Transform::IDENTITY);
             self.0.sweep::<I>(self.1, LaneParameters::Shared(&shared), self.2, &mut frame, &mut screws);
             screws
