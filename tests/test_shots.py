@@ -1,17 +1,18 @@
 """Instruments that are read several times at each pose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import truearm as ta
-from tests.report_support import words_of
 from truearm._core import CoreError, same_poses
 from truearm.measurements import Measurements
-from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.splitting import SplitRule, split_rows
 from truearm.summary import noise_mm
+from truearm.visits import means, one_row_a_visit
 
 POSES, SHOTS = 60, 3
 NOT_REPEATED_MM, OF_A_SHOT_M, STILL_RAD = 0.04, 2e-6, 2e-5
@@ -81,7 +82,38 @@ def test_shots_that_share_what_is_left_are_no_drift(calibration):
     assert calibration.validation.drift is None
 
 
-def test_the_report_tells_how_shots_repeat(calibration):
-    words = words_of(report(calibration).html)
-    assert "No pose was measured twice" not in words
-    assert "approached from both sides" not in words, "readings that scatter are no movement"
+def test_a_visit_is_the_mean_of_its_rows(measured):
+    _, shots = measured
+    found = one_row_a_visit(shots)
+    assert found.rows.tolist() == shots.rows[::SHOTS].tolist()
+    points = shots.targets.reshape(POSES, SHOTS, 1, 3).mean(axis=1)
+    np.testing.assert_allclose(found.targets, points, rtol=0.0, atol=1e-15)
+    stated = replace(shots, sigma_m=np.full(len(shots), 3e-5))
+    sigma = one_row_a_visit(stated).sigma_m
+    assert sigma is not None
+    np.testing.assert_allclose(sigma, 3e-5 / np.sqrt(SHOTS))
+    assert one_row_a_visit(found) is found
+
+
+def test_turns_of_a_visit_are_averaged_whatever_their_sign():
+    quaternion = np.array([0.5, -0.5, 0.5, 0.5])
+    table = {"q1": [0.1] * 2, **dict.fromkeys("xyz", [1.0] * 2)}
+    names = ("qw", "qx", "qy", "qz")
+    turned = {name: [value, -value] for name, value in zip(names, quaternion, strict=True)}
+    data = Measurements.from_dataframe(pd.DataFrame({**table, **turned}))
+    found = one_row_a_visit(data)
+    assert found.orientations is not None
+    np.testing.assert_allclose(np.abs(found.orientations[0] @ quaternion), 1.0)
+
+
+def test_rows_without_weight_do_not_count_in_a_visit():
+    values, visits = np.array([[1.0], [2.0], [30.0], [4.0]]), np.array([0, 0, 0, 1])
+    np.testing.assert_allclose(means(values, visits, np.array([1.0, 1.0, 0.0, 1.0])), [[1.5], [4.0]])
+
+
+def test_an_update_sees_poses_not_shots(arm, calibration):
+    new = shots_of(arm.measure_table(arm.poses(15, seed=31), seed=31), seed=32)
+    found = ta.update(calibration, new)
+    assert found.n_poses == 15
+    assert 1e-3 < found.rest.p < 1.0 - 1e-6
+    assert found.verdict == "holds"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 
-from truearm._core import FieldFit, Setup, find_drift, same_poses
+from truearm._core import FieldFit, Setup, find_drift
 from truearm.defaults import NO_DRIFT
 from truearm.details import DriftDetails, Jump
 from truearm.errors import Notice
@@ -23,6 +23,7 @@ from truearm.models import CONSTANT, VARIABLE
 from truearm.unexplained import unexplained
 from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
+from truearm.visits import means, visit_numbers
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -153,14 +154,13 @@ def _drift_of(
             every = np.flatnonzero(data.group == group)
             own = np.flatnonzero((data.group[train] == group) & (weight > 0.0))
             times = before.progress[train[own]]
-            visits = _visits(times, data.select(train[own]).readings)
+            visits = _visits(times, data.select(train[own]))
             if len(np.unique(visits)) < FEWEST_ROWS:
                 continue
-            known, seen = _of_visits(times, visits), _of_visits(left[own], visits)
+            known, seen = (means(values, visits, weight[own]) for values in (times, left[own]))
+            trust = means(weight[own], visits, weight[own])
             wanted = np.concatenate([before.progress[every], times])
-            found, noise, steps, gain = find_drift(
-                known, seen, _of_visits(weight[own], visits), wanted, most_steps
-            )
+            found, noise, steps, gain = find_drift(known, seen, trust, wanted, most_steps)
             if gain <= OVERWHELMING:
                 found, steps = np.zeros_like(found), []
             change = found[len(every) :] - before.moved[train[own]]
@@ -170,23 +170,15 @@ def _drift_of(
     return None if np.array_equal(moved, before.moved) else Drift(moved, before.progress, jumps)
 
 
-def _visits(progress: Floats, readings: Floats) -> Rows:
-    """For each row (n,) the number of its visit: shots of a pose one after the other are one.
+def _visits(progress: Floats, data: Measurements) -> Rows:
+    """For each row (n,) the number of its visit to a pose: its rows count as one.
 
     They share what no model explains of the pose, which is no sign that rows after each other are alike.
     """
     order = np.argsort(progress, kind="stable")
-    poses = same_poses(readings, np.zeros(len(readings), dtype=np.int64))
     visits = np.empty(len(order), dtype=np.int64)
-    visits[order] = np.cumsum(np.diff(poses[order], prepend=-1) != 0) - 1
+    visits[order] = visit_numbers(data.readings[order], data.group[order])
     return visits
-
-
-def _of_visits(values: Floats, visits: Rows) -> Floats:
-    """Mean of the values (n, ...) of each visit's rows."""
-    sums = np.zeros((visits.max() + 1, *values.shape[1:]))
-    np.add.at(sums, visits, values)
-    return (sums.T / np.bincount(visits)).T
 
 
 def _around(step: float, progress: Floats, rows: Rows) -> tuple[int, int]:

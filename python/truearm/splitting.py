@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from truearm._core import same_poses
 from truearm.columns import VALIDATE
 from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
 from truearm.measurements import Measurements
+from truearm.visits import visit_numbers
 
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -255,7 +255,7 @@ def _first_of_kin(data: Measurements) -> Rows:
     """For each row (n,) the first row that must stay on the same side."""
     count = len(data)
     _, alike = np.unique(data.readings, axis=0, return_inverse=True)
-    links = [alike.reshape(-1), _shots(data)]
+    links = [alike.reshape(-1), visit_numbers(data.readings, data.sources)]
     if data.pair is not None:
         _, pair = np.unique(data.pair, return_inverse=True)
         alone = data.pair == ""
@@ -265,13 +265,6 @@ def _first_of_kin(data: Measurements) -> Rows:
         kin = _components(kin, other)
     _, first, index = np.unique(kin, return_index=True, return_inverse=True)
     return np.asarray(first[index.reshape(-1)], dtype=np.int64)
-
-
-def _shots(data: Measurements) -> Rows:
-    """Number of each row's visit to a pose (n,): rows after one another that were read at the same one."""
-    _, files = np.unique(data.sources, return_inverse=True)
-    pose = same_poses(np.ascontiguousarray(data.readings), files.reshape(-1).astype(np.int64))
-    return np.cumsum(np.diff(pose, prepend=-1) != 0)
 
 
 def _components(a: Rows, b: Rows) -> Rows:

@@ -7,7 +7,7 @@ use crate::bank::Bank;
 use crate::evidence::Evidence;
 use crate::extrapolation::extrapolation_factor;
 use crate::hyper::{Hyper, Wave};
-use crate::joined::joined;
+use crate::joined::{Joined, join};
 use crate::kernel::Input;
 use crate::linear::{input_values, training};
 use crate::optimise::{Curvature, Limits};
@@ -125,7 +125,8 @@ pub fn fit_field(
     options: &FieldOptions,
 ) -> Result<FieldFit, FieldError> {
     let point = Point { parameters: &constant.parameters, setup: &constant.setup };
-    let (mut training, pose_of) = rows(problem, point, options)?;
+    let Joined { mut training, pose_of, doubtful } = rows(problem, point, options)?;
+    training.take_weight(&doubtful);
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
     let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0, curvature: None };
     let mut hyper = search.first(&training, noise)?;
@@ -156,7 +157,7 @@ pub fn fit_field(
         parameters: refined.parameters,
         bank: refined.bank,
         setup: refined.setup,
-        hyper,
+        hyper: as_loud_as_shots(hyper, posterior.training()),
         evidence: search.evidence,
         evaluations: search.evaluations,
         residuals: refined.residuals,
@@ -178,19 +179,15 @@ pub fn restore(
     options: &FieldOptions,
     hyper: Hyper,
 ) -> Result<Posterior, FieldError> {
-    let (training, _) = rows(problem, point, options)?;
+    let training = rows(problem, point, options)?.training;
     let posterior = Posterior::new(training, hyper, options.degree, &options.cancel)?;
     Ok(posterior.widened(options.degree, &options.cancel)?.unwrap_or(posterior))
 }
 
-/// The rows of a problem linearised at a point, shots of the same pose as one, and which pose each measured one went into.
-fn rows(
-    problem: &Problem,
-    point: Point,
-    options: &FieldOptions,
-) -> Result<(Training, Vec<usize>), FieldError> {
+/// The rows of a problem linearised at a point, shots of the same pose as one.
+fn rows(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Joined, FieldError> {
     let set = problem.measurements;
-    Ok(joined(training(problem, point, options)?, &set.group, set.rows_per_pose()))
+    Ok(join(training(problem, point, options)?, &set.group, set.rows_per_pose()))
 }
 
 struct Judged {
@@ -300,7 +297,8 @@ impl Search<'_> {
     }
 
     fn posterior(&self, training: &Training, hyper: &Hyper) -> Result<Posterior, FieldError> {
-        Posterior::new(training.clone(), hyper.clone(), self.options.degree, &self.options.cancel)
+        let hyper = as_loud_as_shots(hyper.clone(), training);
+        Posterior::new(training.clone(), hyper, self.options.degree, &self.options.cancel)
     }
 
     fn judge(&self, posterior: Posterior) -> Result<Judged, FieldError> {
@@ -311,6 +309,12 @@ impl Search<'_> {
         let judgement = outliers::judge(&posterior)?;
         Ok(Judged { posterior, solution, judgement })
     }
+}
+
+/// Hyper-parameters whose noise is not less than what shots of a pose differ by.
+fn as_loud_as_shots(mut hyper: Hyper, training: &Training) -> Hyper {
+    hyper.noise.iter_mut().zip(training.shot).for_each(|(noise, shot)| *noise = noise.max(shot.sqrt()));
+    hyper
 }
 
 fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Found, FieldError> {

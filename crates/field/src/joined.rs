@@ -7,12 +7,15 @@
 
 use std::collections::VecDeque;
 
+use crate::kernel::Input;
 use crate::outliers::chi_squared;
 use crate::training::Training;
 
 /// Joint values that differ by less, rad or m, are one pose: far less than the shortest length scale, more than what
 /// readings of an arm that stands still scatter.
 const STILL: f64 = 3e-4;
+/// The same of features, whose range is pi: a thousandth of it.
+const ALIKE: f64 = 3e-3;
 /// Typical deviations from the median of a pose's shots from which on one stands apart, to be judged as a row of its own.
 const FAR: f64 = 10.0;
 /// Least deviation that is taken for typical, m or rad: that of an instrument's last digit.
@@ -20,28 +23,37 @@ const LAST_DIGIT: f64 = 1e-5;
 /// Rows of a position, and of an orientation.
 const COORDINATES: f64 = 3.0;
 
-/// The rows with one pose for all of its shots, and which of these poses each measured one has become a part of, (n,).
-///
-/// `group` (n,) tells set-ups apart; each pose has a place for `rows_per_pose` residuals.
-pub fn joined(training: Training, group: &[usize], rows_per_pose: usize) -> (Training, Vec<usize>) {
+/// Rows with one pose for all of its shots.
+pub struct Joined {
+    pub training: Training,
+    /// Which of these poses each measured one has become a part of, (n,).
+    pub pose_of: Vec<usize>,
+    /// Poses of single shots that most others of their pose contradict.
+    pub doubtful: Vec<usize>,
+}
+
+/// Joins the shots of each pose; `group` (n,) tells set-ups apart, each pose has a place for `rows_per_pose` residuals.
+pub fn join(training: Training, group: &[usize], rows_per_pose: usize) -> Joined {
     let shots = Shots { training: &training, group, rows_per_pose };
     let mut poses = shots.poses();
     if poses.len() == training.pose_count() {
         let pose_of = (0..poses.len()).collect();
-        return (training, pose_of);
+        return Joined { training, pose_of, doubtful: Vec::new() };
     }
-    poses = shots.without_far_ones(poses);
+    let doubted = shots.set_apart(&mut poses);
     poses.sort_unstable_by_key(|members| members[0]);
     let mut pose_of = vec![0; training.pose_count()];
     for (pose, members) in poses.iter().enumerate() {
         members.iter().for_each(|&member| pose_of[member] = pose);
     }
-    (shots.joined(&poses), pose_of)
+    let doubtful = doubted.into_iter().map(|shot| pose_of[shot]).collect();
+    Joined { training: shots.means(&poses), pose_of, doubtful }
 }
 
 /// The shots of each pose, ascending: joint values within [`STILL`] of those of one of them that `may_be_one` with it.
 pub fn shots_of_poses(joints: &[&[f64]], may_be_one: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
-    let first = |shot: usize| joints[shot].first().copied().unwrap_or(0.0);
+    let widest = widest(joints);
+    let first = |shot: usize| joints[shot].get(widest).copied().unwrap_or(0.0);
     let are_still = |a: usize, b: usize| joints[a].iter().zip(joints[b]).all(|(x, y)| (x - y).abs() <= STILL);
     let mut order: Vec<usize> = (0..joints.len()).collect();
     order.sort_by(|&a, &b| first(a).total_cmp(&first(b)));
@@ -64,6 +76,16 @@ pub fn shots_of_poses(joints: &[&[f64]], may_be_one: impl Fn(usize, usize) -> bo
     poses
 }
 
+/// The joint that moves most: it keeps those few that may be alike.
+fn widest(joints: &[&[f64]]) -> usize {
+    let span = |joint: usize| {
+        let values = joints.iter().map(|values| values[joint]);
+        values.clone().fold(f64::NEG_INFINITY, f64::max) - values.fold(f64::INFINITY, f64::min)
+    };
+    let count = joints.first().map_or(0, |values| values.len());
+    (0..count).fold(0, |best, joint| if span(joint) > span(best) { joint } else { best })
+}
+
 /// What may be several shots of the same pose.
 struct Shots<'a> {
     training: &'a Training,
@@ -83,13 +105,17 @@ impl Shots<'_> {
 
     fn may_be_one(&self, a: usize, b: usize) -> bool {
         let training = self.training;
-        let features = |pose: usize| &training.values_of(pose)[training.geometry.joint_count()..];
+        let joints = training.geometry.joint_count();
+        let are_alike = |((input, x), y): ((&Input, &f64), &f64)| (input.scale * (x - y)).abs() <= ALIKE;
+        let inputs = training.inputs.iter().zip(training.values_of(a)).zip(training.values_of(b));
+        let sigmas = |pose: usize| &training.variance[training.rows(pose)];
         let places = |pose: usize| {
             training.rows(pose).map(move |row| training.source[row][0] - pose * self.rows_per_pose)
         };
         let weight = |pose: usize| training.rows(pose).next().map(|row| training.weight[row]);
         self.group[a] == self.group[b]
-            && features(a) == features(b)
+            && inputs.skip(joints).all(are_alike)
+            && sigmas(a) == sigmas(b)
             && weight(a).is_some()
             && weight(a) == weight(b)
             && places(a).eq(places(b))
@@ -114,8 +140,8 @@ impl Shots<'_> {
             .collect()
     }
 
-    /// The poses with shots that stand apart as poses of their own.
-    fn without_far_ones(&self, poses: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
+    /// Makes poses of their own of shots that stand apart; gives those that most others of their pose contradict.
+    fn set_apart(&self, poses: &mut Vec<Vec<usize>>) -> Vec<usize> {
         let mut squares = vec![[0.0; 2]; self.training.pose_count()];
         let mut all: [Vec<f64>; 2] = Default::default();
         for members in poses.iter().filter(|members| members.len() > 1) {
@@ -130,13 +156,17 @@ impl Shots<'_> {
             .map(|mut all| (median(&mut all) / chi_squared(COORDINATES, 0.0)).max(LAST_DIGIT * LAST_DIGIT));
         let limit = typical.map(|typical| FAR * FAR * COORDINATES * typical);
         let is_far = |shot: &usize| squares[*shot].iter().zip(limit).any(|(square, limit)| *square > limit);
-        let mut kept = Vec::new();
-        for members in poses {
+        let (mut kept, mut doubted) = (Vec::new(), Vec::new());
+        for members in poses.drain(..) {
             let (far, near): (Vec<usize>, Vec<usize>) = members.into_iter().partition(is_far);
+            if near.len() > far.len().max(1) {
+                doubted.extend(&far);
+            }
             kept.extend(far.into_iter().map(|shot| vec![shot]));
             kept.extend((!near.is_empty()).then_some(near));
         }
-        kept
+        *poses = kept;
+        doubted
     }
 
     /// Variance of a shot beside its own, of positions and of orientations: what it is at least, in all likelihood, so that
@@ -164,7 +194,7 @@ impl Shots<'_> {
     }
 
     /// One pose with the mean of the residuals for each of `poses`.
-    fn joined(&self, poses: &[Vec<usize>]) -> Training {
+    fn means(&self, poses: &[Vec<usize>]) -> Training {
         let old = self.training;
         let firsts: Vec<usize> = poses.iter().map(|members| members[0]).collect();
         let mut joined = old.select(&firsts);

@@ -90,6 +90,17 @@ fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * share).round() as usize]
 }
 
+impl Training {
+    /// Takes the weight of some poses away until they are judged.
+    pub fn take_weight(&mut self, poses: &[usize]) {
+        for &pose in poses {
+            for row in self.rows(pose) {
+                self.weight[row] *= NEGLIGIBLE;
+            }
+        }
+    }
+}
+
 impl Judgement {
     /// Takes the weight of the outliers away and gives it back to poses judged innocent; says whether anything changed.
     pub fn reweigh(&self, training: &mut Training) -> bool {

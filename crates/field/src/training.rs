@@ -79,7 +79,7 @@ pub struct Training {
     pub variance: Vec<f64>,
     /// Weight of each row, (R,): the noise variance is divided by it.
     pub weight: Vec<f64>,
-    /// Variance of a single shot's noise, of positions and orientations, where poses were measured several times.
+    /// Variance of what shots of a pose differ by, of positions and orientations; zero where all poses have one.
     pub shot: [f64; 2],
     /// Places of each row among the residuals (n, m) of all measurements, whose mean it is: one for each shot, (R,).
     pub source: Vec<Vec<usize>>,
@@ -118,24 +118,20 @@ impl Training {
         &self.jacobian[row * self.columns.len()..(row + 1) * self.columns.len()]
     }
 
-    /// Variance of a row's noise, given the noise that single shots of positions and orientations have.
+    /// Variance of a row's noise, given the noise that single shots of positions and orientations have; it is not less than
+    /// what the shots of poses differ by.
     pub fn noise_variance(&self, row: usize, noise: [f64; 2]) -> f64 {
-        let (noise, averaged) = self.noise_of_mean(row, noise);
-        (noise - averaged + self.variance[row]) / self.weight[row]
+        let shot = self.shot[usize::from(self.is_orientation[row])];
+        let lost = shot * (1.0 - 1.0 / self.source[row].len() as f64);
+        let square = noise[usize::from(self.is_orientation[row])].powi(2).max(shot);
+        (square - lost + self.variance[row]) / self.weight[row]
     }
 
     /// What it grows by with the logarithm of the noise's variance.
     pub fn noise_slope(&self, row: usize, noise: [f64; 2]) -> f64 {
-        let kind = usize::from(self.is_orientation[row]);
-        let (square, averaged) = self.noise_of_mean(row, noise);
-        (if self.shot[kind] < square { square } else { square - averaged }) / self.weight[row]
-    }
-
-    /// The square of the noise, and what its part of single shots loses in their mean.
-    fn noise_of_mean(&self, row: usize, noise: [f64; 2]) -> (f64, f64) {
-        let kind = usize::from(self.is_orientation[row]);
-        let square = noise[kind] * noise[kind];
-        (square, self.shot[kind].min(square) * (1.0 - 1.0 / self.source[row].len() as f64))
+        let square = noise[usize::from(self.is_orientation[row])].powi(2);
+        let counts = square > self.shot[usize::from(self.is_orientation[row])];
+        if counts { square / self.weight[row] } else { 0.0 }
     }
 
     /// The same with levers of heights along `up`, a direction in the base frame.

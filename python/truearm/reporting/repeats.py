@@ -1,13 +1,12 @@
 """Chapter: repeatability, hysteresis and noise floor, where poses were measured more than once."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import same_poses
 from truearm.errors import count_of
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
@@ -22,6 +21,8 @@ from truearm.units import MM_PER_METRE
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+SAME_READING: Final = 1e-6
+"""Readings that differ by less, rad or m, are one pose: a micrometre at a metre."""
 FEWEST_GROUPS: Final = 3
 
 
@@ -30,7 +31,7 @@ class Repeats:
     """Rows in their order of measuring, with the pose that each belongs to.
 
     Attributes:
-        place: Number of the pose (n,); rows of one set-up that were read at it share it.
+        place: Number of the pose (n,); rows of one set-up with equal readings share it.
         missed: Measured minus predicted (n, 3), m, what drifted taken out; what is predicted is the same
             within a pose.
         approach: Sign of each joint's last movement (n, N).
@@ -51,10 +52,10 @@ class Repeats:
         first = 3 * selection.targets.index(target)
         seen = np.flatnonzero(np.isfinite(data.targets[:, target]).all(axis=1))
         order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
-        _, group = np.unique(data.group, return_inverse=True)
-        pose = same_poses(np.ascontiguousarray(data.readings), group.reshape(-1).astype(np.int64))
-        # Readings of an arm that stands still scatter, which is no movement.
-        approach, place = _approach(replace(data, readings=data.readings[pose]))[order], pose[order]
+        approach = _approach(data)[order]
+        rounded = np.round(data.readings[order] / SAME_READING)
+        _, group = np.unique(data.group[order], return_inverse=True)
+        _, place = np.unique(np.column_stack([group, rounded]), axis=0, return_inverse=True)
         again = np.bincount(place)[place] > 1
         if not again.any():
             return None

@@ -26,6 +26,7 @@ from truearm.updating.unknowns import Unknowns
 from truearm.updating.updated import updated
 from truearm.updating.validating import errors_at_left_out, left_out_errors
 from truearm.validation import Errors
+from truearm.visits import one_row_a_visit
 
 Verdict = Literal["holds", "moved", "field"]
 
@@ -133,6 +134,7 @@ def update(
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
     notices += known_rows(calibration.learned_from, data)
+    data = one_row_a_visit(data)
     task = _task(calibration, data, chosen, stages)
     if task.selection.orientation:
         check_turns(data, calibration.robot)

@@ -59,7 +59,7 @@ fn gradient_and_value_with_several_shots_of_poses() {
     assert_eq!(training.pose_count(), 18);
     check_value(&training, &hyper(&training, 6));
     check_gradient(&training, &hyper(&training, 6));
-    // As quiet as single shots: nothing is left to the poses.
+    // Below what shots differ by nothing changes with the noise.
     let quiet = Hyper { noise: [0.4 * training.shot[0].sqrt(), 1e-4], ..hyper(&training, 6) };
     check_gradient(&training, &quiet);
 }

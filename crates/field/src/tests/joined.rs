@@ -1,17 +1,27 @@
 //! Shots of the same pose count as one.
 
+use truearm_estimate::MeasurementSet;
+
 use super::common::{Measure, Truth, deviations, fit, root_mean_square, shots, six_axes, subset};
 use super::sets::rows_of;
-use crate::joined::joined;
+use crate::fit::FieldOptions;
+use crate::joined::{Joined, join};
+use crate::kernel::Input;
+use crate::training::Training;
 
 const STILL: f64 = 2e-5;
+
+fn joined(rows: Training, set: &MeasurementSet) -> Joined {
+    join(rows, &set.group, set.rows_per_pose())
+}
 
 #[test]
 fn shots_are_joined_to_their_mean() {
     let arm = six_axes(Truth::BENDING);
     let once = Measure { groups: 2, ..Measure::poses(30) }.of(&arm);
     let often = shots(&once, 4, 0.0, 1e-5, 3);
-    let (found, pose_of) = joined(rows_of(&arm, &often, |_| ()), &often.group, often.rows_per_pose());
+    let Joined { training: found, pose_of, doubtful } = joined(rows_of(&arm, &often, |_| ()), &often);
+    assert!(doubtful.is_empty());
     assert_eq!(pose_of, (0..120).map(|shot| shot / 4).collect::<Vec<usize>>());
     let all = rows_of(&arm, &often, |_| ());
     for pose in 0..30 {
@@ -21,7 +31,7 @@ fn shots_are_joined_to_their_mean() {
             assert_eq!(found.source[row].len(), 4);
         }
     }
-    // 30 x 3 x 3 differences know the shots' variance to 9 %; it is the least likely one that is taken.
+    // 30 x 3 x 3 differences know the shots' variance to 9 %; it is the smallest that is still plausible that is taken.
     let share = found.shot[0] / 1e-10;
     assert!((0.6..1.05).contains(&share), "{share}");
     let (noise, mean) = (3e-5_f64, found.noise_variance(0, [3e-5, 0.0]));
@@ -32,7 +42,7 @@ fn shots_are_joined_to_their_mean() {
 fn nothing_changes_where_poses_were_measured_once() {
     let arm = six_axes(Truth::BENDING);
     let set = Measure::poses(40).of(&arm);
-    let (found, pose_of) = joined(rows_of(&arm, &set, |_| ()), &set.group, set.rows_per_pose());
+    let Joined { training: found, pose_of, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
     assert_eq!(pose_of, (0..40).collect::<Vec<usize>>());
     assert_eq!(found.residual, rows_of(&arm, &set, |_| ()).residual);
     assert_eq!(found.shot, [0.0; 2]);
@@ -47,7 +57,7 @@ fn readings_that_scatter_are_one_pose_and_others_are_not() {
     set.group[8] = 1;
     set.group[9..].iter_mut().step_by(2).for_each(|group| *group = 1);
     set.weight[5] = 0.0;
-    let (found, pose_of) = joined(rows_of(&arm, &set, |_| ()), &set.group, set.rows_per_pose());
+    let Joined { training: found, pose_of, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
     assert_eq!(pose_of[..9], [0, 0, 0, 1, 2, 3, 4, 4, 5]);
     assert!(found.rows(3).is_empty(), "a row without weight");
 }
@@ -57,8 +67,8 @@ fn a_shot_that_its_others_contradict_stands_apart() {
     let arm = six_axes(Truth::BENDING);
     let mut set = shots(&Measure::poses(60).of(&arm), 3, STILL, 1e-5, 5);
     set.targets[3 * 31] += 1e-3;
-    let (_, pose_of) = joined(rows_of(&arm, &set, |_| ()), &set.group, set.rows_per_pose());
-    assert_eq!(pose_of[30..33], [10, 11, 10]);
+    let Joined { pose_of, doubtful, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
+    assert_eq!((&pose_of[30..33], &doubtful[..]), (&[10, 11, 10][..], &[11][..]));
     let fit = fit(&arm, &set).unwrap();
     assert_eq!(fit.field.judgement.outliers, [31]);
     let weights = fit.field.weights();
@@ -77,4 +87,38 @@ fn shots_do_not_pass_what_poses_scatter_off_as_the_fields() {
     assert!((0.6..1.4).contains(&(all.field.hyper.noise[0] / scatter)), "{:?}", all.field.hyper.noise);
     let (all, single) = (left(&all), left(&single));
     assert!(all < 1.05 * single, "{all} from four shots of each pose, {single} from one");
+}
+
+#[test]
+fn many_contradicted_shots_are_found() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = shots(&Measure::poses(60).of(&arm), 3, STILL, 1e-5, 8);
+    let bad: Vec<usize> = (0..12).map(|k| 3 * (5 * k) + k % 3).collect();
+    bad.iter().for_each(|&shot| set.targets[3 * shot] += 1e-3);
+    let fit = fit(&arm, &set).unwrap();
+    assert_eq!(fit.field.judgement.outliers, bad);
+    assert!(fit.field.hyper.noise[0] < 6e-5, "{:?}", fit.field.hyper.noise);
+}
+
+#[test]
+fn noise_is_not_less_than_what_shots_differ_by() {
+    let arm = six_axes(Truth::BENDING);
+    let quiet = Measure { noise: 0.0, ..Measure::poses(60) }.of(&arm);
+    let fit = fit(&arm, &shots(&quiet, 5, 0.0, 2e-5, 9)).unwrap();
+    let share = fit.field.hyper.noise[0] / 2e-5;
+    assert!((0.85..1.3).contains(&share), "{share} of the noise of a shot");
+}
+
+#[test]
+fn shots_of_other_sigmas_and_features_are_rows_of_their_own() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = shots(&Measure::poses(30).of(&arm), 3, STILL, 1e-5, 10);
+    set.sigma[1] = 5e-4;
+    let warm = |options: &mut FieldOptions| {
+        options.features = vec![Input::line(10.0)];
+        options.feature_values =
+            (0..90).map(|row| if row == 3 { 9.0 } else { 0.002 * (row % 3) as f64 }).collect();
+    };
+    let Joined { pose_of, .. } = joined(rows_of(&arm, &set, warm), &set);
+    assert_eq!(pose_of[..9], [0, 1, 0, 2, 3, 3, 4, 4, 4]);
 }

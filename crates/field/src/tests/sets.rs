@@ -5,7 +5,7 @@ use truearm_estimate::{MeasurementSet, Point, Setup};
 use super::common::{Arm, Measure, Truth, options, problem, scara, shots, six_axes, subset};
 use crate::fit::FieldOptions;
 use crate::hyper::{Hyper, Wave};
-use crate::joined::joined;
+use crate::joined::join;
 use crate::kernel::Input;
 use crate::linear::training;
 use crate::training::Training;
@@ -60,7 +60,7 @@ pub fn several_shots(poses: usize) -> Training {
     all.sigma.extend(&more.sigma);
     all.weight.extend(&more.weight);
     all.group.extend(&more.group);
-    joined(rows_of(&arm, &all, |_| ()), &groups, all.rows_per_pose()).0
+    join(rows_of(&arm, &all, |_| ()), &groups, all.rows_per_pose()).training
 }
 
 /// A prismatic joint and a feature.

@@ -1,0 +1,65 @@
+"""Which rows are shots of one visit to a pose: read one after the other while the arm stood still."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import same_poses
+from truearm.measurements import Measurements
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+
+def visit_numbers(readings: Floats, kin: NDArray[np.str_]) -> Rows:
+    """Number of each row's visit to a pose (n,), rows in the order of measuring.
+
+    Rows after one another that were read at the same pose are one visit.
+
+    Args:
+        readings: (n, N), rad or m.
+        kin: File or set-up of each row (n,); a visit is within one.
+    """
+    _, names = np.unique(kin, return_inverse=True)
+    pose = same_poses(np.ascontiguousarray(readings), names.reshape(-1).astype(np.int64))
+    return np.asarray(np.cumsum(np.diff(pose, prepend=-1) != 0) - 1, dtype=np.int64)
+
+
+def means(values: Floats, visits: Rows, weight: Floats | None = None) -> Floats:
+    """Weighted mean of the values (n, ...) of each visit's rows, all alike without `weight` (n,)."""
+    given = np.ones(len(visits)) if weight is None else weight
+    sums = np.zeros((visits.max() + 1, *values.shape[1:]))
+    np.add.at(sums, visits, (values.T * given).T)
+    return np.asarray((sums.T / np.bincount(visits, given)).T)
+
+
+def one_row_a_visit(data: Measurements) -> Measurements:
+    """The mean of each visit's rows, with the number of its first one; rows with distances stay as they are.
+
+    Visits whose rows do not hold the same points stay as they are as well.
+    """
+    visits = visit_numbers(data.readings, np.char.add(np.char.add(data.sources, "\n"), data.group))
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(data.targets).all(axis=2))
+    if data.orientations is not None:
+        seen = np.column_stack([seen, np.isfinite(data.orientations).all(axis=1)])
+    _, first = np.unique(visits, return_index=True)
+    alike = (seen == seen[first][visits]).all(axis=1)
+    if data.distance_m is not None or not alike.all() or len(first) == len(data):
+        return data
+    orientations = data.orientations
+    if orientations is not None:
+        sign = np.where((orientations * orientations[first][visits]).sum(axis=1) < 0.0, -1.0, 1.0)
+        mean = means(orientations * sign[:, None], visits)
+        orientations = mean / np.linalg.norm(mean, axis=1)[:, None]
+    sigma = data.sigma_m
+    if sigma is not None:
+        sigma = np.sqrt(means(np.square(sigma), visits) / np.bincount(visits))
+    shown = data.select(first)
+    return replace(
+        shown,
+        readings=means(data.readings, visits),
+        targets=means(data.targets, visits),
+        orientations=orientations,
+        sigma_m=sigma,
+    )
