@@ -23,6 +23,7 @@ SUMMARY = [
     "robot",
     "n_train",
     "n_holdout",
+    "n_holdout_poses",
     "holdout",
     "train",
     "coverage_95",

@@ -9,9 +9,13 @@ import pytest
 import truearm as ta
 from truearm._core import CoreError, same_poses
 from truearm.measurements import Measurements
+from truearm.reporting.facts import Facts
+from truearm.reporting.parts import Figure
+from truearm.reporting.repeats import Repeats, repeats
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.splitting import SplitRule, split_rows
 from truearm.summary import noise_mm
+from truearm.validation import Validation
 from truearm.visits import means, one_row_a_visit
 
 POSES, SHOTS = 60, 3
@@ -76,6 +80,35 @@ def test_what_the_arm_did_not_repeat_is_not_taken_for_the_field(arm, measured, c
 
     assert error(calibration) < 1.05 * error(ta.calibrate(arm.robot, measured[0]))
     assert noise_mm(calibration) == pytest.approx(NOT_REPEATED_MM, rel=0.5)
+
+
+def test_held_out_poses_are_counted_not_their_shots(calibration):
+    validation = calibration.validation
+    assert validation.n_holdout == SHOTS * validation.n_holdout_poses == SHOTS * 18
+    assert validation.poses_judged == "18 held-out poses (54 rows)"
+    assert validation.few.startswith("The errors above come from 18 held-out poses")
+    assert Validation.from_dict(validation.to_dict()) == validation
+    older = {key: value for key, value in validation.to_dict().items() if key != "n_holdout_poses"}
+    assert Validation.from_dict(older).n_holdout_poses == validation.n_holdout
+
+
+def test_the_report_tells_shots_from_poses_that_were_come_back_to(arm, measured, calibration):
+    (figure,) = (part for part in repeats(Facts(calibration)).parts if isinstance(part, Figure))
+    assert f"{SHOTS * POSES} measurements of {POSES} poses" in figure.says
+    assert "They were read right after another one at the same pose" in figure.says
+    once = arm.measure_table(arm.poses(POSES))
+    again = pd.concat([once, arm.measure_table(arm.poses(POSES), seed=8)], ignore_index=True)
+    later = ta.calibrate(arm.robot, Measurements.from_dataframe(again))
+    (figure,) = (part for part in repeats(Facts(later)).parts if isinstance(part, Figure))
+    assert f"{2 * POSES} measurements of {POSES} poses" in figure.says
+    assert "right after another" not in figure.says
+
+
+def test_jitter_while_the_arm_stands_is_no_approach(calibration):
+    found = Repeats.of(Facts(calibration))
+    assert found is not None
+    sides = [np.unique(found.approach[mine], axis=0) for mine in found.poses()]
+    assert all(len(side) == 1 for side in sides)
 
 
 def test_shots_that_share_what_is_left_are_no_drift(calibration):

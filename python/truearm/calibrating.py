@@ -45,6 +45,7 @@ from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.unexplained import unexplained
 from truearm.validation import Validation
+from truearm.visits import pose_count
 
 
 def calibrate(
@@ -167,6 +168,7 @@ def _validate(
     validation = Validation(
         n_train=len(trained.data),
         n_holdout=len(held),
+        n_holdout_poses=pose_count(held),
         n_planned=split.planned,
         holdout={name: found.statistics() for name, found in errors.items()},
         train={name: found.statistics() for name, found in on_training.items()},

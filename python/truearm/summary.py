@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 
 MRAD_PER_RAD: Final = 1e3
 WAVE: Final = "wave"
+OWN: Final = "own"
+FEWEST_RIPPLES: Final = 3.0
+"""Curves of joints that do so less often in a turn are said not to ripple."""
 AMPLITUDES: Final = (
     ("theta_mrad", MRAD_PER_RAD),
     ("other_angles_mrad", MRAD_PER_RAD),
@@ -58,7 +61,7 @@ def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:
 
     Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units; a wave
     has cycles a turn of its joint instead. Amplitudes are prior standard deviations; a wave's is what it
-    reaches.
+    reaches. Curves of joints that ripple have about how often they do a turn.
     """
     field, details = calibration.model.field, calibration.variable
     if field is None or details is None:
@@ -75,6 +78,9 @@ def _describe(
     found: dict[str, Any] = {"name": name}
     if name == WAVE:
         found["cycles"], scales = scales[0], []
+    ripples = hyper.get("own_cycles", [0.0])[0]
+    if name == OWN and ripples >= FEWEST_RIPPLES and block["axes"][0][0]:
+        found["ripples"] = ripples
     cells = 1
     for axis in block["axes"]:
         cells *= axis[4]

@@ -108,6 +108,7 @@ class Validation:
     Attributes:
         n_train: Rows that trained.
         n_holdout: Rows that were held out, or left out in turn.
+        n_holdout_poses: How many poses they are of: shots of the same pose count once.
         holdout: Errors of "nominal", "constant" and, if fitted, "variable" on these rows.
         train: The same on training rows.
         coverage_95: Share of the held-out coordinates that lie within the 95 % intervals of the variable
@@ -120,6 +121,7 @@ class Validation:
 
     n_train: int
     n_holdout: int
+    n_holdout_poses: int
     holdout: Mapping[str, Errors]
     train: Mapping[str, Errors]
     coverage_95: float | None = None
@@ -134,16 +136,17 @@ class Validation:
 
     @property
     def poses_judged(self) -> str:
-        """How many they are: "832 held-out poses"."""
-        return count_of(self.n_holdout, f"{self.judged} pose")
+        """How many they are: "832 held-out poses", or "70 held-out poses (210 rows)"."""
+        rows = "" if self.n_holdout == self.n_holdout_poses else f" ({count_of(self.n_holdout, 'row')})"
+        return count_of(self.n_holdout_poses, f"{self.judged} pose") + rows
 
     @property
     def few(self) -> str:
         """What is said where so few were judged that others would give other errors; empty elsewhere."""
-        if self.n_holdout >= FEW_HELD:
+        if self.n_holdout_poses >= FEW_HELD:
             return ""
         if self.left_out:
-            poses = count_of(self.n_holdout, "pose")
+            poses = count_of(self.n_holdout_poses, "pose")
             return f"The errors above come from {poses}: truearm evaluate judges it on others."
         return f"The errors above come from {self.poses_judged}: another split would give others."
 
@@ -152,6 +155,7 @@ class Validation:
         return {
             "n_train": self.n_train,
             "n_holdout": self.n_holdout,
+            "n_holdout_poses": self.n_holdout_poses,
             "holdout": {name: errors.to_dict() for name, errors in self.holdout.items()},
             "train": {name: errors.to_dict() for name, errors in self.train.items()},
             "coverage_95": self.coverage_95,
@@ -170,6 +174,7 @@ class Validation:
         return cls(
             n_train=content["n_train"],
             n_holdout=content["n_holdout"],
+            n_holdout_poses=content.get("n_holdout_poses", content["n_holdout"]),
             holdout=sides["holdout"],
             train=sides["train"],
             coverage_95=content["coverage_95"],

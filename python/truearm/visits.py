@@ -12,6 +12,23 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 
+def pose_numbers(readings: Floats, kin: NDArray[np.str_]) -> Rows:
+    """First row of each row's pose (n,): rows that were read at the same pose are shots of it.
+
+    Args:
+        readings: (n, N), rad or m.
+        kin: File or set-up of each row (n,); a pose is of one of them.
+    """
+    _, names = np.unique(kin, return_inverse=True)
+    found = same_poses(np.ascontiguousarray(readings), names.reshape(-1).astype(np.int64))
+    return np.asarray(found, dtype=np.int64)
+
+
+def pose_count(data: Measurements) -> int:
+    """How many poses the rows are of: shots of a pose in a set-up count once."""
+    return len(np.unique(pose_numbers(data.readings, data.group)))
+
+
 def visit_numbers(readings: Floats, kin: NDArray[np.str_]) -> Rows:
     """Number of each row's visit to a pose (n,), rows in the order of measuring.
 
@@ -21,9 +38,8 @@ def visit_numbers(readings: Floats, kin: NDArray[np.str_]) -> Rows:
         readings: (n, N), rad or m.
         kin: File or set-up of each row (n,); a visit is within one.
     """
-    _, names = np.unique(kin, return_inverse=True)
-    pose = same_poses(np.ascontiguousarray(readings), names.reshape(-1).astype(np.int64))
-    return np.asarray(np.cumsum(np.diff(pose, prepend=-1) != 0) - 1, dtype=np.int64)
+    changes = np.diff(pose_numbers(readings, kin), prepend=-1) != 0
+    return np.asarray(np.cumsum(changes) - 1, dtype=np.int64)
 
 
 def means(values: Floats, visits: Rows, weight: Floats | None = None) -> Floats:

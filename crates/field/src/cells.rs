@@ -52,15 +52,15 @@ const CELLS_OF_CYCLE: usize = 16;
 const FINEST: f64 = 0.004;
 
 impl Axis {
-    /// An axis for the values of one input (raw), with `per_length` cells per length scale.
+    /// An axis for the values of one input (raw), with a length scale, about so far from cell to cell.
     pub fn covering(
         input: Input,
         values: impl Iterator<Item = f64>,
         length: f64,
-        per_length: f64,
+        spacing: f64,
         degree: usize,
     ) -> Self {
-        let spacing = (length / per_length).clamp(FINEST, WIDEST);
+        let spacing = spacing.clamp(FINEST, WIDEST);
         let mut scaled: Vec<f64> = values.map(|value| input.scale * value).collect();
         let (low, high) = match input.kind {
             InputKind::Line => range(&scaled),
@@ -295,11 +295,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn closed(degree: usize) -> Axis {
-        Axis::covering(Input::ANGLE, (0..400).map(|k| f64::from(k) * 0.0157), 0.3, 2.0, degree)
+        Axis::covering(Input::ANGLE, (0..400).map(|k| f64::from(k) * 0.0157), 0.3, 0.15, degree)
     }
 
     fn open(degree: usize) -> Axis {
-        Axis::covering(Input::ANGLE, (0..50).map(|k| 2.9 + f64::from(k) * 0.02), 0.2, 2.0, degree)
+        Axis::covering(Input::ANGLE, (0..50).map(|k| 2.9 + f64::from(k) * 0.02), 0.2, 0.1, degree)
     }
 
     proptest! {

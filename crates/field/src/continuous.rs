@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, exp};
 
 use crate::hyper::{Hyper, Product};
-use crate::kernel::Shape;
+use crate::kernel::{Input, Shape};
+use crate::own::OwnKernel;
 use crate::pairs::{PairKernels, PairTable};
 use crate::sag::alike;
 use crate::training::Training;
@@ -25,7 +26,7 @@ pub struct Pairing {
 /// Kernels of one pose with the poses from it on, under given hyper-parameters.
 pub struct PoseKernels {
     /// Of each input, (I, count).
-    pub own: Vec<Slopes>,
+    pub own: Vec<OwnSlopes>,
     /// Summed over the inputs.
     pub smooth: Slopes,
     /// For each product, (count,).
@@ -36,6 +37,13 @@ pub struct PoseKernels {
 pub struct Slopes {
     pub kernel: Vec<f64>,
     pub by_log_length: Vec<f64>,
+}
+
+/// The same of an `own` block.
+pub struct OwnSlopes {
+    pub kernel: Vec<f64>,
+    pub by_log_length: Vec<f64>,
+    pub by_log_cycles: Vec<f64>,
 }
 
 /// The kernels of all poses.
@@ -78,7 +86,8 @@ impl Pairing {
 impl<'a> Continuous<'a> {
     /// Under given hyper-parameters.
     pub fn new(training: &'a Training, pairings: &'a [Pairing], hyper: &'a Hyper) -> Self {
-        let poses = pairings.par_iter().map(|pairing| dispatch(Fill { pairing, hyper })).collect();
+        let inputs = &training.inputs;
+        let poses = pairings.par_iter().map(|pairing| dispatch(Fill { pairing, inputs, hyper })).collect();
         Self { training, hyper, pairings, poses }
     }
 }
@@ -106,6 +115,7 @@ impl PairKernels for Continuous<'_> {
 
 struct Fill<'a> {
     pairing: &'a Pairing,
+    inputs: &'a [Input],
     hyper: &'a Hyper,
 }
 
@@ -114,13 +124,11 @@ impl Kernel for Fill<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> PoseKernels {
-        let Self { pairing: Pairing { distances, count, .. }, hyper } = self;
+        let Self { pairing: Pairing { distances, count, .. }, inputs, hyper } = self;
         let mut own = Vec::with_capacity(distances.len());
         let mut smooth = Slopes::zeros(*count);
-        for distances in distances {
-            let mut slopes = Slopes::zeros(*count);
-            slopes.add::<I>(Shape::Matern, distances, hyper.own_length);
-            own.push(slopes);
+        for (input, distances) in inputs.iter().zip(distances) {
+            own.push(OwnSlopes::new::<I>(OwnKernel::of(hyper, input.kind), distances));
             smooth.add::<I>(Shape::SquaredExponential, distances, hyper.smooth_length);
         }
         let mut products = Vec::with_capacity(hyper.products.len());
@@ -128,6 +136,23 @@ impl Kernel for Fill<'_> {
             products.push(product_kernels::<I>(product, distances, *count));
         }
         PoseKernels { own, smooth, products }
+    }
+}
+
+impl OwnSlopes {
+    #[inline(always)]
+    fn new<I: Isa>(kernel: OwnKernel, distances: &[f64]) -> Self {
+        let zeros = || vec![0.0; distances.len()];
+        let mut slopes = Self { kernel: zeros(), by_log_length: zeros(), by_log_cycles: zeros() };
+        let (kernels, lengths) = (runs_mut(&mut slopes.kernel), runs_mut(&mut slopes.by_log_length));
+        let outputs = kernels.iter_mut().zip(lengths).zip(runs_mut(&mut slopes.by_log_cycles));
+        for (distance, ((value, by_length), by_cycles)) in runs(distances).iter().zip(outputs) {
+            let found = kernel.of_lane::<I>(Lane(*distance));
+            *value = found.kernel.0;
+            *by_length = found.by_log_length.0;
+            *by_cycles = found.by_log_cycles.0;
+        }
+        slopes
     }
 }
 

@@ -164,7 +164,7 @@ impl Curve {
     fn new(left: &Left, right: &Mat<f64>, length: f64, steps: &[f64]) -> Option<Self> {
         let input = Input::line(1.0);
         let scaled = input.scale * length;
-        let axis = Axis::covering(input, [0.0, 1.0].into_iter(), scaled, PER_LENGTH, DEGREE);
+        let axis = Axis::covering(input, [0.0, 1.0].into_iter(), scaled, scaled / PER_LENGTH, DEGREE);
         let cells = CellKernel::new(axis, |distance| Shape::Matern.at(distance, scaled));
         let root = Root::new(&cells)?;
         let features: Vec<Vec<f64>> =

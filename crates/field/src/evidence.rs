@@ -17,8 +17,8 @@ use truearm_kinematics::{Isa, Kernel, dispatch};
 use crate::FieldError;
 use crate::continuous::{Continuous, Pairing, PoseKernels, dot, exponent_factors, padded, pairings};
 use crate::hyper::{
-    AT_CONSTANT, AT_OWN, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH, AT_SMOOTH_LENGTH,
-    Hyper, Product,
+    AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
+    AT_SMOOTH_LENGTH, Hyper, Product,
 };
 use crate::pairs::{ByColumn, ClassSums, add_products, write_covariance};
 use crate::product::times;
@@ -210,7 +210,7 @@ impl Kernel for PoseGradient<'_> {
 /// `(alpha alpha^T - P)[r, c] J[r, p] J[c, p]` summed over the pose's rows c and the columns p of a kind; by row r
 /// while it is gathered, by pose in the end.
 struct Shares {
-    constant: Vec<f64>,
+    constants: [Vec<f64>; 3],
     classes: [Vec<f64>; 3],
     own: Vec<Vec<f64>>,
     noise: [f64; 2],
@@ -220,7 +220,7 @@ impl Shares {
     fn zeros(rows: usize, inputs: usize) -> Self {
         let zeros = || vec![0.0; rows];
         Self {
-            constant: zeros(),
+            constants: [zeros(), zeros(), zeros()],
             classes: [zeros(), zeros(), zeros()],
             own: vec![zeros(); inputs],
             noise: [0.0; 2],
@@ -235,7 +235,7 @@ impl Shares {
             sums
         };
         Self {
-            constant: sum(self.constant),
+            constants: self.constants.map(sum),
             classes: self.classes.map(sum),
             own: self.own.into_iter().map(sum).collect(),
             noise: self.noise,
@@ -258,8 +258,8 @@ impl PoseGradient<'_> {
             self.weights(row, first, &mut weights);
             let noise = training.noise_slope(row, self.hyper.noise);
             shares.noise[usize::from(training.is_orientation[row])] += weights[row - first] * noise;
-            add_products(&mut shares.constant, &sums.constant, &weights, 1.0);
-            for (share, sums) in shares.classes.iter_mut().zip(&sums.classes) {
+            let kinds = shares.constants.iter_mut().chain(&mut shares.classes);
+            for (share, sums) in kinds.zip(sums.constants.iter().chain(&sums.classes)) {
                 add_products(share, sums, &weights, 1.0);
             }
             for (own, share) in by_column.own.iter().zip(&mut shares.own) {
@@ -293,7 +293,9 @@ impl PoseGradient<'_> {
         let hyper = self.hyper;
         let mut gradient = vec![0.0; hyper.to_logs().len()];
         let noise = gradient.len() - 2;
-        gradient[AT_CONSTANT] = hyper.constant.powi(2) * shares.constant.iter().sum::<f64>();
+        for (class, (factor, share)) in hyper.constant.iter().zip(&shares.constants).enumerate() {
+            gradient[AT_CONSTANT + class] = factor.powi(2) * share.iter().sum::<f64>();
+        }
         let anew: f64 = shares.own.iter().map(|share| share[0]).sum();
         gradient[AT_REPEATABILITY] = hyper.repeatability.powi(2) * anew;
         gradient[noise] = shares.noise[0];
@@ -315,6 +317,7 @@ impl PoseGradient<'_> {
         for (kernels, share) in self.kernels.own.iter().zip(&shares.own) {
             gradient[AT_OWN] += own * dot(share, &kernels.kernel);
             gradient[AT_OWN_LENGTH] += 0.5 * own * dot(share, &kernels.by_log_length);
+            gradient[AT_OWN_CYCLES] += 0.5 * own * dot(share, &kernels.by_log_cycles);
         }
         for (loads, share) in self.evidence.pairings[self.pose].loads.iter().zip(&shares.own) {
             gradient[AT_SAG] += sag * dot(share, loads);

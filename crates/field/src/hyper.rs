@@ -36,12 +36,14 @@ pub struct Wave {
 /// Hyper-parameters; amplitudes in rad or m, lengths in scaled input units (rad).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hyper {
-    /// Factor on the constants' prior standard deviations.
-    pub constant: f64,
+    /// Factors on the constants' prior standard deviations by class.
+    pub constant: [f64; 3],
     /// Amplitude of `own` blocks, rad (for prismatic joints times [`truearm_estimate::ANGLE_ARM`] m).
     pub own: f64,
     /// Length scale of `own` blocks.
     pub own_length: f64,
+    /// Cycles a turn that `own` blocks of angles ripple with; below one they hardly do.
+    pub own_cycles: f64,
     /// Amplitudes of `smooth` blocks by class.
     pub smooth: [f64; 3],
     /// Length scale of `smooth` blocks.
@@ -89,9 +91,12 @@ const fn amplitude(start: f64) -> Range {
     range(start * MILLI, 0.001 * MILLI, 3.0 * MILLI, 1.0)
 }
 
-const CONSTANT: Range = range(1.0, 0.1, 10.0, 0.5);
+const CONSTANT: Range = range(1.0, 0.02, 10.0, 1.0);
 const OWN: Range = range(0.1 * MILLI, 0.003 * MILLI, 3.0 * MILLI, 1.0);
 const OWN_LENGTH: Range = range(0.1, 0.02, 3.0, 0.7);
+const OWN_CYCLES: Range = range(0.7, 0.1, 60.0, 1.7);
+/// Where a search for ripples begins.
+const RIPPLE: f64 = 10.0;
 const SMOOTH: [Range; 3] = [amplitude(0.05), amplitude(0.05), amplitude(0.025)];
 const SMOOTH_LENGTH: Range = range(1.5, 0.5, 10.0, 0.7);
 const REPEATABILITY: Range = range(0.03 * MILLI, 0.002 * MILLI, MILLI, 1.0);
@@ -108,13 +113,14 @@ const NOISE_HIGH: f64 = 1000.0 * MILLI;
 
 /// Positions of the hyper-parameters in the vector of logarithms; products follow, then noise.
 pub const AT_CONSTANT: usize = 0;
-pub const AT_OWN: usize = 1;
-pub const AT_OWN_LENGTH: usize = 2;
-pub const AT_SMOOTH: usize = 3;
-pub const AT_SMOOTH_LENGTH: usize = 6;
-pub const AT_REPEATABILITY: usize = 7;
-pub const AT_SAG: usize = 8;
-pub const AT_PRODUCTS: usize = 9;
+pub const AT_OWN: usize = 3;
+pub const AT_OWN_LENGTH: usize = 4;
+pub const AT_OWN_CYCLES: usize = 5;
+pub const AT_SMOOTH: usize = 6;
+pub const AT_SMOOTH_LENGTH: usize = 9;
+pub const AT_REPEATABILITY: usize = 10;
+pub const AT_SAG: usize = 11;
+pub const AT_PRODUCTS: usize = 12;
 
 /// Name of the block whose joints the evidence chooses.
 pub const MAJOR_NAME: &str = "major";
@@ -156,9 +162,10 @@ impl Hyper {
             products.push(Product::start(WRIST_NAME, last_three));
         }
         Self {
-            constant: CONSTANT.start,
+            constant: [CONSTANT.start; 3],
             own: OWN.start,
             own_length: OWN_LENGTH.start,
+            own_cycles: OWN_CYCLES.start,
             smooth: SMOOTH.map(|r| r.start),
             smooth_length: SMOOTH_LENGTH.start,
             repeatability: REPEATABILITY.start,
@@ -183,6 +190,9 @@ impl Hyper {
         if self.products.iter().flat_map(|product| &product.joints).any(|&joint| joint >= inputs.len()) {
             return refuse("a block varies with a joint that the arm has not");
         }
+        if !(0.0..=MOST_CYCLES).contains(&self.own_cycles) {
+            return refuse("curves of joints ripple as no drive does");
+        }
         if self.waves.len() > MOST_WAVES {
             return refuse("there are more waves than an arm has drives");
         }
@@ -201,18 +211,18 @@ impl Hyper {
 
     /// Several starts: the evidence has more than one maximum.
     ///
-    /// Beside the priors' centres, errors that sit in fine curves of the joints and errors that sit in slow variations
+    /// Beside the priors' centres, errors that sit in rippling curves of the joints and errors that sit in slow variations
     /// of all joints together.
     pub fn starts(major_joints: &[usize], joint_count: usize, noise: [f64; 2]) -> Vec<Self> {
         let plain = Self::start(major_joints, joint_count, noise);
         let fine = Self {
-            constant: 0.3 * plain.constant,
+            constant: plain.constant.map(|factor| 0.3 * factor),
             own: 4.0 * plain.own,
-            own_length: 0.6 * plain.own_length,
+            own_cycles: RIPPLE,
             ..plain.clone()
         };
         let mut slow = Self {
-            constant: 0.3 * plain.constant,
+            constant: plain.constant.map(|factor| 0.3 * factor),
             own: 0.2 * plain.own,
             own_length: 2.0 * plain.own_length,
             ..plain.clone()
@@ -225,7 +235,9 @@ impl Hyper {
 
     /// Logarithms of all hyper-parameters.
     pub fn to_logs(&self) -> Vec<f64> {
-        let mut values = vec![self.constant, self.own, self.own_length];
+        let mut values = self.constant.to_vec();
+        // Fields that do not ripple are near those that hardly do.
+        values.extend([self.own, self.own_length, self.own_cycles.max(OWN_CYCLES.low)]);
         values.extend(self.smooth);
         values.extend([self.smooth_length, self.repeatability, self.sag]);
         for product in &self.products {
@@ -249,9 +261,10 @@ impl Hyper {
             first += product.len();
         }
         Self {
-            constant: at(AT_CONSTANT),
+            constant: three(AT_CONSTANT),
             own: at(AT_OWN),
             own_length: at(AT_OWN_LENGTH),
+            own_cycles: at(AT_OWN_CYCLES),
             smooth: three(AT_SMOOTH),
             smooth_length: at(AT_SMOOTH_LENGTH),
             repeatability: at(AT_REPEATABILITY),
@@ -303,7 +316,8 @@ impl Hyper {
 
     /// Bounds and priors in the order of the logarithms.
     pub fn ranges(&self) -> Vec<Range> {
-        let mut ranges = vec![CONSTANT, OWN, OWN_LENGTH];
+        let mut ranges = vec![CONSTANT; 3];
+        ranges.extend([OWN, OWN_LENGTH, OWN_CYCLES]);
         ranges.extend(SMOOTH);
         ranges.extend([SMOOTH_LENGTH, REPEATABILITY, SAG]);
         for product in &self.products {
@@ -383,6 +397,9 @@ mod tests {
             (1, 202.0, f64::INFINITY),
         ] {
             assert!(waved(joint, cycles, amplitude).is_err(), "{joint} {cycles} {amplitude}");
+        }
+        for own_cycles in [-1.0, 1e17, f64::NAN] {
+            assert!(Hyper { own_cycles, ..good.clone() }.check(&inputs).is_err(), "{own_cycles}");
         }
         let elsewhere = Hyper::start(&[1, 9], 6, [1e-4, 1e-4]);
         assert!(elsewhere.check(&inputs).unwrap_err().to_string().contains("calibrate again"));

@@ -3,9 +3,10 @@
 use crate::cells::{Active, Axis, CellKernel, Grid};
 use crate::hyper::{Hyper, Product, WAVE_NAME, Wave};
 use crate::kernel::Shape;
+use crate::own::OwnKernel;
 use crate::pairs::{ByColumn, PairKernels, PairTable};
 use crate::sag::{Levers, Sag, alike};
-use crate::training::Training;
+use crate::training::{Class, Training};
 
 /// Cells per length scale: `own` curves have a rougher kernel and cost little.
 const OWN_CELLS: f64 = 3.0;
@@ -29,16 +30,17 @@ pub struct Cells {
 impl Cells {
     /// Cells that cover the values of a training set.
     pub fn new(training: &Training, by_column: &ByColumn, hyper: &Hyper, degree: usize) -> Self {
-        let axis = |k: usize, length: f64, per_length: f64| {
+        let axis = |k: usize, length: f64, spacing: f64| {
             let values = (0..training.pose_count()).map(|pose| training.values_of(pose)[k]);
-            Axis::covering(training.inputs[k], values, length, per_length, degree)
+            Axis::covering(training.inputs[k], values, length, spacing, degree)
         };
         let own = |k: usize| {
-            let axis = axis(k, hyper.own_length, OWN_CELLS);
-            by_column.own[k].map(|_| CellKernel::new(axis, |d| Shape::Matern.at(d, hyper.own_length)))
+            let kernel = OwnKernel::of(hyper, training.inputs[k].kind);
+            let axis = axis(k, hyper.own_length, kernel.finest_scale() / OWN_CELLS);
+            by_column.own[k].map(|_| CellKernel::new(axis, |d| kernel.at(d)))
         };
         let smooth = |k: usize, length: f64| {
-            CellKernel::new(axis(k, length, CELLS), |d| Shape::SquaredExponential.at(d, length))
+            CellKernel::new(axis(k, length, length / CELLS), |d| Shape::SquaredExponential.at(d, length))
         };
         let product = |product: &Product| {
             let joints = product.joints.iter().zip(&product.lengths);
@@ -196,7 +198,8 @@ impl Model {
 
     /// Prior standard deviation of a column's constant.
     pub fn constant_deviation(&self, p: usize) -> f64 {
-        self.hyper.constant * self.training.columns[p].constant
+        let column = &self.training.columns[p];
+        self.hyper.constant[Class::of(column.parameter).index()] * column.constant
     }
 
     /// All blocks, `own` of each input first, then `smooth`, then the products, then waves.

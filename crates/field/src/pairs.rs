@@ -1,7 +1,7 @@
 //! Covariance of measured rows, column by column, from kernels between poses.
 //!
 //! For rows r of pose i and c of pose j,
-//! `K[r, c] = sum_p J[r, p] J[c, p] (constant_p^2 + own^2 k_own + sag^2 k_sag + sum wave^2 k_wave + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
+//! `K[r, c] = sum_p J[r, p] J[c, p] (constant^2 constant_p^2 + own^2 k_own + sag^2 k_sag + sum wave^2 k_wave + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
 //! and within one pose what its joints do not repeat.
 //! The sums over the parameters of a class are formed first, for all rows at once, so that the inner loops run over
 //! contiguous rows; nothing of the size of the matrix is kept but the matrix.
@@ -69,8 +69,10 @@ pub struct ByColumn {
 
 /// Columns of one class with one prior variance of their constants.
 struct Group {
-    /// The class whose blocks drive them, by its index.
-    class: Option<usize>,
+    /// The class, by its index.
+    class: usize,
+    /// Whether its blocks drive them.
+    driven: bool,
     constant: f64,
     columns: Vec<usize>,
 }
@@ -103,11 +105,14 @@ impl ByColumn {
         let constant = training.columns.iter().enumerate().filter(|(_, column)| column.constant > 0.0);
         let mut groups: Vec<Group> = Vec::new();
         for (p, column) in training.columns.iter().enumerate() {
-            let class = column.driven.then(|| Class::of(column.parameter).index());
+            let (class, driven) = (Class::of(column.parameter).index(), column.driven);
             let constant = column.constant.powi(2);
-            match groups.iter_mut().find(|group| group.class == class && group.constant == constant) {
+            let is_alike = |group: &&mut Group| {
+                (group.class, group.driven) == (class, driven) && group.constant == constant
+            };
+            match groups.iter_mut().find(is_alike) {
                 Some(group) => group.columns.push(p),
-                None => groups.push(Group { class, constant, columns: vec![p] }),
+                None => groups.push(Group { class, driven, constant, columns: vec![p] }),
             }
         }
         Self {
@@ -146,7 +151,7 @@ impl ByColumn {
 /// Sums over the parameters of each class for one row c, over rows r from the pose's first on.
 #[derive(Default)]
 pub struct ClassSums {
-    pub constant: Vec<f64>,
+    pub constants: [Vec<f64>; 3],
     pub classes: [Vec<f64>; 3],
 }
 
@@ -156,11 +161,10 @@ impl ClassSums {
     pub fn fill<I: Isa>(&mut self, by_column: &ByColumn, row: usize, first: usize) {
         let count = by_column.rows - first;
         let room = count.next_multiple_of(STEP);
-        self.constant.resize(room, 0.0);
-        self.classes.iter_mut().for_each(|sums| sums.resize(room, 0.0));
+        self.constants.iter_mut().chain(&mut self.classes).for_each(|sums| sums.resize(room, 0.0));
         for start in (0..room).step_by(STEP) {
-            let mut constant = [Lane::ZERO; STEP / LANES];
-            let mut classes = [[Lane::ZERO; STEP / LANES]; 3];
+            let mut constants = [[Lane::ZERO; STEP / LANES]; 3];
+            let mut classes = constants;
             for group in &by_column.groups {
                 let mut sum = [Lane::ZERO; STEP / LANES];
                 for &p in &group.columns {
@@ -171,17 +175,17 @@ impl ClassSums {
                     }
                 }
                 let variance = Lane::splat(group.constant);
-                for (total, sum) in constant.iter_mut().zip(&sum) {
+                for (total, sum) in constants[group.class].iter_mut().zip(&sum) {
                     *total = I::mul_add(variance, *sum, *total);
                 }
-                if let Some(class) = group.class {
-                    for (total, sum) in classes[class].iter_mut().zip(&sum) {
+                if group.driven {
+                    for (total, sum) in classes[group.class].iter_mut().zip(&sum) {
                         *total += *sum;
                     }
                 }
             }
-            write(&mut self.constant[start..start + STEP], &constant);
-            for (sums, found) in self.classes.iter_mut().zip(&classes) {
+            let all = self.constants.iter_mut().chain(&mut self.classes);
+            for (sums, found) in all.zip(constants.iter().chain(&classes)) {
                 write(&mut sums[start..start + STEP], found);
             }
         }
@@ -270,9 +274,12 @@ impl Kernel for PoseColumns<'_> {
         let mut sums = ClassSums::default();
         for (k, row) in rows.enumerate() {
             sums.fill::<I>(by_column, row, first);
-            let constant = hyper.constant * hyper.constant;
             column.clear();
-            column.extend(sums.constant[..by_column.rows - first].iter().map(|sum| constant * sum));
+            column.resize(by_column.rows - first, 0.0);
+            for (sums, factor) in sums.constants.iter().zip(&hyper.constant) {
+                let variance = factor * factor;
+                column.iter_mut().zip(sums).for_each(|(value, sum)| *value += variance * sum);
+            }
             for (sums, factors) in sums.classes.iter().zip(&factors.classes) {
                 add_products(&mut column, sums, factors, 1.0);
             }

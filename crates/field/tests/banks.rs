@@ -15,7 +15,7 @@ fn block(name: &str, inputs: &[usize], outputs: &[usize], degree: usize, random:
         let input = if k == 2 { Input::line(2.0) } else { Input::ANGLE };
         let reach = if k == 0 { 6.2 } else { 2.0 };
         let values = (0..100).map(|i| reach * f64::from(i) / 99.0);
-        Axis::covering(input, values.collect::<Vec<_>>().into_iter(), 0.7, 2.0, degree)
+        Axis::covering(input, values.collect::<Vec<_>>().into_iter(), 0.7, 0.35, degree)
     };
     let grid = Grid { inputs: inputs.to_vec(), axes: inputs.iter().map(axis).collect() };
     let weights = (0..grid.cell_count() * outputs.len()).map(|_| random.normal()).collect();
@@ -43,7 +43,7 @@ fn turning_bank(degree: usize) -> Bank {
     for block in &mut blocks {
         for axis in &mut block.grid.axes {
             let turn = (0..100).map(|i| 0.063 * f64::from(i)).collect::<Vec<_>>();
-            *axis = Axis::covering(Input::ANGLE, turn.into_iter(), 0.7, 2.0, degree);
+            *axis = Axis::covering(Input::ANGLE, turn.into_iter(), 0.7, 0.35, degree);
             assert!(axis.closed);
         }
         let cells = block.grid.cell_count() * outputs.len();

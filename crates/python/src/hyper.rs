@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use pyo3::prelude::*;
-use truearm_field::{Hyper, MAJOR_NAME, Product, UPRIGHT, WRIST_NAME, Wave};
+use truearm_field::{Hyper, MAJOR_NAME, Product, UNRIPPLED, UPRIGHT, WRIST_NAME, Wave};
 
 use crate::door::CoreError;
 
@@ -35,9 +35,13 @@ pub fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
     let names = [MAJOR_NAME, WRIST_NAME];
     let present = names.iter().filter(|name| values.contains_key(&format!("{name}_joints")));
     Ok(Hyper {
-        constant: one("constant")?,
+        constant: match get("constant")?.as_slice() {
+            &[shared] => [shared; 3],
+            _ => three("constant")?,
+        },
         own: one("own")?,
         own_length: one("own_length")?,
+        own_cycles: values.get("own_cycles").map_or(Ok(UNRIPPLED), |_| one("own_cycles"))?,
         smooth: three("smooth")?,
         smooth_length: one("smooth_length")?,
         repeatability: one("repeatability")?,
@@ -76,9 +80,10 @@ fn joint_from(stored: f64) -> PyResult<usize> {
 /// To values by name.
 pub fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
     let mut values = HashMap::from([
-        ("constant".to_owned(), vec![hyper.constant]),
+        ("constant".to_owned(), hyper.constant.to_vec()),
         ("own".to_owned(), vec![hyper.own]),
         ("own_length".to_owned(), vec![hyper.own_length]),
+        ("own_cycles".to_owned(), vec![hyper.own_cycles]),
         ("smooth".to_owned(), hyper.smooth.to_vec()),
         ("smooth_length".to_owned(), vec![hyper.smooth_length]),
         ("repeatability".to_owned(), vec![hyper.repeatability]),

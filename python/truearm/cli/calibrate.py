@@ -216,7 +216,9 @@ def print_results(calibration: "Calibration") -> None:
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
     print_determined(calibration)
     of = "distance" if calibration.selection.distances else "position"
-    print_errors(validation.holdout, count_of(validation.n_holdout, "held-out row"), of)
+    shots = validation.n_holdout_poses < validation.n_holdout
+    rows = validation.poses_judged if shots else count_of(validation.n_holdout, "held-out row")
+    print_errors(validation.holdout, rows, of)
     if validation.drift is not None:
         say_wrapped(validation.drift.words)
     if validation.few:

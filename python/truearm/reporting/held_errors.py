@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import count_of
 from truearm.held_rows import HeldRows
 from truearm.reporting.charts import axis, legend, line, log_axis, points, running_median
 from truearm.reporting.facts import Facts
@@ -213,12 +214,13 @@ def worst(held: HeldRows, facts: Facts) -> Table:
     columns = ["row", *(["file"] if several else []), *(f"{name}, mm" for name in facts.models)]
     units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
     share = mine[order].sum() / mine[mine >= 0].sum()
+    judged = count_of(len(held), f"{facts.calibration.validation.judged} row")
     return Table(
         "Worst poses",
         [*columns, f"joints, {units}"],
         rows,
-        says=f"These {len(rows)} of {facts.poses_judged} make up {100 * share:.0f} % of the sum of all "
-        "errors. Row 1 is the first below the header of the file.",
+        says=f"These {len(rows)} of {judged} make up {100 * share:.0f} % of the sum of all errors. "
+        "Row 1 is the first below the header of the file.",
         left=(0, len(columns)) if not several else (0, 1, len(columns)),
     )
 

@@ -17,12 +17,11 @@ from truearm.reporting.numbers import fixed, lean, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.simulation import approach_in_sequence
 from truearm.units import MM_PER_METRE
+from truearm.visits import pose_numbers, visit_numbers
 
 Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-SAME_READING: Final = 1e-6
-"""Readings that differ by less, rad or m, are one pose: a micrometre at a metre."""
 FEWEST_GROUPS: Final = 3
 
 
@@ -31,15 +30,17 @@ class Repeats:
     """Rows in their order of measuring, with the pose that each belongs to.
 
     Attributes:
-        place: Number of the pose (n,); rows of one set-up with equal readings share it.
+        place: Number of the pose (n,); rows of one set-up that were read at the same pose share it.
         missed: Measured minus predicted (n, 3), m, what drifted taken out; what is predicted is the same
             within a pose.
         approach: Sign of each joint's last movement (n, N).
+        stayed: Whether a row came right after another of its pose (n,): the arm may have stood still.
     """
 
     place: Index
     missed: Floats
     approach: Floats
+    stayed: NDArray[np.bool_]
 
     @classmethod
     def of(cls, facts: Facts) -> "Repeats | None":
@@ -53,13 +54,15 @@ class Repeats:
         seen = np.flatnonzero(np.isfinite(data.targets[:, target]).all(axis=1))
         order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
         approach = _approach(data)[order]
-        rounded = np.round(data.readings[order] / SAME_READING)
-        _, group = np.unique(data.group[order], return_inverse=True)
-        _, place = np.unique(np.column_stack([group, rounded]), axis=0, return_inverse=True)
+        kin = data.group[order]
+        place, visits = pose_numbers(data.readings[order], kin), visit_numbers(data.readings[order], kin)
         again = np.bincount(place)[place] > 1
         if not again.any():
             return None
-        return cls(place[again], rows.residual[order][again, first : first + 3], approach[again])
+        stayed = np.diff(visits, prepend=-1) == 0
+        return cls(
+            place[again], rows.residual[order][again, first : first + 3], approach[again], stayed[again]
+        )
 
     def distances_mm(self) -> Floats:
         """Distance of each row from the centre of its pose (n,), mm, as unbiased as n rows a pose allow."""
@@ -145,7 +148,8 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     return Figure(
         "How well poses repeat",
         f"{len(distances)} measurements of {count_of(poses, 'pose')} lie {texts[0]} mm from the mean of "
-        f"their pose on average; mean plus three standard deviations is {texts[1]} mm.{times}{steady}",
+        f"their pose on average; mean plus three standard deviations is {texts[1]} mm.{times}{steady}"
+        f"{_standing(found)}",
         [trace],
         {
             "xaxis": axis("distance from the mean of the pose, mm", rangemode="tozero"),
@@ -153,6 +157,18 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
             "bargap": 0.05,
         },
         height=280,
+    )
+
+
+def _standing(found: Repeats) -> str:
+    """Said where poses were read several times in a row."""
+    if not found.stayed.any():
+        return ""
+    poses = len(np.unique(found.place))
+    which = "They" if found.stayed.sum() == len(found.stayed) - poses else f"{found.stayed.sum()} of them"
+    return (
+        f" {which} were read right after another one at the same pose: where the arm stood still in between, "
+        "they show how the instrument repeats, not how the arm does."
     )
 
 
@@ -187,5 +203,7 @@ def _approach(data: Measurements) -> Floats:
     for source in data.files:
         own = np.flatnonzero(data.sources == source)
         own = own[np.argsort(data.rows[own], kind="stable")]
-        approach[own] = approach_in_sequence(data.readings[own])
+        visits = visit_numbers(data.readings[own], data.group[own])
+        _, first = np.unique(visits, return_index=True)
+        approach[own] = approach_in_sequence(data.readings[own[first]])[visits]
     return approach

@@ -8,6 +8,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
+from truearm.validation import Validation
 
 VERDICTS: Final = {
     "holds": "No significant change was found.",
@@ -106,7 +107,7 @@ def _former(told: Mapping[str, Any], best: str) -> list[Table]:
     former = told["former"]
     rows = [[name, *_cells(errors), *_cells(errors, "mrad")] for name, errors in former["holdout"].items()]
     turned = [f"{name}, mrad" for name in HEADINGS] if "mean_mrad" in former["holdout"][best] else []
-    what = f"{former['n_holdout']} {'left-out' if former['left_out'] else 'held-out'} poses"
+    what = Validation.from_dict(former).poses_judged
     table = Table(
         f"Errors of the calibration before, on {what} of its own data, mm",
         ["model", *HEADINGS, *turned],

@@ -46,6 +46,8 @@ def _blocks(facts: Facts) -> Table:
         inputs = [f"joint {joint}" for joint in block["joints"]] + list(block["features"])
         if "cycles" in block:
             inputs.append(f"{block['cycles']:.4g} cycles a turn")
+        if "ripples" in block:
+            inputs.append(f"rippling about {block['ripples']:.0f} times a turn")
         rows.append(
             [
                 block["name"],

@@ -107,7 +107,7 @@ pub fn identity(n: usize) -> Vec<f64> {
 pub fn field(chain: &Chain, size: f64) -> Bank {
     let (joints, width) = (chain.joint_count(), chain.parameter_count());
     let axis = |length: f64, low: f64, high: f64| {
-        Axis::covering(Input::ANGLE, [low, high].into_iter(), length, 2.0, 2)
+        Axis::covering(Input::ANGLE, [low, high].into_iter(), length, length / 2.0, 2)
     };
     let mut blocks = Vec::new();
     for (joint, column) in chain.joint_columns().iter().enumerate() {

@@ -59,10 +59,11 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(30))]
 
-    /// A tripod that is bumped while it warms up, by six times the noise in one coordinate.
+    /// A tripod that is bumped while it warms up, by ten times the noise in one coordinate, not in the twentieth of the
+    /// session at either end, where a quick curve may stand for it.
     #[test]
-    fn a_step_is_found_where_it_is(seed in 0_u64..1000, after in 8_usize..ROWS - 8) {
-        let stepped = |row: usize| if row > after { 1.2e-4 } else { 0.0 };
+    fn a_step_is_found_where_it_is(seed in 0_u64..1000, after in ROWS / 20 + 2..ROWS - ROWS / 20 - 2) {
+        let stepped = |row: usize| if row > after { 2e-4 } else { 0.0 };
         let truth: Vec<f64> = progress().iter().flat_map(|&at| warming(at)).collect();
         let truth = truth.iter().enumerate();
         let truth = truth.map(|(k, value)| if k % 3 == 1 { stepped(k / 3) } else { *value });
@@ -72,7 +73,7 @@ proptest! {
         let rows = |at: f64| (at - expected) * (ROWS - 1) as f64;
         prop_assert!(found.steps.len() == 1 && rows(found.steps[0]).abs() < 1.5, "{:?}", found.steps);
         let jump = found.moved[3 * (after + 3) + 1] - found.moved[3 * (after - 2) + 1];
-        prop_assert!((jump / 1.2e-4 - 1.0).abs() < 0.25, "{jump}");
+        prop_assert!((jump / 2e-4 - 1.0).abs() < 0.25, "{jump}");
     }
 
     /// Two bumps, rows in any order.

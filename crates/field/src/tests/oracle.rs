@@ -29,6 +29,12 @@ impl Exact<'_> {
         (-self.distance(input, a, b) / length.powi(2)).exp()
     }
 
+    fn ripple(&self, input: usize, difference: f64) -> f64 {
+        let cycles = if self.0.inputs[input].kind == InputKind::Angle { self.1.own_cycles } else { 0.0 };
+        let (whole, part) = (cycles.floor(), cycles.fract());
+        (1.0 - part) * (whole * difference).cos() + part * ((whole + 1.0) * difference).cos()
+    }
+
     fn distance(&self, input: usize, a: f64, b: f64) -> f64 {
         let difference = self.0.inputs[input].scale * (a - b);
         match self.0.inputs[input].kind {
@@ -42,7 +48,7 @@ impl Kernels for Exact<'_> {
     fn own(&self, input: usize, a: f64, b: f64) -> f64 {
         let r = (2.0 * self.distance(input, a, b)).max(0.0).sqrt() / self.1.own_length;
         let s = 5f64.sqrt() * r;
-        (1.0 + s + 5.0 * r * r / 3.0) * (-s).exp()
+        (1.0 + s + 5.0 * r * r / 3.0) * (-s).exp() * self.ripple(input, a - b)
     }
 
     fn smooth(&self, input: usize, a: f64, b: f64) -> f64 {
@@ -152,7 +158,10 @@ impl<'a, K: Kernels> Oracle<'a, K> {
         };
         let columns = &self.training.columns;
         Variances {
-            constant: columns.iter().map(|column| (hyper.constant * column.constant).powi(2)).collect(),
+            constant: columns
+                .iter()
+                .map(|column| (hyper.constant[Class::of(column.parameter).index()] * column.constant).powi(2))
+                .collect(),
             varying: columns.iter().map(of).collect(),
         }
     }
