@@ -22,6 +22,7 @@ STATISTICS = ["mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm"]
 SUMMARY = [
     "robot",
     "n_train",
+    "n_train_poses",
     "n_holdout",
     "n_holdout_poses",
     "holdout",

@@ -88,14 +88,16 @@ def test_held_out_poses_are_counted_not_their_shots(calibration):
     assert validation.poses_judged == "18 held-out poses (54 rows)"
     assert validation.few.startswith("The errors above come from 18 held-out poses")
     assert Validation.from_dict(validation.to_dict()) == validation
-    older = {key: value for key, value in validation.to_dict().items() if key != "n_holdout_poses"}
+    assert validation.poses_trained == "42 training poses (126 rows)"
+    older = {key: value for key, value in validation.to_dict().items() if not key.endswith("_poses")}
     assert Validation.from_dict(older).n_holdout_poses == validation.n_holdout
+    assert Validation.from_dict(older).n_train_poses == validation.n_train
 
 
 def test_the_report_tells_shots_from_poses_that_were_come_back_to(arm, measured, calibration):
     (figure,) = (part for part in repeats(Facts(calibration)).parts if isinstance(part, Figure))
     assert f"{SHOTS * POSES} measurements of {POSES} poses" in figure.says
-    assert "They were read right after another one at the same pose" in figure.says
+    assert "All of the repeats came right after another measurement" in figure.says
     once = arm.measure_table(arm.poses(POSES))
     again = pd.concat([once, arm.measure_table(arm.poses(POSES), seed=8)], ignore_index=True)
     later = ta.calibrate(arm.robot, Measurements.from_dataframe(again))
@@ -104,11 +106,26 @@ def test_the_report_tells_shots_from_poses_that_were_come_back_to(arm, measured,
     assert "right after another" not in figure.says
 
 
-def test_jitter_while_the_arm_stands_is_no_approach(calibration):
+def test_jitter_while_the_arm_stands_is_no_approach_and_no_scatter(calibration):
     found = Repeats.of(Facts(calibration))
     assert found is not None
     sides = [np.unique(found.approach[mine], axis=0) for mine in found.poses()]
     assert all(len(side) == 1 for side in sides)
+    expected = 1e3 * OF_A_SHOT_M * np.sqrt(8.0 / np.pi)
+    assert found.distances_mm().mean() == pytest.approx(expected, rel=0.15)
+
+
+def test_poses_that_others_lie_between_did_not_stay(arm):
+    once = arm.measure_table(arm.poses(POSES))
+    reference = arm.measure_table(np.repeat(arm.poses(1, seed=4), POSES, axis=0), seed=5)
+    between = pd.concat([once, reference]).sort_index(kind="stable").reset_index(drop=True)
+    twice = arm.measure_table(np.repeat(arm.poses(POSES), 2, axis=0))
+    planned = twice.assign(purpose=["train", "repeat"] * POSES)
+    for table, words in ((between, "reference"), (planned, "planned")):
+        data = Measurements.from_dataframe(table, name=words)
+        found = Repeats.of(Facts(ta.calibrate(arm.robot, data, refit=words == "planned", holdout=0.3)))
+        assert found is not None
+        assert not found.stayed.any(), words
 
 
 def test_shots_that_share_what_is_left_are_no_drift(calibration):

@@ -167,6 +167,7 @@ def _validate(
     on_training = judge(task, models, trained.data, trained.data)
     validation = Validation(
         n_train=len(trained.data),
+        n_train_poses=pose_count(trained.data),
         n_holdout=len(held),
         n_holdout_poses=pose_count(held),
         n_planned=split.planned,

@@ -12,7 +12,8 @@ MRAD_PER_RAD: Final = 1e3
 WAVE: Final = "wave"
 OWN: Final = "own"
 FEWEST_RIPPLES: Final = 3.0
-"""Curves of joints that do so less often in a turn are said not to ripple."""
+LEAST_OF_A_RIPPLE: Final = 1.0
+"""Curves whose length scale holds less than this angle (rad) of a ripple are as good as without ripples."""
 AMPLITUDES: Final = (
     ("theta_mrad", MRAD_PER_RAD),
     ("other_angles_mrad", MRAD_PER_RAD),
@@ -61,7 +62,8 @@ def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:
 
     Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units; a wave
     has cycles a turn of its joint instead. Amplitudes are prior standard deviations; a wave's is what it
-    reaches. Curves of joints that ripple have about how often they do a turn.
+    reaches. Curves of joints have ripples, about how many a turn, where their prior, which joints share,
+    knows of any.
     """
     field, details = calibration.model.field, calibration.variable
     if field is None or details is None:
@@ -78,8 +80,8 @@ def _describe(
     found: dict[str, Any] = {"name": name}
     if name == WAVE:
         found["cycles"], scales = scales[0], []
-    ripples = hyper.get("own_cycles", [0.0])[0]
-    if name == OWN and ripples >= FEWEST_RIPPLES and block["axes"][0][0]:
+    ripples = _ripples(hyper)
+    if name == OWN and block["axes"][0][0] and ripples is not None:
         found["ripples"] = ripples
     cells = 1
     for axis in block["axes"]:
@@ -92,6 +94,12 @@ def _describe(
         "cells": cells,
         "parameters": len(block["outputs"]),
     }
+
+
+def _ripples(hyper: dict[str, list[float]]) -> float | None:
+    """Cycles a turn that curves of joints ripple with; None where they hardly do."""
+    cycles, length = (sum(hyper.get(name, [])) for name in ("own_cycles", "own_length"))
+    return cycles if cycles >= FEWEST_RIPPLES and cycles * length >= LEAST_OF_A_RIPPLE else None
 
 
 def _lengths(block: dict[str, Any], hyper: dict[str, list[float]]) -> list[float]:

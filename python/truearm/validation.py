@@ -107,8 +107,9 @@ class Validation:
 
     Attributes:
         n_train: Rows that trained.
+        n_train_poses: How many poses they are of: shots of the same pose count once.
         n_holdout: Rows that were held out, or left out in turn.
-        n_holdout_poses: How many poses they are of: shots of the same pose count once.
+        n_holdout_poses: How many poses those are of.
         holdout: Errors of "nominal", "constant" and, if fitted, "variable" on these rows.
         train: The same on training rows.
         coverage_95: Share of the held-out coordinates that lie within the 95 % intervals of the variable
@@ -120,6 +121,7 @@ class Validation:
     """
 
     n_train: int
+    n_train_poses: int
     n_holdout: int
     n_holdout_poses: int
     holdout: Mapping[str, Errors]
@@ -135,10 +137,14 @@ class Validation:
         return "left-out" if self.left_out else "held-out"
 
     @property
+    def poses_trained(self) -> str:
+        """How many trained: "400 training poses", or "140 training poses (420 rows)"."""
+        return _poses("training", self.n_train_poses, self.n_train)
+
+    @property
     def poses_judged(self) -> str:
-        """How many they are: "832 held-out poses", or "70 held-out poses (210 rows)"."""
-        rows = "" if self.n_holdout == self.n_holdout_poses else f" ({count_of(self.n_holdout, 'row')})"
-        return count_of(self.n_holdout_poses, f"{self.judged} pose") + rows
+        """How many were judged: "832 held-out poses", or "70 held-out poses (210 rows)"."""
+        return _poses(self.judged, self.n_holdout_poses, self.n_holdout)
 
     @property
     def few(self) -> str:
@@ -154,6 +160,7 @@ class Validation:
         """JSON values."""
         return {
             "n_train": self.n_train,
+            "n_train_poses": self.n_train_poses,
             "n_holdout": self.n_holdout,
             "n_holdout_poses": self.n_holdout_poses,
             "holdout": {name: errors.to_dict() for name, errors in self.holdout.items()},
@@ -173,6 +180,7 @@ class Validation:
         }
         return cls(
             n_train=content["n_train"],
+            n_train_poses=content.get("n_train_poses", content["n_train"]),
             n_holdout=content["n_holdout"],
             n_holdout_poses=content.get("n_holdout_poses", content["n_holdout"]),
             holdout=sides["holdout"],
@@ -182,6 +190,11 @@ class Validation:
             n_planned=content.get("n_planned", 0),
             drift=DriftDetails.from_dict(content["drift"]) if content.get("drift") else None,
         )
+
+
+def _poses(which: str, poses: int, rows: int) -> str:
+    shots = "" if rows == poses else f" ({count_of(rows, 'row')})"
+    return count_of(poses, f"{which} pose") + shots
 
 
 def row_errors(

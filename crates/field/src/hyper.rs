@@ -42,7 +42,7 @@ pub struct Hyper {
     pub own: f64,
     /// Length scale of `own` blocks.
     pub own_length: f64,
-    /// Cycles a turn that `own` blocks of angles ripple with; below one they hardly do.
+    /// Cycles a turn that `own` blocks of angles ripple with; they hardly do where it is far below one by the length scale.
     pub own_cycles: f64,
     /// Amplitudes of `smooth` blocks by class.
     pub smooth: [f64; 3],
@@ -189,6 +189,11 @@ impl Hyper {
         let refuse = |what| Err(FieldError::Hyper { what });
         if self.products.iter().flat_map(|product| &product.joints).any(|&joint| joint >= inputs.len()) {
             return refuse("a block varies with a joint that the arm has not");
+        }
+        let lengths = self.products.iter().flat_map(|product| &product.lengths);
+        let scales = lengths.chain(&self.constant).chain([&self.own_length, &self.smooth_length]);
+        if !scales.into_iter().all(|scale| *scale > 0.0 && scale.is_finite()) {
+            return refuse("a length scale or a factor is not positive");
         }
         if !(0.0..=MOST_CYCLES).contains(&self.own_cycles) {
             return refuse("curves of joints ripple as no drive does");
@@ -400,6 +405,11 @@ mod tests {
         }
         for own_cycles in [-1.0, 1e17, f64::NAN] {
             assert!(Hyper { own_cycles, ..good.clone() }.check(&inputs).is_err(), "{own_cycles}");
+        }
+        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let constant = [1.0, wrong, 1.0];
+            assert!(Hyper { own_length: wrong, ..good.clone() }.check(&inputs).is_err(), "length {wrong}");
+            assert!(Hyper { constant, ..good.clone() }.check(&inputs).is_err(), "factor {wrong}");
         }
         let elsewhere = Hyper::start(&[1, 9], 6, [1e-4, 1e-4]);
         assert!(elsewhere.check(&inputs).unwrap_err().to_string().contains("calibrate again"));

@@ -13,7 +13,7 @@ from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
 from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
-from truearm.columns import VALIDATE
+from truearm.columns import REPEAT, VALIDATE
 from truearm.errors import UsageError, WorkError
 from truearm.identified import IdentifiedArm
 from truearm.planning.choosing import SETUP_KINDS, Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
@@ -28,7 +28,6 @@ POOL_PER_NUMBER: Final = 3
 LEAST_POOL: Final = 400
 MOST_DRAWS: Final = 200_000
 UNLIMITED_RAD: Final = np.pi
-REPEAT: Final = "repeat"
 JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
 JOINT_SPEED_RAD_S: Final = 1.0
 PRIOR_M: Final = 2e-3

@@ -101,10 +101,10 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         )
         yield Advice("noise_floor", "The noise floor is reached.", words, floor)
         return
-    trained = facts.calibration.validation.n_train
+    trained = facts.calibration.validation.poses_trained
     words = (
         f"The mean error is {left} mm, and noise alone would leave {noise} mm. The rest is what {trained} "
-        "training poses leave undetermined. Poses like those of the task help most."
+        "leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.columns import REPEAT
 from truearm.errors import count_of
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
@@ -31,10 +32,11 @@ class Repeats:
 
     Attributes:
         place: Number of the pose (n,); rows of one set-up that were read at the same pose share it.
-        missed: Measured minus predicted (n, 3), m, what drifted taken out; what is predicted is the same
-            within a pose.
+        missed: Measured minus what is predicted at the reading of the pose's first row (n, 3), m, what
+            drifted taken out.
         approach: Sign of each joint's last movement (n, N).
-        stayed: Whether a row came right after another of its pose (n,): the arm may have stood still.
+        stayed: Whether a row came right after another of its pose (n,), and was not planned to repeat it: the
+            arm may have stood still.
     """
 
     place: Index
@@ -50,19 +52,18 @@ class Repeats:
             return None
         data = rows.data
         target = data.most_held(selection.targets)
-        first = 3 * selection.targets.index(target)
+        which = selection.targets.index(target)
         seen = np.flatnonzero(np.isfinite(data.targets[:, target]).all(axis=1))
         order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
         approach = _approach(data)[order]
-        kin = data.group[order]
-        place, visits = pose_numbers(data.readings[order], kin), visit_numbers(data.readings[order], kin)
+        place = pose_numbers(data.readings[order], data.group[order])
         again = np.bincount(place)[place] > 1
         if not again.any():
             return None
-        stayed = np.diff(visits, prepend=-1) == 0
-        return cls(
-            place[again], rows.residual[order][again, first : first + 3], approach[again], stayed[again]
-        )
+        missed = rows.residual[order][:, 3 * which : 3 * which + 3]
+        here, there = order[again], order[place[again]]
+        moved = _predicted(facts, data, here, which) - _predicted(facts, data, there, which)
+        return cls(place[again], missed[again] + moved, approach[again], _stayed(data, order, place)[again])
 
     def distances_mm(self) -> Floats:
         """Distance of each row from the centre of its pose (n,), mm, as unbiased as n rows a pose allow."""
@@ -165,10 +166,11 @@ def _standing(found: Repeats) -> str:
     if not found.stayed.any():
         return ""
     poses = len(np.unique(found.place))
-    which = "They" if found.stayed.sum() == len(found.stayed) - poses else f"{found.stayed.sum()} of them"
+    count = int(found.stayed.sum())
+    which = "All" if count == len(found.stayed) - poses else str(count)
     return (
-        f" {which} were read right after another one at the same pose: where the arm stood still in between, "
-        "they show how the instrument repeats, not how the arm does."
+        f" {which} of the repeats came right after another measurement of their pose: if the arm stood still "
+        "in between, they show how the instrument repeats, not how the arm does."
     )
 
 
@@ -195,6 +197,31 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
         "The order of the rows is taken for the order of measuring.",
     )
     return [table]
+
+
+def _predicted(facts: Facts, data: Measurements, rows: Index, which: int) -> Floats:
+    """Where one of the fitted targets is predicted in some rows (n, 3), base frame, m."""
+    calibration = facts.calibration
+    features = {name: data.features[name].to_numpy() for name in calibration.options.features}
+    points = np.empty((len(rows), 3))
+    for number, name in enumerate(calibration.groups):
+        mine = data.group[rows] == name
+        own = rows[mine]
+        points[mine] = calibration.position(
+            data.readings[own],
+            tool=calibration.model.setup.targets[number, which],
+            features={name: values[own] for name, values in features.items()} or None,
+        )
+    return points
+
+
+def _stayed(data: Measurements, order: Index, place: Index) -> NDArray[np.bool_]:
+    """Whether each row in the order of measuring came right after one of its pose, unplanned (n,)."""
+    before = np.roll(np.arange(len(order)), 1)
+    source, number = data.sources[order], data.rows[order]
+    unplanned = np.ones(len(order), bool) if data.purpose is None else data.purpose[order] != REPEAT
+    follows = (source == source[before]) & (number == number[before] + 1)
+    return np.asarray((place == place[before]) & follows & unplanned)
 
 
 def _approach(data: Measurements) -> Floats:

@@ -47,7 +47,7 @@ def _blocks(facts: Facts) -> Table:
         if "cycles" in block:
             inputs.append(f"{block['cycles']:.4g} cycles a turn")
         if "ripples" in block:
-            inputs.append(f"rippling about {block['ripples']:.0f} times a turn")
+            inputs.append(f"may ripple about {block['ripples']:.0f} times a turn")
         rows.append(
             [
                 block["name"],

@@ -46,8 +46,9 @@ def about(facts: Facts) -> str:
     if facts.update is not None:
         rows = f"updated with {count_of(validation.n_train, 'pose')}"
     else:
-        rows = f"{count_of(validation.n_train, 'training pose')}, {facts.poses_judged}"
-        rows += f" ({validation.n_planned} as planned)" if validation.n_planned else ""
+        rows = f"{validation.poses_trained}, {facts.poses_judged}"
+        planned = count_of(validation.n_planned, "row")
+        rows += f" ({planned} as planned)" if validation.n_planned else ""
     setups = f"{count_of(len(calibration.groups), 'set-up')} ({', '.join(calibration.groups)})"
     return f"{calibration.robot.name}, {joints}; {setups}, {what}; {rows}; {facts.best} model"
 

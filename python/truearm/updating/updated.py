@@ -20,7 +20,6 @@ from truearm.updating.estimating import Estimate
 from truearm.updating.scene import Scene
 from truearm.updating.validating import setup_of
 from truearm.validation import RowErrors, Validation
-from truearm.visits import pose_count
 
 Floats = NDArray[np.float64]
 
@@ -56,8 +55,9 @@ def updated(
         constant=_constant(calibration, scene, found),
         validation=Validation(
             n_train=len(scene.data),
+            n_train_poses=len(scene.data),
             n_holdout=len(scene.data),
-            n_holdout_poses=pose_count(scene.data),
+            n_holdout_poses=len(scene.data),
             holdout={name: errors.statistics() for name, errors in judged.items()},
             train={name: errors.statistics() for name, errors in fitted.items()},
             left_out=True,

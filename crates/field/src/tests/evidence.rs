@@ -3,7 +3,7 @@
 use truearm_estimate::{Cancel, EstimateError};
 
 use super::oracle::{Exact, Oracle};
-use super::sets::{hyper, line_inputs, poses_in_two_groups, positions, several_shots};
+use super::sets::{hyper, line_inputs, poses_in_two_groups, positions, rippling, several_shots};
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
@@ -45,6 +45,16 @@ fn check_value(training: &Training, hyper: &Hyper) {
 fn gradient_with_positions() {
     let training = positions(22);
     check_gradient(&training, &hyper(&training, 6));
+}
+
+#[test]
+fn gradient_and_value_with_ripples() {
+    let training = positions(22);
+    check_value(&training, &rippling(&training, 6));
+    check_gradient(&training, &rippling(&training, 6));
+    let training = line_inputs(16);
+    check_value(&training, &rippling(&training, 4));
+    check_gradient(&training, &rippling(&training, 4));
 }
 
 #[test]

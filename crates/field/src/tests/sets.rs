@@ -87,6 +87,11 @@ pub fn hyper(training: &Training, joints: usize) -> Hyper {
     start.with_logs(&logs)
 }
 
+/// The same with curves of joints that ripple.
+pub fn rippling(training: &Training, joints: usize) -> Hyper {
+    Hyper { own_cycles: 12.4, ..hyper(training, joints) }
+}
+
 /// The same with long length scales, so that weights are few.
 pub fn long(training: &Training, joints: usize) -> Hyper {
     let mut hyper = hyper(training, joints);
