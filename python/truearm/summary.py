@@ -12,6 +12,7 @@ MRAD_PER_RAD: Final = 1e3
 WAVE: Final = "wave"
 OWN: Final = "own"
 FEWEST_RIPPLES: Final = 3.0
+"""Fewer a turn are slow curves."""
 LEAST_OF_A_RIPPLE: Final = 1.0
 """Curves whose length scale holds less than this angle (rad) of a ripple are as good as without ripples."""
 AMPLITUDES: Final = (
@@ -80,8 +81,7 @@ def _describe(
     found: dict[str, Any] = {"name": name}
     if name == WAVE:
         found["cycles"], scales = scales[0], []
-    ripples = _ripples(hyper)
-    if name == OWN and block["axes"][0][0] and ripples is not None:
+    if name == OWN and block["axes"][0][0] and (ripples := _ripples(hyper)) is not None:
         found["ripples"] = ripples
     cells = 1
     for axis in block["axes"]:
@@ -97,8 +97,8 @@ def _describe(
 
 
 def _ripples(hyper: dict[str, list[float]]) -> float | None:
-    """Cycles a turn that curves of joints ripple with; None where they hardly do."""
-    cycles, length = (sum(hyper.get(name, [])) for name in ("own_cycles", "own_length"))
+    """Cycles a turn that curves of joints ripple with; None where they hardly do or none are known."""
+    cycles, length = ((hyper.get(name) or [0.0])[0] for name in ("own_cycles", "own_length"))
     return cycles if cycles >= FEWEST_RIPPLES and cycles * length >= LEAST_OF_A_RIPPLE else None
 
 

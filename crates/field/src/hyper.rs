@@ -36,7 +36,7 @@ pub struct Wave {
 /// Hyper-parameters; amplitudes in rad or m, lengths in scaled input units (rad).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hyper {
-    /// Factors on the constants' prior standard deviations by class.
+    /// Factors on the constants' prior standard deviations by class (theta, other angles, lengths).
     pub constant: [f64; 3],
     /// Amplitude of `own` blocks, rad (for prismatic joints times [`truearm_estimate::ANGLE_ARM`] m).
     pub own: f64,
@@ -220,7 +220,7 @@ impl Hyper {
     /// of all joints together.
     pub fn starts(major_joints: &[usize], joint_count: usize, noise: [f64; 2]) -> Vec<Self> {
         let plain = Self::start(major_joints, joint_count, noise);
-        let fine = Self {
+        let rippling = Self {
             constant: plain.constant.map(|factor| 0.3 * factor),
             own: 4.0 * plain.own,
             own_cycles: RIPPLE,
@@ -235,7 +235,7 @@ impl Hyper {
         for product in &mut slow.products {
             product.amplitudes = product.amplitudes.map(|amplitude| 3.0 * amplitude);
         }
-        vec![plain, fine, slow]
+        vec![plain, rippling, slow]
     }
 
     /// Logarithms of all hyper-parameters.

@@ -1,8 +1,8 @@
 //! The kernel of `own` blocks: what an encoder or a drive leaves over its joint.
 //!
 //! Along a turn such errors ripple: a ring's poles and a bearing's rollers come round so many times, never quite alike. The
-//! kernel is a Matern kernel times a cosine of the difference, `cos(n d)` for whole cycles n and between them the mean of the
-//! neighbours, which keeps it positive definite on the circle. Where cycles times length scale are far below one it is as good as
+//! kernel is a Matern kernel times a cosine of the difference, `cos(n d)` for whole cycles n and between them the weighted mean of
+//! the neighbours, which keeps it positive definite on the circle. Where cycles times length scale are far below one it is as good as
 //! the Matern kernel alone.
 
 use truearm_kinematics::{Isa, Kernel, Lane, dispatch};

@@ -151,7 +151,9 @@ impl ByColumn {
 /// Sums over the parameters of each class for one row c, over rows r from the pose's first on.
 #[derive(Default)]
 pub struct ClassSums {
+    /// Weighed with the prior variances of the constants.
     pub constants: [Vec<f64>; 3],
+    /// Of what blocks drive.
     pub classes: [Vec<f64>; 3],
 }
 

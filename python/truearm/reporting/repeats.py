@@ -202,15 +202,14 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
 def _predicted(facts: Facts, data: Measurements, rows: Index, which: int) -> Floats:
     """Where one of the fitted targets is predicted in some rows (n, 3), base frame, m."""
     calibration = facts.calibration
-    features = {name: data.features[name].to_numpy() for name in calibration.options.features}
     points = np.empty((len(rows), 3))
-    for number, name in enumerate(calibration.groups):
-        mine = data.group[rows] == name
-        own = rows[mine]
+    for number, group in enumerate(calibration.groups):
+        mine = data.group[rows] == group
+        own = data.select(rows[mine])
         points[mine] = calibration.position(
-            data.readings[own],
+            own.readings,
             tool=calibration.model.setup.targets[number, which],
-            features={name: values[own] for name, values in features.items()} or None,
+            features={name: own.features[name].to_numpy() for name in calibration.options.features},
         )
     return points
 
