@@ -58,13 +58,13 @@ def test_what_the_panel_sees_leads_back_to_the_point(normal, point):
     seen = panel.seen(carriage, np.array(point))
     assert panel.holds(seen)
     assert seen[2] == pytest.approx(0.02)
-    touched = panel.point(carriage + 0.02 * panel.normal, panel.counts_of(seen))
+    touched = panel.point((carriage + 0.02 * panel.normal).tolist(), *panel.counts_of(seen).tolist())
     np.testing.assert_allclose(touched, point, atol=1e-12)
 
 
 def test_the_panel_counts_a_quarter_of_a_millimetre():
     panel = PanelSection().geometry()
-    step = panel.point(np.zeros(3), np.ones(2)) - panel.point(np.zeros(3), np.zeros(2))
+    step = panel.point([0.0] * 3, 1.0, 1.0) - panel.point([0.0] * 3, 0.0, 0.0)
     np.testing.assert_allclose(1e3 * step, [0.2598, 0.3125, 0.0], atol=1e-4)
 
 

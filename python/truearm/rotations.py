@@ -27,6 +27,11 @@ def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
     return _wxyz(Rotation.from_matrix(m.reshape(-1, 3, 3))).reshape(*m.shape[:-2], 4)
 
 
+def rotation_onto(direction: ArrayLike) -> NDArray[np.float64]:
+    """A rotation matrix (3, 3) whose z axis is a unit vector (3,)."""
+    return np.asarray(Rotation.align_vectors(np.asarray(direction), [0.0, 0.0, 1.0])[0].as_matrix())
+
+
 def rigid_motion(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Change (n, 3, 6) of points (n, 3) with a translation and a rotation vector about the origin."""
     jacobian = np.zeros((len(points), 3, 6))

@@ -1,9 +1,8 @@
 """The cell file: which arm, which devices at which ports, and how to measure."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,16 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, field_validator
 
+from truearm._core import Chain
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.protocols import Robot, Sensor
 from truearm.cell.schema import Positive, Quaternion, Section, Share, Vector3, checked
 from truearm.errors import InputError
 from truearm.files import parsed, read_text
 from truearm.robot import Robot as Arm
-from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
+from truearm.rotations import UNIT_TOLERANCE, rotation_onto, transform_from_parts
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
+Seen = Callable[[Floats], tuple[Floats, Floats]]
 
 
 class WorldSection(Section):
@@ -182,23 +183,25 @@ class Cell:
         """Nominal points of the target (n, 3) in the base frame, m, of readings (n, N)."""
         return np.asarray((self._flange(readings) @ self.flange_from_target)[:, :3, 3])
 
-    def target_seen_from(self, frame_from_base: Floats, readings: Floats) -> tuple[Floats, Floats]:
-        """Nominal target (3,), m, and direction of the tool there (3,) in a frame, of readings (N,).
+    def target_seen_from(self, frame_from_base: Floats) -> Seen:
+        """What gives the nominal target (3,), m, and the direction of the tool there (3,), of readings (N,).
 
-        The direction is that from flange to target, or the flange's z where they coincide.
+        Both are in a frame with the base at `frame_from_base` (4, 4). The direction is that from flange to
+        target, or the flange's z where they coincide. Readings are taken as they are.
         """
-        # Readings of a step are checked already, and this is on the way of every pose.
-        base_from_flange = self.arm.flange_chain.pose(self.arm.values_of(readings[None]))[0]
-        columns = (frame_from_base @ base_from_flange @ self._target_in_flange).T
-        return columns[0, :3], columns[1, :3]
+        arm, lever = self.arm, self.flange_from_target[:3, 3]
+        flange_from_pin, length = np.eye(4), math.hypot(*lever)
+        flange_from_pin[:3, 3] = lever
+        if length > 0.0:
+            flange_from_pin[:3, :3] = rotation_onto(lever / length)
+        base, end = frame_from_base @ arm.base, arm.flange @ flange_from_pin
+        chain = Chain(arm.convention, list(arm.joints), arm.table, base, end)
 
-    @cached_property
-    def _target_in_flange(self) -> Floats:
-        """Columns (4, 2) of the target, a point, and of the tool's direction there."""
-        lever = self.flange_from_target[:3, 3]
-        length = math.hypot(*lever)
-        along = lever / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
-        return np.array([[*lever, 1.0], [*along, 0.0]]).T
+        def seen(readings: Floats) -> tuple[Floats, Floats]:
+            pose = chain.pose(arm.values_of(readings[None]))[0]
+            return pose[:3, 3], pose[:3, 2]
+
+        return seen
 
     def _flange(self, readings: Floats) -> Floats:
         return self.arm.flange_chain.pose(self.arm.joints_from_readings(readings))

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,7 @@ Floats = NDArray[np.float64]
 REPEATS_WHEN_SUSPICIOUS: Final = 1
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """What to do with a pose.
 
     Attributes:
@@ -37,8 +35,7 @@ class Verdict:
 NOTHING_YET: Final = Verdict("again")
 
 
-@dataclass(frozen=True)
-class Rules:
+class Rules(NamedTuple):
     """How readings are judged.
 
     Attributes:

@@ -138,16 +138,17 @@ class LinePort:
         with busy:
             self.resume()
 
-    def send(self, text: str) -> None:
-        """Send a line.
+    def send(self, *texts: str) -> None:
+        """Send lines, in one piece.
 
         Raises:
             DeviceGoneError: If the connection has ended, or there is none.
         """
         channel = self._open_channel()
+        data = b"".join([text.encode("ascii", "replace") + self._terminator for text in texts])
         try:
             with self._writing:
-                channel.write(text.encode("ascii", "replace") + self._terminator)
+                channel.write(data)
         except ConnectionEndedError as error:
             raise gone(self.device, self.address, str(error)) from None
 

@@ -30,13 +30,15 @@ from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
-Tenths = NDArray[np.int64]
+Tenths = tuple[int, ...]
 
 TERMINATOR: Final = b"\r"
 JOINTS: Final = 5
 # Controllers leave out a zero before the point.
 NUMBER: Final = r"[+-]?\d{0,4}\.\d"
 NUMBERS: Final = re.compile(rf"\s*{NUMBER}(?:\s*,\s*{NUMBER}){{4}}\s*")
+# What the controller rounds joints to, rad.
+TENTH: Final = 0.1 * RADIANS_PER_DEGREE
 # Joint speeds for SP 0 to 9, deg/s: the manual gives the share of the greatest, which is 140 here.
 SPEEDS_DEG_S: Final = (4.0, 8.0, 14.0, 24.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 NO_ERROR, HARDWARE_ERROR, COMMAND_ERROR = "0", "1", "2"
@@ -53,39 +55,39 @@ def check_arm(arm: Robot) -> None:
 
 def tenths(readings: Floats) -> Tenths:
     """Readings (N,) in rad as whole tenths of a degree, the controller's rounding."""
-    return np.rint(np.asarray(readings) / (0.1 * RADIANS_PER_DEGREE)).astype(np.int64)
+    return tuple([round(reading / TENTH) for reading in readings.tolist()])
 
 
-def readings_of(count: Sequence[int] | Tenths) -> Floats:
+def readings_of(count: Tenths) -> Floats:
     """Readings (N,) in rad of whole tenths of a degree."""
-    return np.asarray(np.asarray(count) * (0.1 * RADIANS_PER_DEGREE), dtype=np.float64)
+    return np.array([TENTH * value for value in count])
 
 
-def listed(values: Sequence[int] | Tenths) -> str:
+def listed(values: Sequence[int]) -> str:
     """Whole tenths as the numbers of a command."""
-    return ",".join(f"{value / 10:+.1f}" for value in np.asarray(values).tolist())
+    return ",".join([f"{value / 10:+.1f}" for value in values])
 
 
-def parse_numbers(text: str) -> tuple[int, ...] | None:
+def parse_numbers(text: str) -> Tenths | None:
     """Five numbers with one decimal as whole tenths; None if the text is anything else."""
     if NUMBERS.fullmatch(text) is None:
         return None
     return tuple([round(10.0 * float(part)) for part in text.split(",")])
 
 
-def whereabouts(arm: Robot, readings: Floats) -> Floats:
-    """Position x, y, z in mm and angles p, r in deg (5,) that the controller computes, not yet rounded."""
-    point = (_point(arm, readings) * MM_PER_METRE).tolist()
-    degrees = (readings / RADIANS_PER_DEGREE).tolist()
-    return np.array([*point, sum(degrees[1:4]), degrees[4]])
+def whereabouts(arm: Robot, readings: Floats) -> list[float]:
+    """Position x, y, z in mm and angles p, r in deg that the controller computes, not yet rounded."""
+    _, shoulder, elbow, pitch, roll = readings.tolist()
+    angles = (shoulder + elbow + pitch) / RADIANS_PER_DEGREE, roll / RADIANS_PER_DEGREE
+    return [*[MM_PER_METRE * value for value in _point(arm, readings).tolist()], *angles]
 
 
-def readings_near(arm: Robot, where: Floats, seed: Floats) -> Floats | None:
-    """Readings (5,) that give a position (5,), by Newton's method from `seed`; None if it leads nowhere.
+def readings_near(arm: Robot, position: Sequence[float], seed: Floats) -> Floats | None:
+    """Readings (5,) that give a position, by Newton's method from `seed`; None if it leads nowhere.
 
     Angles p and r are met exactly; the first three unknowns follow from the point.
     """
-    readings = np.array(seed, dtype=np.float64)
+    where, readings = np.asarray(position), np.array(seed, dtype=np.float64)
     readings[4] = where[4] * RADIANS_PER_DEGREE
     for _ in range(NEWTON_STEPS):
         readings[3] = where[3] * RADIANS_PER_DEGREE - readings[1] - readings[2]

@@ -1,6 +1,7 @@
 """The touch panel on its carriage: from counts to points in the table's frame, and back."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -49,13 +50,18 @@ class Panel:
         """Out of the face, towards the pin (3,)."""
         return np.asarray(self.axes[:, 2])
 
-    def point(self, carriage: Floats, counts: Floats) -> Floats:
-        """The point in the table's frame (3,) that the panel shows at `counts` (2,), m."""
-        return np.asarray(carriage + self.offset_m + self._metres_of_counts @ counts)
+    def point(self, carriage: Sequence[float], u: float, v: float) -> Floats:
+        """The point in the table's frame (3,) that the panel shows at counts u, v, m."""
+        places = zip(carriage, self._corner_and_metres_of_counts, strict=True)
+        return np.array([at + corner + by_u * u + by_v * v for at, (corner, by_u, by_v) in places])
 
     @cached_property
-    def _metres_of_counts(self) -> Floats:
-        return np.asarray(self.axes[:, :2] * (self.area_m / self.counts))
+    def _corner_and_metres_of_counts(self) -> list[list[float]]:
+        """Along each axis of the table: the offset, and what a count of u and of v adds, m."""
+        by_counts = self.axes[:, :2] * (self.area_m / self.counts)
+        # Plain numbers are quicker than arrays for so few.
+        table: list[list[float]] = np.column_stack([self.offset_m, by_counts]).tolist()
+        return table
 
     @cached_property
     def shorter_m(self) -> float:

@@ -36,6 +36,9 @@ class Prediction:
         self._cell = cell
         world, process = cell.file.world, cell.file.process
         self.world_from_base: Floats | None = None if world is None else world.transform()
+        self._seen = cell.target_seen_from(
+            np.eye(4) if self.world_from_base is None else self.world_from_base
+        )
         self.is_registered = False
         self.radius_m = to_si(process.expected_mm, "mm")
         if world is not None:
@@ -48,6 +51,7 @@ class Prediction:
     def register(self, world_from_base: Floats, residual_m: float) -> None:
         """Take over the registered frame."""
         self.world_from_base, self.is_registered = world_from_base, True
+        self._seen = self._cell.target_seen_from(world_from_base)
         expected = to_si(self._cell.file.process.expected_mm, "mm")
         self.radius_m = self.likely_m = max(expected, SIGMAS * residual_m)
 
@@ -58,10 +62,9 @@ class Prediction:
 
     def expected(self, step: Step) -> Expected:
         """What the sensor is prepared for; where nothing is known, the middle of nowhere with no bound."""
+        point, direction = self._seen(step.readings)
         if self.world_from_base is None:
-            direction = self._cell.target_seen_from(np.eye(4), step.readings)[1]
             return Expected(step.readings, np.zeros(3), np.inf, direction)
-        point, direction = self._cell.target_seen_from(self.world_from_base, step.readings)
         return Expected(step.readings, point, self.radius_m, direction)
 
     def point(self, expected: Expected) -> Floats:

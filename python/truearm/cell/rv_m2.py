@@ -28,7 +28,7 @@ from truearm.cell.device_errors import (
     RefusedError,
 )
 from truearm.cell.line_port import LinePort, PortSection
-from truearm.cell.movemaster import readings_of, tenths
+from truearm.cell.movemaster import TENTH, Tenths, readings_of, tenths
 from truearm.cell.schema import Frame, Positive
 from truearm.inverse import Inverse
 from truearm.robot import Robot
@@ -36,8 +36,6 @@ from truearm.rotations import rigid_inverse
 from truearm.units import RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
-# Few numbers at a time: plain ones are quicker than arrays.
-Tenths = tuple[int, ...]
 
 # The read-out may be off by its rounding, half a unit, and by the rounding of what is added up in it.
 READOUT_TOLERANCE: Final = 0.11
@@ -66,7 +64,7 @@ class RvM2:
         self._port = LinePort.of(self.name, settings, terminator=movemaster.TERMINATOR)
         self._count: Tenths | None = None
         self._guesses: list[Tenths] = []
-        self._low, self._high = np.rint(arm.limits.T / (0.1 * RADIANS_PER_DEGREE)).tolist()
+        self._low, self._high = np.rint(arm.limits.T / TENTH).tolist()
         self._leg = max(1, round(10.0 * settings.leg_s * movemaster.SPEEDS_DEG_S[settings.speed]))
         self._busy = threading.RLock()
         self._still_at = 0.0
@@ -91,7 +89,7 @@ class RvM2:
 
     def move_joints(self, readings: Floats) -> None:
         """See Robot. The arm ends at whole tenths of a degree."""
-        target = _count_of(readings)
+        target = tenths(np.asarray(readings))
         self._check_limits(target)
         with self._busy:
             legs = math.ceil(_longest(_apart(target, self._known_count())) / self._leg)
@@ -131,10 +129,9 @@ class RvM2:
 
     def _go_to_origin(self) -> None:
         self._check_error()
-        origin = _count_of(np.array(self._settings.origin_deg) * RADIANS_PER_DEGREE)
+        origin = tenths(np.array(self._settings.origin_deg) * RADIANS_PER_DEGREE)
         for _ in range(TRIES):
-            self._port.send("NT")
-            self._port.send(f"SP {self._settings.speed}")
+            self._port.send("NT", f"SP {self._settings.speed}")
             if self._locate([origin], self._settings.origin_timeout_s, strict=False):
                 return
         raise DeviceError(
@@ -169,12 +166,12 @@ class RvM2:
         step = tuple([round(share * each) for each in way])
         there = _beyond(before, step)
         beyond = _beyond(there, step)
-        self._port.send(f"MJ {movemaster.listed(step)}")
         self._count, self._guesses = None, [there, before, beyond]
         self._seen_at = -math.inf
         seconds = MOTION_MARGIN * self._seconds(step)
         self._still_at = time.monotonic() + seconds
-        self._locate(self._guesses, self._port.limit_s + seconds)
+        moving = f"MJ {movemaster.listed(step)}"
+        self._locate(self._guesses, self._port.limit_s + seconds, moving)
         if self._known_count() == before:
             # Lost, or only late: sent again too early it would be done twice.
             self._port.pause(self._port.limit_s)
@@ -184,15 +181,16 @@ class RvM2:
     def _seconds(self, step: Tenths) -> float:
         return _longest(step) / 10.0 / movemaster.SPEEDS_DEG_S[self._settings.speed]
 
-    def _locate(self, guesses: list[Tenths], limit_s: float, *, strict: bool = True) -> bool:
+    def _locate(self, guesses: list[Tenths], limit_s: float, *first: str, strict: bool = True) -> bool:
         """Ask where the arm is until the answer fits, and take the count that it fits.
 
+        Commands that come `first` are sent once, with the first question.
         An answer that fits the first guess is believed at once. Any other must come twice in a row, as it may
         be damaged or late; then the other guesses count, and then the nominal inverse kinematics.
         """
         last: Tenths | None = None
         for attempt in range(TRIES):
-            seen = self._where(limit_s)
+            seen = self._where(limit_s, *(() if attempt else first))
             if seen is not None and self._fits(seen, guesses[0]):
                 self._count = guesses[0]
                 return True
@@ -213,10 +211,10 @@ class RvM2:
             rule="The nominal arm must give the same position as the controller, to 0.1 mm and 0.1 deg",
         )
 
-    def _where(self, limit_s: float) -> Tenths | None:
-        """What WH answers, in tenths; None if nothing, or nothing readable, came."""
+    def _where(self, limit_s: float, *first: str) -> Tenths | None:
+        """What WH answers, in tenths, after what is sent first; None if nothing readable came."""
         self._port.drain()
-        self._port.send("WH")
+        self._port.send(*first, "WH")
         try:
             return movemaster.parse_numbers(self._port.receive(limit_s, doing="say where it is"))
         except DeviceSilentError:
@@ -230,13 +228,13 @@ class RvM2:
             if self._fits(seen, guess):
                 return guess
         for seed in guesses:
-            found = movemaster.readings_near(self._arm, 0.1 * np.array(seen), readings_of(seed))
-            if found is not None and self._fits(seen, _count_of(found)):
-                return _count_of(found)
+            found = movemaster.readings_near(self._arm, [0.1 * each for each in seen], readings_of(seed))
+            if found is not None and self._fits(seen, tenths(found)):
+                return tenths(found)
         return None
 
     def _fits(self, seen: Tenths, count: Tenths) -> bool:
-        nominal: list[float] = movemaster.whereabouts(self._arm, readings_of(count)).tolist()
+        nominal = movemaster.whereabouts(self._arm, readings_of(count))
         fits = max([abs(a - 0.1 * b) for a, b in zip(nominal, seen, strict=True)]) <= READOUT_TOLERANCE
         if fits:
             self._silences, self._seen_at = 0, time.monotonic()
@@ -268,10 +266,6 @@ class RvM2:
                 where=self._port.where,
                 way_out="Release the button, reset the controller, and start again: the session continues",
             )
-
-
-def _count_of(readings: Floats) -> Tenths:
-    return tuple(tenths(readings).tolist())
 
 
 def _apart(target: Tenths, start: Tenths) -> Tenths:

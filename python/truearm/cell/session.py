@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -46,8 +46,7 @@ class Step:
     readings: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class Stored:
+class Stored(NamedTuple):
     """A reading of a step as it is in the file: the attempt, from 1, and its point, m, if there is one."""
 
     attempt: int
@@ -134,20 +133,16 @@ class Session:
 
     def next_step(self) -> Step | None:
         """The first step that has no outcome."""
-        rows = self.rows(STEPS_LEFT, (1,))
-        return _step(rows[0]) if rows else None
+        return next(iter(_steps(self.rows(STEPS_LEFT, (1,)))), None)
 
     def steps_left(self) -> Iterator[Step]:
         """The steps that have no outcome, each of which has to get one before the next is asked for."""
         while rows := self.rows(STEPS_LEFT, (STEPS_AT_ONCE,)):
-            yield from map(_step, rows)
+            yield from _steps(rows)
 
     def steps(self, kind: str) -> list[Step]:
         """All steps of a kind."""
-        return [
-            _step(row)
-            for row in self._db.execute("SELECT * FROM steps WHERE kind = ? ORDER BY step", (kind,))
-        ]
+        return _steps(self.rows("SELECT * FROM steps WHERE kind = ? ORDER BY step", (kind,)))
 
     def readings_of(self, step: int) -> list[Stored]:
         """All readings of a step, in the order of their attempts."""
@@ -255,12 +250,17 @@ def _point(values: tuple[Any, ...]) -> Point | None:
 
 
 def _listed(values: Floats) -> str:
-    return json.dumps(np.asarray(values).tolist())
+    """Finite numbers as JSON, which is how Python writes them."""
+    return str(np.asarray(values).tolist())
 
 
 def _step_row(step: Step) -> tuple[Any, ...]:
     return (step.step, step.kind, step.pose, step.purpose, step.approach, _listed(step.readings))
 
 
-def _step(row: Sequence[Any]) -> Step:
-    return Step(row[0], row[1], row[2], row[3], row[4], np.array(json.loads(row[5])))
+def _steps(rows: Sequence[tuple[Any, ...]]) -> list[Step]:
+    readings = np.array(json.loads(f"[{','.join(row[5] for row in rows)}]"))
+    return [
+        Step(step, kind, pose, purpose, approach, each)
+        for (step, kind, pose, purpose, approach, _), each in zip(rows, readings, strict=True)
+    ]

@@ -177,7 +177,7 @@ class TablePanel:
         if answer == "NONE":
             return Reading(None, sigma_m, now, False, answer, "no contact")
         *place, u, v, temperature_c = _numbers(answer, ANSWER_NUMBERS, self._port.where)
-        point = self.panel.point(to_si(np.array(place), "mm"), np.array([u, v]))
+        point = self.panel.point([value / MM_PER_METRE for value in place], u, v)
         return Reading(point, sigma_m, now, True, answer, temperature_c=temperature_c)
 
     def release(self) -> None:
@@ -219,8 +219,8 @@ class TablePanel:
     def _move(self, carriage: Floats) -> None:
         if self._carriage is None:
             raise DeviceError("not connected", where=self._port.where, way_out="Connect it first")
-        way_mm = MM_PER_METRE * math.dist(carriage, self._carriage)
-        x, y, z = (MM_PER_METRE * carriage).tolist()
+        x, y, z = place = (MM_PER_METRE * carriage).tolist()
+        way_mm = math.dist(place, (MM_PER_METRE * self._carriage).tolist())
         self._ask(f"MOVE {x:.3f} {y:.3f} {z:.3f}", self._limit(way_mm / self._settings.speed_mm_s))
         self._carriage = carriage
 

@@ -14,7 +14,6 @@ from truearm.units import RADIANS_PER_DEGREE
 
 SETTLING_S: Final = 0.1
 ORIGIN_SPEED: Final = 3
-TENTH: Final = 0.1 * RADIANS_PER_DEGREE
 
 
 class VirtualRvM2:
@@ -72,7 +71,8 @@ class VirtualRvM2:
     def _where(self) -> str:
         if self._at is None:
             return movemaster.listed([0] * movemaster.JOINTS)
-        return movemaster.listed(np.rint(10.0 * movemaster.whereabouts(self._arm, self._at)).astype(np.int64))
+        where = movemaster.whereabouts(self._arm, self._at)
+        return movemaster.listed([round(10.0 * value) for value in where])
 
     def _move(self, word: str, numbers: str, now: float) -> bool:
         """Do a command that moves or sets something; whether it could be done."""
@@ -113,10 +113,10 @@ class VirtualRvM2:
         parsed = movemaster.parse_numbers(numbers)
         if parsed is None or word not in ("MJ", "MP"):
             return None
-        values = np.array(parsed)
-        target = (
-            at + TENTH * values if word == "MJ" else movemaster.readings_near(self._arm, 0.1 * values, at)
-        )
+        if word == "MJ":
+            target: Floats | None = at + movemaster.readings_of(parsed)
+        else:
+            target = movemaster.readings_near(self._arm, [0.1 * each for each in parsed], at)
         low, high = self._arm.limits.T
         if target is None or (target < low - 1e-9).any() or (target > high + 1e-9).any():
             return None

@@ -68,6 +68,7 @@ class World:
         self.arm = Mover(self.shared, ARM, cell.arm.joint_count)
         self.table = Mover(self.shared, TABLE, 3)
         self.world_from_base = true_frame(cell, self.truth)
+        self._seen = cell.target_seen_from(self.world_from_base)
         panel = cell.sensor.panel if isinstance(cell.sensor, TablePanel) else None
         self.clearance = None if panel is None else _clearance(cell, panel)
 
@@ -79,7 +80,7 @@ class World:
             0
         ]
         point = self.world_from_base @ base_from_target[:, 3]
-        return point[:3], self.cell.target_seen_from(self.world_from_base, q[0])[1]
+        return point[:3], self._seen(q[0])[1]
 
     def touch(self, travel_m: float, now: float) -> Touch | None:
         """Bring the panel up by `travel_m` at the most; None if it feels nothing."""

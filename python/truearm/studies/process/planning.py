@@ -58,7 +58,7 @@ def plan_experiment(setting: Setting) -> Planned:
     found, readings = _divided(setting, 0.0, setting.regions)
     nodes, counts, tests = (np.array(column) for column in zip(*found.batches, strict=True))
     kept = np.repeat(np.isin(nodes, found.regions.leaves), counts)
-    reached = readings_of(tenths(readings[kept]))
+    reached = np.array([readings_of(tenths(each)) for each in readings[kept]])
     order = paper_order(space().robot.position(reached))
     purposes = np.where(np.repeat(tests, counts)[kept], TEST, TRAIN)[order]
     poses = Poses(reached[order], np.zeros(len(order), dtype=np.int64), tuple(purposes.tolist()))
