@@ -9,8 +9,9 @@ from typing import Any
 from truearm.errors import InputError, UsageError
 
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+ZIP = b"PK\x03\x04"
 _SIGNATURES = (
-    (b"PK\x03\x04", "a ZIP archive, such as an Excel workbook"),
+    (ZIP, "a ZIP archive, such as an Excel workbook"),
     (b"\xd0\xcf\x11\xe0", "an old Office document"),
     (b"%PDF", "a PDF"),
     (b"SQLite format 3\x00", "an SQLite database"),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
 from truearm.files import decode_text, read_bytes
 from truearm.reading import DELIMITERS, Table, Texts, check_is_table, quoted_delimiter, split_table
+from truearm.workbooks import DELIMITER, is_workbook, sheet_text
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -45,6 +46,8 @@ class Marks:
         missing: What cells say, besides nothing, where nothing was measured; case does not count.
         encoding: Encoding of the text.
         names: Names of the columns of a table without a header, "-" for those to leave out; () with one.
+        sheet: Name of the sheet of a workbook; None takes the only one. Workbooks have no delimiter, and no
+            encoding, and their lines are rows.
         options: What the options begin with that state these, for messages.
     """
 
@@ -55,6 +58,7 @@ class Marks:
     missing: tuple[str, ...] = ()
     encoding: str = "utf-8"
     names: tuple[str, ...] = ()
+    sheet: str | None = None
     options: str = "--"
 
     def __post_init__(self) -> None:
@@ -167,14 +171,15 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
         UsageError: If marks contradict one another or the file, or are missing.
     """
     where = str(path)
-    lines = _text(path, marks).splitlines(keepends=True)
+    whole, stated = _text(path, marks)
+    lines = whole.splitlines(keepends=True)
     if marks.skip_lines >= len(lines) > 0:
         raise UsageError(f"{marks.skip_lines} lines to skip, the file has {len(lines)}", where=where)
     below = lines[marks.skip_lines :]
     kept = [line for line in below if not (marks.comments and line.lstrip().startswith(marks.comments))]
     text = "".join(kept)
     check_is_table(text, where=where)
-    delimiter = marks.delimiter or _plain_delimiter(text, where, marks.options)
+    delimiter = stated or _plain_delimiter(text, where, marks.options)
     if delimiter == marks.decimal:
         raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
     if delimiter == BLANK:
@@ -386,8 +391,20 @@ def _with_single_blanks(line: str) -> str:
     return '"'.join(part if k % 2 else BLANKS.sub(BLANK, part) for k, part in enumerate(parts))
 
 
-def _text(path: Path, marks: Marks) -> str:
-    where, content, encoding = str(path), read_bytes(path), marks.encoding
+def _text(path: Path, marks: Marks) -> tuple[str, str | None]:
+    """The text of a file, or of a workbook's sheet, and the delimiter, None where nobody states it."""
+    where, content = str(path), read_bytes(path)
+    option = f"{marks.options}sheet"
+    if is_workbook(content):
+        decimal = marks.decimal or DECIMAL_MARKS[0]
+        return sheet_text(content, marks.sheet, where=where, decimal=decimal, option=option), DELIMITER
+    if marks.sheet is not None:
+        raise UsageError(f"{where} is no workbook", where=option, rule="Text has no sheets")
+    return _decoded(content, marks, where), marks.delimiter
+
+
+def _decoded(content: bytes, marks: Marks, where: str) -> str:
+    encoding = marks.encoding
     state = (
         f"State what it is: {marks.options}encoding cp1252 for most files of Windows in western Europe, "
         f'{marks.options}encoding utf-16 for "Unicode text" of a spreadsheet'

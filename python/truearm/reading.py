@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, list_rows, typed
-from truearm.files import UTF_16, decode_text, read_bytes
+from truearm.files import UTF_16, ZIP, decode_text, read_bytes
 
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]
@@ -135,6 +135,13 @@ def read_csv_table(path: Path) -> Table:
     """
     where = str(path)
     content = read_bytes(path)
+    if content.startswith(ZIP):
+        raise InputError(
+            "this is a ZIP archive, such as an Excel workbook",
+            where=where,
+            rule="Measurement files are CSV",
+            way_out=f"Convert a workbook with: truearm import {typed(path)} -o measurements.csv",
+        )
     text = decode_text(content, where=where, way_out=_way_out_of_encoding(path, content))
     check_is_table(text, where=where)
     mark = _delimiter(text)
@@ -246,7 +253,8 @@ def _check_header(header: Sequence[str], where: str) -> None:
         raise InputError(
             f"{list_rows(empty, 'column')} {'has' if len(empty) == 1 else 'have'} no name",
             where=where,
-            way_out="Name them, or delete them if they are empty",
+            way_out="Name them, delete them if they are empty, or, if the header is lower, bring the file in with: "
+            "truearm import FILE --skip-lines 1 ...",
         )
     repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if repeated:

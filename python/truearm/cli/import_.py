@@ -31,10 +31,12 @@ def command(
     delimiter: option.Delimiter = None,
     decimal: option.Decimal = None,
     skip_lines: option.SkipLines = 0,
+    sheet: option.Sheet = None,
     with_names: option.WithNames = None,
     with_delimiter: option.WithDelimiter = None,
     with_decimal: option.WithDecimal = None,
     with_skip_lines: option.WithSkipLines = None,
+    with_sheet: option.WithSheet = None,
     with_encoding: option.WithEncoding = None,
     comment: option.Comments = None,
     missing: option.Missing = None,
@@ -50,12 +52,13 @@ def command(
       truearm import raw.txt -o m.csv --map q1=J1:deg --map x=px:mm
       truearm import joints.csv --with tracker.csv --on point -o m.csv
       truearm import raw.txt -o m.csv --columns x,y,z,-,q1,q2,q3,q4,q5,q6
+      truearm import book.xlsx --sheet "Day 2" -o m.csv --joint-unit deg
     """
     from truearm.importing import ImportPlan, import_table
     from truearm.raw_tables import Marks
     from truearm.rotation_columns import RotationColumns
 
-    stated = (with_names, with_delimiter, with_decimal, with_skip_lines, with_encoding)
+    stated = (with_names, with_delimiter, with_decimal, with_skip_lines, with_sheet, with_encoding)
     other = _other(second or [], asked=any(mark is not None for mark in stated))
     refuse_own_input(output, raw, other)
     marks = Marks(
@@ -66,6 +69,7 @@ def command(
         tuple(missing or ()),
         encoding,
         _names(names),
+        sheet,
     )
     second_marks = replace(
         marks,
@@ -73,6 +77,7 @@ def command(
         delimiter=_delimiter(with_delimiter, "--with-delimiter") or marks.delimiter,
         decimal=with_decimal or decimal,
         skip_lines=skip_lines if with_skip_lines is None else with_skip_lines,
+        sheet=with_sheet,
         encoding=with_encoding or encoding,
         options="--with-",
     )

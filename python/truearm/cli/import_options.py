@@ -47,6 +47,9 @@ Names: TypeAlias = Annotated[
 Delimiter: TypeAlias = Annotated[str | None, typer.Option(help='Mark between fields: ";", tab, space, ...')]
 Decimal: TypeAlias = Annotated[str | None, typer.Option(help='Decimal mark: "." or ",".')]
 SkipLines: TypeAlias = Annotated[int, typer.Option(min=0, help="Lines above the header.")]
+Sheet: TypeAlias = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Sheet of an Excel workbook; the only one without.")
+]
 WithNames: TypeAlias = Annotated[
     str | None,
     typer.Option("--with-columns", metavar="NAME,NAME", help="--columns of the second table."),
@@ -55,6 +58,9 @@ WithDelimiter: TypeAlias = Annotated[str | None, typer.Option(help="--delimiter 
 WithDecimal: TypeAlias = Annotated[str | None, typer.Option(help="--decimal of the second table.")]
 WithSkipLines: TypeAlias = Annotated[
     int | None, typer.Option(min=0, help="--skip-lines of the second table.")
+]
+WithSheet: TypeAlias = Annotated[
+    str | None, typer.Option(metavar="NAME", help="--sheet of the second table.")
 ]
 WithEncoding: TypeAlias = Annotated[str | None, typer.Option(help="--encoding of the second table.")]
 Comments: TypeAlias = Annotated[
