@@ -15,6 +15,7 @@ from truearm.cell.sequence import steps_of
 from truearm.cell.session import Session
 from truearm.errors import InputError, WorkError
 from truearm.robot import Robot
+from truearm.rotations import transform_from_parts
 
 
 @pytest.fixture(scope="module")
@@ -158,3 +159,18 @@ def test_a_database_of_somebody_else_is_left_as_it_is(tmp_path):
     assert path.read_bytes() == before
     with pytest.raises(InputError, match="this is a directory"):
         Session(tmp_path, writing=False)
+
+
+@pytest.mark.parametrize("lever", [(40.0, -25.0, 160.0), (0.0, 0.0, -80.0), (0.0, 0.0, 0.0)])
+def test_a_frame_sees_the_target_and_the_tool_that_points_there(lever):
+    cell = Cell.from_toml(cell_text(target={"in_flange_mm": lever}))
+    frame = transform_from_parts([0.4, -0.3, 1.2], [0.6, 0.0, 0.8, 0.0])
+    readings = np.radians([20.0, 35.0, -50.0, -15.0, 70.0])
+    point, direction = cell.target_seen_from(frame)(readings)
+    flange = frame @ cell.arm.flange_chain.pose(readings[None])[0]
+    np.testing.assert_allclose(
+        point, (frame @ [*cell.targets_in_base(readings[None])[0], 1.0])[:3], atol=1e-12
+    )
+    length = np.linalg.norm(lever)
+    wanted = (point - flange[:3, 3]) / (length / 1e3) if length else flange[:3, 2]
+    np.testing.assert_allclose(direction, wanted, atol=1e-9)
