@@ -1,6 +1,8 @@
 """The measurement process on the virtual cell, through Python and through the command line."""
 
 import json
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -173,11 +175,29 @@ def test_the_commands_lead_from_a_cell_file_to_measurements(tmp_path, capsys, mo
     assert len(ta.Measurements.read_csv("measurements.csv")) == 15
 
 
+def test_an_export_writes_over_no_session_and_over_nothing_that_is_not_named(
+    session, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    places = (Path("measurements.csv"), Path("session.db"))
+    places[0].write_text("mine")
+    shutil.copy(session[0], places[1])
+    before = [place.read_bytes() for place in places]
+    assert main(["session", "export", "session.db"]) == 2
+    assert "measurements.csv is there already" in capsys.readouterr().err
+    assert main(["session", "export", "session.db", "-o", "session.db"]) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert [place.read_bytes() for place in places] == before
+    assert main(["session", "export", "session.db", "-o", "measurements.csv"]) == 0
+    assert len(ta.Measurements.read_csv(places[0])) == 40
+
+
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [
         (["cell", "example", "nothing"], 2, "there is no example"),
         (["cell", "simulate", "missing.toml"], 1, "there is no such file"),
+        (["cell", "simulate", "cell.toml", "-o", "cell.toml"], 2, "never written over"),
         (["cell", "simulate", "cell.toml", "--fault", "lost"], 2, "is no fault"),
         (["cell", "simulate", "cell.toml", "--fault", "lst=0.1"], 1, 'Did you mean "lost"'),
         (["cell", "simulate", "playback.toml"], 1, "no virtual counterpart"),
@@ -192,6 +212,16 @@ def test_wrong_commands_are_told(words, status, message, tmp_path, monkeypatch, 
         main(["cell", "example", name, "-o", "cell.toml" if name == "rv-m2" else "playback.toml"])
     assert main(words) == status
     assert message in capsys.readouterr().err
+
+
+def test_a_virtual_cell_is_not_written_over_the_arm_it_is_of(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("arm.toml").write_text(ta.Robot.load("rv-m2").to_toml())
+    Path("cell.toml").write_text(cell_text(arm="arm.toml"))
+    before = Path("arm.toml").read_bytes()
+    assert main(["cell", "simulate", "cell.toml", "-o", "arm.toml"]) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert Path("arm.toml").read_bytes() == before
 
 
 def test_what_is_named_after_an_example_can_be_done(tmp_path, monkeypatch, capsys):

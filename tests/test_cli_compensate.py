@@ -252,12 +252,28 @@ def test_refusals_of_positions_alone_name_the_tool(arm, capsys):
     assert not Path("out.csv").exists()
 
 
-@pytest.mark.parametrize("words", [["-o", "arm.calib"], ["-o", "new.mod", "--report", "demo.mod"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["-o", "arm.calib"],
+        ["-o", "new.mod", "--report", "demo.mod"],
+        ["-o", "own.toml", "--programming", "own.toml"],
+        ["-o", "new.mod", "--report", "own.toml", "--controller", "own.toml"],
+    ],
+)
 def test_what_is_read_is_never_written_over(words, capsys):
-    before = [Path(name).read_bytes() for name in ("arm.calib", "demo.mod")]
+    Path("own.toml").write_text(ta.Robot.load("abb-irb-120").to_toml())
+    names = ("arm.calib", "demo.mod", "own.toml")
+    before = [Path(name).read_bytes() for name in names]
     assert run(*words) == 2
     assert "never written over" in capsys.readouterr().err
-    assert [Path(name).read_bytes() for name in ("arm.calib", "demo.mod")] == before
+    assert [Path(name).read_bytes() for name in names] == before
+
+
+def test_a_report_does_not_take_the_place_of_the_program(capsys):
+    assert run("-o", "new.mod", "--report", "./new.mod") == 2
+    assert "is the program's output" in capsys.readouterr().err
+    assert not Path("new.mod").exists()
 
 
 def test_inserted_waypoints_are_counted(capsys):

@@ -137,6 +137,17 @@ def test_poses_of_a_cell_are_proposed_that_it_can_measure(calib, tmp_path, capsy
     assert Path("cell.toml").read_bytes() == before
 
 
+@pytest.mark.parametrize("option", ["-o", "--picture"])
+def test_the_robot_s_file_is_never_written_over(option, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("own.toml").write_text(ta.Robot.load("ur10").to_toml())
+    before = Path("own.toml").read_bytes()
+    other = ["-o", "poses.csv"] if option != "-o" else []
+    assert main(["plan", "own.toml", "-n", "5", option, "own.toml", *other]) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert Path("own.toml").read_bytes() == before
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -351,3 +351,12 @@ def test_rotation_options_are_explained(text: str) -> None:
 def test_orders_of_euler_angles_are_explained(sequence: str) -> None:
     with pytest.raises(InputError, match=f'"{sequence}" is no order of Euler angles. Three axes'):
         RotationColumns.parse(f"euler:{sequence}:deg=a,b,c")
+
+
+@pytest.mark.parametrize(
+    "rows", ["J1;J2;px;py;pz;\n90;45;1000;2000;3000;\n", "J1;J2;;px;py;pz\n90;45; ;1;2;3\n"]
+)
+def test_columns_with_neither_name_nor_content_are_left_out(rows: str, tmp_path: Path) -> None:
+    imported = import_table(write(tmp_path, rows), plan(delimiter=";"))
+    assert list(imported.frame.columns) == ["q1", "q2", "x", "y", "z"]
+    assert imported.unused == []

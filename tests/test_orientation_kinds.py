@@ -3,6 +3,7 @@
 from itertools import permutations, product
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -108,3 +109,36 @@ def test_orientations_in_an_unknown_convention_are_doubted():
     alone = ta.calibrate(robot, ta.Measurements.from_dataframe(table), use="position")
     both = (calibration.validation.holdout["variable"].position.mean for calibration in (found, alone))
     assert next(both) < 1.2 * next(both)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_arm_that_turns_about_one_axis_is_believed_wherever_it_stands(seed):
+    rng = np.random.default_rng(seed)
+    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=seed)
+    table = arm.measure_table(arm.poses(40), orientation=True)
+    station = Rotation.random(random_state=seed)
+    turned = station * Rotation.from_quat(np.roll(table[QUATERNION].to_numpy(), -1, axis=1))
+    points = station.apply(table[["x", "y", "z"]].to_numpy(copy=True)) + rng.normal(size=3)
+    quaternions = np.roll(turned.as_quat(), 1, axis=1)
+    elsewhere = table.assign(**dict(zip("xyz", points.T, strict=True)))
+    check_turns(with_quaternions(elsewhere, quaternions), arm.robot)
+    with pytest.raises(ta.InputError, match="do not turn as"):
+        check_turns(with_quaternions(elsewhere, quaternions[:, [1, 2, 3, 0]]), arm.robot)
+
+
+def test_an_arm_that_does_not_turn_its_tool_gives_no_frame_to_doubt():
+    rng = np.random.default_rng(3)
+    links = "".join(
+        f'[[link]]\njoint = "prismatic"\nalpha = {alpha}\ntheta = {theta}\nd = 0.0\na = 0.0\n'
+        for alpha, theta in ((-90.0, 0.0), (90.0, 90.0), (0.0, 0.0))
+    )
+    head = 'name = "gantry"\nconvention = "standard"\nlength_unit = "m"\nangle_unit = "deg"\n'
+    gantry = ta.Robot.from_toml(head + links)
+    q = rng.uniform(0.0, 1.0, (30, 3))
+    station = Rotation.from_euler("xyz", [0.4, -0.7, 1.1])
+    poses = station.as_matrix() @ gantry.pose(q)[:, :3, :3]
+    quaternions = np.roll(Rotation.from_matrix(poses).as_quat(), 1, axis=1)
+    columns = dict(zip(["q1", "q2", "q3"], q.T, strict=True))
+    columns |= dict(zip("xyz", station.apply(gantry.position(q)).T, strict=True))
+    table = pd.DataFrame(columns | dict(zip(QUATERNION, quaternions.T, strict=True)))
+    check_turns(ta.Measurements.from_dataframe(table), gantry)

@@ -111,16 +111,27 @@ def _umask() -> int:
     return mask
 
 
-def refuse_own_input(output: Path, *inputs: Path | None) -> None:
+def refuse_own_input(output: Path, *inputs: Path | str | None) -> None:
     """Refuse to write over a file that the same work reads.
+
+    Args:
+        output: What is to be written.
+        inputs: What is read; a text is what names a robot or a controller, a file with or without the tip
+            link behind a "#", or no file.
 
     Raises:
         UsageError: If the output is one of the inputs, under whatever name.
     """
     for given in inputs:
-        if given is not None and output.exists() and given.exists() and output.samefile(given):
+        if given is not None and output.exists() and any(map(output.samefile, _files_of(given))):
             raise UsageError(
                 f"{output} is what is read",
                 rule="An input is never written over",
                 way_out="Name another file",
             )
+
+
+def _files_of(given: Path | str) -> list[Path]:
+    """The files that an argument may mean."""
+    named = [Path(given), *([Path(given.partition("#")[0])] if isinstance(given, str) else [])]
+    return [path for path in named if path.is_file()]

@@ -171,8 +171,8 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
         UsageError: If marks contradict one another or the file, or are missing.
     """
     where = str(path)
-    whole, stated = _text(path, marks)
-    lines = whole.splitlines(keepends=True)
+    content, stated = _text(path, marks)
+    lines = content.splitlines(keepends=True)
     if marks.skip_lines >= len(lines) > 0:
         raise UsageError(f"{marks.skip_lines} lines to skip, the file has {len(lines)}", where=where)
     below = lines[marks.skip_lines :]
@@ -190,7 +190,9 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
         f"Correct or remove them; {marks.options}skip-lines leaves out lines above the header, "
         "--comment those of remarks"
     )
-    table = _without(split_table(text, delimiter, where=where, uneven=uneven), marks.missing)
+    nameless = f"Name them; {marks.options}skip-lines leaves out lines above the header"
+    whole = split_table(text, delimiter, where=where, uneven=uneven, nameless=nameless)
+    table = _without(whole, marks.missing)
     rows = np.arange(table.row_count)
     parts = {name: Part(table, name, rows, marks) for name in table.names if name not in marks.unnamed}
     left_out = len(below) - len(kept)

@@ -21,6 +21,9 @@ Texts = NDArray[np.str_]
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
 UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
+NAMELESS: Final = (
+    "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ..."
+)
 LOOKED_AT: Final = 4096
 """Bytes of a file in another encoding, an even number, from which its marks are told."""
 REMARKS: Final = ("#", "sep=", "SEP=")
@@ -197,10 +200,13 @@ def check_is_table(text: str, *, where: str) -> None:
             )
 
 
-def split_table(text: str, delimiter: str, *, where: str, uneven: str = UNEVEN) -> Table:
+def split_table(
+    text: str, delimiter: str, *, where: str, uneven: str = UNEVEN, nameless: str = NAMELESS
+) -> Table:
     """The fields of a text with a header line; every line must have as many as the header.
 
-    `uneven` is the way out where a line has another number.
+    `uneven` is the way out where a line has another number, `nameless` where a column has no name. One with
+    neither name nor content is left out: some programs end lines with a delimiter.
 
     Raises:
         InputError: If a name is missing or repeated, a line has another number of fields, or there
@@ -224,8 +230,10 @@ def split_table(text: str, delimiter: str, *, where: str, uneven: str = UNEVEN) 
         )
     if not rows:
         raise InputError("there are no data rows below the header", where=where)
+    named = [k for k, name in enumerate(header) if name or any(row[k].strip() for row in rows)]
+    _check_names([header[k] for k in named], where, nameless)
     cells = np.array(rows, dtype=np.str_)
-    return Table(where, {name: cells[:, k] for k, name in enumerate(header)}, len(rows))
+    return Table(where, {header[k]: cells[:, k] for k in named}, len(rows))
 
 
 def quoted_delimiter(mark: str) -> str:
@@ -248,13 +256,15 @@ def _check_header(header: Sequence[str], where: str) -> None:
             rule="The first line must name the columns, such as q1,q2,q3,q4,q5,q6,x,y,z",
             way_out="Bring the file in with names: truearm import FILE --columns q1,q2,...,x,y,z ...",
         )
+
+
+def _check_names(header: Sequence[str], where: str, nameless: str) -> None:
     empty = [position for position, name in enumerate(header, start=1) if not name]
     if empty:
         raise InputError(
             f"{list_rows(empty, 'column')} {'has' if len(empty) == 1 else 'have'} no name",
             where=where,
-            way_out="Name them, delete them if they are empty, or, if the header is lower, bring the file in with: "
-            "truearm import FILE --skip-lines 1 ...",
+            way_out=nameless,
         )
     repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if repeated:

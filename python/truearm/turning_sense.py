@@ -26,6 +26,10 @@ AS_WELL: Final = 1.5
 """Kinds fit as well whose misfits are within this factor of the least."""
 MOST_NAMED: Final = 2
 AXES: Final = 3
+ABOUT_ONE: Final = 0.02
+"""An arm turns its tool about one axis, as a SCARA does, where turns about others are less than this part."""
+STILL: Final = 0.05
+"""And about none where turns are less than this, rad."""
 
 COMPONENTS: Final = "wxyz"
 READINGS: Final = tuple(product(permutations(range(4)), (False, True)))[1:]
@@ -102,7 +106,8 @@ def _words(held: tuple[int, ...], conjugate: bool) -> str:
 def _misfit(flanges: Floats, points: Floats, quaternions: Floats) -> float:
     """How little measured poses can be those of the arm, its frame and its tool unknown.
 
-    Turns from pose to pose, seen from the world, give the frame's orientation; the rest is then linear.
+    Turns from pose to pose, seen from the world, give the frame's orientation; where the arm turns about one
+    axis, positions give the angle about it. The rest is then linear.
 
     Args:
         flanges: Poses of the nominal flange (n, 4, 4).
@@ -116,15 +121,38 @@ def _misfit(flanges: Floats, points: Floats, quaternions: Floats) -> float:
     u, _, vt = np.linalg.svd(of_tool.T @ of_arm)
     world_from_base = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
     between_turns = np.linalg.norm(of_tool - of_arm @ world_from_base.T, axis=1)
-    wanted = (points @ world_from_base - flanges[:, :3, 3]).reshape(-1)
-    unknown = np.concatenate(
-        [flanges[:, :3, :3], np.broadcast_to(np.eye(AXES), flanges[:, :3, :3].shape)], axis=2
-    )
-    unknown = unknown.reshape(-1, 2 * AXES)
+    _, strengths, axes = np.linalg.svd(of_arm)
+    if strengths[0] < STILL * np.sqrt(len(of_arm)):
+        return float(np.median(between_turns))
+    points_in_base = points @ world_from_base
+    if strengths[1] < ABOUT_ONE * strengths[0]:
+        points_in_base = _turned_about(axes[0], points_in_base, flanges)
+    unknown = _frame_and_tool(flanges)
+    wanted = (points_in_base - flanges[:, :3, 3]).reshape(-1)
     left = wanted - unknown @ np.linalg.lstsq(unknown, wanted)[0]
     between_points = np.linalg.norm(left.reshape(-1, AXES), axis=1)
     spread = np.linalg.norm(points - points.mean(axis=0), axis=1)
     return float(max(np.median(between_turns), np.median(between_points) / np.median(spread)))
+
+
+def _frame_and_tool(flanges: Floats) -> Floats:
+    """How points (n, 3), row by row, move with the target in the flange and with the frame: (3 n, 6)."""
+    moved = np.broadcast_to(np.eye(AXES), (len(flanges), AXES, AXES))
+    return np.concatenate([flanges[:, :3, :3], moved], axis=2).reshape(-1, 2 * AXES)
+
+
+def _turned_about(axis: Floats, points: Floats, flanges: Floats) -> Floats:
+    """Points (n, 3) turned about a unit vector (3,) so that they fit the flanges best.
+
+    Cosine and sine are found as if they were free, together with frame and tool.
+    """
+    along = np.outer(points @ axis, axis)
+    around = points - along
+    across = np.cross(axis, around)
+    columns = np.column_stack([_frame_and_tool(flanges), -around.reshape(-1), -across.reshape(-1)])
+    found = np.linalg.lstsq(columns, (along - flanges[:, :3, 3]).reshape(-1))[0]
+    cosine, sine = found[-2:] / np.hypot(*found[-2:])
+    return np.asarray(along + cosine * around + sine * across)
 
 
 def _turns(frames: Floats) -> Floats:

@@ -14,7 +14,7 @@ use crate::refusal::{Reason, Refusal};
 use crate::task::{Task, axis_turn, shift, turn};
 
 /// Steps at most: two or three do for a model that is smooth over the correction, a field takes one or two more.
-const STEPS: usize = 10;
+const STEPS: usize = 8;
 /// Longest step where joint corrections have a wide bound or none, rad.
 const LONGEST_STEP: f64 = 0.5;
 /// Longest step where they have a tight one: enough to find out what they would have to be.

@@ -3,7 +3,7 @@
 import sys
 import threading
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -50,11 +50,10 @@ def command(
 
     from truearm.cell.virtual.launch import VirtualCell
     from truearm.cli.until_interrupted import until_interrupted
-    from truearm.files import parsed, read_text, write_whole
+    from truearm.files import parsed, read_text, refuse_own_input, write_whole
 
-    if target.resolve() == cell.resolve():
-        raise UsageError("this is the cell file itself", where=str(target), way_out="Name another with -o")
     content = parsed(read_text(cell), where=str(cell))
+    refuse_own_input(target, cell, *_named_in(content, cell.parent))
     section = dict(content.get("simulate", {}))
     faults = {**section.get("faults", {}), **changes.pop("faults", {})}  # type: ignore[dict-item]
     content["simulate"] = {**section, **changes, **({"faults": faults} if faults else {})}
@@ -69,6 +68,13 @@ def command(
         sys.stdout.flush()
         until_interrupted(threading.Event())
     tell("The virtual cell has ended.")
+
+
+def _named_in(content: dict[str, Any], folder: Path) -> list[str]:
+    """What a cell file names that may be a file beside it: its arm, and a recording."""
+    sensor = content.get("sensor")
+    names = [content.get("arm"), sensor.get("file") if isinstance(sensor, dict) else None]
+    return [str(folder / name) for name in names if isinstance(name, str)]
 
 
 def _changes(speed: float | None, seed: int | None, faults: list[str]) -> dict[str, object]:

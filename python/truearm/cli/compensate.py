@@ -59,7 +59,7 @@ def command(
     from truearm.programs.densify import Spacing
     from truearm.programs.report import report_of
 
-    _check_outputs(output, report, (calibration, program, frames), dry_run=dry_run)
+    _check_outputs(output, report, program, (calibration, frames, programming, controller), dry_run=dry_run)
     limits = ta.Limits(
         largest_mm=largest_mm,
         largest_deg=largest_deg,
@@ -112,16 +112,24 @@ def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> l
 
 
 def _check_outputs(
-    output: str | None, report: Path | None, inputs: Sequence[Path | None], *, dry_run: bool
+    output: str | None,
+    report: Path | None,
+    program: Path,
+    others: Sequence[Path | str | None],
+    *,
+    dry_run: bool,
 ) -> None:
-    """Raise UsageError where nothing is to be written, or what is read would be written over."""
-    calibration, program, frames = inputs
+    """Raise UsageError where nothing is to be written, or what is read or written would be written over."""
     if report is not None:
-        refuse_own_input(report, calibration, program, frames)
+        refuse_own_input(report, program, *others)
     if output is not None:
-        refuse_own_input(Path(output), calibration, frames)
+        refuse_own_input(Path(output), *others)
     if output is None and not dry_run:
         raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
+    if report is not None and output is not None and report.resolve() == Path(output).resolve():
+        raise UsageError(
+            f"{report} is the program's output", where="--report", way_out="Name another file for the report"
+        )
 
 
 def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:

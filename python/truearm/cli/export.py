@@ -65,7 +65,7 @@ def command(
     from truearm.exporting import Options, export
     from truearm.exporting.field_grid import features_of
 
-    refuse_own_input(output, calibration, None if urdf is None else Path(str(urdf).partition("#")[0]))
+    refuse_own_input(output, calibration, None if urdf is None else str(urdf))
     options = Options(
         urdf=urdf,
         kinematics_hash=kinematics_hash,

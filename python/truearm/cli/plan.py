@@ -63,7 +63,7 @@ def command(
 
     _check_words(criterion, order)
     _check_counts({"--next": next_count, "--acceptance": acceptance, "--count": count})
-    _check_outputs(output, picture, known, cell)
+    _check_outputs(output, picture, robot, known, cell)
     if known is not None or next_count is not None or acceptance is not None:
         if count is not None:
             raise UsageError(
@@ -106,10 +106,13 @@ def _check_counts(asked: Mapping[str, int | None]) -> None:
             raise UsageError(f"{number} poses", where=name, rule="At least one")
 
 
-def _check_outputs(output: Path, picture: Path | None, *inputs: Path | None) -> None:
+def _check_outputs(output: Path, picture: Path | None, *inputs: Path | str | None) -> None:
     """Raise UsageError where what is read would be written over, or a picture has no known format."""
     refuse_own_input(output, *inputs)
-    if picture is not None and picture.suffix.lower() not in PICTURES:
+    if picture is None:
+        return
+    refuse_own_input(picture, *inputs)
+    if picture.suffix.lower() not in PICTURES:
         rule = f"Its name ends in {list_names(PICTURES, 'or')}"
         raise UsageError(str(picture), where="--picture", rule=rule)
 
