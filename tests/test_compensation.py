@@ -7,6 +7,7 @@ import pytest
 
 import truearm as ta
 from truearm.simulation import Imperfections, VirtualArm
+from truearm.solving import beyond_learnt
 
 MET_M = 1e-9
 PATH = np.linspace([0.3, -1.2, 1.5, -0.8, 1.1, 0.4], [0.8, -1.0, 1.3, -0.9, 1.2, 0.2], 40)
@@ -151,6 +152,11 @@ def test_features_are_needed_where_the_field_has_them(robot):
     assert good.any()
     real = calibration.position(found.q[good], features=features)
     assert real == pytest.approx(robot.position(PATH[good]), abs=MET_M)
+    assert beyond_learnt(calibration, [21.0]) == []
+    assert beyond_learnt(calibration, [30.5]) == [
+        "temperature = 30.5 lies beyond 15 to 30, where it was learnt"
+    ]
+    assert beyond_learnt(calibration.without_rows(), [30.5]) == []
 
 
 def test_coupled_joints_are_corrected_in_readings():

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,12 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from truearm.cli import main
 from truearm.conventions import Convention
 from truearm.grids import grid_steps
 from truearm.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
-from truearm.simulation import VirtualArm
+from truearm.simulation import Imperfections, VirtualArm
 
 
 def notice_of(calibration, kind):
@@ -290,3 +292,30 @@ def test_a_tool_that_is_no_rigid_motion_is_refused():
     for tool in (np.zeros((4, 4)), np.diag([1.0, 1.0, -1.0, 1.0]), np.diag([2.0, 1.0, 1.0, 1.0])):
         with pytest.raises(ta.InputError, match="no rigid motion"):
             calibration.position(arm.poses(2), tool=tool)
+
+
+def test_an_arm_that_fits_its_table_is_not_said_to_have_wrong_data(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    exactly = Imperfections(length_mm=0.0, angle_deg=0.0, share=0.0, noise_mm=0.05)
+    exact = VirtualArm(ta.Robot.load("ur10"), seed=3, imperfections=exactly)
+    exact.measure_table(exact.poses(60)).to_csv("exact.csv", index=False)
+    assert main(["calibrate", "ur10", "exact.csv", "-o", "exact", "--model", "constant"]) == 0
+    told = capsys.readouterr()
+    assert "There is nothing to gain" in told.err
+    assert "truearm compensate" not in told.out
+    assert "Do not use it" not in told.err
+    assert "nothing to gain" in Path("exact/report.html").read_text()
+
+
+def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    table = arm.measure_table(arm.poses(60))
+    found = []
+    for row in range(0, 60, 6):
+        wrong = table.assign(x=table["x"] + np.where(table.index == row, 0.9, 0.0))
+        calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(wrong), model="constant")
+        found.append(notice_of(calibration, "single_rows"))
+        told = found[-1] + notice_of(calibration, "no_help")
+        assert f"row {row + 1} (" in told
+        assert ("row by row" in told) == (not found[-1])
+    assert any(found)

@@ -360,3 +360,12 @@ def test_columns_with_neither_name_nor_content_are_left_out(rows: str, tmp_path:
     imported = import_table(write(tmp_path, rows), plan(delimiter=";"))
     assert list(imported.frame.columns) == ["q1", "q2", "x", "y", "z"]
     assert imported.unused == []
+
+
+@pytest.mark.parametrize("kind", ["euler:ZYX", "vector"])
+def test_angles_longer_than_a_turn_are_refused(kind: str, tmp_path: Path) -> None:
+    path = write(tmp_path, "J1,J2,px,py,pz,A,B,C\n1,2,3,4,5,10,20,170\n1,2,3,4,6,11,21,160\n")
+    stated = {unit: RotationColumns.parse(f"{kind}:{unit}=A,B,C") for unit in ("deg", "rad")}
+    assert len(import_table(path, plan(rotation=stated["deg"])).frame) == 2
+    with pytest.raises(InputError, match="angles of 170 rad.*If these are degrees, say deg"):
+        import_table(path, plan(rotation=stated["rad"]))

@@ -68,7 +68,8 @@ def test_metres_read_as_millimetres(name: str) -> None:
     robot = Robot.load(name)
     data = Measurements.from_dataframe(table(robot, readings(robot)), length_unit="mm")
     with pytest.raises(
-        InputError, match="far too close together.*If they are in metres, give --length-unit m"
+        InputError,
+        match="far too close together.*If they are in metres, name the columns.*--length-unit m",
     ):
         check_against(data, robot)
 

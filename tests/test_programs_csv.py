@@ -131,6 +131,9 @@ def test_a_byte_order_mark_stays_in_front(robot):
     [
         ("q1_mm,q2,q3,q4,q5,q6", "q1_mm: joint 1 is revolute"),
         ("q1,q2,q3,q4,q5,q6,q1_deg", "joint 1 has more than one column"),
+        ("q1,q2,q3,q4,q5,q6,x_mm,y_mm,z_mm", "x_mm, y_mm, z_mm make no whole pose"),
+        ("q1,q2,q3,q4,q5,q6,x,y,z,rx,ry", "x, y, z, rx, ry make no whole pose"),
+        ("q1;q2;q3;q4;q5;q6", "separated by semicolons"),
     ],
 )
 def test_columns_that_cannot_be_are_refused(robot, head, words):

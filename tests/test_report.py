@@ -20,6 +20,7 @@ from tests.report_support import (
 from truearm.calibration_file import read_calibration_file, write_calibration_file
 from truearm.options import Options
 from truearm.reporting.facts import Facts
+from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.gravity import sag
 from truearm.reporting.option_words import GENERAL, SCHEMES, VARIABLE, shown_options
 from truearm.reporting.report import report
@@ -215,6 +216,27 @@ def test_advice_follows_from_the_data(calibrations, reports):
     found = report(ta.calibrate(robot.robot, ta.Measurements.from_dataframe(data), model="constant"))
     assert found.advice[0].kind == "outliers"
     assert "row 5" in found.advice[0].words
+
+
+def test_a_few_rows_with_a_large_sigma_do_not_raise_the_floor():
+    robot = VirtualArm.paper(seed=2)
+    data = robot.measure_table(robot.poses(80))
+    floors = []
+    for few in (0.015, 1.5):
+        table = data.assign(sigma_mm=np.where(data.index % 20 == 3, few, 0.015))
+        found = ta.calibrate(robot.robot, ta.Measurements.from_dataframe(table), model="constant")
+        floors.append(floor_of(found, sigmas=table["sigma_mm"]))
+        assert "with what rows state as their sigma" in words_of(report(found).html)
+    assert floors[1] - floors[0] < 0.2
+
+
+def floor_of(calibration, sigmas):
+    """The mean error that noise alone would leave, mm, which is the mean of the rows' own."""
+    facts = Facts(calibration)
+    noise = facts.summary["noise_mm"]
+    expected = np.sqrt(8.0 / np.pi) * np.hypot(noise, sigmas).mean()
+    assert distance_at_floor_mm(facts) == pytest.approx(expected)
+    return distance_at_floor_mm(facts)
 
 
 def test_a_variable_model_that_does_worse_is_not_said_to_gain(calibrations):

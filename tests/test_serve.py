@@ -43,12 +43,7 @@ def serving(*words):
     out = process.stdout
     assert out is not None
     try:
-        said = ""
-        while not said.rstrip().endswith("}"):
-            line = out.readline()
-            assert line, "the server has ended"
-            said += line
-        yield json.loads(said)["port"], process
+        yield json.loads(out.readline())["port"], process
     finally:
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=10)
@@ -300,3 +295,17 @@ def test_ctrl_c_ends_it_cleanly(calib):
 def test_options_are_checked(calib, option, capsys):
     assert main(["serve", str(calib), option]) == 2
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_it_ends_without_a_traceback_while_a_client_is_turned_away(calib):
+    with serving(calib) as (found, process), socket.create_connection(("127.0.0.1", found)) as client:
+        lines = client.makefile("rw")
+        lines.readline()
+        lines.write('{"q_deg": [1]}\n')
+        lines.flush()
+        assert "error" in json.loads(lines.readline())
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=10)
+    assert "Traceback" not in told
+    assert "Exception" not in told
+    assert "connection closed" in told

@@ -177,8 +177,12 @@ def test_one_value_to_split_by_leaves_nothing_to_train_on():
 
 def test_a_set_up_without_training_rows_is_refused():
     group = ["morning"] * 190 + ["evening"] * 10
-    with pytest.raises(InputError, match=r'no row of the set-up "evening" trains'):
-        split_rows(measured(200, group=group), SplitRule(train_size=5))
+    for rule, less in (
+        (SplitRule(train_size=5), "larger --train-size"),
+        (SplitRule(holdout=0.98), "smaller --holdout"),
+    ):
+        with pytest.raises(InputError, match=rf'no row of the set-up "evening" trains.*a {less}'):
+            split_rows(measured(200, group=group), rule)
 
 
 def planned(count, every=5, **more):

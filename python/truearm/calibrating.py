@@ -13,9 +13,9 @@ from truearm.calibration import Calibration
 from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.doubts import NO_HELP, doubts, mounting, on_a_grid, stood_still
+from truearm.doubts import NO_HELP, Outliers, doubts, mounting, on_a_grid, stood_still
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
-from truearm.errors import InputError, Notice, UsageError
+from truearm.errors import InputError, Notice, UsageError, list_outliers
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
     ENOUGH_FOR_HYPER,
@@ -113,7 +113,10 @@ def calibrate(
 
 def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
     """What makes a calibration doubtful; where it does not help, with what would fit instead."""
-    doubted = doubts(task.arm, found.models, found.validation, found.model_name)
+    rows = [] if found.rows is None else found.rows.outliers()
+    means = {} if found.held is None or found.selection.distances else found.held.means_without_mm(rows)
+    outliers = Outliers(list_outliers(rows, several=len(data.files) > 1), means)
+    doubted = doubts(task.arm, found.models, found.validation, found.model_name, outliers)
     if any(notice.kind == NO_HELP for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_shifted(task, data) or fits_otherwise(task, data)

@@ -1,6 +1,7 @@
 """Whether what a calibration found can be true: signs of wrong data or of another robot."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -28,26 +29,50 @@ LARGE_MRAD: Final = 50.0
 """Nor turns its tool by so much more or less."""
 COMPUTED_MM: Final = 0.02
 """No real arm is where its nominal model has it to within this."""
+NEAR_MM: Final = 0.5
+"""Wrong data, or those of another arm, are never so near the nominal model."""
 MOST_NAMED: Final = 4
 UPRIGHT: Final = (0.0, 0.0, 1.0)
 NO_HELP: Final = "no_help"
+NO_GAIN: Final = "no_gain"
+SINGLE_ROWS: Final = "single_rows"
+OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 ON_A_GRID: Final = "on_a_grid"
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
     "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1) and "
-    "whether joint 3 is counted against link 2 or against the horizontal ([coupling])"
+    "whether joint 3 is counted against link 2 or against the horizontal ([coupling]). Rows of different "
+    "stations need a column group"
 )
 
 
+@dataclass(frozen=True)
+class Outliers:
+    """Rows that are far off.
+
+    Attributes:
+        named: Which they are, in words.
+        means_mm: Mean errors of the models on the judged rows without them; empty where none is judged.
+    """
+
+    named: str
+    means_mm: Mapping[str, float]
+
+
 def doubts(
-    arm: IdentifiedArm, models: Mapping[str, ArmModel], validation: Validation, best: str
+    arm: IdentifiedArm,
+    models: Mapping[str, ArmModel],
+    validation: Validation,
+    best: str,
+    outliers: Outliers | None = None,
 ) -> list[Notice]:
     """What speaks against a calibration whose model `best` is used."""
     before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
     if before < COMPUTED_MM:
         return [_computed()]
+    what = f"mean error on {validation.judged} rows"
     return [
-        *no_help(before, after, f"mean error on {validation.judged} rows"),
+        *(_single_rows(before, after, best, what, outliers) or no_help(before, after, what, outliers)),
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, models[CONSTANT]),
     ]
@@ -92,15 +117,58 @@ def helps(before_mm: float, after_mm: float) -> bool:
     return after_mm < min(before_mm, LARGE_MM)
 
 
-def no_help(before_mm: float, after_mm: float, what: str) -> list[Notice]:
-    """A warning where a calibration is of no use: errors of the nominal model, its own, what they are."""
+def no_help(before_mm: float, after_mm: float, what: str, outliers: Outliers | None = None) -> list[Notice]:
+    """A warning where a calibration is of no use.
+
+    Args:
+        before_mm: Error of the nominal model.
+        after_mm: That of its own.
+        what: What these are.
+        outliers: Rows that are far off, if any are known.
+    """
     if helps(before_mm, after_mm):
         return []
+    if is_near(before_mm):
+        text = (
+            f"There is nothing to gain: the {what} is {after_mm:.4g} mm, that of the nominal model "
+            f"{before_mm:.4g} mm already. As far as these poses tell the arm is where its table has it: use "
+            "it as it is, or measure more poses."
+        )
+        return [Notice(NO_GAIN, text)]
     text = (
         f"The calibration does not help: its {what} is {after_mm:.4g} mm, that of the nominal model "
-        f"{before_mm:.4g} mm. Do not use it until the reason is found. {CHECKS}."
+        f"{before_mm:.4g} mm. Do not use it until the reason is found. {_first(outliers)}{CHECKS}."
     )
     return [Notice(NO_HELP, text)]
+
+
+def _first(outliers: Outliers | None) -> str:
+    """Which rows to look at before all else."""
+    if outliers is None or not outliers.named:
+        return ""
+    return f"Look at these rows first, which alone may spoil the fit: {outliers.named}. "
+
+
+def is_near(before_mm: float) -> bool:
+    """Whether the nominal model misses by so little that the data can hardly be wrong."""
+    return before_mm < NEAR_MM
+
+
+def _single_rows(
+    before_mm: float, after_mm: float, best: str, what: str, outliers: Outliers | None
+) -> list[Notice]:
+    """A warning where a calibration helps but for single rows that are far off."""
+    if outliers is None or helps(before_mm, after_mm) or not outliers.means_mm:
+        return []
+    without, nominally = outliers.means_mm[best], outliers.means_mm[NOMINAL]
+    if not helps(nominally, without):
+        return []
+    text = (
+        f"Single rows are far off: {outliers.named}. With them the {what} is {after_mm:.4g} mm, that of the "
+        f"nominal model {before_mm:.4g} mm; without them they are {without:.4g} and {nominally:.4g} mm. "
+        "Correct these rows or leave them out, and calibrate again."
+    )
+    return [Notice(SINGLE_ROWS, text)]
 
 
 def _computed() -> Notice:

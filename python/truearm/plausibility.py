@@ -131,7 +131,8 @@ def _check_strokes(measurements: Measurements, robot: Robot) -> None:
             f"{measurements.row_names(outside)}, beyond what {robot.name} can reach",
             where=", ".join(measurements.files),
             rule="Prismatic joints are in metres unless their columns say so (q3_mm)",
-            way_out=f"If these are millimetres, give --length-unit mm, or name the columns: {columns}",
+            way_out=f"If these are millimetres, give --length-unit mm, or name the columns: {columns}; if "
+            "truearm import took them for degrees, bring them in with their unit: --map q3=COLUMN:mm",
         )
 
 
@@ -182,15 +183,15 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
             found,
             where=where,
             rule="The joint readings, stated in degrees, look like radians",
-            way_out="Give --angle-unit rad, or name the columns q1, q2, ...",
+            way_out="Name the columns q1, q2, ..., or, if their names say nothing, give --angle-unit rad",
         )
     if nominal > TOOL_ALLOWANCE_M and measured < nominal / SPREAD_FACTOR:
         raise InputError(
             found,
             where=where,
             rule="The positions are far too close together for these poses",
-            way_out="If they are in metres, give --length-unit m, or name the columns x, y, z; "
-            "if they are not, check that the columns belong together",
+            way_out="If they are in metres, name the columns x, y, z, or, if their names say nothing, give "
+            "--length-unit m; if they are not, check that the columns belong together",
         )
 
 

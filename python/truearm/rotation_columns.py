@@ -23,6 +23,7 @@ FORMS: Final = (
     "quaternion:wxyz=A,B,C,D (or xyzw)",
     "matrix=R11,R12,R13,R21,R22,R23,R31,R32,R33 (row by row)",
 )
+A_TURN: Final = 2.0 * np.pi * (1.0 + 1e-6)
 ROUNDED: Final = 0.02
 """So far from unit length and right angles are a rotation matrix's columns with few decimals, at the most."""
 
@@ -68,7 +69,7 @@ class RotationColumns:
         """Quaternions (n, 4), w first, of the columns' values (n, 3), (n, 4) or (n, 9); NaN rows stay NaN.
 
         Raises:
-            InputError: If what should be a rotation matrix is none.
+            InputError: If what should be a rotation matrix is none, or an angle is longer than a turn.
         """
         if self.kind == "quaternion":
             return values if self.order == "wxyz" else values[:, [3, 0, 1, 2]]
@@ -78,11 +79,24 @@ class RotationColumns:
             quaternions[given] = quaternion_from_matrix(_rotations(values[given], np.flatnonzero(given)))
             return quaternions
         angles = to_si(values, self.unit)
+        _check_angles(angles, self.unit)
         if self.kind == "euler":
             quaternions[given] = quaternion_from_euler(angles[given], self.order)
         else:
             quaternions[given] = quaternion_from_rotation_vector(angles[given])
         return quaternions
+
+
+def _check_angles(angles: Floats, unit: str) -> None:
+    """Raise InputError where angles (n, 3) in rad are longer than a turn."""
+    longest = np.nanmax(np.abs(angles), initial=0.0)
+    if longest > A_TURN:
+        raise InputError(
+            f"there are angles of {longest / to_si(1.0, unit):.4g} {unit}",
+            where="--rotation",
+            rule="Orientations are within a turn",
+            way_out="If these are degrees, say deg" if unit == "rad" else "Check which columns they are",
+        )
 
 
 def _rotations(values: Floats, rows: NDArray[np.int64]) -> Floats:

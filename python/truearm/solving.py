@@ -85,6 +85,19 @@ def feature_values(calibration: "Calibration", given: Mapping[str, float] | None
     return [float(value) for value in feature_columns(given, names, 1)[0]]
 
 
+def beyond_learnt(calibration: "Calibration", values: Sequence[float]) -> list[str]:
+    """In words, which features (F,) lie beyond those of the rows that a calibration knows, and theirs."""
+    if calibration.rows is None:
+        return []
+    found = []
+    for name, value in zip(calibration.options.features, values, strict=False):
+        learnt = calibration.rows.data.features[name]
+        low, high = float(learnt.min()), float(learnt.max())
+        if not low <= value <= high:
+            found.append(f"{name} = {value:g} lies beyond {low:g} to {high:g}, where it was learnt")
+    return found
+
+
 def as_poses(base_from_tool: ArrayLike) -> tuple[Floats, bool]:
     """Poses (n, 4, 4) or (4, 4) as a C-contiguous (n, 4, 4) array, and whether it was one.
 

@@ -134,7 +134,7 @@ def split_rows(data: Measurements, rule: SplitRule) -> Split:
         holdout=np.concatenate([part.holdout for part in parts]),
         planned=sum(part.planned for part in parts),
     )
-    _check_groups(data, split)
+    _check_groups(data, split, rule)
     return split
 
 
@@ -300,7 +300,8 @@ def _check_sizes(train: int, holdout: int, rule: SplitRule, where: str) -> None:
         )
 
 
-def _check_groups(data: Measurements, split: Split) -> None:
+def _check_groups(data: Measurements, split: Split, rule: SplitRule) -> None:
+    less = "a smaller --holdout" if rule.train_size is None else "a larger --train-size"
     trained = set(data.group[split.train].tolist())
     missing = [group for group in data.groups if group not in trained]
     if missing:
@@ -309,8 +310,7 @@ def _check_groups(data: Measurements, split: Split) -> None:
             f"no row of the set-up {list_names(missing[:NAMED])}{more} trains",
             where=", ".join(data.files),
             rule="The frame and tool of every set-up are found from its training rows",
-            way_out="Give a larger --train-size or another --seed; "
-            "to judge a whole set-up, use: truearm evaluate",
+            way_out=f"Give {less} or another --seed; to judge a whole set-up, use: truearm evaluate",
         )
 
 

@@ -136,9 +136,9 @@ def _calibrated(arm: "Robot", data: "Measurements", options: "Options", threads:
 
 def suggest_next(calibration: "Calibration", file: Path) -> None:
     """Name the commands that come next: none that uses a calibration that does not help."""
-    from truearm.doubts import NO_HELP
+    from truearm.doubts import OF_NO_USE
 
-    if any(notice.kind == NO_HELP for notice in calibration.notices):
+    if any(notice.kind in OF_NO_USE for notice in calibration.notices):
         suggest(f"truearm report {typed(file)}")
     else:
         suggest(f"truearm evaluate {typed(file)} OTHER.csv", compensate_command(calibration, file))

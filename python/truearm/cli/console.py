@@ -54,9 +54,9 @@ def on_terminal() -> bool:
     return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
-def print_json(value: Any) -> None:  # noqa: ANN401
+def print_json(value: Any, *, on_one_line: bool = False) -> None:  # noqa: ANN401
     """Print a value as JSON on stdout; NaN and infinity are errors of the caller."""
-    say(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    say(json.dumps(value, indent=None if on_one_line else 2, ensure_ascii=False, allow_nan=False))
 
 
 def print_table(

@@ -43,7 +43,7 @@ def command(
     """
     from truearm.calibration import Calibration
     from truearm.cli.error_tables import print_errors
-    from truearm.doubts import NO_HELP
+    from truearm.doubts import OF_NO_USE
     from truearm.evaluation import EvaluationOptions, evaluate
     from truearm.gross_rows import FAR_ROWS
     from truearm.measurements import Measurements
@@ -73,6 +73,6 @@ def command(
     say(f"{known.robot.name}: {how}, {count_of(found.n_judged, 'row')} judged.")
     print_errors(found.errors, count_of(found.n_judged, "row"))
     others = " ".join(map(typed, measurements))
-    useful = all(notice.kind not in (NO_HELP, FAR_ROWS) for notice in found.notices)
+    useful = all(notice.kind not in (*OF_NO_USE, FAR_ROWS) for notice in found.notices)
     next_one = [compensate_command(known, calibration)] if useful else []
     suggest(f"truearm report {typed(calibration)} {others} -o other.html", *next_one)

@@ -45,7 +45,9 @@ def command(
         float, typer.Option(help="How long a correction is held for want of a good one.")
     ] = HOLD_S,
     deadline_s: Annotated[float, typer.Option(help="Longest time between two set-points.")] = DEADLINE_S,
-    as_json: Annotated[bool, typer.Option("--json", help="Say where it listens in JSON.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Say where it listens in one line of JSON.")
+    ] = False,
 ) -> None:
     """Correct the set-points of controllers that cannot link the C library.
 
@@ -74,7 +76,7 @@ def command(
 
     def listening(host: str, at: int) -> None:
         if as_json:
-            print_json({"robot": known.robot.name, "address": host, "port": at})
+            print_json({"robot": known.robot.name, "address": host, "port": at}, on_one_line=True)
         else:
             say(f"Correcting set-points of {known.robot.name} on {host}:{at}; Ctrl-C ends.")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from truearm.compensation import Compensator
 from truearm.controller import Controller
-from truearm.errors import UsageError
+from truearm.errors import Notice, UsageError
 from truearm.inverse import Inverse
 from truearm.kinds import required
 from truearm.programs.declaring import declared_controller, refuse_contradiction
@@ -16,6 +16,7 @@ from truearm.programs.notices import frames_notices, payload_notices, still_noti
 from truearm.programs.program import Language
 from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
 from truearm.robot import Robot
+from truearm.solving import beyond_learnt
 
 
 def compensate_program(
@@ -56,7 +57,8 @@ def compensate_program(
     program = read_program(Path(path), written_in, author, known)
     refuse_contradiction(program, declared, force=chosen.force)
     positions_only = not calibration.selection.orientation
-    models = Models(author, Inverse(author), declared, compensator, compensator.task, positions_only)
+    beyond = tuple(beyond_learnt(calibration, compensator.features))
+    models = Models(author, Inverse(author), declared, compensator, compensator.task, positions_only, beyond)
     mark = mark_text(version("truearm"), calibration.data_hash)
     done = rewrite(program, models, chosen, mark=mark, tell=tell)
     return done.with_facts(
@@ -70,6 +72,7 @@ def compensate_program(
             *payload_notices(program, calibration.robot),
             *still_notices(done, calibration),
             *tool_notices(done, calibration),
+            *(Notice("feature_range", f"{each}: corrections are guesses there.") for each in beyond),
         ],
     )
 

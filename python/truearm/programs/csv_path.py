@@ -23,6 +23,7 @@ from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.scanning import Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
+from truearm.reading import DELIMITERS
 from truearm.robot import Robot
 from truearm.units import to_si
 
@@ -228,7 +229,12 @@ class _Reader:
         if joints and not has_joints:
             self._fail_header(f"there are joints {sorted(joints)}, and the arm has {len(self._joints)}")
         if not has_joints and not has_pose:
-            self._fail_header("there are neither all joints nor a whole pose")
+            mark = next((each for each in DELIMITERS if each != "," and each in self._names[0]), None)
+            found = "" if mark is None else f": its fields are separated by {DELIMITERS[mark]}, not commas"
+            self._fail_header(f"there are neither all joints nor a whole pose{found}")
+        if (points or turns) and not has_pose:
+            named = [self._names[column] for column, _ in sorted([*points.values(), *turns.values()])]
+            self._fail_header(f"{', '.join(named)} make no whole pose, and would stay as they are")
         parts = []
         if has_joints:
             columns = tuple(joints[joint][0] for joint in wanted)

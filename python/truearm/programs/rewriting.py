@@ -93,6 +93,7 @@ class Models:
         compensator: From programming to calibrated.
         task: What it meets; another than "pose" needs to know the tool for joint targets as well.
         positions_only: Whether the calibration was fitted to positions alone.
+        beyond: In words, features that lie beyond what it was fitted to.
     """
 
     programming: Robot
@@ -101,6 +102,7 @@ class Models:
     compensator: Compensator
     task: str = "pose"
     positions_only: bool = False
+    beyond: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -299,7 +301,9 @@ class _State:
         return f"Change them{allow}; {keep}{away}{self._why_unsure()}"
 
     def _why_unsure(self) -> str:
-        """What can be done where the calibration is unsure because it knows positions alone."""
+        """What can be done where the calibration is unsure of features far off, or knows positions alone."""
+        if UNSURE in self.codes and self.models.beyond:
+            return f". {'; '.join(self.models.beyond)}: measure there, or give what the arm has"
         if not (UNSURE in self.codes and self.models.positions_only):
             return ""
         return (

@@ -3,9 +3,12 @@
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.reporting.facts import Facts
 from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
 
 MEAN_LENGTH: Final = float(np.sqrt(8.0 / np.pi))
 """Mean length of a vector of three normal coordinates of deviation one: the Maxwell distribution's."""
@@ -16,11 +19,12 @@ MEAN_SIZE: Final = float(np.sqrt(2.0 / np.pi))
 def distance_at_floor_mm(facts: Facts) -> float:
     """Mean position error that the unexplained part, and the rows' own sigma, alone would leave, mm."""
     factor = MEAN_SIZE if facts.calibration.selection.distances else MEAN_LENGTH
-    return factor * float(np.hypot(facts.summary["noise_mm"], _stated_sigma_mm(facts)))
+    return factor * float(np.hypot(facts.summary["noise_mm"], stated_sigma_mm(facts)).mean())
 
 
-def _stated_sigma_mm(facts: Facts) -> float:
+def stated_sigma_mm(facts: Facts) -> Floats:
+    """What rows (n,) say of their own noise, mm; zero where they say nothing, one zero where none does."""
     rows = facts.calibration.rows
     if rows is None or rows.data.sigma_m is None:
-        return 0.0
-    return MM_PER_METRE * float(np.sqrt(np.square(np.nan_to_num(rows.data.sigma_m)).mean()))
+        return np.zeros(1)
+    return np.asarray(MM_PER_METRE * np.nan_to_num(rows.data.sigma_m))

@@ -1,6 +1,6 @@
 """Chapter: the same models judged on other measurements."""
 
-from truearm.doubts import NO_HELP
+from truearm.doubts import OF_NO_USE
 from truearm.errors import count_of
 from truearm.evaluation import Evaluation
 from truearm.reporting.facts import Facts
@@ -13,7 +13,7 @@ from truearm.units import MM_PER_METRE
 
 def _no_help(found: Evaluation) -> str:
     """A warning where the calibration is of no use there."""
-    if all(notice.kind != NO_HELP for notice in found.notices):
+    if all(notice.kind not in OF_NO_USE for notice in found.notices):
         return ""
     return " On these measurements the calibration does not help."
 

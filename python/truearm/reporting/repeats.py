@@ -13,7 +13,7 @@ from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
 from truearm.reporting.drifts import drifts
 from truearm.reporting.facts import Facts
-from truearm.reporting.floor import distance_at_floor_mm
+from truearm.reporting.floor import distance_at_floor_mm, stated_sigma_mm
 from truearm.reporting.numbers import fixed, lean, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.simulation import approach_in_sequence
@@ -100,10 +100,11 @@ def repeats(facts: Facts) -> Section:
     title = "Repeatability and noise"
     per = "per distance" if facts.calibration.selection.distances else "per coordinate"
     floor, noise = short(distance_at_floor_mm(facts), facts.summary["noise_mm"])
+    alone = "with what rows state as their sigma it" if stated_sigma_mm(facts).any() else "alone it"
     parts: list[Part] = [
         Text(
             f"The residual that the {facts.best} model does not explain has a standard deviation of {noise} "
-            f"mm {per}; alone it would make a mean error of {floor} mm. It comprises noise of the measuring "
+            f"mm {per}; {alone} would make a mean error of {floor} mm. It comprises noise of the measuring "
             "device, what the arm does not repeat, and what the model cannot represent."
         )
     ]

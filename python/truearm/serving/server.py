@@ -105,18 +105,23 @@ class Server:
     async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._connections += 1
         try:
-            await self._served(reader, writer)
-        except MalformedError as error:
-            self._told(f"{_peer(writer)}: {error}; connection closed")
-            await self._say_goodbye(reader, writer, str(error))
-        except (OSError, EOFError):
-            self._told(f"{_peer(writer)}: left")
+            await self._answered(reader, writer)
         except asyncio.CancelledError:
             # The server ends. Python 3.11 prints a traceback for a connection that says it was cancelled.
             self._told(f"{_peer(writer)}: the server ends; connection closed")
         finally:
             self._connections -= 1
             writer.close()
+
+    async def _answered(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Serve a connection until it ends, or breaks the rules and is told so."""
+        try:
+            await self._served(reader, writer)
+        except MalformedError as error:
+            self._told(f"{_peer(writer)}: {error}; connection closed")
+            await self._say_goodbye(reader, writer, str(error))
+        except (OSError, EOFError):
+            self._told(f"{_peer(writer)}: left")
 
     async def _served(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if self._connections > self._bounds.connections:
