@@ -118,6 +118,10 @@ def test_strange_numbers_are_warned_of(tmp_path, capsys):
     assert "Warning: No joint has limits" in printed.err
     assert "Warning: 1.5708 deg in links 1, 4 and 5 looks like radians: check angle_unit." in printed.err
     assert "The file can be used; see the warnings." in printed.out
+    short = Robot.load("ur5").to_toml().replace('length_unit = "m"', 'length_unit = "mm"')
+    path.write_text(short)
+    assert main(["robots", str(path)]) == 0
+    assert "Warning: All links together are 1.19 mm long" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,10 @@ import numpy as np
 
 from truearm.errors import InputError, Notice, list_rows
 from truearm.robot_data import RobotData
-from truearm.units import RADIANS_PER_DEGREE
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 MAX_LENGTH_M: Final = 50.0
+SHORTEST_ARM_M: Final = 0.02
 MAX_ANGLE_RAD: Final = 2.0 * np.pi + 1e-6
 MAX_LIMIT_RAD: Final = 40.0 * np.pi
 RIGHT_ANGLE_TOLERANCE: Final = 1e-3
@@ -34,7 +35,7 @@ def check_sizes(robot: RobotData) -> None:
 
 
 def robot_notices(robot: RobotData) -> list[Notice]:
-    """What is allowed and still strange: no limits at all, radians written where degrees were stated."""
+    """What is allowed and still strange: no limits at all, radians as degrees, metres as millimetres."""
     notices = []
     if np.isinf(robot.limits).all():
         text = "No joint has limits, so readings in a wrong unit may go unnoticed."
@@ -42,6 +43,10 @@ def robot_notices(robot: RobotData) -> list[Notice]:
     written = robot.table[:, [0, 3]] / RADIANS_PER_DEGREE
     quarters = np.round(written / (np.pi / 2))
     strange = (quarters != 0.0) & (np.abs(written - quarters * np.pi / 2) < RIGHT_ANGLE_TOLERANCE)
+    reach = np.abs(robot.table[:, list(LENGTHS)]).sum()
+    if 0.0 < reach < SHORTEST_ARM_M and "prismatic" not in robot.joints:
+        text = f"All links together are {MM_PER_METRE * reach:.3g} mm long: check length_unit."
+        notices.append(Notice("tiny", text))
     if strange.any():
         links = (np.flatnonzero(strange.any(axis=1)) + 1).tolist()
         value = written[strange][0]

@@ -123,4 +123,7 @@ def _way_out_of(seen: float, stated: float) -> str:
         return "If these are millimetres, give --length-unit mm, or name the columns x_mm, y_mm, z_mm"
     if low * stated < seen < high * stated:
         return "If these are metres, give --length-unit m, or name the columns x, y, z"
-    return "Check the columns and their unit, and that each row's place belongs to the point it touched"
+    return (
+        "Check the columns and their units, those of joints too (q1 is in radians, q1_deg in degrees), and "
+        "that each row's place belongs to the point it touched"
+    )
