@@ -104,3 +104,18 @@ def test_compensation_judges_by_it(calibration):
     strict = ta.Limits(largest_std_mm=float(0.9 * exact.min()))
     refused = ta.Compensator(calibration, task="position", limits=strict).joints(q[good][:1]).refusals
     assert refused[0].code == 8
+
+
+def test_a_feature_a_little_beyond_what_was_learnt_does_not_make_all_unknown():
+    arm = VirtualArm.paper(seed=3)
+    table = arm.measure_table(arm.poses(80)).assign(temperature=np.linspace(15.0, 30.0, 80))
+    data = ta.Measurements.from_dataframe(table)
+    calibration = ta.calibrate(arm.robot, data, features=("temperature",), refit=False)
+    q, tool = arm.poses(60, seed=8), calibration.model.setup.targets[0, 0]
+    for temperature in (8.0, 14.9, 22.0, 30.1, 37.0):
+        features = {"temperature": temperature}
+        std = calibration.pose_std(q, tool=tool, features=features)
+        exact = np.sqrt(np.square(std).reshape(-1, 2, 3).sum(axis=2))
+        ratio = calibration.conservative_std(q, tool=tool, features=features) / exact
+        assert (ratio >= 1.0).all()
+        assert (np.median(ratio, axis=0) < 3.0).all()

@@ -27,6 +27,8 @@ QUICK_ROWS: Final = 1200
 """Measured values up to which an exact standard deviation takes less than a millisecond."""
 ENDS: Final = 0.1
 """Configurations are drawn so far beyond a range, as a share of it, and then brought back to its ends."""
+BEYOND: Final = 0.5
+"""Features are bounded so far beyond what was measured, as a share of its range: another day is warmer."""
 SEED: Final = 0
 AT_ONCE: Final = 500
 TOGETHER: Final = 3
@@ -62,7 +64,8 @@ class Reach:
         joints = len(limits)
         inside = np.clip(measured[:joints], limits[:, :1], limits[:, 1:])
         features = measured[joints:]
-        return cls(np.vstack([limits, features]), np.vstack([inside, features]))
+        around = features + BEYOND * np.diff(features) * [-1.0, 1.0]
+        return cls(np.vstack([limits, around]), np.vstack([inside, features]))
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
         """Readings and features (count, N + F): half within the limits, half where was measured.
