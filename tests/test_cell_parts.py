@@ -19,7 +19,7 @@ from truearm.cell import ur_packets
 from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.clearance import TOOL_MARGIN_M, Clearance
 from truearm.cell.crew import Crew
-from truearm.cell.device_errors import DeviceGoneError, DeviceSilentError, EmergencyStopError
+from truearm.cell.device_errors import DeviceError, DeviceGoneError, DeviceSilentError, EmergencyStopError
 from truearm.cell.framing import framed, unframed
 from truearm.cell.judge import Rules, judge
 from truearm.cell.line_port import LinePort
@@ -252,3 +252,11 @@ def test_what_ended_a_way_is_raised_where_the_sensor_fails_too():
     with pytest.raises(EmergencyStopError, match="pressed"):
         crew._together([np.zeros(5)], Mock())
     assert noted == [("failed", "stop sensor: table: no answer.")]
+
+
+def test_joints_that_are_no_numbers_are_an_error_of_the_device():
+    cell = Mock(arm=Robot.load("rv-m2"))
+    cell.robot.name = "own robot"
+    cell.robot.read_joints.return_value = np.array([0.1, np.nan, 0.0, 0.0, 0.0])
+    with pytest.raises(DeviceError, match=r"own robot: it reads its joints as \[0.1, nan"):
+        Crew(cell, Mock()).connect()

@@ -272,7 +272,7 @@ def test_what_is_read_is_never_written_over(words, capsys):
 
 def test_a_report_does_not_take_the_place_of_the_program(capsys):
     assert run("-o", "new.mod", "--report", "./new.mod") == 2
-    assert "is the program's output" in capsys.readouterr().err
+    assert "is the output already" in capsys.readouterr().err
     assert not Path("new.mod").exists()
 
 

@@ -146,6 +146,9 @@ def test_the_robot_s_file_is_never_written_over(option, tmp_path, capsys, monkey
     assert main(["plan", "own.toml", "-n", "5", option, "own.toml", *other]) == 2
     assert "never written over" in capsys.readouterr().err
     assert Path("own.toml").read_bytes() == before
+    assert main(["plan", "own.toml", "-n", "5", "-o", "same.svg", "--picture", "./same.svg"]) == 2
+    assert "is the output already" in capsys.readouterr().err
+    assert not Path("same.svg").exists()
 
 
 @pytest.mark.parametrize(

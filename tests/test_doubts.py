@@ -10,11 +10,14 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from tests.report_support import words_of
 from truearm.cli import main
 from truearm.conventions import Convention
+from truearm.doubts import no_help
 from truearm.grids import grid_steps
 from truearm.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
+from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 
 
@@ -314,8 +317,19 @@ def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
     for row in range(0, 60, 6):
         wrong = table.assign(x=table["x"] + np.where(table.index == row, 0.9, 0.0))
         calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(wrong), model="constant")
-        found.append(notice_of(calibration, "single_rows"))
-        told = found[-1] + notice_of(calibration, "no_help")
+        assert calibration.held is not None
+        judged = row + 1 in calibration.held.rows
+        found.append(judged)
+        told = notice_of(calibration, "single_rows" if judged else "no_help")
         assert f"row {row + 1} (" in told
-        assert ("row by row" in told) == (not found[-1])
-    assert any(found)
+        assert ("row by row" in told) == (not judged)
+        assert ("Single rows are far off" in words_of(report(calibration).html)) == judged
+    assert set(found) == {True, False}
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "kind"), [(0.1, 0.12, "no_gain"), (0.1, 1.3, "no_help"), (0.6, 0.7, "no_help")]
+)
+def test_nothing_to_gain_is_said_of_small_errors_alone(before, after, kind):
+    assert [notice.kind for notice in no_help(before, after, "mean error")] == [kind]
+    assert no_help(after, before, "mean error") == []

@@ -22,14 +22,37 @@ from truearm.workbooks import sheet_text
 ROWS = [[each if k == 0 else float(each) for each in line.split(",")] for k, line in enumerate(PLAIN.split())]
 
 
-def workbook(folder: Path, name: str = "book.xlsx", **sheets: Any) -> Path:
+def workbook(folder: Path, name: str = "book.xlsx", *, stale: bool = False, **sheets: Any) -> Path:
+    """A workbook with these sheets; `stale`: what opens it is to work it out."""
     book = Workbook()
+    book.calculation.fullCalcOnLoad = stale
     for title, rows in (sheets or {"Sheet1": ROWS}).items():
         sheet = book.create_sheet(title)
         for row in rows:
             sheet.append(row)
     path = folder / name
     book.save(path)
+    return path
+
+
+# What other programs write where a formula gives a text of no length, and where nothing was worked out yet.
+EMPTY_TEXT = {'r="B3"><f>': 'r="B3" t="str"><f>'}
+ZERO = {"</f><v></v>": "</f><v>0</v>", "</f><v />": "</f><v>0</v>", "</f><v/>": "</f><v>0</v>"}
+
+
+def rewritten(path: Path, changes: dict[str, str]) -> Path:
+    """The same workbook with other text in its sheets, at least one of it."""
+    with zipfile.ZipFile(path) as file:
+        contents = {name: file.read(name) for name in file.namelist()}
+    changed = 0
+    with zipfile.ZipFile(path, "w") as file:
+        for name, content in contents.items():
+            text = content.decode()
+            for old, new in changes.items() if "worksheets/sheet" in name else ():
+                changed += text.count(old)
+                text = text.replace(old, new)
+            file.writestr(name, text)
+    assert changed
     return path
 
 
@@ -111,13 +134,24 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
         read_raw(workbook(tmp_path, day=[]), Marks(sheet="day"))
     with pytest.raises(InputError, match=r"row 2 holds a formula without a result: =A1\+1"):
         read_raw(workbook(tmp_path, day=[["q1"], ["=A1+1"]]), Marks())
+    empty = [["q1", "x"], [1.0, 2.0], [3.0, '=IF(A3="","",A3)']]
+    assert (
+        read_raw(rewritten(workbook(tmp_path, day=empty), EMPTY_TEXT), Marks()).texts("x").tolist()[1] == ""
+    )
+    zero = rewritten(workbook(tmp_path, stale=True, day=[["q1"], ["=A1+1"]]), ZERO)
+    with pytest.raises(InputError, match=r"row 2 holds a formula without a result: =A1\+1"):
+        read_raw(zero, Marks())
+    with pytest.raises(InputError, match=r"cannot be read as an Excel workbook.*Save it as .xlsx once more"):
+        read_raw(rewritten(workbook(tmp_path), {"<sheetData>": "<sheetData><row"}), Marks())
+    with pytest.raises(InputError, match="cannot be read as an Excel workbook: invalid literal"):
+        read_raw(rewritten(workbook(tmp_path), {"<v>45</v>": "<v>abc</v>"}), Marks())
     archive = tmp_path / "archive.xlsx"
     with zipfile.ZipFile(archive, "w") as file:
         file.writestr("a.txt", "nothing")
-    with pytest.raises(InputError, match="a ZIP archive but no Excel workbook"):
+    with pytest.raises(InputError, match="a ZIP archive that cannot be read as an Excel workbook"):
         read_raw(archive, Marks())
     archive.write_bytes(workbook(tmp_path).read_bytes()[:900])
-    with pytest.raises(InputError, match="a ZIP archive but no Excel workbook"):
+    with pytest.raises(InputError, match="a ZIP archive that cannot be read as an Excel workbook"):
         read_raw(archive, Marks())
     with pytest.raises(UsageError, match="is no workbook"):
         read_raw(write(tmp_path, PLAIN), Marks(sheet="day"))

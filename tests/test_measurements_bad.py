@@ -24,6 +24,9 @@ TABLES = {
     "half a quaternion": ("q1,x,y,z,qw,qx,qy", ["0,1,2,3,1,0,0"], 'Column "qz" of the quaternion is missing'),
     "one name twice": ("q1,x,x,y,z", ["0,1,1,2,3"], 'column "x" occurs more than once'),
     "one meaning twice": ("q1,x,x_mm,y,z", ["0,1,1,2,3"], 'columns "x" and "x_mm" mean the same'),
+    "column without name behind an empty one": ("q1,,x,,y", ["0,,1,2,3"], "column 4 has no name"),
+    "no header, delimiters behind": ("0,0,1,2,3,", ["0,0,1,2,3,"], "first line holds numbers only"),
+    "delimiters alone": (",,", [",,"], "no column has a name"),
     "column without name": ("q1,x,,y,z", ["0,1,1,2,3"], "column 3 has no name"),
     "columns without names": (
         "q1,x,y,z,,",

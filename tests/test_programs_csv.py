@@ -133,6 +133,7 @@ def test_a_byte_order_mark_stays_in_front(robot):
         ("q1,q2,q3,q4,q5,q6,q1_deg", "joint 1 has more than one column"),
         ("q1,q2,q3,q4,q5,q6,x_mm,y_mm,z_mm", "x_mm, y_mm, z_mm make no whole pose"),
         ("q1,q2,q3,q4,q5,q6,x,y,z,rx,ry", "x, y, z, rx, ry make no whole pose"),
+        ("q1,q2,q3,q4,q5,q6,qw,qx,qy,qz", "qw, qx, qy, qz make no whole pose"),
         ("q1;q2;q3;q4;q5;q6", "separated by semicolons"),
     ],
 )

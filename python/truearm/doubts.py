@@ -128,11 +128,11 @@ def no_help(before_mm: float, after_mm: float, what: str, outliers: Outliers | N
     """
     if helps(before_mm, after_mm):
         return []
-    if is_near(before_mm):
+    if nothing_to_gain(before_mm, after_mm):
         text = (
             f"There is nothing to gain: the {what} is {after_mm:.4g} mm, that of the nominal model "
             f"{before_mm:.4g} mm already. As far as these poses tell the arm is where its table has it: use "
-            "it as it is, or measure more poses."
+            "the arm without a calibration, or measure more poses."
         )
         return [Notice(NO_GAIN, text)]
     text = (
@@ -149,9 +149,9 @@ def _first(outliers: Outliers | None) -> str:
     return f"Look at these rows first, which alone may spoil the fit: {outliers.named}. "
 
 
-def is_near(before_mm: float) -> bool:
-    """Whether the nominal model misses by so little that the data can hardly be wrong."""
-    return before_mm < NEAR_MM
+def nothing_to_gain(before_mm: float, after_mm: float) -> bool:
+    """Whether a calibration does not help where both models miss by so little that data are hardly wrong."""
+    return not helps(before_mm, after_mm) and before_mm < NEAR_MM and after_mm < NEAR_MM
 
 
 def _single_rows(

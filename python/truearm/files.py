@@ -134,4 +134,26 @@ def refuse_own_input(output: Path, *inputs: Path | str | None) -> None:
 def _files_of(given: Path | str) -> list[Path]:
     """The files that an argument may mean."""
     named = [Path(given), *([Path(given.partition("#")[0])] if isinstance(given, str) else [])]
-    return [path for path in named if path.is_file()]
+    return [path for path in named if _is_file(path)]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # no file has a name as long as that
+        return False
+
+
+def refuse_same(output: Path, other: Path | None, *, option: str) -> None:
+    """Refuse to write two things into one file.
+
+    Args:
+        output: Where the one goes.
+        other: Where the other goes, if there is one.
+        option: Option that names the other, for messages.
+
+    Raises:
+        UsageError: If both are the same.
+    """
+    if other is not None and other.resolve() == output.resolve():
+        raise UsageError(f"{other} is the output already", where=option, way_out="Name another file")

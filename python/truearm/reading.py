@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -231,7 +231,9 @@ def split_table(
     if not rows:
         raise InputError("there are no data rows below the header", where=where)
     named = [k for k, name in enumerate(header) if name or any(row[k].strip() for row in rows)]
-    _check_names([header[k] for k in named], where, nameless)
+    if not named:
+        raise InputError("no column has a name", where=where, way_out=nameless)
+    _check_names({k + 1: header[k] for k in named}, where, nameless)
     cells = np.array(rows, dtype=np.str_)
     return Table(where, {header[k]: cells[:, k] for k in named}, len(rows))
 
@@ -249,7 +251,7 @@ def _check_header(header: Sequence[str], where: str) -> None:
             rule="The first line must name the columns",
             way_out="Delete it, or bring the file in with: truearm import FILE --skip-lines 1 ...",
         )
-    if all(_as_number(name) is not None for name in header):
+    if any(header) and all(_as_number(name) is not None for name in header if name):
         raise InputError(
             "the first line holds numbers only",
             where=where,
@@ -258,14 +260,16 @@ def _check_header(header: Sequence[str], where: str) -> None:
         )
 
 
-def _check_names(header: Sequence[str], where: str, nameless: str) -> None:
-    empty = [position for position, name in enumerate(header, start=1) if not name]
+def _check_names(names: Mapping[int, str], where: str, nameless: str) -> None:
+    """Raise InputError unless every column, by its position in the file, has a name of its own."""
+    empty = [position for position, name in names.items() if not name]
     if empty:
         raise InputError(
             f"{list_rows(empty, 'column')} {'has' if len(empty) == 1 else 'have'} no name",
             where=where,
             way_out=nameless,
         )
+    header = list(names.values())
     repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if repeated:
         raise InputError(f'column "{repeated[0]}" occurs more than once', where=where)

@@ -94,7 +94,7 @@ def beyond_learnt(calibration: "Calibration", values: Sequence[float]) -> list[s
         learnt = calibration.rows.data.features[name]
         low, high = float(learnt.min()), float(learnt.max())
         if not low <= value <= high:
-            found.append(f"{name} = {value:g} lies beyond {low:g} to {high:g}, where it was learnt")
+            found.append(f"{name} = {value:.10g} lies beyond {low:.10g} to {high:.10g}, where it was learnt")
     return found
 
 

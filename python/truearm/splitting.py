@@ -301,7 +301,9 @@ def _check_sizes(train: int, holdout: int, rule: SplitRule, where: str) -> None:
 
 
 def _check_groups(data: Measurements, split: Split, rule: SplitRule) -> None:
-    less = "a smaller --holdout" if rule.train_size is None else "a larger --train-size"
+    less = "a larger --train-size"
+    if rule.train_size is None:
+        less = "a smaller --holdout" if rule.holdout_range is None else "a smaller share of --holdout-range"
     trained = set(data.group[split.train].tolist())
     missing = [group for group in data.groups if group not in trained]
     if missing:

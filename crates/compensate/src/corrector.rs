@@ -236,7 +236,8 @@ impl Corrector {
         let limits = &self.options.limits;
         let std = if limits.largest_std.is_finite() { found.std_m } else { 0.0 };
         limits
-            .refuse_residual(&self.plan, [found.residual_m, found.residual_rad])
+            .refuse_reading(&self.calibrated.chain, true, |joint| workspace.nominal[joint].0[i])
+            .or_else(|| limits.refuse_residual(&self.plan, [found.residual_m, found.residual_rad]))
             .or_else(|| self.refuse_joint(workspace, i))
             .or_else(|| Refusal::above(Reason::Shift, norm(found.shift), limits.largest_shift))
             .or_else(|| Refusal::above(Reason::Turn, norm(found.turn), limits.largest_turn))
@@ -248,14 +249,14 @@ impl Corrector {
         for (joint, (from, to)) in workspace.nominal.iter().zip(&workspace.search.best).enumerate() {
             let (from, to) = (from.0[i], to.0[i]);
             let slides = self.calibrated.chain.slides(joint);
-            let largest = if slides { limits.largest_slide } else { limits.largest_angle };
+            let largest = limits.largest_correction(slides);
             let value = (to - from).abs();
             if value > largest {
                 let reason = Reason::JointCorrection;
                 return Some(Refusal { reason, joint: joint + 1, value, limit: largest, slides });
             }
         }
-        limits.refuse_reading(&self.calibrated.chain, |joint| workspace.search.best[joint].0[i])
+        limits.refuse_reading(&self.calibrated.chain, false, |joint| workspace.search.best[joint].0[i])
     }
 }
 

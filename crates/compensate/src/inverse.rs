@@ -186,7 +186,8 @@ impl Inverse {
         self.limits
             .refuse_residual(&self.plan, residual)
             .or_else(|| {
-                self.limits.refuse_reading(&self.aimed.chain, |joint| workspace.search.best[joint].0[i])
+                self.limits
+                    .refuse_reading(&self.aimed.chain, false, |joint| workspace.search.best[joint].0[i])
             })
             .or_else(|| {
                 let other = self.has_branches()

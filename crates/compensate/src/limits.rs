@@ -80,13 +80,23 @@ impl Limits {
             .or_else(|| Refusal::above(Reason::OrientationNotReached, residual[1], turn))
     }
 
-    /// The first joint whose reading is beyond its limits.
-    pub(crate) fn refuse_reading(&self, chain: &Chain, reading: impl Fn(usize) -> f64) -> Option<Refusal> {
+    /// Largest change of a joint's reading, m where it slides, else rad.
+    pub(crate) fn largest_correction(&self, slides: bool) -> f64 {
+        if slides { self.largest_slide } else { self.largest_angle }
+    }
+
+    /// The first joint whose reading is beyond its limits; `before` it is corrected, so far that no correction helps.
+    pub(crate) fn refuse_reading(
+        &self,
+        chain: &Chain,
+        before: bool,
+        reading: impl Fn(usize) -> f64,
+    ) -> Option<Refusal> {
         for (joint, [low, high]) in self.joints.iter().enumerate() {
-            let value = reading(joint);
-            if value < *low || value > *high {
+            let (value, slides) = (reading(joint), chain.slides(joint));
+            let slack = if before { self.largest_correction(slides) } else { 0.0 };
+            if value < *low - slack || value > *high + slack {
                 let limit = if value < *low { *low } else { *high };
-                let slides = chain.slides(joint);
                 return Some(Refusal { reason: Reason::JointLimit, joint: joint + 1, value, limit, slides });
             }
         }

@@ -53,6 +53,18 @@ fn joint_limits() {
 }
 
 #[test]
+fn readings_far_beyond_their_limits_are_the_reason_where_nothing_is_reached() {
+    let mut joints = vec![[-3.0, 3.0]; 6];
+    joints[2] = [-3.0, Q[2] - 0.1];
+    let never = Limits { residual: 1e-30, ..Limits::default() };
+    let text = refuses(limits(Limits { joints: joints.clone(), ..never.clone() }), Reason::JointLimit);
+    assert!(text.contains("joint 3 would be at 80.2"), "{text}");
+    // A correction could still bring this one back.
+    joints[2] = [-3.0, Q[2] - 0.01];
+    refuses(limits(Limits { joints, ..never }), Reason::PositionNotReached);
+}
+
+#[test]
 fn the_other_bounds() {
     let base = Limits::default;
     let text = refuses(limits(Limits { largest_angle: 1e-6, ..base() }), Reason::JointCorrection);

@@ -1,5 +1,6 @@
 """Robot and sensor as they work together: who moves when, and what is done when one fails."""
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
@@ -128,8 +129,11 @@ class Crew:
             self._here = place
 
     def _where(self) -> Floats:
-        self._here = self._cell.robot.read_joints()
-        return self._here
+        here = self._cell.robot.read_joints()
+        if not all(map(math.isfinite, here.tolist())):
+            raise DeviceError(f"it reads its joints as {here.tolist()}", where=self._cell.robot.name)
+        self._here = here
+        return here
 
     def recover(self) -> None:
         """Connect both devices anew, as carefully as at the start."""

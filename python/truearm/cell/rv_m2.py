@@ -89,6 +89,8 @@ class RvM2:
 
     def move_joints(self, readings: Floats) -> None:
         """See Robot. The arm ends at whole tenths of a degree."""
+        if not np.isfinite(readings).all():
+            raise RefusedError("readings that are no numbers", where=self._port.where)
         target = tenths(np.asarray(readings))
         self._check_limits(target)
         with self._busy:

@@ -16,7 +16,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
 from truearm.errors import UsageError, typed
-from truearm.files import refuse_own_input, write_whole
+from truearm.files import refuse_own_input, refuse_same, write_whole
 
 OnRefusal = Literal["stop", "keep-nominal"]
 
@@ -124,12 +124,9 @@ def _check_outputs(
         refuse_own_input(report, program, *others)
     if output is not None:
         refuse_own_input(Path(output), *others)
+        refuse_same(Path(output), report, option="--report")
     if output is None and not dry_run:
         raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
-    if report is not None and output is not None and report.resolve() == Path(output).resolve():
-        raise UsageError(
-            f"{report} is the program's output", where="--report", way_out="Name another file for the report"
-        )
 
 
 def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:

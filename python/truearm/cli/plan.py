@@ -11,7 +11,7 @@ from truearm.cli.console import print_json, print_table, say, say_wrapped, sugge
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.errors import UsageError, count_of, list_names, typed
-from truearm.files import refuse_own_input
+from truearm.files import refuse_own_input, refuse_same
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -112,6 +112,7 @@ def _check_outputs(output: Path, picture: Path | None, *inputs: Path | str | Non
     if picture is None:
         return
     refuse_own_input(picture, *inputs)
+    refuse_same(output, picture, option="--picture")
     if picture.suffix.lower() not in PICTURES:
         rule = f"Its name ends in {list_names(PICTURES, 'or')}"
         raise UsageError(str(picture), where="--picture", rule=rule)

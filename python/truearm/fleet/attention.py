@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from truearm.doubts import helps
+from truearm.doubts import helps, nothing_to_gain
 from truearm.fleet.fleet_file import LimitsSection
 
 Row = Mapping[str, Any]
@@ -68,7 +68,9 @@ def order(found: Sequence[Reason]) -> tuple[int, float]:
 def _no_gain(arm: Row) -> Iterator[Reason]:
     before, after = arm["nominal_mean_mm"], arm["mean_mm"]
     if not helps(before, after):
-        words = f"The calibration does not help: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
+        none = nothing_to_gain(before, after)
+        said = "There is nothing to gain" if none else "The calibration does not help"
+        words = f"{said}: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
         yield Reason("no_gain", words, after / before)
 
 

@@ -232,8 +232,10 @@ class _Reader:
             mark = next((each for each in DELIMITERS if each != "," and each in self._names[0]), None)
             found = "" if mark is None else f": its fields are separated by {DELIMITERS[mark]}, not commas"
             self._fail_header(f"there are neither all joints nor a whole pose{found}")
-        if (points or turns) and not has_pose:
-            named = [self._names[column] for column, _ in sorted([*points.values(), *turns.values()])]
+        turned = [column for column, name in names.items() if name in QUATERNION]
+        parts_of_pose = [*turned, *(column for column, _ in [*points.values(), *turns.values()])]
+        if parts_of_pose and not has_pose:
+            named = [self._names[column] for column in sorted(parts_of_pose)]
             self._fail_header(f"{', '.join(named)} make no whole pose, and would stay as they are")
         parts = []
         if has_joints:

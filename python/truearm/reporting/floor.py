@@ -19,12 +19,12 @@ MEAN_SIZE: Final = float(np.sqrt(2.0 / np.pi))
 def distance_at_floor_mm(facts: Facts) -> float:
     """Mean position error that the unexplained part, and the rows' own sigma, alone would leave, mm."""
     factor = MEAN_SIZE if facts.calibration.selection.distances else MEAN_LENGTH
-    return factor * float(np.hypot(facts.summary["noise_mm"], stated_sigma_mm(facts)).mean())
+    return factor * float(np.mean(np.hypot(facts.summary["noise_mm"], stated_sigma_mm(facts))))
 
 
-def stated_sigma_mm(facts: Facts) -> Floats:
-    """What rows (n,) say of their own noise, mm; zero where they say nothing, one zero where none does."""
+def stated_sigma_mm(facts: Facts) -> Floats | float:
+    """What rows (n,) say of their own noise, mm; zero where they say nothing."""
     rows = facts.calibration.rows
     if rows is None or rows.data.sigma_m is None:
-        return np.zeros(1)
+        return 0.0
     return np.asarray(MM_PER_METRE * np.nan_to_num(rows.data.sigma_m))

@@ -100,7 +100,7 @@ def repeats(facts: Facts) -> Section:
     title = "Repeatability and noise"
     per = "per distance" if facts.calibration.selection.distances else "per coordinate"
     floor, noise = short(distance_at_floor_mm(facts), facts.summary["noise_mm"])
-    alone = "with what rows state as their sigma it" if stated_sigma_mm(facts).any() else "alone it"
+    alone = "with what rows state as their sigma it" if np.any(stated_sigma_mm(facts)) else "alone it"
     parts: list[Part] = [
         Text(
             f"The residual that the {facts.best} model does not explain has a standard deviation of {noise} "

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import helps, is_near
+from truearm.doubts import SINGLE_ROWS, helps, nothing_to_gain
 from truearm.errors import count_of
 from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
@@ -66,7 +66,9 @@ def verdict(facts: Facts) -> str:
         f"On {poses} the mean {facts.error} is {numbers[0]} mm and the largest {numbers[1]} mm; "
         f"{_former(facts)} they are {numbers[2]} mm and {numbers[3]} mm."
     )
-    if not helps(nominal.mean, after.mean) and is_near(nominal.mean):
+    if any(notice.kind == SINGLE_ROWS for notice in facts.calibration.notices):
+        return f"{said} Single rows are far off: correct them or leave them out, and calibrate again."
+    if nothing_to_gain(nominal.mean, after.mean):
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
     if not helps(nominal.mean, after.mean):
         return f"{said} The calibration does not help: do not use it until the reason is found."
