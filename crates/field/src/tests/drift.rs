@@ -52,7 +52,8 @@ proptest! {
         let residual: Vec<f64> = noise(seed).iter().map(|value| 1e-4 * value).collect();
         let found = found_in(&residual, &[1.0; ROWS]);
         let moved = (found.moved.iter().map(|x| x * x).sum::<f64>() / (3 * ROWS) as f64).sqrt();
-        prop_assert!(found.gain < 8.0 && moved < 0.3e-4, "{} {moved}", found.gain);
+        // A gain of ten is taken for a drift.
+        prop_assert!(found.gain < 10.0 && moved < 0.3e-4, "{} {moved}", found.gain);
     }
 }
 
