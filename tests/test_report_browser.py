@@ -13,7 +13,7 @@ from truearm.reporting.report import report
 if os.environ.get("TRUEARM_BROWSER") != "1":
     pytest.skip("looked at by: make check-report", allow_module_level=True)
 
-NARROW, WIDE = 400, 1280
+NARROW, MIDDLE, WIDE = 400, 800, 1280
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +40,21 @@ def test_every_figure_is_drawn_without_a_word_on_the_console(page, path, tmp_pat
     assert 'data-figures="printable"' in done.stdout
     assert done.stdout.count('class="printed"') == len(figures_of(page)["figures"])
     assert done.stdout.count("main-svg") >= len(figures_of(page)["figures"])
+
+
+@pytest.mark.parametrize("width", [MIDDLE, WIDE])
+def test_the_first_table_is_shown_whole_on_a_screen(page, tmp_path, width):
+    measure = (
+        "const first = document.querySelector('.beside .scroll');"
+        "document.title = first.scrollWidth > first.clientWidth ? 'clipped' : 'whole';"
+    )
+    path = tmp_path / "report.html"
+    path.write_text(page.replace("</body>", f"<script>{measure}</script></body>"))
+    command = browser_command(
+        browser(), str(tmp_path), [f"--window-size={width},2000", "--dump-dom", path.as_uri()]
+    )
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "<title>whole</title>" in done.stdout
 
 
 def test_it_prints(page, tmp_path):

@@ -125,7 +125,7 @@ def table(facts: Facts) -> Table:
     turned = {name: found.orientation for name, found in errors.items()}
     for name, found in turned.items():
         if found is not None:
-            rows.append([f"{name}, orientation in mrad", *_cells(found)])
+            rows.append([f"{name}, mrad", *_cells(found)])
             units = ["mm", "orientation in mrad"]
     of = "Distance errors" if facts.calibration.selection.distances else "Errors"
     return Table(
