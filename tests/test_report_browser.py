@@ -42,7 +42,7 @@ def test_every_figure_is_drawn_without_a_word_on_the_console(page, path, tmp_pat
     assert done.stdout.count("main-svg") >= len(figures_of(page)["figures"])
 
 
-@pytest.mark.parametrize("width", [MIDDLE, WIDE])
+@pytest.mark.parametrize("width", [NARROW, MIDDLE, WIDE])
 def test_the_first_table_is_shown_whole_on_a_screen(page, tmp_path, width):
     measure = (
         "const first = document.querySelector('.beside .scroll');"
