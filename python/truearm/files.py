@@ -1,8 +1,9 @@
 """Reading and writing whole files, with errors that name the file and the way out."""
 
 import os
-import tempfile
+import secrets
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -81,16 +82,45 @@ def parsed(text: str, *, where: str) -> dict[str, Any]:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file completely or not at all: a neighbour is written, then renamed.
+    """Write a file completely or not at all, as :func:`write_all`."""
+    write_all([(path, content)])
+
+
+def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
+    """Write files, each completely or not at all: neighbours of all are written, then renamed in this order.
+
+    A link is followed. What is no file, such as a pipe or /dev/stdout, is written to and not replaced.
 
     Raises:
-        InputError: If the directory does not exist or may not be written to, or is what the path names.
+        InputError: If a directory does not exist or may not be written to, or is what a path names; nothing
+            is written then.
     """
+    written: list[tuple[Path, Path]] = []
+    try:
+        for path, content in contents:
+            data = content.encode() if isinstance(content, str) else content
+            place = path.resolve() if path.is_symlink() else path
+            written.append((_written(place, data), place))
+        for neighbour, place in written:
+            if neighbour != place:
+                neighbour.replace(place)
+    except BaseException:
+        for neighbour, place in written:
+            if neighbour != place:
+                neighbour.unlink(missing_ok=True)
+        raise
+
+
+def _written(path: Path, data: bytes) -> Path:
+    """The neighbour of a file that holds what is to come into it; the path itself where it is no file."""
     if path.is_dir():
         raise InputError("this is a directory", where=str(path), rule="A file is to be written")
-    data = content.encode() if isinstance(content, str) else content
+    if path.exists() and not path.is_file():
+        path.write_bytes(data)
+        return path
+    neighbour = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     try:
-        handle, neighbour = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        handle = os.open(neighbour, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     except FileNotFoundError:
         raise InputError("there is no such directory", where=str(path.parent)) from None
     except PermissionError:
@@ -98,17 +128,10 @@ def write_whole(path: Path, content: str | bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
-        Path(neighbour).chmod(0o666 & ~_umask())
-        Path(neighbour).replace(path)
     except BaseException:
-        Path(neighbour).unlink(missing_ok=True)
+        neighbour.unlink(missing_ok=True)
         raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    return neighbour
 
 
 def refuse_own_input(output: Path, *inputs: Path | str | None) -> None:

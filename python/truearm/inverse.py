@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import Inverse as Solver
 from truearm.arrays import as_rows, as_transforms
-from truearm.errors import WorkError, list_rows
+from truearm.errors import InputError, WorkError, count_of, list_rows
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -119,6 +119,11 @@ class Inverse:
         seeds, one = as_rows(seed, self.robot.joint_count, what="seeds")
         if one:
             seeds = np.repeat(seeds, len(poses), axis=0)
+        if len(seeds) != len(poses):
+            raise InputError(
+                f"there are {count_of(len(seeds), 'seed')} for {count_of(len(poses), 'pose')}",
+                rule="One seed for all poses, or one for each",
+            )
         return self._solver.near(poses, np.ascontiguousarray(seeds)), single
 
 

@@ -78,6 +78,13 @@ class RobotData:
             object.__setattr__(self, field, _checked(field, getattr(self, field), shape))
         if self.base_row is not None:
             object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
+        unordered = np.flatnonzero(~(self.limits[:, 0] < self.limits[:, 1]))
+        if len(unordered):
+            raise InputError(
+                f"joint {unordered[0] + 1} has {self.limits[unordered[0]].tolist()}",
+                where="limits",
+                rule="The lowest reading comes first, then the highest; infinite where there is none",
+            )
         if abs(np.linalg.det(self.coupling)) < MIN_COUPLING_DETERMINANT:
             raise InputError(
                 "the coupling matrix is singular",

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import CoreError, Stream
+from truearm.arrays import as_numbers
 from truearm.compensation import Compensator
 from truearm.defaults import DEADLINE_S, HOLD_S, RAMP_S
-from truearm.errors import UsageError
+from truearm.errors import InputError, UsageError
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -90,6 +91,7 @@ class CorrectionStream:
             UsageError: If an option is not positive.
         """
         self._features: Sequence[float] = compensator.features
+        self._joints = compensator.programming.joint_count
         try:
             self._core = Stream(compensator.corrector(tool), (options or StreamOptions()).core())
         except CoreError as error:
@@ -106,7 +108,15 @@ class CorrectionStream:
         Args:
             q: Readings (N,), or None where none came in time.
             elapsed_s: Time since the step before.
+
+        Raises:
+            InputError: If these are no numbers, or not one for each joint. Nothing has become of it then.
         """
-        readings = None if q is None else np.ascontiguousarray(q, dtype=np.float64)
+        readings = None if q is None else as_numbers(q, what="the readings of a set-point")
+        if readings is not None and readings.shape != (self._joints,):
+            raise InputError(
+                f"the readings of a set-point have shape {readings.shape}",
+                rule=f"One number for each of the {self._joints} joints: ({self._joints},)",
+            )
         self.last = Streamed(*self._core.step(readings, self._features, elapsed_s))
         return self.last

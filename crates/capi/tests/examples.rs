@@ -80,7 +80,7 @@ fn numbers(said: &str, word: &str) -> Vec<f64> {
 
 #[test]
 fn the_c_example_corrects_as_the_library_does() {
-    let Some(example) = Example::new("gcc", "-std=c11", "correct.c") else { return };
+    let Some(example) = Example::new("cc", "-std=c11", "correct.c") else { return };
     let (_, expected, found) = Rig::new().correct(&HOME);
     let said = example.says(&HOME);
     assert_eq!(numbers(&said, "corrected"), expected);
@@ -95,7 +95,7 @@ fn the_c_example_corrects_as_the_library_does() {
 
 #[test]
 fn the_c_example_says_what_is_wrong() {
-    let Some(example) = Example::new("gcc", "-std=c11", "correct.c") else { return };
+    let Some(example) = Example::new("cc", "-std=c11", "correct.c") else { return };
     assert_eq!(example.run(&HOME[..3]).status.code(), Some(2));
     std::fs::write(&example.calibration, b"{\"no\": \"calibration\"}").unwrap();
     let done = example.run(&HOME);
@@ -105,7 +105,7 @@ fn the_c_example_says_what_is_wrong() {
 
 #[test]
 fn the_cpp_example_corrects_in_threads() {
-    let Some(example) = Example::new("g++", "-std=c++17", "correct.cpp") else { return };
+    let Some(example) = Example::new("c++", "-std=c++17", "correct.cpp") else { return };
     let (_, expected, _) = Rig::new().correct(&HOME);
     let said = example.says(&HOME);
     assert_eq!(numbers(&said, "corrected"), expected);

@@ -26,3 +26,23 @@ fn the_header_is_fresh() {
     let again = "write it again: TRUEARM_WRITE_HEADER=1 cargo test -p truearm-capi --test header";
     assert!(String::from_utf8(stored) == String::from_utf8(fresh), "include/truearm.h is stale; {again}");
 }
+
+#[test]
+fn every_status_is_documented() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let source = std::fs::read_to_string(root.join("src/ffi/status.rs")).unwrap();
+    let page = std::fs::read_to_string(root.join("../../docs/reference/c-library.md")).unwrap();
+    let body = source.split("pub enum Status {").nth(1).unwrap().split('}').next().unwrap();
+    let numbers: Vec<&str> = body
+        .lines()
+        .filter_map(|line| line.split_once(" = "))
+        .map(|(_, number)| number.trim_end_matches(','))
+        .collect();
+    assert!(numbers.len() > 10);
+    for number in numbers {
+        assert!(
+            page.contains(&format!("` | {number} | ")),
+            "docs/reference/c-library.md says nothing of {number}"
+        );
+    }
+}

@@ -43,6 +43,36 @@ fn a_missing_file_is_said_to_be_missing() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_name_is_whatever_the_system_takes() {
+    let (mut out, mut message) = (null_mut(), [1 as std::ffi::c_char; 200]);
+    // SAFETY: all pointers are to memory of the sizes given.
+    let status =
+        unsafe { truearm_load_file(c"/no/\xe9.calib".as_ptr(), &mut out, message.as_mut_ptr(), 200) };
+    assert_eq!(status, Status::Unreadable);
+}
+
+#[test]
+fn every_failure_has_a_message_and_success_an_empty_one() {
+    let calibration = load(&File::new().bytes()).unwrap();
+    let (mut out, mut message) = (null_mut(), [1 as std::ffi::c_char; 200]);
+    let (no_motion, buffer) = ([0.0; 16], message.as_mut_ptr());
+    // SAFETY: all pointers are to memory of the sizes given.
+    unsafe {
+        let made = truearm_corrector_new(calibration, no_motion.as_ptr(), null(), &mut out, buffer, 200);
+        assert_eq!((made, out), (Status::BadOption, null_mut()));
+        assert!(text(buffer).contains("0 0 0 1"));
+        let made = truearm_corrector_new(null(), null(), null(), &mut out, buffer, 200);
+        assert_eq!(made, Status::BadPointer);
+        assert_eq!(text(buffer), text(truearm_status_text(made as i32)));
+        let made = truearm_corrector_new(calibration, null(), null(), &mut out, buffer, 200);
+        assert_eq!((made, text(buffer)), (Status::Ok, String::new()));
+        assert_eq!(truearm_corrector_free(out), Status::Ok);
+        assert_eq!(truearm_calibration_free(calibration), Status::Ok);
+    }
+}
+
+#[test]
 fn every_altered_byte_is_noticed() {
     let bytes = File::new().bytes();
     for place in (0..bytes.len()).step_by(101) {

@@ -167,9 +167,13 @@ class Cell:
         """
         file = checked(CellFile, parsed(text, where=where), where=where)
         arm = _arm(file, folder)
-        robot, robot_settings = driver_and_settings(file.robot, ROBOTS, where=f"{where}, robot")
+        robot, robot_settings = driver_and_settings(
+            file.robot, ROBOTS, where=f"{where}, robot", folder=folder
+        )
         sensor_section = _beside(file.sensor, folder)
-        sensor, sensor_settings = driver_and_settings(sensor_section, SENSORS, where=f"{where}, sensor")
+        sensor, sensor_settings = driver_and_settings(
+            sensor_section, SENSORS, where=f"{where}, sensor", folder=folder
+        )
         target = arm.tool.copy()
         if file.target is not None:
             target[:3, 3] = to_si(np.array(file.target.in_flange_mm), "mm")

@@ -171,5 +171,5 @@ class Crew:
     def _tried(self, what: str, action: Callable[[], None]) -> None:
         try:
             action()
-        except DeviceError as error:
-            self._note("failed", f"{what}: {error}")
+        except Exception as error:  # noqa: BLE001  # a driver of a user's own may raise anything, here of all places
+            self._note("failed", f"{what}: {error or type(error).__name__}")

@@ -1,7 +1,9 @@
 """Drivers by name, and users' own ones by module and class."""
 
+import sys
 from collections.abc import Mapping
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel
@@ -23,7 +25,7 @@ SENSORS: Final = {
 
 
 def driver_and_settings(
-    section: Mapping[str, Any], known: Mapping[str, str], *, where: str
+    section: Mapping[str, Any], known: Mapping[str, str], *, where: str, folder: Path = Path()
 ) -> tuple[type[Any], BaseModel]:
     """The class of a driver, and its section of the cell file as an object of the driver's Settings.
 
@@ -31,6 +33,7 @@ def driver_and_settings(
         section: The section; its key `driver` is a name, or "package.module:Class".
         known: Drivers by name.
         where: The section, for messages.
+        folder: Where modules that are not installed are looked for: the folder of the cell file.
 
     Raises:
         InputError: If there is no such driver, or a key breaks a rule.
@@ -47,10 +50,17 @@ def driver_and_settings(
             way_out=did_you_mean(name, list(known)),
         )
     module, _, attribute = place.partition(":")
+    beside = str(folder.resolve())
+    if name not in known and beside not in sys.path:
+        sys.path.append(beside)
     try:
         driver = getattr(import_module(module), attribute)
     except (ImportError, AttributeError) as error:
-        raise InputError(f'driver "{name}" cannot be imported: {error}', where=where) from None
+        raise InputError(
+            f'driver "{name}" cannot be imported: {error}',
+            where=where,
+            rule=f"Its module is installed, on PYTHONPATH or in {beside}",
+        ) from None
     settings = getattr(driver, "Settings", None)
     if not (isinstance(settings, type) and issubclass(settings, BaseModel)):
         raise InputError(

@@ -41,7 +41,7 @@ class Rules(NamedTuple):
     Attributes:
         contacts: Readings that have to agree.
         attempts: How many are made at the most.
-        agree_m: How far apart readings of a pose may be.
+        agree_m: How far readings of a pose may be from one of them.
         likely_m: How far a reading may be from the prediction without being suspicious.
     """
 
@@ -54,7 +54,7 @@ class Rules(NamedTuple):
 def judge(readings: Sequence[Stored], expected: Floats, rules: Rules) -> Verdict:
     """Judge all readings of a pose so far.
 
-    The largest set of readings that agree with one another is accepted if it is large enough, and larger than
+    The largest set of readings that agree with one of them is accepted if it is large enough, and larger than
     all readings that contradict it together. Where it is far from the prediction (3,), it has to have one
     reading more.
     """

@@ -41,7 +41,6 @@ class LineRobot:
         joints: str
         stop: str
         tolerance_deg: Positive = 0.02
-        moved_answer: str | None = None
 
         @field_validator("joints")
         @classmethod

@@ -85,7 +85,7 @@ class LineSensor:
                     raise silent(self.name, self.address, self._settings.timeout_s, doing="measure")
                 line = self._line()
                 numbers = None if line is None else numbers_in(self._answer, line)
-                if line is not None and numbers is not None:
+                if line is not None and numbers is not None and numbers.keys() >= set(XYZ):
                     lines.append((line, numbers))
         return self._reading(lines)
 
@@ -112,11 +112,13 @@ class LineSensor:
             return None
 
     def _reading(self, lines: list[tuple[str, dict[str, float]]]) -> Reading:
-        numbers = {name: np.array([each.get(name, np.nan) for _, each in lines]) for name in lines[-1][1]}
+        names = dict.fromkeys(name for _, each in lines for name in each)
+        numbers = {name: np.array([each.get(name, np.nan) for _, each in lines]) for name in names}
         unit = self._settings.length_unit
         points = to_si(np.column_stack([numbers.pop(axis) for axis in XYZ]), unit)
         sigma = numbers.pop("sigma", None)
-        sigma_m = to_si(self._settings.sigma_mm, "mm") if sigma is None else to_si(float(sigma.mean()), unit)
+        stated = to_si(self._settings.sigma_mm, "mm")
+        sigma_m = stated if sigma is None else to_si(float(np.nanmean(sigma)), unit)
         temperature = numbers.pop("temperature", None)
         reason = ""
         if not np.all(numbers.pop("ok", np.ones(1)) == 1.0):
@@ -130,6 +132,6 @@ class LineSensor:
             not reason,
             "; ".join(line for line, _ in lines),
             reason,
-            temperature_c=None if temperature is None else float(temperature.mean()),
-            features={name: float(values.mean()) for name, values in numbers.items()},
+            temperature_c=None if temperature is None else float(np.nanmean(temperature)),
+            features={name: float(np.nanmean(values)) for name, values in numbers.items()},
         )

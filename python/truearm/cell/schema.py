@@ -11,7 +11,7 @@ from truearm.errors import InputError, did_you_mean
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Frame = Annotated[str, Field(pattern="[78][NEO][12]")]
+Frame = Annotated[str, Field(pattern="^[78][NEO][12]$")]
 Vector2 = tuple[Number, Number]
 Vector3 = tuple[Number, Number, Number]
 Quaternion = tuple[Number, Number, Number, Number]

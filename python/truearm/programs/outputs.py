@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from truearm.errors import UsageError
-from truearm.files import write_whole
+from truearm.files import write_all
 from truearm.programs.program import Program
 
 
@@ -34,10 +34,9 @@ def output_paths(program: Program, output: Path) -> list[Path]:
 
 
 def write_outputs(paths: Sequence[Path], contents: Sequence[bytes]) -> None:
-    """Write all files, each beside its place and then moved there, the named one last.
+    """Write all files beside their places and then move them there, the named one last.
 
     Raises:
-        InputError: If a directory does not exist or may not be written to.
+        InputError: If a directory does not exist or may not be written to; no file is written then.
     """
-    for path, content in reversed(list(zip(paths, contents, strict=True))):
-        write_whole(path, content)
+    write_all(reversed(list(zip(paths, contents, strict=True))))

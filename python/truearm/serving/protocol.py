@@ -16,6 +16,8 @@ from truearm.units import MM_PER_METRE
 PROTOCOL: Final = 1
 KEYS: Final = ("q", "q_deg", "id", "switch")
 LONGEST_ID: Final = 100
+LARGEST: Final = 1e9
+"""Readings beyond it are a mistake of whoever sends them."""
 
 
 class MalformedError(TruearmError):
@@ -127,7 +129,10 @@ def _number(entry: Any) -> float:  # noqa: ANN401
         return math.nan
     if isinstance(entry, bool) or not isinstance(entry, int | float):
         raise MalformedError("a reading is no number")
-    return float(entry)
+    number = float(entry)
+    if LARGEST < abs(number) < math.inf:
+        raise MalformedError("a reading is too large")
+    return number
 
 
 def _switch(content: dict[str, Any]) -> bool | None:
@@ -139,8 +144,9 @@ def _switch(content: dict[str, Any]) -> bool | None:
 
 
 def _identity(value: Any) -> str | int | float | None:  # noqa: ANN401
-    if value is None or (isinstance(value, str) and len(value) <= LONGEST_ID):
-        return value
-    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-        return value
+    if value is None:
+        return None
+    known = isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
+    if known and not isinstance(value, bool) and len(str(value)) <= LONGEST_ID:
+        return value  # type: ignore[no-any-return]
     raise MalformedError(f"id is a number or a text of at most {LONGEST_ID} characters")

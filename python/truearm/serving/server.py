@@ -30,7 +30,7 @@ class Bounds:
 
     Attributes:
         line_bytes: Longest line.
-        requests_per_s: Requests in any second.
+        requests_per_s: Requests in a second; seconds begin with the first request after the one before.
         connections: Connections at once.
         token_s: Time to send the token.
         reading_s: Time to take an answer off the line.
@@ -158,7 +158,7 @@ class Server:
         except TimeoutError:
             raise MalformedError("no token came") from None
         given = read_object(line).get("token")
-        if not isinstance(given, str) or not hmac.compare_digest(given.encode(), token.encode()):
+        if not isinstance(given, str) or not hmac.compare_digest(_bytes(given), _bytes(token)):
             raise MalformedError("the token is wrong")
 
     async def _line(self, reader: asyncio.StreamReader) -> bytes:
@@ -187,6 +187,11 @@ class Server:
             await asyncio.wait_for(_discard(reader), self._bounds.reading_s)
         except (OSError, TimeoutError):
             writer.transport.abort()
+
+
+def _bytes(token: str) -> bytes:
+    """A token as bytes; JSON can hold halves of characters that UTF-8 cannot."""
+    return token.encode("utf-8", "surrogatepass")
 
 
 async def _discard(reader: asyncio.StreamReader) -> None:

@@ -75,6 +75,27 @@ pub unsafe fn empty<T>(to: *mut *mut T) -> Result<(), Status> {
     Ok(())
 }
 
+/// Guards a function with a message, which is empty where all went well and holds words where it did not.
+///
+/// # Safety
+/// As for [`tell`].
+pub unsafe fn worded(
+    message: *mut c_char,
+    size: usize,
+    work: impl FnOnce() -> Result<Status, Status>,
+) -> Status {
+    // SAFETY: as the caller promises.
+    unsafe { tell(message, size, "") };
+    let status = guarded(work);
+    // SAFETY: as the caller promises; the first byte has just been written.
+    unsafe {
+        if status as i32 != 0 && !message.is_null() && size > 0 && message.read() == 0 {
+            tell(message, size, &status.words().to_string_lossy());
+        }
+    }
+    status
+}
+
 /// Writes a message of an error, cut to `size` bytes with the zero at its end.
 ///
 /// # Safety

@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use truearm_compensate::{Corrector, Stream};
 use truearm_kinematics::Transform;
 
-use super::guard::{copy_in, empty, guarded, tell};
+use super::guard::{copy_in, empty, guarded, tell, worded};
 use super::handles::{
     Calibration, CorrectorHandle, Handle, Memory, StreamHandle, WorkspaceHandle, borrow, free, give,
 };
@@ -33,19 +33,17 @@ pub unsafe extern "C" fn truearm_load_file(
     message: *mut c_char,
     message_size: usize,
 ) -> Status {
-    guarded(|| {
-        // SAFETY: as the caller promises.
-        let bytes = unsafe {
+    // SAFETY: as the caller promises.
+    unsafe {
+        worded(message, message_size, || {
             empty(out)?;
             if path.is_null() {
                 return Err(Status::BadPointer);
             }
-            read(CStr::from_ptr(path))
-        };
-        let loaded = bytes.and_then(|bytes| Loaded::from_bytes(&bytes));
-        // SAFETY: `out` was checked, `message` is as the caller promises.
-        unsafe { hand_over(loaded, out, message, message_size) }
-    })
+            let loaded = read(CStr::from_ptr(path)).and_then(|bytes| Loaded::from_bytes(&bytes));
+            hand_over(loaded, out, message, message_size)
+        })
+    }
 }
 
 /// Loads a calibration from `size` bytes of memory, which are not needed afterwards.
@@ -62,9 +60,9 @@ pub unsafe extern "C" fn truearm_load_memory(
     message: *mut c_char,
     message_size: usize,
 ) -> Status {
-    guarded(|| {
-        // SAFETY: as the caller promises.
-        unsafe {
+    // SAFETY: as the caller promises.
+    unsafe {
+        worded(message, message_size, || {
             empty(out)?;
             if bytes.is_null() {
                 return Err(Status::BadPointer);
@@ -74,8 +72,8 @@ pub unsafe extern "C" fn truearm_load_memory(
             }
             let loaded = Loaded::from_bytes(std::slice::from_raw_parts(bytes, size));
             hand_over(loaded, out, message, message_size)
-        }
-    })
+        })
+    }
 }
 
 /// Frees a calibration; correctors made of it stay usable. Null is no mistake.
@@ -154,12 +152,16 @@ pub unsafe extern "C" fn truearm_corrector_new(
     message: *mut c_char,
     message_size: usize,
 ) -> Status {
-    guarded(|| {
-        // SAFETY: as the caller promises.
-        unsafe {
+    // SAFETY: as the caller promises.
+    unsafe {
+        worded(message, message_size, || {
             empty(out)?;
             let loaded = &borrow(calibration)?.loaded;
-            let tool = tool(flange_from_tool, &loaded.tool)?;
+            let tool = tool(flange_from_tool, &loaded.tool).inspect_err(|status| {
+                if *status == Status::BadOption {
+                    tell(message, message_size, "the last row of the tool must be 0 0 0 1");
+                }
+            })?;
             let options =
                 if options.is_null() { CorrectorOptions::usual() } else { options.read_unaligned() };
             let options = options.core(loaded).inspect_err(|_| {
@@ -177,8 +179,8 @@ pub unsafe extern "C" fn truearm_corrector_new(
                     Err(Status::BadOption)
                 }
             }
-        }
-    })
+        })
+    }
 }
 
 /// Frees a corrector; its workspaces and streams stay usable. Null is no mistake.
@@ -248,9 +250,9 @@ pub unsafe extern "C" fn truearm_stream_new(
     message: *mut c_char,
     message_size: usize,
 ) -> Status {
-    guarded(|| {
-        // SAFETY: as the caller promises.
-        unsafe {
+    // SAFETY: as the caller promises.
+    unsafe {
+        worded(message, message_size, || {
             empty(out)?;
             let core = &borrow(corrector)?.core;
             let options = if options.is_null() { StreamSettings::usual() } else { options.read_unaligned() };
@@ -266,8 +268,8 @@ pub unsafe extern "C" fn truearm_stream_new(
                     Err(Status::BadOption)
                 }
             }
-        }
-    })
+        })
+    }
 }
 
 /// Frees a stream. Null is no mistake.
@@ -281,8 +283,11 @@ pub unsafe extern "C" fn truearm_stream_free(stream: *mut StreamHandle) -> Statu
 }
 
 fn read(path: &CStr) -> Result<Vec<u8>, LoadError> {
-    let path = path.to_str().map_err(|_| LoadError::NotOurs("its name is not UTF-8"))?;
-    Ok(std::fs::read(Path::new(path))?)
+    #[cfg(unix)]
+    let path: &Path = <std::ffi::OsStr as std::os::unix::ffi::OsStrExt>::from_bytes(path.to_bytes()).as_ref();
+    #[cfg(not(unix))]
+    let path = Path::new(path.to_str().map_err(|_| std::io::Error::from(std::io::ErrorKind::InvalidInput))?);
+    Ok(std::fs::read(path)?)
 }
 
 /// Gives a loaded calibration to C, or says why there is none.

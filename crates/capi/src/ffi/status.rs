@@ -40,6 +40,14 @@ pub enum Status {
     OtherWorkspace = -13,
 }
 
+impl Status {
+    /// A sentence about it.
+    pub(super) fn words(self) -> &'static CStr {
+        // SAFETY: every text of this library is a literal that ends with a zero.
+        unsafe { CStr::from_ptr(truearm_status_text(self as i32)) }
+    }
+}
+
 /// Version of this interface; a program compares it with truearm_abi_version().
 pub const TRUEARM_ABI_VERSION: u32 = 1;
 
@@ -90,7 +98,7 @@ pub extern "C" fn truearm_status_text(status: i32) -> *const c_char {
 pub extern "C" fn truearm_reason_text(reason: u32) -> *const c_char {
     let text = match reason {
         0 => c"nothing is wrong",
-        1 => c"a reading or a feature is not a finite number",
+        1 => c"a reading or a feature is not a finite number, or none came",
         2 => c"the tool cannot be brought to the target's position: singular, or out of reach",
         3 => c"the tool cannot be turned to the target's orientation: singular, or out of reach",
         4 => c"a corrected joint would be beyond its limits",
