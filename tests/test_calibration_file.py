@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from safetensors.numpy import save as save_arrays
 
 import truearm as ta
+from tests.calibration_file_support import read_calibration_file, write_calibration_file
 from truearm import calibration_file
-from truearm.calibration_file import read_calibration_file, write_calibration_file
 from truearm.simulation import VirtualArm
 
 

@@ -196,6 +196,22 @@ def test_damaged_movemaster_numbers_are_none(text):
     assert movemaster.parse_numbers(text) is None
 
 
+def test_groups_that_some_lines_lack_are_means_of_the_others(monkeypatch):
+    number = r"[-+.\d]+"
+    answer = (
+        rf"^(?P<x>{number}) (?P<y>{number}) (?P<z>{number})(?: s(?P<sigma>{number}))?(?: t(?P<t>{number}))?$"
+    )
+    settings = LineSensor.Settings(port="tcp://127.0.0.1:1", answer=answer, average=3, settle_s=0.0)
+    sensor = LineSensor(settings, Robot.load("ur5e"))
+    lines = iter(["1 2 3 s0.04 t20", "1 2 3.05 s0.06", "damaged", "1 2 3.1"])
+    monkeypatch.setattr(sensor, "_port", Mock(receive=Mock(side_effect=lambda **_: next(lines))))
+    reading = sensor.measure()
+    assert reading.valid
+    assert reading.point_in_world == pytest.approx([1e-3, 2e-3, 3.05e-3])
+    assert reading.sigma_m == pytest.approx(5e-5)
+    assert reading.features == {"t": 20.0}
+
+
 def test_an_instrument_that_cannot_be_set_up_lets_go_of_its_port(monkeypatch):
     settings = {"port": "tcp://127.0.0.1:1", "answer": "(?P<x>.*) (?P<y>.*) (?P<z>.*)", "setup": ("START",)}
     sensor = LineSensor(LineSensor.Settings(**settings), Robot.load("ur5e"))

@@ -8,6 +8,7 @@ import pytest
 
 from tests.cell_support import cell_text, poses_of, write_poses
 from truearm.cell import Cell
+from truearm.cell.drivers import ROBOTS, driver_and_settings
 from truearm.cell.examples import EXAMPLES, example
 from truearm.cell.opening import open_session
 from truearm.cell.poses_file import Poses
@@ -61,6 +62,24 @@ def test_a_wrong_cell_file_is_told(before, after, message):
     assert before in text
     with pytest.raises(InputError, match=message):
         Cell.from_toml(text.replace(before, after, 1), where="cell.toml")
+
+
+@pytest.mark.parametrize("frame", ["X8N1", "98N15", "8N3"])
+def test_a_frame_is_bits_parity_and_stop_bits_and_no_more(frame):
+    text = example("rv-m2").replace('port = "/dev/ttyS0"', f'port = "/dev/ttyS0"\nframe = "{frame}"', 1)
+    with pytest.raises(InputError, match="robot, frame"):
+        Cell.from_toml(text)
+
+
+def test_a_driver_of_ones_own_may_lie_beside_the_cell_file(tmp_path):
+    (tmp_path / "lying_beside.py").write_text(
+        "from truearm.cell.playback import PlaybackRobot\n\nclass Own(PlaybackRobot): ...\n"
+    )
+    section = {"driver": "lying_beside:Own"}
+    with pytest.raises(InputError, match=r"cannot be imported.*installed, on PYTHONPATH or in"):
+        driver_and_settings(section, ROBOTS, where="cell.toml, robot", folder=tmp_path / "elsewhere")
+    found, settings = driver_and_settings(section, ROBOTS, where="cell.toml, robot", folder=tmp_path)
+    assert (found.__name__, settings.model_dump()) == ("Own", section)
 
 
 def test_patterns_need_their_groups():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.calibration_file import read_calibration_file, write_calibration_file
+from tests.calibration_file_support import read_calibration_file, write_calibration_file
 from truearm.simulation import VirtualArm
 
 JOINTS = 5

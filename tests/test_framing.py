@@ -216,6 +216,8 @@ def test_too_little_is_refused(exact, tmp_path):
         find_tool(model, data)
     with pytest.raises(InputError, match="no rotation matrix"):
         find_tool(model, data, orientation=np.ones((3, 3)))
+    with pytest.raises(InputError, match="no rotation matrix"):
+        find_tool(model, data, orientation=np.full((3, 3), np.nan))
     with pytest.raises(InputError, match="no place x, y, z of every touched point"):
         find_object(model, data, TOOL)
     places = dict(zip(["x_m", "y_m", "z_m"], np.outer([1, 2, 3, 4, 5, 6, 7, 8], [0.1, 0, 0]).T, strict=True))

@@ -1,6 +1,7 @@
 """The house keeps its own rules: layers of crates, sizes of files and functions, one version."""
 
 import ast
+import importlib.metadata
 import json
 import re
 import shutil
@@ -10,6 +11,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+
+from truearm import _core
 
 SPINE = ["truearm-kinematics", "truearm-estimate", "truearm-field", "truearm-compensate", "truearm-python"]
 BESIDE = ["truearm-text", "truearm-inverse", "truearm-clearance"]
@@ -68,6 +71,7 @@ def test_one_version_for_all():
         assert tomllib.loads(manifest.read_text())["package"]["version"] == {"workspace": True}, manifest
     assert "version" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dynamic"]
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text()
+    assert _core.__version__ == importlib.metadata.version("truearm")
 
 
 def test_nothing_asks_for_one_processor():

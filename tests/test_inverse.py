@@ -232,9 +232,9 @@ def test_what_is_out_of_reach_is_said_by_number():
         (np.diag([1.0, 1.0, -1.0, 1.0]), np.zeros(6), "without a mirror"),
         (np.eye(4), np.zeros(5), r"\(n, 6\)"),
         (np.eye(4), np.full(6, np.nan), "seeds hold NaN"),
-        (np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 6)), "18 numbers, it must have 12"),
+        (np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 6)), "3 seeds for 2 poses"),
     ],
 )
 def test_bad_poses_and_seeds_are_refused(pose, seed, message):
-    with pytest.raises((InputError, ValueError), match=message):
+    with pytest.raises(InputError, match=message):
         SOLVERS["ur5"].near(pose, seed)

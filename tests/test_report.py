@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 import pytest
 
 import truearm as ta
+from tests.calibration_file_support import read_calibration_file, write_calibration_file
 from tests.remastered import remastered
 from tests.report_support import (
     errors_table,
@@ -17,7 +18,6 @@ from tests.report_support import (
     small_calibration,
     words_of,
 )
-from truearm.calibration_file import read_calibration_file, write_calibration_file
 from truearm.options import Options
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm

@@ -177,6 +177,8 @@ def test_an_order_alone_is_no_set_point(client):
         (b'{"switch": null}\n', 'switch is "on" or "off"'),
         (b'{"q": null, "switch": null}\n', 'switch is "on" or "off"'),
         (b'{"q": null, "id": {"a": 1}}\n', "id is a number"),
+        (b'{"q": null, "id": 1' + b"0" * 400 + b"}\n", "id is a number"),
+        (b'{"q": [1.7e308, 0, 0, 0, 0, 0]}\n', "too large"),
         (b'{"other": 1}\n', "not known"),
         (b'{"q": "' + b"x" * 20000 + b'"}\n', "longer than"),
         (b"x" * 40000, "longer than"),
@@ -259,7 +261,7 @@ def test_clients_that_vanish_leave_no_trace(port):
 def test_a_token_is_asked_for(calib, tmp_path):
     (tmp_path / "token").write_text(TOKEN + "\n")
     with serving(calib, "--token-file", tmp_path / "token", "--address", "0.0.0.0") as (port, _):
-        for bad in ({"token": "wrong"}, {"q": HOME}, {"token": 3}):
+        for bad in ({"token": "wrong"}, {"q": HOME}, {"token": 3}, {"token": "\ud800"}):
             with Client(port) as client:
                 assert client.ask(bad)["error"] == "the token is wrong"
         with Client(port) as client:

@@ -52,7 +52,7 @@ def test_it_ramps_to_the_correction_of_single_waypoints(compensator, home):
 def test_what_has_no_correction_holds_the_last_one(compensator, home):
     stream = CorrectionStream(compensator, StreamOptions(hold_s=0.02))
     last = run(stream, home, 1.4)[-1].q
-    for bad, words in ((None, "missing"), (np.full(6, np.nan), "missing"), (np.zeros(5), "missing")):
+    for bad, words in ((None, "missing"), (np.full(6, np.nan), "missing")):
         step = stream.step(bad, CYCLE)
         assert step.phase == "holding"
         assert words in str(step.fault)
@@ -63,6 +63,19 @@ def test_what_has_no_correction_holds_the_last_one(compensator, home):
     assert "limit" in str(steps[0].fault)
     assert [steps[k].phase for k in (0, 10, -1)] == ["holding", "falling", "off"]
     assert np.array_equal(steps[-1].q, beyond)
+
+
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [(np.zeros(5), r"shape \(5,\)"), (np.zeros((1, 6)), r"shape \(1, 6\)"), ("six", "are not numbers")],
+)
+def test_what_is_no_set_point_is_an_error_and_changes_nothing(compensator, home, bad, words):
+    stream = CorrectionStream(compensator)
+    before = run(stream, home, 0.2)[-1]
+    with pytest.raises(ta.InputError, match=words):
+        stream.step(bad, CYCLE)
+    assert stream.last is before
+    assert stream.step(home, CYCLE).fault is None
 
 
 def test_nothing_comes_out_before_something_went_in(compensator):

@@ -65,10 +65,6 @@ class Chain:
     def joint_count(self) -> int:
         """J, the number of links that are not fixed."""
 
-    @property
-    def link_count(self) -> int:
-        """L, the number of links."""
-
     def position(
         self,
         q: NDArray[np.float64],

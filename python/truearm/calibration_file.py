@@ -8,7 +8,6 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -17,7 +16,6 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from truearm.errors import InputError
-from truearm.files import read_bytes, write_whole
 
 SCHEMA: Final = 1
 METADATA_KEY: Final = "truearm"
@@ -31,15 +29,6 @@ AGAIN: Final = "Copy it again from where it was written, or calibrate again"
 Arrays = dict[str, NDArray[Any]]
 
 
-def write_calibration_file(path: Path, arrays: Arrays, content: Mapping[str, Any]) -> None:
-    """Write arrays and JSON values to a file, completely or not at all.
-
-    Raises:
-        InputError: If the directory does not exist or may not be written to.
-    """
-    write_whole(path, calibration_bytes(arrays, content))
-
-
 def calibration_bytes(arrays: Arrays, content: Mapping[str, Any]) -> bytes:
     """What a file of arrays and JSON values holds."""
     text = json.dumps(
@@ -49,15 +38,6 @@ def calibration_bytes(arrays: Arrays, content: Mapping[str, Any]) -> bytes:
     data = save(contiguous, {METADATA_KEY: text})
     before, _, behind = data.partition(NO_DIGEST.encode())
     return before + hashlib.sha256(data).hexdigest().encode() + behind
-
-
-def read_calibration_file(path: Path) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays and JSON values of a file.
-
-    Raises:
-        InputError: If there is no such file, or as for :func:`parse_calibration`.
-    """
-    return parse_calibration(read_bytes(path), str(path))
 
 
 def parse_calibration(data: bytes, where: str) -> tuple[Arrays, dict[str, Any]]:

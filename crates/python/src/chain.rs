@@ -113,11 +113,6 @@ impl Chain {
         self.core.joint_count()
     }
 
-    #[getter]
-    fn link_count(&self) -> usize {
-        self.core.link_count()
-    }
-
     #[pyo3(signature = (q, parameters=None, out=None, threads=None))]
     fn position<'py>(
         &self,

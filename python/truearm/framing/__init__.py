@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_transforms
+from truearm.arrays import RIGID_WITHIN
 from truearm.calibration import Calibration
 from truearm.errors import InputError, Notice, UsageError
 from truearm.framing.calibrated import calibrated_poses
@@ -104,8 +104,8 @@ def _with(notices: Sequence[Notice], found: IdentifiedFrame) -> IdentifiedFrame:
 
 def _rotation(orientation: ArrayLike) -> Floats:
     given = np.asarray(orientation, dtype=np.float64)
-    if given.shape != (3, 3):
+    square = given.shape == (3, 3)
+    off = np.abs(given.T @ given - np.eye(3)).max() if square else np.nan
+    if not off <= RIGID_WITHIN or np.linalg.det(given) < 0:
         raise InputError("the orientation is no rotation matrix (3, 3)")
-    turned = np.eye(4)
-    turned[:3, :3] = given
-    return as_transforms(turned, what="the tool's orientations")[0][0, :3, :3]
+    return given

@@ -1,0 +1,63 @@
+"""Files are written whole, all of them or none, and only files are replaced."""
+
+import os
+import sys
+import threading
+
+import pytest
+
+from truearm.errors import InputError
+from truearm.files import write_all, write_whole
+
+
+def test_a_link_stays_one_and_what_it_leads_to_is_written(tmp_path):
+    (tmp_path / "shelf").mkdir()
+    target, link = tmp_path / "shelf" / "real.txt", tmp_path / "link.txt"
+    target.write_text("old")
+    link.symlink_to(target)
+    write_whole(link, "new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+
+
+def test_a_pipe_stays_one_and_is_written_to(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    got: list[str] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_text()))
+    reader.start()
+    write_whole(pipe, "through")
+    reader.join(5.0)
+    assert pipe.is_fifo()
+    assert got == ["through"]
+
+
+def test_where_one_of_several_cannot_be_written_none_is(tmp_path):
+    (tmp_path / "second").mkdir()
+    (tmp_path / "first").write_text("old")
+    with pytest.raises(InputError, match="this is a directory"):
+        write_all([(tmp_path / "first", "new"), (tmp_path / "second", "new")])
+    assert (tmp_path / "first").read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["first", "second"]
+
+
+def test_threads_leave_the_mask_of_new_files_alone(tmp_path):
+    before, interval = os.umask(0o027), sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        work = [threading.Thread(target=_write_many, args=(tmp_path, name)) for name in "abcd"]
+        for thread in work:
+            thread.start()
+        for thread in work:
+            thread.join()
+        left = os.umask(0o027)
+    finally:
+        os.umask(before)
+        sys.setswitchinterval(interval)
+    assert left == 0o027
+    assert {path.stat().st_mode & 0o777 for path in tmp_path.iterdir()} == {0o640}
+
+
+def _write_many(folder, name):
+    for number in range(50):
+        write_whole(folder / f"{name}{number}", "text")
