@@ -270,6 +270,26 @@ def test_what_is_read_is_never_written_over(words, capsys):
     assert [Path(name).read_bytes() for name in names] == before
 
 
+def test_a_report_never_takes_the_place_of_a_file_that_belongs_to_the_program(capsys):
+    Path("part.src").write_text("DEF part()\nPTP {A1 0,A2 10,A3 -20,A4 0,A5 30,A6 0}\nEND\n")
+    Path("part.dat").write_text("DEFDAT part\nENDDAT\n")
+    words = ["compensate", "arm.calib", "part.src", "--controller", "nominal"]
+    for output in (["--dry-run"], ["-o", "else/"]):
+        assert main([*words, *output, "--report", "part.dat"]) == 2
+        assert "never written over" in capsys.readouterr().err
+    Path("there").mkdir()
+    for output, report in (("new.src", "new.dat"), ("there", "there/part.src")):
+        assert main([*words, "-o", output, "--report", report]) == 2
+        assert "is the output already" in capsys.readouterr().err
+        assert not Path(output).is_file()
+    assert Path("part.dat").read_text() == "DEFDAT part\nENDDAT\n"
+
+
+def test_a_least_spacing_says_nothing_alone(capsys):
+    assert run("--dry-run", "--least-spacing-mm", "5") == 2
+    assert "Give --densify-mm as well" in capsys.readouterr().err
+
+
 def test_a_report_does_not_take_the_place_of_the_program(capsys):
     assert run("-o", "new.mod", "--report", "./new.mod") == 2
     assert "is the output already" in capsys.readouterr().err

@@ -75,6 +75,20 @@ def test_a_tool_and_then_an_object_as_people_teach_them():
     assert min(entries["object"]["wTable"]["identified"]["std_mm"]) > 0.5 * min(known["std_mm"])
 
 
+def test_comments_and_layout_of_the_file_stay():
+    head = "# our cell\nformat = 1\n\n[tool.tGripper]  # the old one\nxyz = [20, -50, 179]\n\n"
+    held = f"{head}# a wall\n[object.wWall]\nxyz = [1, 2, 3]  # by hand\n"
+    Path("cell.toml").write_text(held)
+    words = ["touches.csv", "--tool", "tGripper", "--orientation", "0,0,0", "-o", "cell.toml"]
+    assert main(["frame", "arm.calib", *words]) == 0
+    text = Path("cell.toml").read_text()
+    for kept in ("# our cell", "[tool.tGripper]  # the old one", "# a wall", "xyz = [1, 2, 3]  # by hand"):
+        assert kept in text
+    frames = Frames.load(Path("cell.toml"))
+    assert np.abs(frames.tool("tGripper").true[:3, 3] - TIP).max() < 1e-4
+    assert frames.tool("tGripper").controller[:3, 3] == pytest.approx([0.02, -0.05, 0.179])
+
+
 def test_what_the_file_held_becomes_what_the_controller_has(capsys):
     former = '[tool."tGripper"]\nxyz = [20, -50, 179]\neuler_zyx_deg = [10, 0, 0]\npayload_kg = 2.5\n'
     other = "[object.wWall]\nxyz = [1, 2, 3]\n"

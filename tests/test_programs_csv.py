@@ -56,6 +56,29 @@ def test_poses_are_corrected_on_the_branch_of_their_seed(robot, seeds):
     assert np.abs(again - Q - SHIFT).max() < 1e-7
 
 
+def test_a_byte_order_mark_stays_first_and_what_was_written_is_read_again(robot):
+    text = "\ufeff".encode().decode("latin-1") + joints(Q)
+    result = rewritten(CSV, text, robot, by=SHIFT, mark="compensated")
+    assert result.changed.all()
+    written = result.contents[0].decode("latin-1")
+    assert written.startswith(text[:3] + "# compensated\n" + text[3:8])
+    assert np.abs(says(CSV, written, robot) - Q - SHIFT).max() < 1e-6
+
+
+def test_numbers_in_quotes_are_numbers(robot):
+    rows = joints(Q).splitlines()
+    quoted = "\n".join([rows[0], *(",".join(f'"{one}"' for one in row.split(",")) for row in rows[1:])])
+    result = rewritten(CSV, quoted, robot, by=SHIFT)
+    assert result.contents[0].decode().replace('"', "") == rewritten(
+        CSV, joints(Q), robot, by=SHIFT
+    ).contents[0].decode().rstrip("\n")
+
+
+def test_lines_that_end_in_cr_alone_are_told(robot):
+    with pytest.raises(InputError, match="CR alone"):
+        read(CSV, joints(Q).replace("\n", "\r"), robot)
+
+
 def test_without_a_seed_the_branch_is_not_certain(robot):
     text = "\n".join(",".join(line.split(",")[-13:-6]) for line in poses(robot, Q).splitlines())
     result = rewritten(CSV, text, robot, by=SHIFT)

@@ -20,6 +20,9 @@ LARGEST_JOINT_DEG: Final = 3.0
 LARGEST_STD_MM: Final = 1.0
 """Standard deviation of the tool's position that a correction may have."""
 
+LEAST_SPACING_MM: Final = 10.0
+"""Way between two waypoints that are inserted on a line, at the least."""
+
 RAMP_S: Final = 1.0
 """Time of the ramp from no correction to the whole one."""
 

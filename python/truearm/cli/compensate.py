@@ -14,7 +14,7 @@ from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.given import given_options
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
-from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
+from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM, LEAST_SPACING_MM
 from truearm.errors import UsageError, typed
 from truearm.files import refuse_own_input, refuse_same, write_whole
 
@@ -40,7 +40,7 @@ def command(
     largest_joint_deg: option.LargestJointDeg = LARGEST_JOINT_DEG,
     largest_std_mm: LargestStdMm = LARGEST_STD_MM,
     densify_mm: option.DensifyMm = None,
-    least_spacing_mm: option.LeastSpacingMm = 10.0,
+    least_spacing_mm: option.LeastSpacingMm = None,
     dry_run: option.DryRun = False,
     force: option.Force = False,
     as_json: AsJson = False,
@@ -57,16 +57,21 @@ def command(
     from truearm.cli.rewritten import print_rewritten
     from truearm.limits import Task
     from truearm.programs.densify import Spacing
+    from truearm.programs.languages import language_of
     from truearm.programs.report import report_of
 
-    _check_outputs(output, report, program, (calibration, frames, programming, controller), dry_run=dry_run)
+    files = (program, *language_of(program, language).companions(program))
+    _check_outputs(output, report, files, (calibration, frames, programming, controller), dry_run=dry_run)
     limits = ta.Limits(
         largest_mm=largest_mm,
         largest_deg=largest_deg,
         largest_joint_deg=largest_joint_deg,
         largest_std_mm=largest_std_mm,
     )
-    spacing = None if densify_mm is None else Spacing.of(densify_mm, least_spacing_mm)
+    if densify_mm is None and least_spacing_mm is not None:
+        raise UsageError("--least-spacing-mm says nothing alone", way_out="Give --densify-mm as well")
+    least_mm = LEAST_SPACING_MM if least_spacing_mm is None else least_spacing_mm
+    spacing = None if densify_mm is None else Spacing.of(densify_mm, least_mm)
     choices = ta.Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language)
     compensator = ta.Compensator(
         ta.Calibration.load(calibration),
@@ -102,8 +107,12 @@ def command(
 
 def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> list[Path]:
     """The program's files, where there is something to write, and the report."""
+    from truearm.programs.outputs import output_paths
     from truearm.programs.report import report_of
 
+    if output is not None:
+        for path in output_paths(done.program, Path(output)):
+            refuse_same(path, report, option="--report")
     paths = [] if output is None or not done.changed.any() else done.save(output)
     if report is not None:
         content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
@@ -114,14 +123,14 @@ def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> l
 def _check_outputs(
     output: str | None,
     report: Path | None,
-    program: Path,
+    program: Sequence[Path],
     others: Sequence[Path | str | None],
     *,
     dry_run: bool,
 ) -> None:
     """Raise UsageError where nothing is to be written, or what is read or written would be written over."""
     if report is not None:
-        refuse_own_input(report, program, *others)
+        refuse_own_input(report, *program, *others)
     if output is not None:
         refuse_own_input(Path(output), *others)
         refuse_same(Path(output), report, option="--report")

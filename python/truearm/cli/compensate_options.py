@@ -5,6 +5,8 @@ from typing import Annotated, TypeAlias
 
 import typer
 
+from truearm.defaults import LEAST_SPACING_MM
+
 Program: TypeAlias = Annotated[
     Path, typer.Argument(metavar="PROGRAM", help="The program, or one of its files.")
 ]
@@ -50,7 +52,13 @@ DensifyMm: TypeAlias = Annotated[
     typer.Option("--densify-mm", metavar="MM", help="Insert waypoints on lines that deviate by more."),
 ]
 LeastSpacingMm: TypeAlias = Annotated[
-    float, typer.Option("--least-spacing-mm", metavar="MM", help="Least way between inserted waypoints.")
+    float | None,
+    typer.Option(
+        "--least-spacing-mm",
+        metavar="MM",
+        help="Least way between inserted waypoints.",
+        show_default=f"{LEAST_SPACING_MM:g}",
+    ),
 ]
 DryRun: TypeAlias = Annotated[
     bool, typer.Option("--dry-run", help="Show a table and a unified diff; write nothing.")

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import tomli_w
+import tomlkit
 from numpy.typing import NDArray
 
 from truearm.errors import Notice
@@ -46,26 +46,26 @@ def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -
     """Write a frame into a file, which is made if it is not there; other frames stay.
 
     Where the file held the frame already, what it held becomes what the controller has, unless it said
-    what the controller has. Comments of the file are not kept.
+    what the controller has. Comments of the file and its layout stay.
 
     Raises:
         InputError: If the file breaks a rule or cannot be written.
     """
-    content = _content(path)
-    key = _key(content, found.kind, name)
-    entry = dict(content.get(found.kind, {}).get(key, {})) if key is not None else {}
-    former = {part: entry.pop(part) for part in PLACEMENT if part in entry}
-    if former:
-        entry.setdefault("controller", former)
-    unit = LENGTHS_M[content.setdefault("length_unit", "mm")]
-    written = (
-        _placement(found.transform, unit)
-        | {"identified": _identified(found, data_hash)}
-        | {part: value for part, value in entry.items() if part != "identified"}
-    )
+    content: Any = tomlkit.parse(_text(path))
     content.setdefault("format", FORMAT)
-    content.setdefault(found.kind, {})[key or name] = written
-    text = tomli_w.dumps(content)
+    unit = LENGTHS_M[str(content.setdefault("length_unit", "mm"))]
+    written = {**_placement(found.transform, unit), "identified": _identified(found, data_hash)}
+    key = _key(content, found.kind, name)
+    former: dict[str, Any] = {}
+    if key is None:
+        content.setdefault(found.kind, {})[name] = written
+    else:
+        entry = content[found.kind][key]
+        former = {part: entry.pop(part).unwrap() for part in PLACEMENT if part in entry}
+        entry.update(written)
+        if former:
+            entry.setdefault("controller", former)
+    text = tomlkit.dumps(content)
     Frames.parse(text, where=str(path))
     write_whole(path, text)
     if not former:
@@ -80,10 +80,15 @@ def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -
 
 
 def _content(path: Path) -> dict[str, Any]:
+    return parsed(_text(path), where=str(path))
+
+
+def _text(path: Path) -> str:
+    """What a frames file holds that keeps to its rules; nothing if it is not there."""
     if not path.exists():
-        return {"format": FORMAT, "length_unit": "mm"}
+        return ""
     Frames.load(path)
-    return parsed(read_text(path), where=str(path))
+    return read_text(path)
 
 
 def _key(content: Mapping[str, Any], kind: str, name: str) -> str | None:

@@ -95,10 +95,11 @@ class _Reader:
 
     def __init__(self, source: Source, robot: Robot) -> None:
         self._source = source
+        if b"\n" not in source.content and b"\r" in source.content:
+            source.fail(0, "its lines end with CR alone", way_out="Save it with LF or CR LF")
         self._scan = Scan(source.content)
         self._header = self._find_header()
         fields = self._fields(self._header)
-        fields[0] = fields[0][source.first if self._header == 0 else 0 :]
         self._names = [name.strip().strip('"') for name in fields]
         self._joints = robot.joints
         quaternion = all(name in self._names for name in QUATERNION)
@@ -168,7 +169,8 @@ class _Reader:
         return not text or text.startswith("#")
 
     def _line(self, line: int) -> str:
-        return self._source.part(int(self._scan.starts[line]), int(self._scan.starts[line + 1]))
+        start = max(int(self._scan.starts[line]), self._source.first)
+        return self._source.part(start, int(self._scan.starts[line + 1]))
 
     def _fields(self, line: int) -> list[str]:
         """The fields of a line."""
@@ -199,8 +201,11 @@ class _Reader:
         places: list[int | None] = []
         for name, text in zip(self._names, fields, strict=True):
             at = start + len(text) - len(text.lstrip())
+            end = start + len(text.rstrip())
+            if end - at > 1 and text.strip()[0] == text.strip()[-1] == '"':
+                at, end = at + 1, end - 1
             place = known.get(at)
-            whole = place is not None and int(ends[place]) == start + len(text.rstrip())
+            whole = place is not None and int(ends[place]) == end
             if not whole and text.strip() and self._is_needed(name):
                 self._source.fail(at, f'"{text.strip()}" in column "{name}" is no number')
             places.append(place if whole else None)
