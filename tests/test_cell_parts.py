@@ -260,3 +260,11 @@ def test_joints_that_are_no_numbers_are_an_error_of_the_device():
     cell.robot.read_joints.return_value = np.array([0.1, np.nan, 0.0, 0.0, 0.0])
     with pytest.raises(DeviceError, match=r"own robot: it reads its joints as \[0.1, nan"):
         Crew(cell, Mock()).connect()
+
+
+def test_a_driver_that_raises_anything_while_it_lets_go_does_not_keep_the_other_open():
+    noted: list[tuple[str, str]] = []
+    cell = Mock(robot=Mock(close=Mock(side_effect=OSError("pulled out"))), arm=Robot.load("rv-m2"))
+    Crew(cell, lambda kind, message: noted.append((kind, message))).quiet()
+    assert noted == [("failed", "close robot: pulled out")]
+    cell.sensor.close.assert_called_once_with()
