@@ -278,10 +278,10 @@ def test_a_report_never_takes_the_place_of_a_file_that_belongs_to_the_program(ca
         assert main([*words, *output, "--report", "part.dat"]) == 2
         assert "never written over" in capsys.readouterr().err
     Path("there").mkdir()
-    for output, report in (("new.src", "new.dat"), ("there", "there/part.src")):
-        assert main([*words, "-o", output, "--report", report]) == 2
+    for named, report in (("new.src", "new.dat"), ("there", "there/part.src")):
+        assert main([*words, "-o", named, "--report", report]) == 2
         assert "is the output already" in capsys.readouterr().err
-        assert not Path(output).is_file()
+        assert not Path(named).is_file()
     assert Path("part.dat").read_text() == "DEFDAT part\nENDDAT\n"
 
 

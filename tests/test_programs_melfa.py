@@ -206,7 +206,7 @@ def test_branches_make_tool_and_predecessor_uncertain(robot):
     )
     program = read(MELFA, text, robot)
     unknown = [bool(program.environments[int(n)].tool.unknown) for n in program.moves.environment]
-    assert unknown == [False, True, False, True]
+    assert unknown == [False, True, False, False]
     assert program.moves.follows.tolist() == [False, False, True, False]
 
 
@@ -328,7 +328,7 @@ def test_lines_keep_their_numbers_where_there_is_room(robot):
 
 
 def test_lines_that_are_jumped_to_by_number_are_not_numbered_anew(robot):
-    text = long_line(robot, ["1 Mov P1", "2 Mvs P3", "3 If M1=1 Then 1 Else 2", "4 End"])
+    text = long_line(robot, ["1 Mov P1", "2 Mvs P3", "3 If M1=1 Then 1 Else 4", "4 End"])
     done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
     assert done.inserted == 0
     assert line_numbers(done.contents[0]) == [1, 2, 3, 4]

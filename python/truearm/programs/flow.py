@@ -23,6 +23,8 @@ class Flow(Generic[State]):
         state: At the start.
         join: What is known where two states meet.
         same: Whether two states are equal.
+        overruled: Whether a state within a loop is another one when the loop comes round, given the state
+            before the loop and what is known there then; without, where it is the one before and that is not.
 
     Attributes:
         state: What is known now.
@@ -31,9 +33,14 @@ class Flow(Generic[State]):
     """
 
     def __init__(
-        self, state: State, join: Callable[[State, State], State], same: Callable[[State, State], bool]
+        self,
+        state: State,
+        join: Callable[[State, State], State],
+        same: Callable[[State, State], bool],
+        overruled: Callable[[State, State, State], bool] | None = None,
     ) -> None:
         self._join, self._same, self._start = join, same, state
+        self._differs = overruled or self._is_before
         self.overruled: set[int] = set()
         self._blocks: list[_Block[State]] = []
         self.state, self.certain = state, False
@@ -74,7 +81,7 @@ class Flow(Generic[State]):
         if block.loop and not self._same(block.before, self.state):
             again = self._join(block.before, self.state)
             for number, state in self._uses[block.first_use :]:
-                if self._same(state, block.before) and not self._same(again, state):
+                if self._differs(state, block.before, again):
                     self.overruled.add(number)
         reached = self.state
         for end in block.ends if block.complete else [*block.ends, block.before]:
@@ -83,6 +90,16 @@ class Flow(Generic[State]):
         if not self._blocks:
             self._uses.clear()
 
+    def leave(self) -> None:
+        """The innermost loop is left with the present state."""
+        loop = next((block for block in reversed(self._blocks) if block.loop), None)
+        if loop is not None:
+            loop.ends.append(self.state)
+        self.certain = False
+
     def jump(self) -> None:
         """The next statement is not the one executed next, or may be reached from elsewhere."""
         self.certain = False
+
+    def _is_before(self, state: State, before: State, again: State) -> bool:
+        return self._same(state, before) and not self._same(again, state)

@@ -1,9 +1,9 @@
 """Reading KRL: first what is stored under which name, then the motions in their order."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -12,9 +12,40 @@ from truearm.programs.branches import Branches
 from truearm.programs.environment import Environment, Environments, Frame
 from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
-from truearm.programs.krl_state import CALLED, KrlFrames, Modal, remote
+from truearm.programs.krl_order import Order, Place
+from truearm.programs.krl_routines import (
+    BAS_LEAVING,
+    EXTERNAL,
+    LEAVING,
+    SETTING,
+    Routine,
+    Routines,
+    bas_command,
+    called,
+    immediate,
+)
+from truearm.programs.krl_state import (
+    CALLED,
+    CALLERS,
+    INTERRUPTED,
+    JUMPED,
+    NOTHING,
+    ROUND_AGAIN,
+    FrameData,
+    KrlFrames,
+    Modal,
+    remote,
+)
 from truearm.programs.krl_status import ACCURATE, StatusAndTurn
-from truearm.programs.krl_storage import ASSIGNING, COMPUTED, TARGET_KINDS, KrlStorage, lines
+from truearm.programs.krl_storage import (
+    ASSIGNING,
+    COMPUTED,
+    DECLARED,
+    TARGET_KINDS,
+    KrlStorage,
+    is_data,
+    lines,
+)
 from truearm.programs.krl_values import (
     Named,
     Operands,
@@ -26,7 +57,7 @@ from truearm.programs.krl_values import (
     structure,
 )
 from truearm.programs.layouts import EulerPose, Joints
-from truearm.programs.lexing import Reader
+from truearm.programs.lexing import Reader, Token
 from truearm.programs.program import Listed, Program
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
@@ -45,18 +76,36 @@ MOTIONS: Final[Mapping[str, Motion]] = {
     "circ": Motion.CIRCULAR,
     "scirc": Motion.CIRCULAR,
 }
+OWN: Final = {
+    "tool": re.compile(r"\$tool=stool2?\((\w+)\)"),
+    "base": re.compile(r"\$base=sbase\((\w+)\.base_no\)"),
+    "mode": re.compile(r"\$ipo_mode=sipo_mode\((\w+)\.ipo_frame\)"),
+}
+"""Settings of a motion's own that name the frame data of an inline form."""
 RELATIVE: Final = frozenset(f"{word}_rel" for word in MOTIONS)
 BLENDING: Final = frozenset({"c_dis", "c_ptp", "c_ori", "c_vel", "c_spl"})
-ROUTINES: Final = frozenset({"def", "deffct", "global"})
 OPENING: Final = {"if": False, "switch": False, "for": True, "while": True, "loop": True, "repeat": True}
 CLOSING: Final = frozenset({"endif", "endswitch", "endfor", "endwhile", "endloop", "until"})
 OTHERWISE: Final = frozenset({"else", "case", "default"})
-JUMPS: Final = frozenset({"goto", "return", "exit"})
+JUMPS: Final = frozenset({"goto", "return"})
 SPLINES: Final = frozenset({"spline", "ptp_spline"})
 TAUGHT_ACCURATE: Final = "bit 3 of S says that points were taught with an absolutely accurate robot"
 RUN_TIME: Final = "its target is computed at run time"
 READ: Final = "the program computes with it"
-ROUND_AGAIN: Final = "a loop comes round to it with another tool or base"
+
+
+class Call(NamedTuple):
+    """A call of a routine of the program.
+
+    Attributes:
+        use: Its number among the uses of the state; None where an interrupt or a trigger calls it.
+        state: What is known there.
+        place: Where it is.
+    """
+
+    use: int | None
+    state: Modal
+    place: Place
 
 
 class KrlReading:
@@ -75,19 +124,21 @@ class KrlReading:
         self._fixed: dict[int, str] = {}
         self._storage = KrlStorage()
         self._numbers: dict[str, int] = {}
-        self._accurate, self._in_spline, self._prepared = False, False, ""
-        self._used: list[int] = []
+        self._accurate, self._in_spline, self._interrupting = False, False, False
+        self._used: list[int | None] = []
+        self._calls: dict[str, list[Call]] = {}
         for number in self._data_first():
             self._storage.gather(number, sources[number])
-        self._frames = KrlFrames(self._storage, frames, sources)
-        self._flow = Flow(self._frames.start(), Modal.joined, Modal.same)
-        self._around = self._flow.state
+        self._routines, self._order = Routines(sources), Order()
+        self._frames = KrlFrames(self._storage, frames, sources, self._routines, self._order)
+        self._flow = Flow(self._frames.start(), Modal.joined, Modal.same, Modal.overruled)
+        self._around, self._gone = self._flow.state, False
 
     def program(self) -> Program:
         """The program."""
         for number in self._data_first():
             source = self._sources[number]
-            if source.path.suffix.lower() != ".dat":
+            if not is_data(source):
                 for start, end in lines(source):
                     self._line(number, start, end)
         self._settle()
@@ -112,120 +163,209 @@ class KrlReading:
 
     def _data_first(self) -> list[int]:
         order = range(len(self._sources))
-        return sorted(order, key=lambda number: self._sources[number].path.suffix.lower() != ".dat")
+        return sorted(order, key=lambda number: not is_data(self._sources[number]))
 
     def _line(self, file: int, start: int, end: int) -> None:
         source = self._sources[file]
         head = source.text[start:end].lstrip()
         if not head or head[0] in ";&":
             return
-        reader = line_reader(source, start, end)
-        if reader.done:
+        routine = self._routines.beginning(file, start)
+        if routine is not None:
+            self._begin(routine)
             return
+        reader = line_reader(source, start, end)
         word = reader.peek()
+        if reader.done or word in EXTERNAL or DECLARED.match(source.text, start, end):
+            return
+        if "(" in head:
+            self._calls_of(reader.rest())
         if word in MOTIONS and reader.peek(1) not in {"=", "(", "[", "."}:
             at = reader.take().start
             self._motion((file, at), MOTIONS[word], reader, passing=word == "spl")
         elif word in RELATIVE:
             self._list(file, reader.offset, "a relative move")
+            self._storage.read |= names_in(reader.rest())
             self._flow.jump()
         elif ASSIGNING.match(source.text, start, end):
-            self._assignment(reader)
+            self._assignment(file, reader)
         elif word == "bas":
             self._bas(reader)
         else:
-            self._statement(word, reader)
+            self._statement(word, reader, (file, start))
 
-    def _statement(self, word: str, reader: Reader) -> None:
+    def _begin(self, routine: Routine) -> None:
+        """A routine begins: the program itself with what the controller has, others with what callers set."""
+        self._flow.restart()
+        self._in_spline, self._gone = False, False
+        known = self._routines.called_above_only(routine)
+        calls = self._calls.get(routine.name, []) if known else []
+        self._order.begin([call.place for call in calls])
+        if self._routines.is_program(routine):
+            return
+        states = [
+            call.state.lost(ROUND_AGAIN) if call.use in self._flow.overruled else call.state for call in calls
+        ]
+        state = states[0] if states else replace(self._flow.state.lost(CALLERS), load_kg=None)
+        for other in states[1:]:
+            state = state.joined(other)
+        self._flow.state = state
+
+    def _calls_of(self, found: list[Token]) -> None:
+        """Routines that a line calls may set tool and base, and move the arm."""
+        now, later = immediate(found)
+        touched = {"$tool", "$base"} & names_in(now)
+        for name in called(now):
+            if self._routines.local(name):
+                self._called(name)
+            if not self._routines.leaves(name) or (touched and name not in LEAVING):
+                self._flow.state = self._flow.state.lost(CALLED)
+            if self._routines.local(name) or name not in LEAVING:
+                self._flow.jump()
+        for name in called(later):
+            if self._routines.local(name):
+                call = Call(None, self._flow.state.lost(INTERRUPTED), self._order.here())
+                self._calls.setdefault(name, []).append(call)
+            self._interrupting |= not self._routines.leaves(name)
+        if later and found[0].text.lower() != "trigger":
+            self._after_interrupts()
+
+    def _called(self, name: str) -> None:
+        """A routine of the program is called: it begins with the present state."""
+        self._used.append(None)
+        number = len(self._used) - 1
+        self._calls.setdefault(name, []).append(Call(number, self._flow.state, self._order.here()))
+        self._flow.use(number)
+
+    def _after_interrupts(self) -> None:
+        """What interrupts and triggers may have set by now."""
+        if self._interrupting and not self._in_spline:
+            self._flow.state = self._flow.state.lost(INTERRUPTED)
+
+    def _statement(self, word: str, reader: Reader, place: tuple[int, int]) -> None:
         flow = self._flow
-        if word in ROUTINES:
-            flow.restart()
-        elif word in OPENING:
+        if word in OPENING:
+            flow.state = replace(flow.state, prepared=NOTHING) if OPENING[word] else flow.state
             flow.open(loop=OPENING[word])
+            self._order.open()
         elif word in CLOSING:
             flow.close()
+            self._order.close()
         elif word in OTHERWISE:
             flow.otherwise(last=word != "case")
-        elif word in JUMPS or reader.peek(1) == ":":
+            self._order.otherwise()
+        elif word == "exit":
+            flow.leave()
+        elif word in JUMPS:
+            self._gone |= word == "goto"
             flow.jump()
+        elif reader.peek(1) == ":":
+            self._label(place)
         elif word in SPLINES:
             self._in_spline, self._around = True, flow.state
-            flow.state = self._with([token.text.lower() for token in reader.rest()])
+            flow.state = self._with(reader.rest())
         elif word == "endspline":
             self._in_spline, flow.state = False, self._around
-        elif reader.kind() == "name" and reader.peek(1) == "(":
-            flow.state = flow.state.lost(CALLED)
-            flow.jump()
-        if word not in ROUTINES | {"decl"}:
+            self._after_interrupts()
+        if word != "decl":
             self._storage.read |= names_in(reader.rest())
+
+    def _label(self, place: tuple[int, int]) -> None:
+        """Statements that a GOTO may lead to from elsewhere follow."""
+        if self._gone:
+            self._order.forget()
+        if self._routines.wanders(*place):
+            self._flow.state = self._flow.state.lost(JUMPED)
+        self._flow.jump()
 
     def _bas(self, reader: Reader) -> None:
         """BAS sets what the inline forms prepared."""
-        words = [token.text.lower() for token in reader.rest()]
-        command = words[3] if len(words) > 3 and words[1:3] == ["(", "#"] else ""
-        number = words[5] if len(words) > 5 and words[4] == "," and words[5].isdigit() else "?"
+        command, number = bas_command([token.text.lower() for token in reader.rest()])
         state = self._flow.state
         if command in {"ptp_params", "cp_params", "frames"}:
-            self._flow.state = self._frames.of_inline_form(state, self._prepared)
+            self._flow.state = self._frames.of_inline_form(state, state.prepared)
         elif command in {"tool", "base"}:
             self._flow.state = state.set(command, self._frames.numbered(command, number))
-        elif command == "initmov":
-            self._flow.state = state.lost("BAS(#INITMOV) was called since it was set")
+        elif command not in BAS_LEAVING:
+            name = f"#{command.upper()}" if command else ""
+            self._flow.state = state.lost(f"BAS({name}) was called since it was set")
 
-    def _assignment(self, reader: Reader) -> None:
+    def _assignment(self, file: int, reader: Reader) -> None:
         variable = named(reader)
         if variable is None:
             return
         state, kind = self._flow.state, variable.name.removeprefix("$")
+        whole = reader.accept("=")
         if variable.name in {"$tool", "$base"}:
-            whole = reader.accept("=")
             frame = self._frames.evaluated(kind, operands(reader) if whole else None)
             self._flow.state = state.set(kind, frame)
-        elif not reader.accept("="):
-            return
         elif variable.name == "fdat_act":
-            self._prepared = reader.peek()
+            prepared = self._frame_data(file, reader) if whole else NOTHING
+            self._flow.state = replace(state, prepared=prepared)
+        elif not whole:
+            return
         elif variable.name == "$ipo_mode":
             mode = "".join(token.text for token in reader.rest())
             self._flow.state = replace(state, remote=remote(mode))
-        elif variable.name == "$load" and reader.peek() == "{":
-            mass = structure(reader).numbers.get("m")
+        elif variable.name == "$load":
+            mass = structure(reader).numbers.get("m") if reader.peek() == "{" else None
             self._flow.state = replace(state, load_kg=None if mass is None else mass.value)
+        else:
+            self._order.assign(variable.key)
+
+    def _frame_data(self, file: int, reader: Reader) -> FrameData:
+        """What an inline form prepares: frame data by name, or written out."""
+        if reader.peek() == "{":
+            return FrameData("FDAT_ACT", file, structure(reader))
+        return self._frames.frame_data(reader.peek())
 
     def _motion(self, place: tuple[int, int], motion: Motion, reader: Reader, *, passing: bool) -> None:
+        whole = reader.rest()
         chains = [operands(reader)]
         if motion == Motion.CIRCULAR:
             chains.append(operands(reader) if reader.accept(",") else None)
-        words = [token.text.lower() for token in reader.rest()]
+        found = reader.rest()
+        words = [token.text.lower() for token in found]
         before = self._flow.state
-        self._flow.state = self._with(words)
+        self._flow.state = self._with(found)
         blended = passing or self._in_spline or bool(BLENDING & set(words))
         kinds = [Motion.VIA, Motion.CIRCULAR] if motion == Motion.CIRCULAR else [motion]
-        for kind, chain in zip(kinds, chains, strict=True):
-            self._go(place, chain, kind, blended=blended or kind == Motion.VIA)
+        for number, (kind, chain) in enumerate(zip(kinds, chains, strict=True)):
+            if not self._go(place, chain, kind, blended=blended or kind == Motion.VIA):
+                self._storage.read |= names_in([token for part in _parts(whole)[number:] for token in part])
+        if "with" in words:
+            self._storage.read |= names_in(found[words.index("with") :])
         self._flow.state = before
+        self._after_interrupts()
 
-    def _with(self, words: list[str]) -> Modal:
+    def _with(self, found: list[Token]) -> Modal:
         """The state of a motion with settings of its own, such as WITH $TOOL=STOOL2(FP1)."""
         state = self._flow.state
+        words = [token.text.lower() for token in found]
         if "with" not in words:
             return state
-        text = "".join(words[words.index("with") :])
-        found = re.search(r"\$tool=stool2?\((\w+)", text)
-        if found is not None:
-            return self._frames.of_inline_form(state, found.group(1))
-        for kind in ("tool", "base"):
-            if f"${kind}=" in text:
-                state = state.set(kind, Frame.missing(f"{kind}: it is set in the motion in an unknown way"))
+        for part in _parts(found[words.index("with") + 1 :]):
+            if not part or part[0].text.lower() not in SETTING:
+                continue
+            text = "".join(token.text.lower() for token in part if token.text.lower() not in BLENDING)
+            kind = next((one for one, pattern in OWN.items() if pattern.fullmatch(text)), "")
+            if kind:
+                data = self._frames.frame_data(text.partition("(")[2].rstrip(")").partition(".")[0])
+                state = self._frames.of_inline_form(state, data, (kind,))
+            elif text.startswith(("$tool", "$base")):
+                unknown = Frame.missing(f"{text[1:5]}: it is set in the motion in an unknown way")
+                state = state.set(text[1:5], unknown)
+            elif text.startswith("$ipo_mode="):
+                state = replace(state, remote=remote(text.partition("=")[2]))
         return state
 
-    def _go(self, place: tuple[int, int], chain: Operands | None, motion: Motion, *, blended: bool) -> None:
-        """A move to the target of a chain of operands, or a line of the listing."""
+    def _go(self, place: tuple[int, int], chain: Operands | None, motion: Motion, *, blended: bool) -> bool:
+        """Whether there is a move to the target of a chain of operands; a line of the listing otherwise."""
         found = RUN_TIME if chain is None else self._target_among(place[0], chain)
         if isinstance(found, str) or chain is None:
             self._list(*place, found if isinstance(found, str) else RUN_TIME)
             self._flow.jump()
-            return
+            return False
         numbers, which = found
         environment = self._environments.number(self._environment(chain, which))
         for number in numbers:
@@ -235,6 +375,7 @@ class KrlReading:
             self._flow.use(len(self._used) - 1)
         if len(numbers) > 1:
             self._flow.jump()
+        return True
 
     def _environment(self, chain: Operands, which: int) -> Environment:
         state = self._flow.state
@@ -314,5 +455,20 @@ class KrlReading:
                 self._fixed.setdefault(number, READ)
             if f"{name}[?]" in self._storage.values:
                 self._fixed.setdefault(number, COMPUTED)
-        for move in self._flow.overruled:
-            self._fixed.setdefault(self._used[move], ROUND_AGAIN)
+        for use in self._flow.overruled:
+            target = self._used[use]
+            if target is not None:
+                self._fixed.setdefault(target, ROUND_AGAIN)
+
+
+def _parts(found: Sequence[Token]) -> list[list[Token]]:
+    """Tokens between commas that no brackets enclose."""
+    parts: list[list[Token]] = [[]]
+    depth = 0
+    for token in found:
+        depth += (token.text in "({[") - (token.text in ")}]")
+        if token.text == "," and depth == 0:
+            parts.append([])
+        else:
+            parts[-1].append(token)
+    return parts

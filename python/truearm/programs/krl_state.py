@@ -1,13 +1,16 @@
 """The tool and the base that are active in a KRL program, and where they are told."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from truearm.programs.environment import Frame, Transform
 from truearm.programs.frames import Frames, name_at_start, written_out
+from truearm.programs.krl_order import Order
+from truearm.programs.krl_routines import Routines
 from truearm.programs.krl_storage import KrlStorage
 from truearm.programs.krl_values import Named, Operands, Structure
 from truearm.programs.source import Source
@@ -15,7 +18,29 @@ from truearm.programs.source import Source
 REMOTE: Final = "the workpiece is on the arm and the tool stands still (#TCP)"
 CALLED: Final = "a subroutine was called since it was set, and may have set another"
 DIFFERS: Final = "it is not the same on all ways to this motion"
+CALLERS: Final = "it is the one that the callers of this routine have set"
+INTERRUPTED: Final = "a subroutine that an interrupt or a trigger calls may have set another"
+JUMPED: Final = "a GOTO may come here with another"
+ROUND_AGAIN: Final = "a loop comes round to it with another tool or base"
 KINDS: Final = {"tool": "TOOL_DATA", "base": "BASE_DATA"}
+PARTS: Final = (*KINDS, "mode")
+
+
+class FrameData(NamedTuple):
+    """Frame data of an inline form.
+
+    Attributes:
+        name: As the program has it.
+        file: Number of the file that states it.
+        value: What it states; None where that is not certain.
+    """
+
+    name: str = "FDAT_ACT"
+    file: int = 0
+    value: Structure | None = None
+
+
+NOTHING: Final = FrameData()
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,17 +52,29 @@ class Modal:
         base: base_from_object, in the arm's own base.
         remote: Why nothing can be changed with it.
         load_kg: Mass of $LOAD, if the program says it.
+        prepared: What FDAT_ACT holds.
     """
 
     tool: Frame
     base: Frame
     remote: str = ""
     load_kg: float | None = None
+    prepared: FrameData = NOTHING
 
     def same(self, other: "Modal") -> bool:
         """Whether nothing differs."""
         mine = (self.tool.key, self.base.key, self.remote, self.load_kg)
         return mine == (other.tool.key, other.base.key, other.remote, other.load_kg)
+
+    def overruled(self, before: "Modal", again: "Modal") -> bool:
+        """Whether a tool or base that is known here, in a loop, is another one when it comes round again."""
+        known = [
+            (mine.key, was.key, now.key)
+            for mine, was, now in ((self.tool, before.tool, again.tool), (self.base, before.base, again.base))
+            if not mine.unknown
+        ]
+        parts = [*known, (self.remote, before.remote, again.remote)]
+        return any(mine == was != now for mine, was, now in parts)
 
     def joined(self, other: "Modal") -> "Modal":
         """What is known where two branches meet."""
@@ -46,11 +83,13 @@ class Modal:
             self.base if self.base.key == other.base.key else Frame.missing(f"base: {DIFFERS}"),
             self.remote or other.remote,
             self.load_kg if self.load_kg == other.load_kg else None,
+            self.prepared if self.prepared == other.prepared else NOTHING,
         )
 
     def lost(self, why: str) -> "Modal":
         """The state where neither tool nor base is known any more."""
-        return replace(self, tool=Frame.missing(f"tool: {why}"), base=Frame.missing(f"base: {why}"))
+        tool, base = (Frame.missing(f"{kind}: {why}") for kind in KINDS)
+        return replace(self, tool=tool, base=base, prepared=NOTHING)
 
     def set(self, kind: str, frame: Frame) -> "Modal":
         """The state with another "tool" or "base"."""
@@ -65,8 +104,16 @@ def remote(mode: str) -> str:
 class KrlFrames:
     """Looks tools and bases up in the program and in the frames file."""
 
-    def __init__(self, storage: KrlStorage, frames: Frames, sources: tuple[Source, ...]) -> None:
+    def __init__(
+        self,
+        storage: KrlStorage,
+        frames: Frames,
+        sources: tuple[Source, ...],
+        routines: Routines,
+        order: Order,
+    ) -> None:
         self._storage, self._frames, self._sources = storage, frames, sources
+        self._routines, self._order = routines, order
         self._world = frames.held("object", "$WORLD") or Frame.of(np.eye(4), "$WORLD")
         self._written = {kind: self._names_of_written(kind) for kind in KINDS}
 
@@ -99,31 +146,59 @@ class KrlFrames:
 
     def named(self, kind: str, name: str) -> Frame:
         """A tool or base by the name that the controller knows it by."""
-        stored = self._storage.values.get(name.lower(), [])
+        key = name.lower()
+        stored = self._storage.values.get(key, [])
         value = stored[0][1] if len(stored) == 1 else None
         stated = None if value is None else value.transform()
         known = self._frames.of("tool" if kind == "tool" else "object")
         number = re.search(r"\[(\d+)\]", name)
         if number is not None and name.casefold() not in known and number.group(1) in known:
             name = number.group(1)
-        if stored and stated is None:
-            return Frame.missing(f"{kind} {name} is assigned more than once, or at run time", name)
+        problem = self._problem(key, stated)
+        if problem:
+            return Frame.missing(f"{kind} {name} {problem}", name)
         return self._looked_up(kind, name, stated)
+
+    def _problem(self, key: str, stated: Transform | None) -> str:
+        """Why a tool or base of that name is not certain where the program uses it; empty if it is."""
+        storage, array = self._storage, key.partition("[")[0]
+        if key.endswith("[?]"):
+            return "is chosen at run time"
+        if (key in storage.values and stated is None) or f"{array}[?]" in storage.values:
+            return "is assigned more than once, or at run time"
+        if {key, array, f"{array}[?]"} & self._routines.given:
+            return "is given to a subroutine, which may change it"
+        if key in storage.values and not self._holds(key):
+            return "is assigned in the program, but not certainly before it is used"
+        return ""
+
+    def _holds(self, key: str) -> bool:
+        """Whether a name certainly has the value that the program assigns to it."""
+        return key in self._storage.initial or self._order.assigned(key)
 
     def _looked_up(self, kind: str, name: str, stated: Transform | None) -> Frame:
         if kind == "tool":
             return self._frames.tool(name, stated)
         return self._placed(kind, self._frames.work_object(name, stated))
 
-    def of_inline_form(self, state: Modal, name: str) -> Modal:
-        """The state with tool, base and interpolation mode of an inline form's frame data."""
+    def frame_data(self, name: str) -> FrameData:
+        """The frame data of that name, as far as they are certain."""
         file, value = self._storage.only(name)
-        if value is None:
-            return state.lost(f"{name.upper() or 'FDAT_ACT'} does not tell it in this program")
-        numbers = {part: value.numbers.get(f"{part}_no") for part in ("tool", "base")}
-        for kind, number in numbers.items():
-            text = "?" if number is None else f"{number.value:.0f}"
-            state = state.set(kind, self.numbered(kind, text))
+        certain = self._holds(name.lower()) and name.lower() not in self._routines.given
+        return FrameData(name.upper(), file, value if certain else None)
+
+    def of_inline_form(self, state: Modal, data: FrameData, parts: Sequence[str] = PARTS) -> Modal:
+        """The state with tool, base and interpolation mode of an inline form's frame data, or with parts."""
+        name, file, value = data
+        for kind in (one for one in KINDS if one in parts):
+            if value is None:
+                missing = Frame.missing(f"{kind}: {name} does not tell it in this program")
+                state = state.set(kind, missing)
+                continue
+            number = value.numbers.get(f"{kind}_no")
+            state = state.set(kind, self.numbered(kind, "?" if number is None else f"{number.value:.0f}"))
+        if value is None or "mode" not in parts:
+            return state
         text = self._sources[file].text[value.at : value.end].lower()
         return replace(state, remote=remote("#tcp" if re.search(r"ipo_frame\s*#tcp", text) else ""))
 

@@ -14,20 +14,30 @@ DECLARED: Final = re.compile(
     r"[ \t]+(?=[A-Za-z_$])",
     re.IGNORECASE,
 )
+HEADER: Final = re.compile(
+    r"[ \t]*(global[ \t]+)?def(?:fct)?(?=[ \t])[^(\r\n;]*?[ \t]([\w$]+)[ \t]*(?=[(\r\n;]|$)", re.IGNORECASE
+)
 DECLARING: Final = re.compile(r"[ \t]*(?:(?:decl|global|const)[ \t]+)+(\w+[ \t]+)?", re.IGNORECASE)
 ASSIGNING: Final = re.compile(r"[ \t]*[A-Za-z_$][\w$]*(?:[ \t]*\[[^\]\r\n]*\])?(?:\.\w+)*[ \t]*=(?!=)")
 TARGET_KINDS: Final = frozenset({"pos", "e6pos", "axis", "e6axis"})
-PREPARED: Final = frozenset({"fdat_act", "pdat_act", "ldat_act"})
+PREPARED: Final = frozenset({"fdat_act", "pdat_act", "ldat_act", "$h_pos"})
+"""What is assigned as it is, without computing with it."""
 COMPUTED: Final = "it is assigned at run time"
 TWICE: Final = "it is assigned more than once"
+PARAMETER: Final = "a routine is given a value of that name at run time"
 NOT_HERE: Final = "it is not stored in this program"
 
 Stored = tuple[int, Structure | None]
 
 
 def lines(source: Source) -> Iterator[tuple[int, int]]:
-    """Where each line begins and ends."""
-    yield from pairwise([*source.line_starts, len(source.text)])
+    """Where each line begins and ends, a byte order mark left out."""
+    yield from pairwise([source.first, *source.line_starts[1:], len(source.text)])
+
+
+def is_data(source: Source) -> bool:
+    """Whether a file is a data list."""
+    return source.path.suffix.lower() == ".dat"
 
 
 class KrlStorage:
@@ -36,12 +46,16 @@ class KrlStorage:
     Attributes:
         values: File and structure (None for one that is computed) of every assignment to a name.
         kinds: Types of declared names.
+        initial: Names that have their value before the program runs.
+        parameters: Names of what routines are given.
         read: Names that the program computes with.
     """
 
     def __init__(self) -> None:
         self.values: dict[str, list[Stored]] = {}
         self.kinds: dict[str, str] = {}
+        self.initial: set[str] = set()
+        self.parameters: set[str] = set()
         self.read: set[str] = set()
 
     def gather(self, file: int, source: Source) -> None:
@@ -51,6 +65,10 @@ class KrlStorage:
             InputError: If a structure is not closed; names line and column.
         """
         for start, end in lines(source):
+            header = HEADER.match(source.text, start, end)
+            if header is not None:
+                self._parameters(file, line_reader(source, header.end(), end))
+                continue
             begins = DECLARED.match(source.text, start, end)
             if begins is not None:
                 reader = line_reader(source, begins.end(), end)
@@ -59,7 +77,7 @@ class KrlStorage:
             declaring = DECLARING.match(source.text, start, end)
             first = start if declaring is None else declaring.end()
             if ASSIGNING.match(source.text, first, end):
-                self._assigned(file, line_reader(source, first, end))
+                self._assigned(file, line_reader(source, first, end), initial=is_data(source))
 
     def only(self, key: str) -> Stored:
         """File and value of a name that is assigned once; no value for any other."""
@@ -69,6 +87,8 @@ class KrlStorage:
     def why_not(self, key: str) -> str:
         """Why the target under a name cannot be changed; empty if it can."""
         found = self.values.get(key)
+        if key.partition("[")[0] in self.parameters:
+            return PARAMETER
         if not found:
             return NOT_HERE
         if len(found) > 1:
@@ -82,6 +102,17 @@ class KrlStorage:
             return [key for key in self.values if key.startswith(f"{variable.name}[") and key[-2] != "?"]
         return [variable.key] if variable.key in self.values else []
 
+    def _parameters(self, file: int, reader: Reader) -> None:
+        """What a routine is given is known at run time."""
+        while not reader.done:
+            kind = reader.kind()
+            name = reader.take().text.lower()
+            if kind == "name":
+                self.parameters.add(name)
+                self.values.setdefault(name, []).append((file, None))
+            if reader.accept(":"):
+                reader.accept("in", "out")
+
     def _declared(self, file: int, kind: str, reader: Reader) -> None:
         while not reader.done:
             variable = named(reader)
@@ -89,14 +120,17 @@ class KrlStorage:
                 return
             self.kinds.setdefault(variable.name, kind)
             if reader.accept("="):
+                self.initial.add(variable.key)
                 self._keep(file, variable, reader)
             if not reader.accept(","):
                 return
 
-    def _assigned(self, file: int, reader: Reader) -> None:
+    def _assigned(self, file: int, reader: Reader, *, initial: bool) -> None:
         variable = named(reader)
         if variable is None:
             return
+        if initial:
+            self.initial.add(variable.key)
         if reader.accept("="):
             self._keep(file, variable, reader)
             return
@@ -104,9 +138,10 @@ class KrlStorage:
         self.read |= names_in(reader.rest())
 
     def _keep(self, file: int, variable: Named, reader: Reader) -> None:
+        whole = reader.rest()
         value = structure(reader) if reader.peek() == "{" else None
-        if value is None or reader.peek() == ":":
-            if variable.name not in PREPARED and not variable.name.startswith("$"):
-                self.read |= names_in(reader.rest())
-            value = None
+        joined = value is None or reader.peek() == ":"
+        if (joined or (value is not None and value.others)) and variable.name not in PREPARED:
+            self.read |= names_in(whole)
+        value = None if joined else value
         self.values.setdefault(variable.key, []).append((file, value))

@@ -13,8 +13,9 @@ from typing import Final
 
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints
-from truearm.programs.melfa_reader import FLAGGED, Reader
+from truearm.programs.melfa_reader import Reader
 from truearm.programs.melfa_steps import inserted
+from truearm.programs.melfa_variables import FLAGGED
 from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.robot import Robot
@@ -51,10 +52,10 @@ class MelfaBasic:
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """A remark: behind the first line where lines are numbered, else a line of its own before it."""
-        numbered = _NUMBERED.match(source.text)
+        numbered = _NUMBERED.match(source.text, source.first)
         if numbered is not None:
             return numbered.end(), f" ' {text}"
-        return 0, f"' {text}{source.newline}"
+        return source.first, f"' {text}{source.newline}"
 
     def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
         """A Mvs to a variable of its own for each; lines are numbered anew where there is no number left."""

@@ -1,8 +1,8 @@
 """Reads a MELFA BASIC program: its motions, and the position and joint variables that they go to."""
 
 import re
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +11,20 @@ from truearm.errors import InputError
 from truearm.programs.branches import Branches
 from truearm.programs.environment import IDENTITY, Environment, Environments, Frame
 from truearm.programs.frames import Frames, name_at_start, written_out
-from truearm.programs.layouts import EulerPose
 from truearm.programs.melfa_configuration import StructureFlags
+from truearm.programs.melfa_flow import Ways
 from truearm.programs.melfa_text import (
     JOINTS,
     NAME,
     POSE,
     SLOTS,
-    Constant,
-    Statement,
-    assignment,
-    constant,
+    Move,
+    array_of,
+    moves,
+    name_of,
     statements,
 )
+from truearm.programs.melfa_variables import COMBINED, FLAGS, SETTING, Variable, Variables
 from truearm.programs.program import Listed
 from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Motion, MoveTable, TargetTable
@@ -31,12 +32,8 @@ from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
 
 Transform = NDArray[np.float64]
+Kind = Literal["tool", "base"]
 
-FLAGS: Final = 2
-FLAGGED: Final = EulerPose(columns=(2, 1, 0), configuration=FLAGS)
-_MOTION: Final = re.compile(
-    r"(?<![\w.])(Mov|Mvs|Mvc|Mvr[23]?|Mva|E?Mv[A-Za-z]+|Jrc)(?=[\s(,])", re.IGNORECASE
-)
 _KINDS: Final = {
     "mov": (Motion.JOINT,),
     "mvs": (Motion.LINEAR,),
@@ -46,33 +43,20 @@ _KINDS: Final = {
     "mvr3": (Motion.LINEAR, Motion.CIRCULAR, Motion.NONE),
     "mvc": (Motion.LINEAR, Motion.VIA, Motion.VIA),
 }
-_END_OF_TARGETS: Final = re.compile(r"(?<![\w.])(Type|Wth|WthIf|Else|EndIf)\b", re.IGNORECASE)
 _VARIABLE: Final = re.compile(rf"\s*\(?\s*({NAME})\s*\)?\s*\Z")
-_COMBINED: Final = re.compile(rf"\s*({NAME})\s*([*/+-])\s*({NAME})\s*\Z")
 _DISTANCE: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*\Z")
-_SETTING: Final = re.compile(r"\s*(Tool|Base|Cnt)\b\s*(.*?)\s*\Z|\s*M_Tool\s*=\s*(.*?)\s*\Z", re.IGNORECASE)
-_SET_WITHIN: Final = re.compile(r"\b(Then|Else)\s+(Tool|Base)\b|\bM_Tool\s*=(?!=)", re.IGNORECASE)
-"""A setting in one branch of a line."""
-_LABEL: Final = re.compile(r"\s*\*")
 _BRANCHING: Final = re.compile(
-    r"(?<![\w.])(GoSub|GoTo|If|Then|Else|EndIf|For|Next|While|WEnd|Select|Case|Break|CallP|Return|On|"
-    r"XRun|Act|Hlt)\b",
+    r"(?<![\w.])(GoSub|GoTo|If|For|Next|While|WEnd|Select|Case|Break|CallP|Return|On|XRun|Act|Hlt)\b",
     re.IGNORECASE,
 )
-_DEFINED: Final = re.compile(r"\s*Def\s+(Pos|Jnt)\s+(.*)", re.IGNORECASE)
-_NAMES: Final = re.compile(rf"(?<![\w.]){NAME}(\.\w+)?")
-_UNKNOWN_TOOL: Final = Frame.missing("which tool is set here depends on how the program runs")
+_CALLING: Final = re.compile(r"\s*(CallP|RelM)\b", re.IGNORECASE)
+"""What lets another program set tool and base."""
+_SET_BY: Final[Mapping[Kind, tuple[str, ...]]] = {"tool": ("tool", "m_tool"), "base": ("base",)}
+_NUMBERED: Final = "M_Tool="
+_SKIPPED: Final = re.compile(r"(?<![\w.])Skip\b", re.IGNORECASE)
 LONGEST_NAME: Final = 48
 COMPUTED: Final = "its target is computed when the program runs"
 NOT_CONSTANT: Final = "its target is not a constant of this file"
-
-
-@dataclass
-class _Variable:
-    """What a program says of a variable."""
-
-    constants: list[tuple[int, Constant]] = field(default_factory=list)
-    why_not: str = ""
 
 
 class Reader:
@@ -92,208 +76,162 @@ class Reader:
         self.listed: list[Listed] = []
         self.fixed: dict[int, str] = {}
         self._source, self._robot, self._frames = source, robot, frames
-        self._joint_names: set[str] = set()
-        self._variables: dict[str, _Variable] = {}
         self._statements = list(statements(source))
-        self._offsets = self._find_offsets()
-        self._read_variables()
-        self._targets = {name.casefold(): self._target(name, v) for name, v in self._known()}
-        self._tool_names = self._written_tools()
-        start = name_at_start("tool", written=bool(self._tool_names))
-        self._tool, self._base, self._blended = frames.at_start("tool", start), IDENTITY, False
-        self._follows = False
-        self._several = self._count_settings() > 1
-        for statement in self._statements:
-            self._statement(statement)
+        self._moves = {place: found for place, one in enumerate(self._statements) if (found := moves(one))}
+        self._variables = Variables(source, self._statements, self._moves, robot.joint_count)
+        self._targets = {name: self._target(name, one) for name, one in self._variables.targets()}
+        self._elements: dict[str, list[int]] = {}
+        for name, target in self._targets.items():
+            self._elements.setdefault(array_of(name), []).append(target)
+        ways = Ways(self._statements)
+        self._jumped_to = ways.jumped_to()
+        self._settings = {kind: self._find_settings(kind) for kind in _SET_BY}
+        texts = (name_of(text) for text in self._settings["tool"].values())
+        self._written = written_out("tool", (text for text in texts if text.startswith("(")))
+        start = name_at_start("tool", written=bool(self._written))
+        self._tools = self._set_at("tool", frames.at_start("tool", start), ways)
+        self._bases = self._set_at("base", IDENTITY, ways)
+        self._blended, self._follows, self._in_branch = False, False, False
+        for place in range(len(self._statements)):
+            self._statement(place)
 
     def configuration(self) -> StructureFlags | None:
         """How flags are meant; None for an arm whose flags we cannot compute."""
         try:
             return StructureFlags(Branches.of(self._robot))
         except InputError as unsuited:
-            for name, variable in self._known():
+            for name, variable in self._variables.targets():
                 if variable.constants[0][1].layout == POSE:
-                    self.fixed.setdefault(self._targets[name.casefold()], unsuited.what)
+                    self.fixed.setdefault(self._targets[name], unsuited.what)
             return None
 
-    def _known(self) -> list[tuple[str, _Variable]]:
-        """Variables that are assigned a constant somewhere, and are no tools, bases or offsets."""
-        return [(n, v) for n, v in self._variables.items() if v.constants and n not in self._offsets]
-
-    def _find_offsets(self) -> set[str]:
-        """Variables that are tools, bases, or offsets of targets."""
-        found = [m.group(2) or "" for s in self._statements if (m := _SETTING.match(s.text)) is not None]
-        for statement in self._statements:
-            motion = _MOTION.search(statement.text)
-            pieces = _split(statement.text[motion.end() :]) if motion is not None else []
-            found += [m.group(3) for piece in pieces if (m := _COMBINED.match(piece)) is not None]
-        return {_name(text) for text in found}
-
-    def _is_joints(self, name: str) -> bool:
-        plain = name.partition("(")[0].casefold()
-        return plain in self._joint_names or (plain.startswith("j") and plain not in self._positions)
-
-    def _is_position(self, name: str) -> bool:
-        return name.casefold() in self._positions or name.casefold().startswith("p")
-
-    def _read_variables(self) -> None:
-        self._positions: set[str] = set()
-        for statement in self._statements:
-            defined = _DEFINED.match(statement.text)
-            if defined is not None:
-                chosen = self._joint_names if defined.group(1).casefold() == "jnt" else self._positions
-                chosen |= {name.strip().partition("(")[0].casefold() for name in defined.group(2).split(",")}
-        for statement in self._statements:
-            found = assignment(statement)
-            if found is not None:
-                self._assign(statement, *found)
-            elif _MOTION.search(statement.text) is None and _DEFINED.match(statement.text) is None:
-                self._used(statement, statement.text)
-
-    def _assign(self, statement: Statement, name: str, at: int, text: str) -> None:
-        plain = name.partition("(")[0]
-        if not (self._is_joints(plain) or self._is_position(plain)):
-            self._used(statement, text)
-            return
-        variable = self._variables.setdefault(name.casefold(), _Variable())
-        count = self._robot.joint_count
-        held = constant(text, at, joints=self._is_joints(plain), joint_count=count)
-        if held is None:
-            line = self._source.place(statement.at)[0]
-            variable.why_not = variable.why_not or f"it is computed in line {line} when the program runs"
-            self._used(statement, text)
-        elif variable.constants:
-            variable.why_not = variable.why_not or "it is assigned more than once"
-            variable.constants.append((statement.at, held))
-        else:
-            variable.constants.append((statement.at, held))
-
-    def _used(self, statement: Statement, text: str) -> None:
-        """Variables in `text` are used for something else than a motion."""
-        for found in _NAMES.finditer(text):
-            name = _name(found.group()).partition(".")[0]
-            if name[0] in "pj" or name in self._variables:
-                variable = self._variables.setdefault(name, _Variable())
-                line = self._source.place(statement.at)[0]
-                reason = f"it is also used in line {line} for something else than a motion"
-                variable.why_not = variable.why_not or reason
-
-    def _target(self, name: str, variable: _Variable) -> int:
+    def _target(self, name: str, variable: Variable) -> int:
         """The number of the last target added: one for each constant of the variable."""
-        number = -1
+        number, why_not = -1, self._variables.why_not(name)
         for at, held in variable.constants:
             layout = held.layout
             width = self._robot.joint_count if layout == JOINTS else SLOTS + FLAGS
             numbers = held.numbers if not held.problem else (ABSENT,) * width
             shown = self._source.text[at : at + len(name)].strip() or name
             number = self.targets.add(0, at, layout, numbers, shown)
-            if held.problem or variable.why_not:
-                self.fixed[number] = held.problem or variable.why_not
+            if held.problem or why_not:
+                self.fixed[number] = held.problem or why_not
         return number
 
-    def _count_settings(self) -> int:
-        """How many different tools and bases are set."""
-        found = {m.group().casefold() for s in self._statements if (m := _SETTING.match(s.text)) is not None}
-        return len([text for text in found if "cnt" not in text])
+    def _find_settings(self, kind: Kind) -> dict[int, str]:
+        """Statements that set a tool or base, and what they say of it; M_Tool with its name before it."""
+        found = {}
+        for place, statement in enumerate(self._statements):
+            setting = SETTING.match(statement.text)
+            if setting is not None and (setting.group(1) or "m_tool").casefold() in _SET_BY[kind]:
+                found[place] = setting.group(2) if setting.group(1) else f"{_NUMBERED}{setting.group(3)}"
+        return found
 
-    def _statement(self, statement: Statement) -> None:
-        motion = _MOTION.search(statement.text)
-        setting = _SETTING.match(statement.text)
-        branching = _LABEL.match(statement.text) or _BRANCHING.search(statement.text)
-        if branching is not None:
-            self._follows, self._blended = False, True
-            if self._several or _SET_WITHIN.search(statement.text) is not None:
-                self._tool = self._base = _UNKNOWN_TOOL
-        if motion is not None:
-            self._motion(statement, motion)
-        elif setting is not None:
-            self._set(setting)
-        if branching is not None:
-            self._follows = False
-
-    def _set(self, setting: re.Match[str]) -> None:
-        word, given, number = (setting.group(1) or "m_tool").casefold(), setting.group(2), setting.group(3)
-        if word == "cnt":
-            self._blended = not given.startswith("0")
-        elif word == "m_tool":
-            self._tool = self._frames.tool(number) if number.isdigit() else _UNKNOWN_TOOL
-        elif word == "tool":
-            self._tool = self._stated_tool(given)
-        else:
-            self._base = self._stated_base(given)
+    def _set_at(self, kind: Kind, start: Frame, ways: Ways) -> dict[int, Frame]:
+        """The tool or base of each statement that moves."""
+        settings: dict[str, list[int]] = {}
+        for place, text in self._settings[kind].items():
+            settings.setdefault(name_of(text), []).append(place)
+        calls = [place for place, one in enumerate(self._statements) if _CALLING.match(one.text) is not None]
+        ends = {*self._settings[kind], *calls}
+        unsure = Frame.missing(f"which {kind} is set here depends on how the program runs")
+        found: dict[int, Frame] = dict.fromkeys(self._moves.keys() & ways.from_start(ends), start)
+        for places in settings.values():
+            given = self._settings[kind][places[0]]
+            frame = self._stated_tool(given) if kind == "tool" else self._stated_base(given)
+            for place in self._moves.keys() & ways.behind(places, ends):
+                found[place] = unsure if place in found else frame
+        for call in calls:
+            line = self._source.place(self._statements[call].at)[0]
+            called = Frame.missing(f"the program called in line {line} may have set another {kind}")
+            found |= dict.fromkeys(self._moves.keys() & ways.behind([call], ends), called)
+        elsewhere = list({id(frame): frame for frame in found.values()}.values())
+        only = elsewhere[0] if len(elsewhere) == 1 else unsure
+        return dict.fromkeys(self._moves, only) | found
 
     def _stated_tool(self, given: str) -> Frame:
-        """Tool (x, y, z, a, b, c), of a variable, or of the arm itself."""
+        """Tool (x, y, z, a, b, c), of a variable, of a number, or of the arm itself."""
         if given.casefold() == "p_ntool":
             return Frame.of(np.eye(4), given)
-        stated = self._transform(given)
-        name = self._tool_names.get(given, given)
+        number = given.removeprefix(_NUMBERED)
+        if number != given:
+            found = self._frames.tool(number) if number.isdigit() else None
+            return found or Frame.missing("the tool's number is computed when the program runs")
+        stated = self._variables.transform(given)
+        name = self._written.get(name_of(given), given)
         if stated is None:
             return Frame.missing("the tool is computed when the program runs", name)
         return self._frames.tool(name, stated)
-
-    def _written_tools(self) -> dict[str, str]:
-        """Names of tools that are written out in numbers, by their text."""
-        settings = (_SETTING.match(statement.text) for statement in self._statements)
-        texts = [m.group(2) for m in settings if m is not None and (m.group(1) or "").casefold() == "tool"]
-        return written_out("tool", (text for text in texts if _VARIABLE.match(text) is None))
 
     def _stated_base(self, given: str) -> Frame:
         """Base: only where it stands in the frames file, unless it is the robot's own.
 
         Which of the two frames a base conversion gives in the other is not said here: the file says it.
         """
-        stated = self._transform(given)
-        own = given.casefold() in ("0", "p_nbase") or (stated is not None and np.allclose(stated, np.eye(4)))
-        if own:
+        if self._is_own_base(given):
             return IDENTITY
-        return self._frames.work_object(f"base {given}" if given.isdigit() else "base")
+        if given.isdigit():
+            return self._frames.work_object(f"base {given}")
+        others = {name_of(text) for text in self._settings["base"].values() if not text.isdigit()}
+        if len([text for text in others if not self._is_own_base(text)]) > 1:
+            return Frame.missing('several bases are written out, and "base" in a frames file is one')
+        return self._frames.work_object("base")
 
-    def _transform(self, given: str) -> Transform | None:
-        """The transform of a constant or of a variable that is one; None if it is not constant."""
-        held = constant(given, 0, joints=False, joint_count=SLOTS)
-        if held is None and (variable := self._variables.get(_name(given))) is not None:
-            single = len(variable.constants) == 1 and not variable.why_not.startswith("it is computed")
-            held = variable.constants[0][1] if single else None
-        values = held.numbers[:SLOTS] if held is not None and held.layout == POSE else ()
-        if len(values) < SLOTS:
-            return None
-        return np.asarray(FLAGGED.to_poses(np.array([[number.value for number in values]]))[0])
+    def _is_own_base(self, given: str) -> bool:
+        stated = self._variables.transform(given)
+        return given.casefold() in {"0", "p_nbase"} or (stated is not None and np.allclose(stated, np.eye(4)))
 
-    def _motion(self, statement: Statement, motion: re.Match[str]) -> None:
-        word = motion.group(1).casefold()
-        at = statement.at + motion.start()
+    def _statement(self, place: int) -> None:
+        statement = self._statements[place]
+        branching = _BRANCHING.search(statement.text) is not None
+        behind_branch = statement.part == 0 and self._in_branch
+        self._in_branch = bool(statement.lead) or (self._in_branch and statement.part > 0)
+        if branching or behind_branch or statement.lead or place in self._jumped_to:
+            self._follows, self._blended = False, True
+        for move in self._moves.get(place, ()):
+            self._motion(place, move)
+        setting = SETTING.match(statement.text)
+        if setting is not None and (setting.group(1) or "").casefold() == "cnt":
+            self._blended = not setting.group(2).startswith("0")
+        if branching:
+            self._follows = False
+
+    def _motion(self, place: int, move: Move) -> None:
+        word = move.word.casefold()
+        line = self._source.place(move.at)[0]
         if word not in _KINDS:
             self._list(
-                at, f"{motion.group(1)} is not followed: the tool stands still, or it is a relative move"
+                move.at, f"{move.word} is not followed: the tool stands still, or it is a relative move"
             )
+            self._keep(move.pieces, f"it is also used in line {line} by {move.word}, which is not followed")
             return
-        end = _END_OF_TARGETS.search(statement.text, motion.end())
-        text = statement.text[motion.end() : None if end is None else end.start()]
-        pieces = _split(text)
-        if word in ("mov", "mvs", "mva"):
-            behind, pieces = pieces[1:], pieces[:1]
-            offset, problem = _close_distance(behind) if word != "mva" else (np.eye(4), "")
-        else:
-            offset, problem = np.eye(4), ""
-        for piece, kind in zip(pieces, _KINDS[word], strict=False):
-            self._one(at, piece, kind, offset, problem)
+        kinds = _KINDS[word]
+        pieces, behind = move.pieces[: len(kinds)], move.pieces[len(kinds) :]
+        self._keep(behind, f"a distance is computed from it in line {line} when the program runs")
+        offset, problem = _close_distance(behind) if word in {"mov", "mvs"} else (np.eye(4), "")
+        for piece, kind in zip(pieces, kinds, strict=False):
+            found = self._place(piece)
+            if isinstance(found, str):
+                self._list(move.at, found)
+                self._keep([piece], f"a target is computed from it in line {line} when the program runs")
+                continue
+            target, before, after = found
+            environment = self._environment(place, before, after @ offset, problem)
+            self._go(move.at, target, kind, environment)
+            self._follows = not problem and _SKIPPED.search(move.added) is None
 
-    def _one(self, at: int, piece: str, kind: Motion, offset: Transform, problem: str) -> None:
-        """One target of a motion."""
-        found = self._place(piece)
-        if isinstance(found, str):
-            self._list(at, found)
-            return
-        target, before, after = found
-        environment = Environment(
-            tool=self._tool,
-            work_object=self._base,
+    def _environment(self, place: int, before: Transform, after: Transform, problem: str) -> Environment:
+        tool = self._tools[place]
+        return Environment(
+            tool=tool,
+            work_object=self._bases[place],
             before=before,
-            after=after @ offset,
+            after=after,
             problem=problem,
-            payload_kg=self._frames.payloads_kg.get(self._tool.name.casefold()),
+            payload_kg=self._frames.payloads_kg.get(tool.name.casefold()),
         )
+
+    def _go(self, at: int, target: int, kind: Motion, environment: Environment) -> None:
         self.moves.add(
             target,
             (0, at),
@@ -302,23 +240,30 @@ class Reader:
             blended=self._blended or kind == Motion.VIA,
             follows=self._follows,
         )
-        self._follows = not problem
+
+    def _keep(self, pieces: Sequence[str], reason: str) -> None:
+        """Variables in pieces of a motion that is not certain cannot be changed."""
+        for name in (name for piece in pieces for name in self._variables.named(piece)):
+            elements = self._elements.get(name, ()) if name not in self._targets else ()
+            for target in (self._targets.get(name), *elements):
+                if target is not None:
+                    self.fixed.setdefault(target, reason)
 
     def _place(self, piece: str) -> tuple[int, Transform, Transform] | str:
         """Target and what is before and after it; or why it is not known."""
         if not piece.strip():
             return "it is a relative move"
-        plain, combined = _VARIABLE.match(piece), _COMBINED.match(piece)
-        if plain is not None and _name(plain.group(1)) in self._offsets:
+        plain, combined = _VARIABLE.match(piece), COMBINED.match(piece)
+        if plain is not None and name_of(plain.group(1)) in self._variables.offsets:
             return "its target is also a tool, a base or an offset"
         if plain is not None:
-            target = self._targets.get(_name(plain.group(1)))
+            target = self._targets.get(name_of(plain.group(1)))
             return NOT_CONSTANT if target is None else (target, np.eye(4), np.eye(4))
         return COMPUTED if combined is None else self._combined(*combined.groups())
 
     def _combined(self, first: str, operator: str, second: str) -> tuple[int, Transform, Transform] | str:
         """P1*P2, P1/P2, P1+P2 and P1-P2, where the second is constant."""
-        target, other = self._targets.get(_name(first)), self._transform(second)
+        target, other = self._targets.get(name_of(first)), self._variables.transform(second)
         if target is None or other is None:
             return COMPUTED
         if operator in "*/":
@@ -336,23 +281,7 @@ class Reader:
         self._follows = False
 
 
-def _name(text: str) -> str:
-    """A variable's name as it is compared: case and blanks do not matter."""
-    return re.sub(r"\s", "", text).casefold()
-
-
-def _split(text: str) -> list[str]:
-    """The pieces between commas that are in no brackets."""
-    pieces, depth, start = [], 0, 0
-    for place, letter in enumerate(text):
-        depth += (letter == "(") - (letter == ")")
-        if letter == "," and depth == 0:
-            pieces.append(text[start:place])
-            start = place + 1
-    return [*pieces, text[start:]]
-
-
-def _close_distance(pieces: list[str]) -> tuple[Transform, str]:
+def _close_distance(pieces: Sequence[str]) -> tuple[Transform, str]:
     """The offset along the tool's z axis that Mov P1, -50 states, mm; and why it is not known."""
     offset = np.eye(4)
     if not pieces or not pieces[0].strip():

@@ -5,13 +5,13 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Final
 
-from truearm.programs.melfa_text import NAME, without_remark
+from truearm.programs.melfa_text import NAME, lines, without_remark
 from truearm.programs.program import Insertion, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.stepping import copied, free_numbers, line_start, target_of
 
 _PLAIN: Final = re.compile(rf"([ \t]*\d+(?=[ \t]))?([ \t]*Mvs[ \t]+){NAME}[ \t]*", re.IGNORECASE)
-_LINE_NUMBER: Final = re.compile(r"^[ \t]*(\d+)(?=[ \t*])", re.MULTILINE)
+_LINE_NUMBER: Final = re.compile(r"[ \t]*(\d+)(?=[ \t*])")
 _JUMP_TO_NUMBER: Final = re.compile(r"\b(?:GoTo|GoSub|Then|Else)[ \t]*\d", re.IGNORECASE)
 _POSITION: Final = re.compile(r"(?<!\w)P(\d+)\b", re.IGNORECASE)
 LAST_LINE: Final = 32767
@@ -63,14 +63,16 @@ class _Numbering:
 
     def __init__(self, source: Source, wanted: dict[int, int]) -> None:
         """Lines, from 1, before which so many others are wanted."""
-        self._found = list(_LINE_NUMBER.finditer(source.text))
-        self._lines = [source.place(found.start(1))[0] for found in self._found]
+        texts = list(lines(source))
+        numbered = {n: found for n, (_, text) in enumerate(texts, 1) if (found := _LINE_NUMBER.match(text))}
+        self._lines = list(numbered)
+        self._spans = [(texts[n - 1][0] + found.start(1), found.group(1)) for n, found in numbered.items()]
         self._wanted = [wanted.get(line, 0) for line in self._lines]
-        stated = [int(found.group(1)) for found in self._found]
+        stated = [int(number) for _, number in self._spans]
         self._ascending = all(first < second for first, second in pairwise(stated))
         between = [number - before - 1 for before, number in pairwise([0, *stated])]
         fits = all(room >= some for room, some in zip(between, self._wanted, strict=True))
-        self._jumps = _JUMP_TO_NUMBER.search("\n".join(map(without_remark, source.text.splitlines())))
+        self._jumps = any(_JUMP_TO_NUMBER.search(without_remark(text)) for _, text in texts)
         self._numbers = stated if fits or not self._ascending else self._renumbered(stated)
 
     def before(self, line: int) -> Sequence[int] | None:
@@ -85,16 +87,16 @@ class _Numbering:
 
     def anew(self) -> Iterator[Insertion]:
         """What the lines that there are are numbered now, where that changes."""
-        for found, number in zip(self._found, self._numbers or (), strict=False):
-            if int(found.group(1)) != number:
-                yield Insertion(0, *found.span(1), str(number))
+        for (at, stated), number in zip(self._spans, self._numbers or (), strict=False):
+            if int(stated) != number:
+                yield Insertion(0, at, at + len(stated), str(number))
 
     def _renumbered(self, stated: Sequence[int]) -> list[int] | None:
         """Numbers with room for all, in the step that the program begins with; None if jumps tell numbers."""
         step = max(stated[1] - stated[0], 1) if len(stated) > 1 else 1
         total = len(stated) + sum(self._wanted)
         step = step if stated[0] + step * total <= LAST_LINE else 1
-        if self._jumps is not None or stated[0] + step * total > LAST_LINE:
+        if self._jumps or stated[0] + step * total > LAST_LINE:
             return None
         numbers, number = [], stated[0] - step
         for some in self._wanted:

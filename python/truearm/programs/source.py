@@ -70,6 +70,11 @@ class Source:
         """The bytes decoded as Latin-1, whatever their encoding: encoding them again gives the same bytes."""
         return self.content.decode("latin-1")
 
+    @cached_property
+    def text_with_line_feeds(self) -> str:
+        """The text; where lines end with CR alone LF stands for it, so that offsets are the same."""
+        return self.text if "\n" in self.text else self.text.replace("\r", "\n")
+
     def part(self, start: int, end: int) -> str:
         """The text from one offset to another, without decoding all of it."""
         return self.content[start:end].decode("latin-1")

@@ -54,7 +54,7 @@ def section(source: Source, name: str) -> tuple[int, int]:
     Raises:
         InputError: If there is none.
     """
-    marks = list(_SECTION.finditer(source.text))
+    marks = list(_SECTION.finditer(source.text_with_line_feeds))
     for mark, behind in zip(marks, [*marks[1:], None], strict=False):
         if mark.group(1) == name:
             return mark.end(), len(source.text) if behind is None else behind.start()
@@ -69,7 +69,7 @@ def positions(source: Source, start: int, end: int, joint_count: int) -> Iterato
     Raises:
         InputError: If one does not end; names line and column.
     """
-    text, behind = source.text, start
+    text, behind = source.text_with_line_feeds, start
     while (opening := _OPENING.search(text, behind, end)) is not None:
         found = _POSITION.match(text, opening.start(), end)
         if found is None:
@@ -80,10 +80,10 @@ def positions(source: Source, start: int, end: int, joint_count: int) -> Iterato
 
 def position_text(source: Source, at: int) -> str | None:
     """The whole text of the position at an offset; None if more motion groups than one are in it."""
-    found = _POSITION.match(source.text, at)
+    found = _POSITION.match(source.text_with_line_feeds, at)
     if found is None or len(_GROUP.findall(found.group())) > 1:
         return None
-    return found.group()
+    return source.part(*found.span())
 
 
 def _position(text: str, found: re.Match[str], joint_count: int) -> Position:

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, Number, TargetTable
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
 from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, positions, section
+from truearm.programs.tp_state import JUMPS, OFFSET, SENSED, Current, moved_at
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -24,20 +24,16 @@ Floats = NDArray[np.float64]
 _LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
 _TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
-_SET: Final = re.compile(r"\s*(UFRAME_NUM|UTOOL_NUM)\s*=\s*(\S+)\s*$")
-_SET_INSIDE: Final = re.compile(r"\b(UFRAME_NUM|UTOOL_NUM)\s*=")
-_CALLED: Final = re.compile(r"\b(CALL|RUN)\b")
-_REDEFINED: Final = re.compile(r"\s*(UFRAME|UTOOL)\[([^\]]+)\]\s*=")
+_COMMENT: Final = re.compile(r":[^\[\]\n]*(?=\])")
 _STRING: Final = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"")
 _BLEND: Final = re.compile(r"\b(FINE|CNT\s*(\d+|R\[)|CR\s*\d+|CD\s*\d+)", re.IGNORECASE)
-_JUMPS: Final = re.compile(r"\s*(LBL|JMP|IF|ELSE|ENDIF|FOR|ENDFOR|SELECT|CALL|RUN|SKIP)\b|.*\b(JMP|CALL)\b")
 # fmt: off
 _OPTIONS: Final = (
     (re.compile(r"\bINC\b", re.IGNORECASE), "it is a relative move (INC)"),
-    (re.compile(r"\b(TOOL_OFFSET|VOFFSET|OFFSET)\b", re.IGNORECASE), "an offset known at run time is added"),
+    (re.compile(r"\b(TOOL_OFFSET|VOFFSET|OFFSET)\b", re.IGNORECASE), OFFSET),
     (re.compile(r"\bRTCP\b", re.IGNORECASE), "the tool stands still and the arm holds the part (RTCP)"),
     (re.compile(r"\bCOORD\b", re.IGNORECASE), "it is coordinated with another motion group (COORD)"),
-    (re.compile(r"\b(TRACK|STITCH|TOUCH)\b", re.IGNORECASE), "the path is changed at run time by a sensor"),
+    (re.compile(r"\b(TRACK|STITCH|TOUCH|SEARCH)\b", re.IGNORECASE), SENSED),
 )
 # fmt: on
 _MOTIONS: Final = {"J": Motion.JOINT, "L": Motion.LINEAR, "C": Motion.CIRCULAR, "A": Motion.CIRCULAR}
@@ -47,31 +43,6 @@ ORDER_UNKNOWN: Final = (
     "its turn numbers mean different joints to different controllers, and no joint position of the "
     "same place tells which"
 )
-
-
-@dataclass
-class _Current:
-    """What UFRAME_NUM and UTOOL_NUM are set to anywhere in the program, and frames that are redefined."""
-
-    numbers: dict[str, set[str]] = field(default_factory=lambda: {"UFRAME_NUM": set(), "UTOOL_NUM": set()})
-    redefined: dict[tuple[str, str], int] = field(default_factory=dict)
-    late: dict[str, int] = field(default_factory=dict)
-    called: int = 0
-
-    def of(self, name: str) -> str | None:
-        """The one number; None if there are several, or one known at run time, or none."""
-        found = self.numbers[name]
-        return next(iter(found)) if len(found) == 1 and next(iter(found)).isdigit() else None
-
-    def doubt(self, name: str) -> str:
-        """Why the number is not certain wherever a motion is; empty if it is."""
-        if self.of(name) is None:
-            return f"{name} is not one number throughout the program"
-        if name in self.late:
-            return (
-                f"{name} is set in line {self.late[name]}, behind motions or branches that do not have it yet"
-            )
-        return f"the program called in line {self.called} may set {name}" if self.called else ""
 
 
 class Reader:
@@ -96,8 +67,10 @@ class Reader:
         start, end = section(source, "POS")
         self._positions = {p.number: p for p in positions(source, start, end, robot.joint_count)}
         self._targets = {number: self._target(p) for number, p in self._positions.items()}
-        self._current = _Current()
+        self._current = Current()
         self._settings()
+        self._moved = moved_at(source.part(0, self._main[0]), self._statements())
+        self._used, self._chosen = set[int](), 0
         self._motions()
         self.orders = self._orders()
 
@@ -129,7 +102,7 @@ class Reader:
     def _whole_lines(self) -> Iterator[tuple[int, str]]:
         """Offset and text of each line up to its semicolon, with the lines that go on with it."""
         start, pieces = -1, list[str]()
-        for found in _LINE.finditer(self._source.text, *self._main):
+        for found in _LINE.finditer(self._source.text_with_line_feeds, *self._main):
             text = found.group(2)
             if text is None or found.group(1) or not pieces:
                 start, pieces = found.start(2), []
@@ -142,22 +115,10 @@ class Reader:
                 pieces = []
 
     def _settings(self) -> None:
-        current, straight = self._current, True
+        straight = True
         for at, text in self._statements():
-            chosen, redefined = _SET.match(text), _REDEFINED.match(text)
-            line = self._source.place(at)[0]
-            if chosen is not None:
-                if not straight and not current.numbers[chosen.group(1)]:
-                    current.late[chosen.group(1)] = line
-                current.numbers[chosen.group(1)].add(chosen.group(2))
-            for inside in _SET_INSIDE.finditer(text) if chosen is None else ():
-                current.numbers[inside.group(1)].add(inside.group())
-            if _CALLED.search(text):
-                current.called = current.called or line
-            straight = straight and _MOTION.match(text) is None and _JUMPS.match(text) is None
-            if redefined is not None:
-                key = (redefined.group(1), redefined.group(2).partition(":")[0].strip())
-                current.redefined.setdefault(key, line)
+            self._current.read(self._source.place(at)[0], text, straight=straight)
+            straight = straight and _MOTION.match(text) is None and JUMPS.match(text) is None
 
     def _motions(self) -> None:
         follows = False
@@ -165,35 +126,54 @@ class Reader:
             motion = _MOTION.match(text)
             if motion is None:
                 self._other_use(at, text)
-                follows = follows and _JUMPS.match(text) is None
+                follows = follows and JUMPS.match(text) is None
             else:
                 follows = self._motion(at, text, motion.group(1), follows=follows)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Positions that only a motion to a computed number may go to."""
+        for number in set(self._targets.values()) - self._used if self._chosen else ():
+            self.fixed.setdefault(number, f"only line {self._chosen} may go there, by a computed number")
 
     def _other_use(self, at: int, text: str) -> None:
         """A position that is read or compared: what it is changed to would be computed with."""
+        line = self._source.place(at)[0]
         for found in _TARGET.finditer(text):
             number = found.group(2)
-            if found.group(1) == "P" and number.isdigit() and int(number) in self._targets:
-                line = self._source.place(at)[0]
+            if found.group(1) == "P" and not number.isdigit():
+                self._keep_all(f"it may also be used in line {line} for something else than a motion")
+            elif found.group(1) == "P" and int(number) in self._targets:
                 reason = f"it is also used in line {line} for something else than a motion"
                 self.fixed.setdefault(self._targets[int(number)], reason)
+
+    def _keep_all(self, reason: str) -> None:
+        """No position can be changed with certainty."""
+        for number in self._targets.values():
+            self.fixed.setdefault(number, reason)
 
     def _motion(self, at: int, text: str, kind: str, *, follows: bool) -> bool:
         """One motion; whether the arm is where it leads, afterwards."""
         found = [one for one in _TARGET.finditer(text) if one.start() < _options_at(text)]
-        problem = next((why for option, why in _OPTIONS if option.search(text)), "")
-        blended = _is_blended(text)
-        known = True
+        bare = _COMMENT.sub("", text)
+        problem = self._moved.get(at) or next((why for option, why in _OPTIONS if option.search(bare)), "")
+        blended, known = _is_blended(bare), bool(found)
+        if not found:
+            self._choose(at, text.strip(), problem)
         for place, target in enumerate(found[:2]):
             via = kind == "C" and place == 0
             motion = Motion.VIA if via else _MOTIONS.get(kind, Motion.LINEAR)
             number = int(target.group(2)) if target.group(2).isdigit() else None
             reason = self._why_unknown(target.group(1), number)
-            if number is None or reason:
+            if number is None and target.group(1) == "P":
+                self._choose(at, target.group(), problem)
+            elif number is None or reason:
                 self._list(at, target.group(), reason)
+            if number is None or reason:
                 follows = known = False
                 continue
             position = self._positions[number]
+            self._used.add(self._targets[number])
             environment = self.environments.number(self._environment(position, problem))
             self.moves.add(
                 self._targets[number],
@@ -204,13 +184,19 @@ class Reader:
                 follows=follows,
             )
             follows = True
-        return known and not problem and not re.search(r"\bSKIP\b", text, re.IGNORECASE)
+        return known and not problem and not re.search(r"\bSKIP\b", bare, re.IGNORECASE)
+
+    def _choose(self, at: int, name: str, problem: str) -> None:
+        """A motion to any position."""
+        self._list(at, name, "which position it is, is computed at run time")
+        self._chosen = self._chosen or self._source.place(at)[0]
+        if problem:
+            line = self._source.place(at)[0]
+            self._keep_all(f"line {line} may go there too: {problem}")
 
     def _why_unknown(self, kind: str, number: int | None) -> str:
         if kind == "PR":
             return "a position register is set at run time"
-        if number is None:
-            return "which position it is, is computed at run time"
         return "" if number in self._positions else "there is no such position in /POS"
 
     def _list(self, at: int, name: str, reason: str) -> None:
@@ -229,13 +215,13 @@ class Reader:
     def _frame(self, kind: str, number: str) -> Frame:
         """The frame that a position is in, or its tool; number 0 is the robot's own."""
         if number == CURRENT:
-            doubt = self._current.doubt(f"{kind}_NUM")
+            doubt = self._current.doubt(kind)
             if doubt:
                 return Frame.missing(doubt, number)
-            number = str(self._current.of(f"{kind}_NUM"))
-        line = self._current.redefined.get((kind, number))
-        if line is not None:
-            return Frame.missing(f"{kind}[{number}] is set in line {line} when the program runs", number)
+            number = self._current.number(kind)
+        unknown = self._current.why_unknown(kind, number)
+        if unknown:
+            return Frame.missing(unknown, number)
         stated = np.eye(4) if number == "0" else None
         find = self._frames.tool if kind == "UTOOL" else self._frames.work_object
         return find(number, stated)

@@ -1,0 +1,211 @@
+"""What routines a KRL program has and calls, and which of them leave tool, base and arm as they are."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Final
+
+from truearm.programs.krl_storage import ASSIGNING, HEADER, is_data, lines
+from truearm.programs.krl_values import line_reader
+from truearm.programs.lexing import Token
+from truearm.programs.source import Source
+
+CALL: Final = re.compile(r"([A-Za-z_$][\w$]*)[ \t]*\(")
+EXTERNAL: Final = frozenset({"ext", "extfct", "extp", "extfctp"})
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+KEYWORDS: Final = _words(
+    "and b_and b_exor b_not b_or ca case delay do exor for if not or return sec step switch then to until "
+    "wait when while"
+)
+COMPUTING: Final = _words(
+    "abs acos atan2 cos sin sqrt tan forward inverse strcomp strdecllen strfind strlen varstate "
+    "sacc_cp sacc_joint sapo sapo_ptp sbase scirc_m scirc_mode scirc_typ sgear_jerk sipo_mode sjerk sload "
+    "sori_typ spath_jerk stool stool2 svel_cp svel_joint use_cm_pro_values arcgetdelay arcgetpath"
+)
+"""Functions of KUKA that only compute: they change nothing that they are given."""
+LEAVING: Final = COMPUTING | _words(
+    "arcmainng bas cast_from cast_to cclose cioctl clear_krldlg clear_krlmsg copen cread cwrite "
+    "exists_krldlg exists_krlmsg get_msgbuffer ir_stopm krl_fclose krl_feof krl_fgetc krl_fopen krl_fprintf "
+    "krl_freadln krl_fseek krl_fwriteln msgdialog msgloop msgnotify msgquit msgstate msgstatus pulse "
+    "set_cd_params set_krldlg set_krlmsg sread stradd strclear strcopy swrite"
+)
+"""Routines of KUKA that change neither tool nor base and do not move the arm; BAS is read for itself."""
+BAS_LEAVING: Final = frozenset({"acc_cp", "acc_ptp", "acc_glue", "cp_dat", "ptp_dat", "vel_cp", "vel_ptp"})
+"""Commands of BAS that set neither tool nor base."""
+SETTING: Final = frozenset({"$tool", "$base", "$ipo_mode", "$load", "fdat_act"})
+
+
+@dataclass(frozen=True)
+class Routine:
+    """A routine of a program.
+
+    Attributes:
+        name: In small letters; empty for what stands before all headers.
+        file: Number of its file.
+        start: Offset of its header.
+        end: Offset behind its last line.
+        visible: Whether programs in other files can call it.
+    """
+
+    name: str
+    file: int
+    start: int
+    end: int
+    visible: bool
+
+
+def called(found: Sequence[Token]) -> list[str]:
+    """Names of routines that tokens of a statement call, in small letters, in their order."""
+    return [
+        token.text.lower()
+        for token, behind in pairwise(found)
+        if behind.text == "(" and token.kind == "name" and token.text.lower() not in KEYWORDS
+    ]
+
+
+def immediate(found: list[Token]) -> tuple[list[Token], list[Token]]:
+    """What a statement does at once, and what an interrupt or a trigger does later."""
+    words = [token.text.lower() for token in found[:3]]
+    starts = "trigger" in words[:1] or "interrupt" in words[:2]
+    at = next(
+        (place for place, token in enumerate(found) if starts and token.text.lower() == "do"), len(found)
+    )
+    return found[:at], found[at:]
+
+
+def bas_command(words: Sequence[str]) -> tuple[str, str]:
+    """Command and number of a call of BAS, whose tokens are in small letters; "?" for no number."""
+    command = words[3] if len(words) > 3 and words[1:3] == ["(", "#"] else ""
+    number = (
+        words[5] if len(words) > 6 and words[4] == "," and words[5].isdigit() and words[6] == ")" else "?"
+    )
+    return command, number
+
+
+class Routines:
+    """The routines of a program."""
+
+    def __init__(self, sources: tuple[Source, ...]) -> None:
+        self._sources = sources
+        self._all = [routine for file in self._programs() for routine in self._of(file)]
+        self._by_name = {routine.name: routine for routine in self._all if routine.name}
+        self._by_place = {(routine.file, routine.start): routine for routine in self._all if routine.name}
+        self._leaving: dict[str, bool] = {}
+        self._wandering: dict[Routine, bool] = {}
+
+    def _programs(self) -> list[int]:
+        return [n for n, source in enumerate(self._sources) if not is_data(source)]
+
+    def _of(self, file: int) -> list[Routine]:
+        source = self._sources[file]
+        headers = [found for place in lines(source) if (found := HEADER.match(source.text, *place))]
+        starts = [*(found.start() for found in headers), len(source.text)]
+        named = [
+            Routine(found.group(2).lower(), file, start, end, number == 0 or bool(found.group(1)))
+            for number, (found, (start, end)) in enumerate(zip(headers, pairwise(starts), strict=True))
+        ]
+        return [Routine("", file, source.first, starts[0], True), *named]
+
+    def beginning(self, file: int, start: int) -> Routine | None:
+        """The routine whose header is the line at offset `start`."""
+        return self._by_place.get((file, start))
+
+    def is_program(self, routine: Routine) -> bool:
+        """Whether it is the program itself: the first routine of its file."""
+        return routine is next(one for one in self._all if one.file == routine.file and one.name)
+
+    def local(self, name: str) -> bool:
+        """Whether a routine of that name is in the program."""
+        return name in self._by_name
+
+    def called_above_only(self, routine: Routine) -> bool:
+        """Whether all calls of a routine stand above it."""
+        source = self._sources[routine.file]
+        line, _ = source.place(routine.start)
+        behind = source.line_starts[line] if line < len(source.line_starts) else len(source.text)
+        mention = re.compile(rf"(?<![\w$]){re.escape(routine.name)}[ \t]*\(", re.IGNORECASE)
+        return not routine.visible and mention.search(source.text, behind) is None
+
+    def leaves(self, name: str) -> bool:
+        """Whether a call of a routine certainly leaves tool and base as they are."""
+        routine = self._by_name.get(name)
+        if routine is None:
+            return name in LEAVING
+        if name not in self._leaving:
+            self._leaving[name] = False
+            self._leaving[name] = not any(self._sets(routine.file, *place) for place in self._body(routine))
+        return self._leaving[name]
+
+    def wanders(self, file: int, at: int) -> bool:
+        """Whether the routine around a label sets tool or base where a GOTO may lead around it."""
+        routine = next(one for one in self._all if one.file == file and one.start <= at < one.end)
+        if routine not in self._wandering:
+            jumped, found = False, False
+            for place in self._body(routine):
+                words = self._words(file, *place)
+                jumped |= words[:1] == ["goto"] or words[1:2] == [":"]
+                found |= jumped and self._sets(file, *place)
+            self._wandering[routine] = found
+        return self._wandering[routine]
+
+    @cached_property
+    def given(self) -> frozenset[str]:
+        """Names that routines are given and may change, in small letters."""
+        found: set[str] = set()
+        for file in self._programs():
+            source = self._sources[file]
+            for start, end in lines(source):
+                names = {one.group(1).lower() for one in CALL.finditer(source.text, start, end)}
+                if names - KEYWORDS - COMPUTING - {"bas"} and HEADER.match(source.text, start, end) is None:
+                    found |= _arguments(list(line_reader(source, start, end).rest()))
+        return frozenset(found)
+
+    def _body(self, routine: Routine) -> Iterator[tuple[int, int]]:
+        source = self._sources[routine.file]
+        first = source.place(routine.start)[0] - 1
+        starts = [*source.line_starts, len(source.text)]
+        for place in range(first, len(starts) - 1):
+            if starts[place] >= routine.end:
+                return
+            if starts[place] > routine.start or not routine.name:
+                yield max(starts[place], source.first), starts[place + 1]
+
+    def _words(self, file: int, start: int, end: int) -> list[str]:
+        return [token.text.lower() for token in line_reader(self._sources[file], start, end).rest()]
+
+    def _sets(self, file: int, start: int, end: int) -> bool:
+        """Whether a line may set what stays until it is changed."""
+        source = self._sources[file]
+        found = line_reader(source, start, end).rest()
+        words = [token.text.lower() for token in found]
+        if not words or words[0] in EXTERNAL:
+            return False
+        if words[0] == "bas" and bas_command(words)[0] not in BAS_LEAVING:
+            return True
+        assigned = ASSIGNING.match(source.text, start, end) is not None and words[0] in SETTING
+        return assigned or not all(self.leaves(name) for name in called(found))
+
+
+def _arguments(found: list[Token]) -> set[str]:
+    """Variables, with an index that is a number, within the parentheses of calls that may change them."""
+    texts = [token.text.lower() for token in found]
+    names: set[str] = set()
+    around: list[bool] = []
+    for place, text in enumerate(texts):
+        if text == "(":
+            function = place > 0 and found[place - 1].kind == "name" and texts[place - 1] not in KEYWORDS
+            changing = function and texts[place - 1] not in COMPUTING | {"bas"}
+            around.append(changing or (not function and bool(around) and around[-1]))
+        elif text == ")" and around:
+            around.pop()
+        elif found[place].kind == "name" and around and around[-1]:
+            indexed = texts[place + 1 : place + 2] == ["["] and texts[place + 3 : place + 4] == ["]"]
+            names.add(f"{text}[{texts[place + 2]}]" if indexed else text)
+    return names
