@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from tests.programs_rig import ABB, again, models, obeyed, read, rewritten
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
+from truearm.programs.program import LinearStep
 from truearm.programs.rapid_configuration import Confdata
+from truearm.programs.rewriting import Choices, rewrite
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
 
@@ -261,3 +263,148 @@ def test_a_routine_may_displace_what_comes_after_its_call():
     body = f"PDispOff;\nMoveJ pA,{GO}\nshift;\nMoveL pB,{GO}\nENDPROC\nPROC shift()\nPDispSet pd;"
     done = rewritten(read("a.mod", module(body, data), ABB), models(ABB))
     assert done.changed[done.program.moves.target].tolist() == [True, False]
+
+
+OTHER = "ENDPROC\nPROC other"
+SHADOWED = [
+    (f"MoveJ Offs(pA,0,0,nUp),{GO}\n{OTHER}()\nVAR num nUp:=10;\nMoveJ pB,{GO}", "declared more than once"),
+    (f"MoveJ Offs(pA,0,0,nUp),{GO}\n{OTHER}(num nUp)\nMoveJ pB,{GO}", "declared more than once"),
+    (f"MoveJ Offs(pA,0,0,nUp),{GO}\n{OTHER}(\\switch on|num nUp{{*}})\nMoveJ pB,{GO}", "more than once"),
+    (f"MoveJ Offs(pA,0,0,nUp),{GO}\nFOR nUp FROM 1 TO 2 DO\nMoveJ pB,{GO}\nENDFOR", "more than once"),
+    (f"CONST num n:=5;\n{OTHER}()\nCONST num n:=6;\nMoveJ RelTool(pA,0,0,-n),{GO}", "more than once"),
+    (f"CONST num n:=5;\n{OTHER}()\nMoveJ Offs(pA,0,0,n),{GO}", "run time"),
+    (f"CONST num n:=nUp;\nMoveJ Offs(pA,0,0,n),{GO}\n{OTHER}()\nVAR num nUp;", "run time"),
+    (f"CONST pose d:=[[0,0,25],[1,0,0,0]];\nPDispSet d;\nMoveJ pA,{GO}\n{OTHER}()\n"
+     "CONST pose d:=[[0,0,60],[1,0,0,0]];", "displacement"),
+    (f"CONST pose d:=[[0,0,25],[1,0,0,0]];\n{OTHER}()\nPDispSet d;\nMoveJ pA,{GO}", "displacement"),
+    (f"MoveJ pA,{GO}\n{OTHER}(robtarget pA)", "declared more than once"),
+    (f"MoveJ pA,{GO}\n{OTHER}()\nVAR num pA;", "declared more than once"),
+    (f"MoveJ pA,{GO}\n{OTHER}(PERS tooldata tG)", 'tool "tG" is declared more than once'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "reason"), SHADOWED)
+def test_a_name_with_several_meanings_is_not_certain(body, reason):
+    assert reason in reasons(body, points())["pa"]
+
+
+def test_a_target_of_one_routine_is_not_that_of_another():
+    local = f"CONST robtarget pL:={numbers(SEEN['pA'])};\nMoveJ pL,{GO}\n"
+    found = reasons(f"{local}{OTHER}()\nMoveJ pL,v100,fine,tool0;")
+    assert found == {"MoveJ pL,v100,fine,tool0;": "it is declared in another routine alone"}
+
+
+def test_constants_declared_alike_are_certain():
+    pose = "CONST pose d:=[[0,0,25],[1,0,0,0]];"
+    body = f"CONST num n:=25;\nPDispOff;\nMoveJ Offs(pA,0,0,n),{GO}\n{OTHER}()\nCONST num n:=5*5;\n{pose}\n"
+    body += f"PDispSet d;\nMoveJ pB,{GO}\n{OTHER}2(num unused)\nCONST num n:=25;\n{pose}\nVAR num unused2;"
+    found = reasons(body, points())
+    assert "pa" not in found
+    assert "pb" not in found
+
+
+CHANGED = [
+    ("FindPart wT;", ""),
+    ("FindPart wT.uframe;", ""),
+    ("FindPart \\Frame:=wT;", ""),
+    ("ok:=Found(wT);", ""),
+    ("IF ok FindPart wT;", ""),
+    ("IF NOT Found(wT) THEN\nok:=FALSE;\nENDIF", ""),
+    ("Incr wT.oframe.trans.x;", ""),
+    ("Own wT;", "Own(INOUT wobjdata w)\nw.oframe.trans.x:=1;"),
+    (
+        "Own wT;",
+        "Own(PERS wobjdata w)\nOnce w;\nENDPROC\nPROC Once(INOUT wobjdata v)\nIncr v.oframe.trans.x;",
+    ),
+    ("Own 3;", "Own(VAR num dx)\nwT.oframe.trans.x:=dx;"),
+    ("Own 3;", "Own(num dx)\nIF dx>1 wT.oframe.trans.x:=dx;"),
+]
+
+
+@pytest.mark.parametrize(("statement", "routine"), CHANGED)
+def test_what_may_change_a_work_object_makes_it_uncertain(statement, routine):
+    own = f"\nENDPROC\nPROC {routine}" if routine else ""
+    assert 'work object "wT" is ' in reasons(f"MoveJ pA,{GO}\n{statement}{own}", points())["pa"]
+    other = f"MoveJ {numbers(SEEN['pA'], placed=NOTHING)},v100,fine,tG;"
+    assert not any(key.startswith("MoveJ [") for key in reasons(f"{other}\n{statement}{own}"))
+
+
+UNCHANGED = [
+    ("pHere:=CRobT(\\Tool:=tG\\WObj:=wT);", ""),
+    ("SearchL di1,pHere,pB,v100,tG\\WObj:=wT;", ""),
+    ("IF (ok) AND NOT (wT.robhold) MoveJ pB,v100,fine,tG\\WObj:=wT;", ""),
+    ('TPWrite "x"\\Num:=wT.oframe.trans.x;', ""),
+    ("Own wT,tG;", "Own(PERS wobjdata w,PERS tooldata t)\nMoveJ pB,v100,fine,t\\WObj:=w;"),
+    ("Own wT;", "Own(wobjdata w)\nw.oframe.trans.x:=1;"),
+]
+
+
+@pytest.mark.parametrize(("statement", "routine"), UNCHANGED)
+def test_what_only_reads_a_work_object_leaves_it_certain(statement, routine):
+    own = f"\nENDPROC\nPROC {routine}" if routine else ""
+    assert "pa" not in reasons(f"MoveJ pA,{GO}\n{statement}{own}", points())
+
+
+def test_a_short_if_may_displace_what_comes_after():
+    body = f"PDispOff;\nIF ok shift;\nMoveJ pA,{GO}\n{OTHER}()\nPDispSet pd;"
+    assert "displacement" in reasons(body, points())["pa"]
+
+
+READ_IN_MOTIONS = [
+    f"MoveL Above(pA,50),{GO}",
+    f"MoveL Offs(Above(pA,50),0,0,5),{GO}",
+    f"MoveL [pA.trans,[1,0,0,0],pA.robconf,pA.extax],{GO}",
+    f"MoveL Offs(pB,0,0,Distance(pA.trans,pB.trans)),{GO}",
+    "MoveL pB,v100\\T:=Distance(pA.trans,pB.trans),fine,tG\\WObj:=wT;",
+]
+
+
+@pytest.mark.parametrize("motion", READ_IN_MOTIONS)
+def test_targets_that_a_motion_is_computed_from_are_left(motion):
+    found = reasons(f"MoveJ pA,{GO}\n{motion}", points())
+    assert found["pa"] == "the program computes with it"
+
+
+def test_an_array_with_an_external_axis_keeps_the_others():
+    moved = numbers(SEEN["pB"]).replace(UNUSED, "[9E9,0,9E9,9E9,9E9,9E9]")
+    data = f"CONST robtarget pts{{3}}:=[{numbers(SEEN['pA'])},{moved},pHome];"
+    found = reasons(f"MoveJ pts{{i}},{GO}\nMoveJ pts{{2}},v100,fine,tG;", data)
+    assert {"pts{2}", "pts{3}"} < set(found)
+    assert "pts{1}" not in found
+
+
+@pytest.mark.parametrize("start", ["\xef\xbb\xbf", ""])
+def test_a_byte_order_mark_stays_in_front(start):
+    target = numbers(SEEN["pA"], NOTHING, NOTHING)
+    text = f"{start}MODULE m\nCONST robtarget pA:={target};\nPROC main()\nMoveJ pA,v1,fine,tool0;\n"
+    for body in (text, text.replace("MODULE m\n", "")):
+        done = rewrite(read("a.mod", body, ABB), models(ABB), Choices(), mark="mark")
+        assert done.changed.all()
+        head = body.partition("CONST")[0]
+        assert done.contents[0].decode("latin-1").startswith(f"{head}! mark\nCONST")
+
+
+PLAIN = ["MoveL pB,v100,fine,tG;", "MoveL pB,v100\\V:=50,z1\\Z:=2,tG\\WObj:=wT\\TLoad:=load0;"]
+NOT_TWICE = [
+    "MoveL pB,v100\\T:=5,fine,tG;",
+    "MoveL pB,v100,z10\\Inpos:=inpos50,tG;",
+    "MoveL \\Conc,pB,v100,z10,tG;",
+    "MoveL pB\\ID:=10,v100,z10,tG;",
+    "MoveL pB,v100,z10,tG\\WObj:=wT\\Corr;",
+    "MoveLDO pB,v100,z10,tG,do1,1;",
+    "MoveLSync pB,v100,z10,tG,\"proc\";",
+    "TriggL pB,v100,trigg1,z10,tG;",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("motion", PLAIN + NOT_TWICE)
+def test_waypoints_copy_what_holds_for_a_part_of_the_way(motion):
+    text = module(motion)
+    line = text.split("\r\n").index(motion) + 1
+    step = LinearStep(
+        line, 0, 7, (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0, 0, 0, 0), (3,) * 3 + (7,) * 4 + (0,) * 4
+    )
+    program = read("a.mod", text, ABB)
+    found = program.language.linear_steps(program, [[step]])
+    assert found.impossible == (() if motion in PLAIN else (7,))
+    assert found.waypoints == len(found.insertions) == (motion in PLAIN)

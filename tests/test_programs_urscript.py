@@ -341,6 +341,67 @@ def test_a_step_is_a_copy_of_its_motion(robot, sample):
     assert step(1, timed).impossible == (0,)
 
 
+def test_a_step_before_a_last_line_without_an_end(robot):
+    program = read(UR, "movel(p[0.1, 0.2, 0.3, 0, 0, 0], a=1)", robot)
+    (only,) = UR.linear_steps(program, [[LinearStep(1, 0, 0, (0.5,) * 6, (1,) * 6)]]).insertions
+    assert only.text == "movel(p[0.5, 0.5, 0.5, 0.5, 0.5, 0.5], a=1)\n"
+
+
+@pytest.mark.parametrize("start", ["", "\xef\xbb\xbf"])
+@pytest.mark.parametrize("ending", ["\n", "\r\n", "\r"])
+def test_line_ends_and_a_byte_order_mark_are_no_matter(robot, sample, start, ending):
+    plain = sample.partition("\n")[2]
+    text = (start + plain.replace("\n", ending)).encode("latin-1")
+    result = rewritten(UR, text, robot, by=SHIFT, mark="mark")
+    assert reasons(result) == []
+    assert names_changed(result) == ["Waypoint_1_p", "home", 12, 15, 16, 17, 18, 18, 19]
+    written = rewritten(UR, plain, robot, by=SHIFT, mark="mark").contents[0].decode()
+    assert result.contents[0] == (start + written.replace("\n", ending)).encode("latin-1")
+
+
+PAIR = """\
+a = [0, -1.5, 1.5, -1.5, -1.5, 0]
+b = [0.1, -1.4, 1.5, -1.5, -1.5, 0]
+{}
+list = [a, b]
+movej(list[i])
+movej(b)
+def own_length(p):
+  return length(p)
+end
+"""
+
+
+@pytest.mark.parametrize(
+    ("statement", "left"),
+    [
+        ("movel(interpolate_pose(a, b, 0.5))", "ab"),
+        ("movej(approach(b))", "b"),
+        ("movej(get_inverse_kin(get_forward_kin(a), qnear=now()))", "a"),
+        ("movec(via(a), b)", "a"),
+        ("mid = mean(a, b)\nmovej(mid)", "ab"),
+        ("d = a[2]\nmovel(pose_trans(p[0, 0, d, 0, 0, 0], p[0.5, 0.2, 0.3, 0, 0, 0]))", "a"),
+        ("movej([a[0], -1.5, 1.5, -1.5, -1.5, 0])", "a"),
+        ("n = nearest(b)\nmovej(list[n])", "b"),
+        ("list.append(a)", "ab"),
+        ("n = own_length(a)", "a"),
+        ("textmsg(own_length(a))", "a"),
+        ("n = length(list)", ""),
+        ("while i < length(list):\ni = i + 1\nend", ""),
+        ("if list.length() > list.capacity():\nend", ""),
+        ("textmsg(str_cat(to_str(a), to_str(length(list))))", ""),
+        ("popup(to_str(a), title=to_str(b))", ""),
+        ("if is_within_safety_limits(a):\nend", ""),
+    ],
+)
+def test_what_the_program_computes_with_is_left(robot, statement, left):
+    result = rewritten(UR, PAIR.format(statement), robot)
+    found = {name: reason for _, name, reason in reasons(result) if name in ("a", "b")}
+    assert set(found) == set(left)
+    assert all(reason.startswith(f'"{name}" is also used in line') for name, reason in found.items())
+    assert {"a", "b"} - set(found) <= set(names_changed(result))
+
+
 @settings(max_examples=60)
 @given(st.data())
 def test_mutilated_programs_end_in_a_listing_or_an_error(robot, sample, data):

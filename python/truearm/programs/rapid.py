@@ -14,7 +14,11 @@ from truearm.programs.source import Source
 from truearm.programs.stepping import lines_before
 from truearm.robot import Robot
 
-MODULE: Final = re.compile(r"^[ \t]*MODULE\b[^\r\n]*(?:\r\n|\n|\r|$)", re.IGNORECASE | re.MULTILINE)
+MODULE: Final = re.compile(
+    r"(?:^|\A\xef\xbb\xbf)[ \t]*MODULE\b[^\r\n]*(?:\r\n|\n|\r|$)", re.IGNORECASE | re.MULTILINE
+)
+REPEATED: Final = frozenset({"v", "z", "wobj", "tload"})
+"""Optional arguments that mean the same for a part of a motion as for the whole."""
 UNUSED_AXES: Final = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 FLY_BY: Final = "z1"
 
@@ -39,10 +43,13 @@ class RAPID:
     def mark(self, source: Source, text: str) -> tuple[int, str]:
         """Behind the line that begins the module."""
         found = MODULE.search(source.text)
-        return (found.end() if found else 0), f"! {text}{source.newline}"
+        return (found.end() if found else source.first), f"! {text}{source.newline}"
 
     def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
-        """The same instruction with a written-out target, passed in a zone; none if it is not on one line."""
+        """The same instruction with a written-out target, passed in a zone.
+
+        None if it is not on one line, or says what does not hold for a part of the way, such as its time.
+        """
         return lines_before(program, moves, self._step)
 
     @staticmethod
@@ -56,8 +63,9 @@ class RAPID:
         if reader.peek() != "movel":
             return None
         reader.take()
-        given = [argument for argument in arguments(reader.rest()) if argument.tokens]
-        if len(given) != 4 or given[0].options:
+        given = arguments(reader.rest())
+        options = {name for argument in given for name in argument.options}
+        if len(given) != 4 or given[0].options or not options <= REPEATED:
             return None
         target, zone = given[0].tokens, given[2].tokens
         cut = [target[0].start - start, target[-1].end - start, zone[0].start - start, zone[-1].end - start]

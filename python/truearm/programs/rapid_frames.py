@@ -91,10 +91,11 @@ class RapidFrames:
     def _value(self, name: str, kind: str) -> Aggregate | str | None:
         """A declared value, why it does not hold, or None where it is not declared."""
         datum = self._declarations.data.get(name.lower())
-        if datum is None or datum.kind != kind:
+        if datum is None:
             return None
-        if self._declarations.changes(name.lower()):
-            return "is changed at run time"
+        why = self._declarations.doubt(name.lower())
+        if why or datum.kind != kind:
+            return why or None
         return datum.value if isinstance(datum.value, Aggregate) else "is not written out in numbers"
 
     def _missing(self, what: str, name: str, why: str) -> Frame:

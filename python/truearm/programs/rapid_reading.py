@@ -16,10 +16,20 @@ from truearm.programs.layouts import Joints, QuaternionPose
 from truearm.programs.lexing import Reader, Token
 from truearm.programs.program import Listed, Program
 from truearm.programs.rapid_configuration import Confdata
-from truearm.programs.rapid_data import Declarations
+from truearm.programs.rapid_data import MODULE, TARGETS, TWICE, Declarations
 from truearm.programs.rapid_frames import RapidFrames
+from truearm.programs.rapid_routines import BEGINNINGS, ENDINGS, given, is_variable
 from truearm.programs.rapid_targets import Meant, RapidTargets
-from truearm.programs.rapid_values import Argument, arguments, pose_of, statement_reader, statements
+from truearm.programs.rapid_values import (
+    Aggregate,
+    Argument,
+    arguments,
+    instruction_place,
+    place_of,
+    pose_of,
+    statement_reader,
+    statements,
+)
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
 from truearm.robot import Robot
@@ -78,10 +88,6 @@ HARMLESS: Final = frozenset(
         "singarea",
         "confj",
         "confl",
-        "incr",
-        "decr",
-        "add",
-        "clear",
         "clkstart",
         "clkstop",
         "clkreset",
@@ -89,11 +95,11 @@ HARMLESS: Final = frozenset(
         "gripload",
     }
 )
-BEGINS: Final = frozenset({"proc", "func", "trap", "module"})
-ENDS: Final = frozenset({"endproc", "endfunc", "endtrap", "endmodule", "error", "undo", "backward", "goto"})
+COUNTING: Final = frozenset({"incr", "decr", "add", "clear"})
+"""Harmless but for what they are given."""
+BEGINS: Final = BEGINNINGS | {"module"}
+ENDS: Final = ENDINGS | {"endmodule", "error", "undo", "backward", "goto"}
 JUMPS: Final = frozenset({"return", "raise", "exit", "exitcycle", "stop", "retry", "trynext", "goto"})
-DISPLACING: Final = frozenset({"pdispon", "pdispset", "pdispoff", "eoffson", "eoffsset", "eoffsoff"})
-INSTRUCTION_WORDS: Final = frozenset(INSTRUCTIONS) | JUMPS | HARMLESS | DISPLACING
 CLOSING: Final = frozenset({"endif", "endfor", "endwhile", "endtest"})
 READ: Final = "the program computes with it"
 PASSED: Final = "it is given to an instruction or routine that is not known here"
@@ -107,6 +113,19 @@ class _Modal:
     displacement: Transform
     problem: str = ""
     load_kg: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Use:
+    """A motion to a target, or to one of several, with what was active there."""
+
+    at: int
+    motion: Motion
+    meant: Meant
+    tool: Argument
+    state: _Modal
+    passed: bool
+    follows: bool
 
 
 class RapidReading:
@@ -132,14 +151,18 @@ class RapidReading:
         start = _Modal(np.eye(4), DISPLACED if self._displaces else "")
         self._flow = Flow(start, _joined, _same)
         self._used: list[int] = []
+        self._uses: list[_Use] = []
+        self._gifts: set[tuple[str, str]] = set()
 
     def program(self) -> Program:
         """The program."""
-        for start, end in statements(self._source.text):
+        for start, end in statements(self._source):
             reader = statement_reader(self._source, start, end)
             self._blocks(reader)
             if not reader.done:
                 self._statement(reader)
+        self._declarations.give(self._gifts)
+        self._move()
         self._settle()
         try:
             configuration = Confdata(Branches.of(self._robot))
@@ -173,6 +196,8 @@ class RapidReading:
         elif word in ENDS:
             reader.take()
             flow.jump()
+            if word in ENDINGS:
+                self._declarations.enter(MODULE)
         elif word in CLOSING:
             reader.take()
             flow.close()
@@ -195,12 +220,13 @@ class RapidReading:
                 reader.take()
 
     def _begin(self, reader: Reader) -> None:
-        word = reader.take().text.lower()
+        word = name = reader.take().text.lower()
         self._flow.restart()
         while not reader.done and reader.peek() != "(" and reader.kind() == "name":
-            reader.take()
+            name = reader.take().text.lower()
             if word in {"proc", "trap", "module"}:
                 break
+        self._declarations.enter(MODULE if word == "module" else name)
         if reader.peek() == "(":
             _skip(reader, "(", ")")
 
@@ -211,14 +237,15 @@ class RapidReading:
             return False
         reader.take()
         stop = {"if": "then", "elseif": "then", "while": "do", "for": "do", "case": ":", "default": ":"}
-        if word == "test":
-            while not reader.done and reader.peek() not in {"case", "default"}:
-                self._read.setdefault(reader.take().text.lower(), READ)
+        condition: list[Token] = []
+        while word == "test" and not reader.done and reader.peek() not in {"case", "default"}:
+            condition.append(reader.take())
         while word in stop and not reader.done:
             token = reader.take()
             if token.text.lower() == stop[word]:
                 break
-            self._read.setdefault(token.text.lower(), READ)
+            condition.append(token)
+        self._mention(condition, READ)
         if word in {"elseif", "else", "case", "default"}:
             flow.otherwise(last=word in {"else", "default"})
         else:
@@ -227,8 +254,8 @@ class RapidReading:
 
     def _short_if(self, reader: Reader) -> None:
         """IF condition instruction; the instruction may or may not be executed."""
-        while not reader.done and reader.peek() not in INSTRUCTION_WORDS:
-            self._read.setdefault(reader.take().text.lower(), READ)
+        behind = instruction_place(reader.rest())
+        self._mention([reader.take() for _ in range(behind)], READ)
         state = self._flow.state
         self._flow.jump()
         if not reader.done:
@@ -259,37 +286,42 @@ class RapidReading:
             self._call(at, word, found)
 
     def _call(self, at: int, word: str, found: Sequence[Token]) -> None:
-        self._mention(found[1:], PASSED)
+        self._mention(found[1:], PASSED, "" if word in JUMPS | HARMLESS else word)
         if word in JUMPS:
             self._flow.jump()
-        elif word not in HARMLESS:
+        elif word not in HARMLESS | COUNTING:
             if word.startswith(("move", "search", "trigg", "arc", "spot", "disp", "paint")):
                 self._list(at, "an instruction that is not known here")
             self._flow.jump()
             if self._displaces:
                 self._flow.state = replace(self._flow.state, problem=DISPLACED)
 
-    def _mention(self, found: Sequence[Token], reason: str) -> None:
-        for token in found:
-            if token.kind == "name":
+    def _mention(self, found: Sequence[Token], reason: str, receiver: str = "") -> None:
+        """Variables are used for something else than a motion; `receiver` as for `given`."""
+        for place, token in enumerate(found):
+            if token.kind == "name" and is_variable(found, place):
                 self._read.setdefault(token.text.lower(), reason)
+        if receiver or any(token.text == "(" for token in found):
+            self._gifts.update(given(found, receiver))
 
     def _displace(self, word: str, found: Sequence[Token]) -> None:
         state = self._flow.state
         if word in {"pdispoff", "eoffsoff"}:
             self._flow.state = replace(state, displacement=np.eye(4), problem="")
             return
-        datum = self._declarations.data.get(found[1].text.lower()) if len(found) == 2 else None
-        pose = pose_of(datum.value) if datum is not None and datum.fixed else None
+        name = found[1].text.lower() if len(found) == 2 else ""
+        datum = self._declarations.data.get(name)
+        certain = self._declarations.visible(name) and not self._declarations.doubt(name)
+        pose = pose_of(datum.value) if datum is not None and datum.fixed and certain else None
         if word == "pdispset" and pose is not None:
             self._flow.state = replace(state, displacement=pose[1], problem="")
         else:
             self._flow.state = replace(state, problem=DISPLACED)
         self._mention(found[1:], READ)
 
-    def _motion(self, at: int, instruction: _Instruction, given: list[Argument]) -> None:
+    def _motion(self, at: int, instruction: _Instruction, stated: list[Argument]) -> None:
         """A motion: its targets, with the tool and the work object of the statement."""
-        plain = [argument for argument in given if argument.tokens]
+        plain = [argument for argument in stated if argument.tokens]
         count = len(instruction.motions)
         if len(plain) <= instruction.tool:
             self._list(at, "it has fewer arguments than this instruction needs")
@@ -300,23 +332,49 @@ class RapidReading:
         for motion, argument in zip(instruction.motions, plain[:count], strict=True):
             passed = blended or motion == Motion.VIA
             self._go(at, motion, self._targets.meant(argument.tokens), plain[instruction.tool], passed=passed)
+            self._mention(self._targets.besides(argument.tokens), READ)
+        for argument in plain[count:]:
+            self._mention(argument.tokens, READ)
+        for argument in stated:
+            for tokens in argument.options.values():
+                self._mention(tokens, READ)
 
     def _go(self, at: int, motion: Motion, meant: Meant | str, tool: Argument, *, passed: bool) -> None:
         if isinstance(meant, str):
             self._list(at, meant)
             self._flow.jump()
             return
-        environment = self._environments.number(self._environment(meant, tool))
+        flow = self._flow
+        follows = flow.certain and len(meant.targets) == 1
+        self._uses.append(_Use(at, motion, meant, tool, flow.state, passed, follows))
         for number in meant.targets:
-            follows = self._flow.certain and len(meant.targets) == 1
-            self._moves.add(number, (0, at), motion, environment=environment, blended=passed, follows=follows)
             self._used.append(number)
-            self._flow.use(len(self._used) - 1)
+            flow.use(len(self._used) - 1)
         if len(meant.targets) > 1:
-            self._flow.jump()
+            flow.jump()
 
-    def _environment(self, meant: Meant, tool: Argument) -> Environment:
-        state = self._flow.state
+    def _list(self, at: int, reason: str) -> None:
+        line, column = self._source.place(at)
+        self._listed.append(Listed(0, line, column, self._source.line_text(line).strip(), reason))
+
+    # At the end.
+
+    def _move(self) -> None:
+        """The moves, once it is known which tools and work objects stay what they are."""
+        for use in self._uses:
+            environment = self._environments.number(self._environment(use))
+            for target in use.meant.targets:
+                self._moves.add(
+                    target,
+                    (0, use.at),
+                    use.motion,
+                    environment=environment,
+                    blended=use.passed,
+                    follows=use.follows,
+                )
+
+    def _environment(self, use: _Use) -> Environment:
+        state, tool, meant = use.state, use.tool, use.meant
         held = self._frames.tool(tool.tokens)
         placed = self._frames.work_object(tool.options.get("wobj", ()))
         mass = self._frames.payload_kg(tool.tokens, tool.options.get("tload", ()))
@@ -330,20 +388,11 @@ class RapidReading:
             payload_kg=mass if state.load_kg is None or mass is None else mass + state.load_kg,
         )
 
-    def _list(self, at: int, reason: str) -> None:
-        line, column = self._source.place(at)
-        self._listed.append(Listed(0, line, column, self._source.line_text(line).strip(), reason))
-
-    # At the end.
-
     def _settle(self) -> None:
         """Targets that are assigned to or computed with, and those that nothing goes to."""
-        for name, kind in self._declarations.kinds.items():
-            if kind not in {"robtarget", "jointtarget"}:
-                continue
-            for key in self._declarations.data:
-                if key == name or key.startswith(f"{name}{{"):
-                    self._settle_one(name, key)
+        for key, datum in self._declarations.data.items():
+            if datum.kind in TARGETS:
+                self._settle_one(key.partition("{")[0], key)
         for use in self._flow.overruled:
             self._fixed.setdefault(self._used[use], DISPLACED)
 
@@ -351,14 +400,15 @@ class RapidReading:
         found = self._targets.stored(key)
         if isinstance(found, str):
             value = self._declarations.data[key].value
-            at = getattr(value, "at", None)
+            written = isinstance(value, Aggregate) or key != name
+            at = place_of(value) if value is not None and written else None
             if at is not None:
                 line, column = self._source.place(at)
                 self._listed.append(Listed(0, line, column, key, found))
         elif name in self._declarations.assigned:
             self._fixed.setdefault(found, "it is assigned at run time")
         elif name in self._declarations.twice:
-            self._fixed.setdefault(found, "it is declared more than once")
+            self._fixed.setdefault(found, f"it {TWICE}")
         elif name in self._read:
             self._fixed.setdefault(found, self._read[name])
 

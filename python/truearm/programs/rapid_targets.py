@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from truearm.programs.environment import Transform
 from truearm.programs.folding import constant
 from truearm.programs.lexing import Reader, Token
-from truearm.programs.rapid_data import Declarations
+from truearm.programs.rapid_data import TWICE, Declarations
 from truearm.programs.rapid_values import (
     UNUSED_AXIS,
     Aggregate,
@@ -25,7 +25,9 @@ from truearm.programs.tables import Number, TargetTable
 
 OF_JOINTS, OF_POSES = 0, 1
 TARGET_KINDS: Final = {"robtarget": OF_POSES, "jointtarget": OF_JOINTS}
+OFFSETS: Final = frozenset({"offs", "reltool"})
 NOT_HERE: Final = "it is not declared in this module"
+OTHER_ROUTINE: Final = "it is declared in another routine alone"
 COMPUTED: Final = "its target is computed at run time"
 EXTERNAL: Final = "external axes"
 DEEPEST: Final = 10
@@ -62,14 +64,27 @@ class RapidTargets:
         head = found[0].text.lower()
         if head == "[":
             return self._written(found)
-        if head in {"offs", "reltool"} and len(found) > 2 and found[1].text == "(":
+        if _is_offset(found):
             return self._offset(head, arguments(found[2:-1]), depth)
-        if len(found) > 1 and found[1].text == "{":
-            return self._element(head, found[2:-1])
-        if len(found) > 1:
+        if len(found) > 1 and found[1].text != "{":
             return COMPUTED
-        number = self.stored(head)
-        return number if isinstance(number, str) else Meant((number,), np.eye(4), np.eye(4))
+        if not self._declarations.visible(head):
+            return OTHER_ROUTINE
+        return self._element(head, found[2:-1]) if len(found) > 1 else self._meant(self.stored(head))
+
+    @staticmethod
+    def besides(found: Sequence[Token]) -> Sequence[Token]:
+        """The tokens of an argument but for the name of the target that it goes to."""
+        others: list[Token] = []
+        for _ in range(DEEPEST):
+            if not _is_offset(found):
+                break
+            inner = arguments(found[2:-1])[0].tokens
+            others += found[2 + len(inner) : -1]
+            found = inner
+        if len(found) > 1 and found[1].text == "{":
+            found = found[1:]
+        return others if len(found) == 1 else [*found, *others]
 
     def stored(self, name: str) -> int | str:
         """The number of a declared target, or why it has none."""
@@ -96,19 +111,21 @@ class RapidTargets:
     def _written(self, found: Sequence[Token]) -> Meant | str:
         value = aggregate(Reader(self._source, list(found), found[-1].end))
         kind = "jointtarget" if len(value.values) == 2 else "robtarget"
-        number = self._add(kind, value, "")
-        return number if isinstance(number, str) else Meant((number,), np.eye(4), np.eye(4))
+        return self._meant(self._add(kind, value, ""))
+
+    @staticmethod
+    def _meant(*numbers: int | str) -> Meant | str:
+        """Those of some targets that are known; if none is, why the first is not."""
+        targets = tuple(number for number in numbers if not isinstance(number, str))
+        why = next((number for number in numbers if isinstance(number, str)), NOT_HERE)
+        return Meant(targets, np.eye(4), np.eye(4)) if targets else why
 
     def _element(self, name: str, index: Sequence[Token]) -> Meant | str:
         place = constant(index, self._declarations.numbers)
-        keys = [key for key in self._declarations.data if key.startswith(f"{name}{{")]
         if place is not None:
-            keys = [key for key in keys if key == f"{name}{{{place:.0f}}}"]
-        numbers = [self.stored(key) for key in keys]
-        targets = tuple(number for number in numbers if not isinstance(number, str))
-        if not targets or len(targets) < len(numbers):
-            return next((number for number in numbers if isinstance(number, str)), NOT_HERE)
-        return Meant(targets, np.eye(4), np.eye(4))
+            return self._meant(self.stored(f"{name}{{{place:.0f}}}"))
+        keys = [key for key in self._declarations.data if key.startswith(f"{name}{{")]
+        return self._meant(*(self.stored(key) for key in keys))
 
     def _offset(self, function: str, given: list[Argument], depth: int) -> Meant | str:
         inner = self.meant(given[0].tokens, depth + 1) if given else COMPUTED
@@ -120,7 +137,7 @@ class RapidTargets:
         shift = [part for part in parts if part is not None]
         angles = {name: turn for name, turn in turns.items() if turn is not None}
         if len(shift) != 3 or len(given) != 4 or len(angles) < len(turns):
-            return Meant(inner.targets, inner.before, inner.after, "its offset is computed at run time")
+            return Meant(inner.targets, inner.before, inner.after, self._why_not(given[1:]))
         moved = np.eye(4)
         moved[:3, 3] = np.array(shift) * 1e-3
         if function == "offs":
@@ -128,6 +145,18 @@ class RapidTargets:
         order = [angles.get(name, 0.0) for name in ("rx", "ry", "rz")]
         moved[:3, :3] = Rotation.from_euler("XYZ", order, degrees=True).as_matrix()
         return Meant(inner.targets, inner.before, inner.after @ moved, inner.problem)
+
+    def _why_not(self, given: Sequence[Argument]) -> str:
+        """Why an offset is not known."""
+        for argument in given:
+            for token in (*argument.tokens, *(token for more in argument.options.values() for token in more)):
+                if token.text.lower() in self._declarations.twice:
+                    return f'"{token.text}" in its offset {TWICE}'
+        return "its offset is computed at run time"
+
+
+def _is_offset(found: Sequence[Token]) -> bool:
+    return len(found) > 2 and found[0].text.lower() in OFFSETS and found[1].text == "("
 
 
 def _parts(value: Value, counts: tuple[int, ...]) -> list[list[Number]] | str:

@@ -22,6 +22,8 @@ TOKENS: Final = re.compile(
 ENDS: Final = re.compile(r'"[^"\r\n]*"?|![^\r\n]*|(?P<end>;)')
 UNUSED_AXIS: Final = 8.9e9
 DEEPEST: Final = 20
+OPERATORS: Final = frozenset({"and", "or", "xor", "not", "div", "mod"})
+CLOSING: Final = frozenset({")", "]", "}"})
 
 
 @dataclass(frozen=True)
@@ -60,10 +62,10 @@ class Argument:
     options: dict[str, tuple[Token, ...]]
 
 
-def statements(text: str) -> Iterator[tuple[int, int]]:
+def statements(source: Source) -> Iterator[tuple[int, int]]:
     """Where each statement begins, and the offset behind its semicolon."""
-    start = 0
-    for found in ENDS.finditer(text):
+    text, start = source.text, source.first
+    for found in ENDS.finditer(text, start):
         if found.lastgroup == "end":
             yield start, found.end()
             start = found.end()
@@ -97,7 +99,53 @@ def aggregate(reader: Reader, depth: int = 0) -> Aggregate:
 
 def arguments(found: Sequence[Token]) -> list[Argument]:
     """The arguments of an instruction, split at commas that stand in no bracket."""
-    return [_argument(part) for part in _split(found, ",")]
+    return [_argument(part) for part in split(found, ",")]
+
+
+def split(found: Sequence[Token], *marks: str) -> list[tuple[Token, ...]]:
+    """The parts between marks that stand in no bracket."""
+    parts: list[list[Token]] = [[]]
+    level = 0
+    for token in found:
+        level += (token.text in "([{") - (token.text in ")]}")
+        if level == 0 and token.text in marks:
+            parts.append([])
+        else:
+            parts[-1].append(token)
+    return [tuple(part) for part in parts]
+
+
+def instruction_place(found: Sequence[Token]) -> int:
+    """Where the instruction begins behind IF and its condition: where no operator joins it to an operand."""
+    for place in range(2, len(found)):
+        before, token = found[place - 1], found[place]
+        operand = before.kind in {"number", "string"} or before.text in CLOSING or _is_operand(before)
+        if operand and (token.text == "%" or _is_operand(token)):
+            return place
+    return len(found)
+
+
+def place_of(value: Value) -> int | None:
+    """Offset of the first character of a value; None of an empty one."""
+    if isinstance(value, Aggregate):
+        return value.at
+    if isinstance(value, Number):
+        return value.start
+    return value[0].start if value else None
+
+
+def same_value(one: Value | None, other: Value | None) -> bool:
+    """Whether two values are written alike; names in them are taken for what they are called."""
+    if isinstance(one, Aggregate) and isinstance(other, Aggregate):
+        pairs = zip(one.values, other.values, strict=False)
+        return len(one.values) == len(other.values) and all(same_value(*pair) for pair in pairs)
+    if isinstance(one, Number) and isinstance(other, Number):
+        return one.value == other.value
+    texts = [
+        None if isinstance(value, Number | Aggregate) else [token.text.lower() for token in value or ()]
+        for value in (one, other)
+    ]
+    return texts[0] is not None and texts[0] == texts[1]
 
 
 def pose_of(value: Value | None) -> tuple[list[Number], Transform] | None:
@@ -137,20 +185,12 @@ def _value(reader: Reader, depth: int) -> Value:
     return tuple(others)
 
 
-def _split(found: Sequence[Token], mark: str) -> list[tuple[Token, ...]]:
-    parts: list[list[Token]] = [[]]
-    level = 0
-    for token in found:
-        level += (token.text in "([{") - (token.text in ")]}")
-        if level == 0 and token.text == mark:
-            parts.append([])
-        else:
-            parts[-1].append(token)
-    return [tuple(part) for part in parts]
+def _is_operand(token: Token) -> bool:
+    return token.kind == "name" and token.text.lower() not in OPERATORS
 
 
 def _argument(part: Sequence[Token]) -> Argument:
-    main, *rest = _split(part, "\\")
+    main, *rest = split(part, "\\")
     options = {}
     for option in rest:
         if option:

@@ -66,8 +66,8 @@ class UrScript:
     @staticmethod
     def _step(program: Program, step: LinearStep) -> str | None:
         source = program.sources[step.file]
-        start, end = source.line_starts[step.line - 1 : step.line + 1] or (0, 0)
-        found = list(statements(source, start, end))
+        start = source.line_starts[step.line - 1]
+        found = list(statements(source, start, start + len(source.line_text(step.line))))
         try:
             call = expression(found[0].tokens) if len(found) == 1 else None
         except NotReadable:

@@ -1,7 +1,9 @@
 """The first reading of a URScript program: its variables, motions, and what changes TCP and payload."""
 
+import re
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from typing import Final, NamedTuple
 
 from truearm.programs.environment import Frame
@@ -33,7 +35,17 @@ UNTRACKED: Final = {
 SHIFTING: Final = frozenset(
     {"path_offset_enable", "path_offset_set", "track_conveyor_linear", "track_conveyor_circular"}
 )
-HARMLESS: Final = frozenset({"textmsg", "popup", "pose_dist", "point_dist", "get_inverse_kin_has_solution"})
+COUNTING: Final = frozenset({"length", "capacity", "size", "get_list_length"})
+"""They tell how many elements a list has, the first two also as path.length()."""
+HARMLESS: Final = COUNTING | {
+    "textmsg",
+    "popup",
+    "pose_dist",
+    "point_dist",
+    "get_inverse_kin_has_solution",
+    "is_within_safety_limits",
+}
+DEFINED: Final = re.compile(rb"\b(?:def|thread|sec)[ \t]+(\w+)")
 PAYLOADS: Final = frozenset({"set_payload", "set_target_payload", "set_payload_mass"})
 FUNCTIONS: Final = frozenset({"def", "thread", "sec"})
 LONGEST_NAME: Final = 48
@@ -81,12 +93,23 @@ class Collected:
                 self._statement(statement)
         self._resolve()
 
+    @cached_property
+    def _own(self) -> frozenset[str]:
+        """Names of the program's own functions."""
+        return frozenset(name.decode("ascii") for name in DEFINED.findall(self._source.content))
+
     def leave(self, at: int, name: str, reason: str) -> None:
         """Something is left as it is, and where the arm comes from behind it is not known."""
         line, column = self._source.place(at)
         shown = name or " ".join(self._source.line_text(line).split())[:LONGEST_NAME]
         self.listed.append(Listed(0, line, column, shown, reason))
         self.breaks.append(at)
+
+    def compute(self, node: Node, at: int) -> None:
+        """The program computes a motion's target, or its numbers, from the variables in `node`."""
+        names = list(_names([node]))
+        self._note(names, at)
+        self._spread(self.elsewhere, names)
 
     def steps(self, frames: Frames) -> Iterator[Step]:
         """The steps, with the TCPs and payloads that they set."""
@@ -169,6 +192,7 @@ class Collected:
             self._used(tokens, statement.at)
             return
         self.constants.assign(name, value, line)
+        self._note(_of_numbers(value), statement.at)
         used = self._used(tokens, None)
         self._made_of[name] = (statement.at, [*used, *self._made_of.get(name, (0, []))[1]])
 
@@ -199,29 +223,35 @@ class Collected:
                 self.leave(node.start, "", "it has no target")
             else:
                 self.motions.append(MotionCall(node.start, target, motion, _blended(node)))
+                self._note(_of_numbers(target), node.start)
         targets = [target for target, _ in pairs]
         others = [part for part in node.parts if not any(part is target for target in targets)]
-        for name in _names(others):
-            self.elsewhere.setdefault(name, node.start)
+        self._note(_names(others), node.start)
 
     def _used(self, tokens: Sequence[Token], at: int | None) -> list[str]:
         """Take note of calls among `tokens`, and of the variables if `at` says where; those variables."""
         used: list[str] = []
-        behind: list[Token | None] = [*tokens[1:], None]
+        texts = [token.text for token in tokens]
         skip_to = -1
-        for place, (token, following) in enumerate(zip(tokens, behind, strict=False)):
-            if token.kind != "name" or place < skip_to:
+        for place, token in enumerate(tokens):
+            if token.kind != "name":
                 continue
-            if following is None or following.text != "(":
+            if texts[place + 1 : place + 2] == ["("]:
+                if token.text not in HARMLESS or token.text in self._own:
+                    self._called(token.text, token.start)
+                elif place > skip_to:
+                    closing = _closing(tokens, place + 1)
+                    skip_to = closing if self._own.isdisjoint(texts[place:closing]) else place
+            elif place > skip_to and not _is_counted(texts[place + 1 : place + 4]):
                 used.append(token.text)
-            elif token.text in HARMLESS:
-                skip_to = _closing(tokens, place + 1)
-            else:
-                self._called(token.text, token.start)
         if at is not None:
-            for name in used:
-                self.elsewhere.setdefault(name, at)
+            self._note(used, at)
         return used
+
+    def _note(self, names: Iterable[str], at: int) -> None:
+        """Variables are used for something else than a motion."""
+        for name in names:
+            self.elsewhere.setdefault(name, at)
 
     def _called(self, name: str, at: int) -> None:
         if name in MOTIONS:
@@ -243,17 +273,21 @@ class Collected:
         self._steps = [step for step in self._steps if step.kind != "call" or step.name in own]
         # The body of an `if` is entered from before it; what follows it, and its other branches, may not be.
         self.breaks.extend(step.at for step in self._steps if step.kind not in ("tcp", "payload", "if"))
-        moved_to = set(_names([motion.target for motion in self.motions]))
-        pending = list(self._made_of)
-        while pending:
-            name = pending.pop()
-            at, used = self._made_of[name]
+        moved_to = dict.fromkeys(_names([motion.target for motion in self.motions]), 0)
+        self._spread(moved_to, list(moved_to))
+        for name, (at, _) in self._made_of.items():
             if name not in moved_to:
                 self.elsewhere.setdefault(name, at)
-            if name in self.elsewhere:
-                fresh = [other for other in used if other not in self.elsewhere]
-                self.elsewhere |= dict.fromkeys(fresh, self.elsewhere[name])
-                pending += [other for other in fresh if other in self._made_of]
+        self._spread(self.elsewhere, list(self.elsewhere))
+
+    def _spread(self, places: dict[str, int], pending: list[str]) -> None:
+        """What some variables are made of is used where they are."""
+        while pending:
+            name = pending.pop()
+            for other in self._made_of.get(name, (0, []))[1]:
+                if other not in places:
+                    places[other] = places[name]
+                    pending.append(other)
 
 
 def _blended(node: Node) -> bool:
@@ -267,6 +301,18 @@ def _names(nodes: Iterable[Node]) -> Iterator[str]:
     """Variables in expressions."""
     for node in nodes:
         yield from (part.text for part in node.walk() if part.kind == "name")
+
+
+def _of_numbers(node: Node) -> Iterator[str]:
+    """Variables that the numbers of poses and places in lists are computed from."""
+    for part in node.walk():
+        if part.kind in ("pose", "index"):
+            yield from _names(part.parts[part.kind == "index" :])
+
+
+def _is_counted(behind: Sequence[str]) -> bool:
+    """Whether what follows a name asks for the number of its elements, as in path.length()."""
+    return len(behind) == 3 and behind[0] == "." and behind[1] in COUNTING and behind[2] == "("
 
 
 def _closing(tokens: Sequence[Token], opening: int) -> int:

@@ -97,6 +97,20 @@ class Constants:
             raise RunTime("there is no such element")
         return node
 
+    def holder(self, node: Node) -> str:
+        """The variable that is assigned what a known `node` stands for; empty where `node` itself says it.
+
+        Raises:
+            RunTime: As for :meth:`literal`.
+        """
+        if node.kind == "name":
+            return self.holder(self.value(node.text)) or node.text
+        if node.kind == "index" and len(node.parts) == 2:
+            whole = self.literal(node.parts[0])
+            element = whole.parts[int(self.number(node.parts[1]))]
+            return self.holder(element) or self.holder(node.parts[0])
+        return ""
+
     def number(self, node: Node, depth: int = 0) -> float:
         """The value of a constant expression.
 

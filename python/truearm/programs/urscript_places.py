@@ -96,8 +96,7 @@ class Places:
             return self.of(literal, depth + 1)
         if literal.kind not in ("list", "pose") or len(literal.parts) != AXES:
             raise RunTime("its target is computed when the program runs")
-        name = "" if node is literal else node.text or next((n.text for n in node.walk() if n.text), "")
-        return Place(literal, name)
+        return Place(literal, self._constants.holder(node))
 
     def every(self, node: Node) -> Iterator[Place]:
         """The places of a target: one, or each element of a list that is indexed at run time.
@@ -107,11 +106,19 @@ class Places:
         """
         if node.kind == "index" and len(node.parts) == 2 and not self._is_number(node.parts[1]):
             whole = self._constants.literal(node.parts[0])
-            if whole.kind == "list" and whole.parts and all(p.kind in ("list", "pose") for p in whole.parts):
+            if whole.kind == "list" and whole.parts and all(map(self._is_place, whole.parts)):
+                holder = self._constants.holder(node.parts[0])
                 for part in whole.parts:
-                    yield replace(self.of(part), name=node.parts[0].text)
+                    place = self.of(part)
+                    yield place if place.name else replace(place, name=holder)
                 return
         yield self.of(node)
+
+    def _is_place(self, node: Node) -> bool:
+        try:
+            return self._constants.literal(node).kind in ("list", "pose")
+        except RunTime:
+            return False
 
     def _is_number(self, node: Node) -> bool:
         try:

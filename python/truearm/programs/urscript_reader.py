@@ -182,10 +182,14 @@ class Reader:
 
     def _places(self, places: Places, motion: MotionCall) -> list[Place]:
         try:
-            return list(places.every(motion.target))
+            found = list(places.every(motion.target))
         except RunTime as unknown:
             self._found.leave(motion.at, "", unknown.reason)
+            self._found.compute(motion.target, motion.at)
             return []
+        for place in found:
+            self._found.compute(place.leaf, motion.at)
+        return found
 
     def _use(self, motion: MotionCall, place: Place, frames: Iterable[int], *, alone: bool) -> None:
         state = self._states[int(self._state(np.array(motion.at)))]

@@ -105,7 +105,9 @@ def statements(source: Source, start: int, end: int) -> Iterator[Statement]:
     """The statements of a text from `start` to `end`, which are ends of lines."""
     tokens: list[Token] = []
     depth = 0
-    for match in _TOKEN.finditer(source.part(start, end)):
+    start = max(start, source.first)
+    text = source.part(start, end)
+    for match in _TOKEN.finditer(text.replace("\r", "\n") if source.newline == "\r" else text):
         kind = match.lastgroup or ""
         if kind in _SKIPPED or (kind == "newline" and depth > 0):
             continue
