@@ -13,7 +13,16 @@ from truearm.calibration import Calibration
 from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.doubts import NO_HELP, Outliers, doubts, mounting, on_a_grid, stood_still
+from truearm.doubts import (
+    NO_HELP,
+    Outliers,
+    constant_is_better,
+    doubts,
+    mounting,
+    on_a_grid,
+    stated_too_large,
+    stood_still,
+)
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError, list_outliers
 from truearm.fitted_rows import FittedRows, sides
@@ -116,7 +125,12 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     rows = [] if found.rows is None else found.rows.outliers()
     means = {} if found.held is None or found.selection.distances else found.held.means_without_mm(rows)
     outliers = Outliers(list_outliers(rows, several=len(data.files) > 1), means)
-    doubted = doubts(task.arm, found.models, found.validation, found.model_name, outliers)
+    judged, best = found.validation, found.model_name
+    doubted = [
+        *doubts(task.arm, found.models, judged, best, outliers),
+        *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
+        *constant_is_better(judged, best),
+    ]
     if any(notice.kind == NO_HELP for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_shifted(task, data) or fits_otherwise(task, data)

@@ -115,8 +115,9 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     fitting = [convention for convention, off in found.items() if off <= max(AS_WELL * best, EXACT_M)]
     named, *others = sorted(fitting, key=lambda convention: (convention.order, found[convention]))
     off, instead = (f"{value * MM_PER_METRE:.3g} mm" for value in (found[named], before))
+    instead = f" in place of {instead}" if np.isfinite(before) else ""
     text = (
-        f"The measurements fit {robot.name}, with a median of {off} in place of {instead} before any "
+        f"The measurements fit {robot.name}, with a median of {off}{instead} before any "
         f"calibration, if {named.words(robot)}. Put that right in a robot file of the arm or "
         f"in the measurements, and calibrate again.{_words_of_others(robot, others)}"
     )

@@ -15,8 +15,8 @@ from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
 from truearm.stillness import still_warning
-from truearm.units import to_si
-from truearm.validation import Validation
+from truearm.units import MM_PER_METRE, to_si
+from truearm.validation import Validation, mean_distance
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +33,11 @@ NEAR_MM: Final = 0.5
 """Wrong data, or those of another arm, are never so near the nominal model."""
 MOST_NAMED: Final = 4
 UPRIGHT: Final = (0.0, 0.0, 1.0)
+SAME: Final = 0.97
+"""Mean errors whose ratio is between it and one are as good as the same."""
+UNLIKELY: Final = 0.5
+"""Noise leaves no mean error of so small a part of its own."""
+STATED_TOO_LARGE: Final = "stated_too_large"
 NO_HELP: Final = "no_help"
 NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
@@ -76,6 +81,41 @@ def doubts(
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, models[CONSTANT]),
     ]
+
+
+def stated_too_large(
+    sigma_m: Floats | None, validation: Validation, best: str, *, distances: bool
+) -> list[Notice]:
+    """A warning where held-out rows are far nearer than the noise that rows (n,) state lets them be."""
+    stated = 0.0 if sigma_m is None else float(np.nan_to_num(sigma_m).mean()) * MM_PER_METRE
+    left, noise = validation.holdout[best].position.mean, mean_distance(stated, distances=distances)
+    if left > UNLIKELY * noise:
+        return []
+    text = (
+        f"The column of sigma says {stated:.3g} mm on average, which alone would leave a mean error of "
+        f"{noise:.3g} mm; on {validation.judged} rows it is {left:.3g} mm. So sigma is too large, and what "
+        "varies is taken for noise. Correct it (sigma is in m, sigma_mm in mm), or leave the column out."
+    )
+    return [Notice(STATED_TOO_LARGE, text)]
+
+
+def constants_do_better(mean_mm: float, constant_mm: float) -> bool:
+    """Whether a mean error is larger than that of constant parameters, by more than hardly anything."""
+    return SAME * mean_mm > constant_mm
+
+
+def constant_is_better(validation: Validation, best: str) -> list[Notice]:
+    """A notice where what varies was learnt and the constants alone are nearer."""
+    means = {name: found.position.mean for name, found in validation.holdout.items()}
+    if best in {NOMINAL, CONSTANT} or not helps(means[NOMINAL], means[best]):
+        return []
+    if not constants_do_better(means[best], means[CONSTANT]):
+        return []
+    text = (
+        f"Constant parameters do better on {validation.judged} rows: a mean error of {means[CONSTANT]:.4g} "
+        f"mm against {means[best]:.4g} mm. Give --model constant, or measure more poses."
+    )
+    return [Notice("constant_better", text)]
 
 
 def mounting(variable: VariableDetails | None) -> list[Notice]:

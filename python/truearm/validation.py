@@ -1,8 +1,9 @@
 """Errors of a model on measured rows, and their statistics."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,10 @@ Floats = NDArray[np.float64]
 
 MILLI = 1e-3
 FEW_HELD = 30
+MEAN_LENGTH: Final = math.sqrt(8.0 / math.pi)
+"""Mean length of a vector of three normal coordinates of deviation one: the Maxwell distribution's."""
+MEAN_SIZE: Final = math.sqrt(2.0 / math.pi)
+"""The same of one coordinate, as of distances."""
 
 
 @dataclass(frozen=True)
@@ -195,6 +200,11 @@ class Validation:
 def _poses(which: str, poses: int, rows: int) -> str:
     shots = "" if rows == poses else f" ({count_of(rows, 'row')})"
     return count_of(poses, f"{which} pose") + shots
+
+
+def mean_distance(std: float, *, distances: bool) -> float:
+    """Mean error of points, or of distances, whose coordinates have a standard deviation."""
+    return (MEAN_SIZE if distances else MEAN_LENGTH) * std
 
 
 def row_errors(

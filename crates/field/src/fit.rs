@@ -110,8 +110,9 @@ const ROWS_FOR_POLISH: usize = 3000;
 const ROWS_FOR_EXTRAPOLATION: usize = 1200;
 const SEARCH: Limits = Limits { evaluations: 60, gain: 0.02 };
 const POLISH: Limits = Limits { evaluations: 12, gain: 0.05 };
-/// Reweightings of outliers at the most.
+/// Reweightings of outliers at the most, and as long as those that are found spoil what was found with them.
 const REWEIGHTINGS: usize = 2;
+const REWEIGHTINGS_OF_SPOILED: usize = 5;
 /// The field leaves this share of the constants' residual to noise at the start of the search.
 const NOISE_SHARE: f64 = 0.3;
 
@@ -133,12 +134,19 @@ pub fn fit_field(
     let mut judged = search.judge(search.posterior(&training, &hyper)?)?;
     training = judged.posterior.training().clone();
     let large = training.row_count() > ROWS_FOR_POLISH;
-    for _ in 0..if large { 1 } else { REWEIGHTINGS } {
-        if !judged.judgement.reweigh(&mut training) {
+    for round in 0..REWEIGHTINGS_OF_SPOILED {
+        let changed = judged.judgement.reweigh(&mut training);
+        let spoilt = judged.judgement.spoils(&changed);
+        if changed.is_empty() || (!spoilt && round >= if large { 1 } else { REWEIGHTINGS }) {
             break;
         }
-        let Judged { posterior, judgement, .. } = judged;
-        let posterior = if (options.rough || large) && !judgement.spoils() {
+        let Judged { posterior, .. } = judged;
+        let posterior = if spoilt && options.hyper.is_none() {
+            // Up, joints of the larger blocks and widths were chosen with the outliers as well.
+            drop(posterior);
+            hyper = search.anew(&training, noise)?;
+            search.posterior(&training, &hyper)?
+        } else if options.rough || large {
             // Where few rows of many change, hyper-parameters stay.
             posterior.reweighed(training.weight.clone(), &options.cancel)?
         } else {
@@ -214,13 +222,19 @@ impl Search<'_> {
                 (self.curvature, self.evidence) = (near.curvature, near.evidence);
                 near.hyper
             }
-            None => self.searched(training, noise)?,
+            None => return self.anew(training, noise),
         };
-        match (self.options.rough, self.options.near.is_some()) {
-            (true, true) => self.again(&middle_of(training), begun),
-            (true, false) => Ok(begun),
-            (false, _) => self.finished(training, begun),
+        if self.options.rough {
+            return self.again(&middle_of(training), begun);
         }
+        self.finished(training, begun)
+    }
+
+    /// Hyper-parameters from nothing but the rows.
+    fn anew(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
+        self.curvature = None;
+        let found = self.searched(training, noise)?;
+        if self.options.rough { Ok(found) } else { self.finished(training, found) }
     }
 
     /// Hyper-parameters for all poses from those that a search found.
@@ -231,7 +245,7 @@ impl Search<'_> {
         if part || !hyper.waves.is_empty() {
             hyper = self.again(training, hyper)?;
         }
-        let large = part_of(training, ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
+        let large = part_of(&training.trusted(), ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
         hyper.extrapolation =
             extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         Ok(hyper)
@@ -252,9 +266,6 @@ impl Search<'_> {
     fn cleaned(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
         if self.options.hyper.is_some() {
             return Ok(hyper);
-        }
-        if self.options.rough {
-            return self.again(&middle_of(training), hyper);
         }
         let hyper = self.again(training, hyper)?;
         let waves = self.waves(training, &hyper)?;

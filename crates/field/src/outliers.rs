@@ -91,6 +91,12 @@ fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 }
 
 impl Training {
+    /// The poses that take part with their full weight.
+    pub fn trusted(&self) -> Training {
+        let poses: Vec<usize> = (0..self.pose_count()).filter(|&pose| is_trusted(self, pose)).collect();
+        self.select(&poses)
+    }
+
     /// Takes the weight of some poses away until they are judged.
     pub fn take_weight(&mut self, poses: &[usize]) {
         for &pose in poses {
@@ -102,15 +108,16 @@ impl Training {
 }
 
 impl Judgement {
-    /// Takes the weight of the outliers away and gives it back to poses judged innocent; says whether anything changed.
-    pub fn reweigh(&self, training: &mut Training) -> bool {
-        let mut changed = false;
+    /// Takes the weight of the outliers away and gives it back to poses judged innocent; the poses of which this is news.
+    pub fn reweigh(&self, training: &mut Training) -> Vec<usize> {
+        let mut changed = Vec::new();
         for pose in 0..training.pose_count() {
             let weight = if self.score[pose] > 1.0 { NEGLIGIBLE / self.score[pose] } else { 1.0 };
-            for row in training.rows(pose) {
-                changed |= (training.weight[row] < 1.0) != (weight < 1.0);
-                training.weight[row] = weight;
+            let rows = training.rows(pose);
+            if rows.clone().any(|row| (training.weight[row] < 1.0) != (weight < 1.0)) {
+                changed.push(pose);
             }
+            training.weight[rows].fill(weight);
         }
         changed
     }
@@ -123,11 +130,13 @@ impl Judgement {
         Judgement { distance: of(&self.distance), outliers, score, inflation: self.inflation }
     }
 
-    /// Whether hyper-parameters that were found with the outliers among the poses cannot stay.
-    pub fn spoils(&self) -> bool {
-        let square = |pose: &usize| self.distance[*pose].powi(2);
-        let of_outliers: f64 = self.outliers.iter().map(square).sum();
-        of_outliers > SPOILING * (0..self.distance.len()).map(|pose| square(&pose)).sum::<f64>()
+    /// Whether hyper-parameters that were found with these poses judged otherwise cannot stay.
+    pub fn spoils(&self, changed: &[usize]) -> bool {
+        let square = |pose: usize| self.distance[pose].powi(2);
+        let of_changed: f64 = changed.iter().map(|&pose| square(pose)).sum();
+        let innocent =
+            (0..self.distance.len()).filter(|pose| self.score[*pose] <= 1.0 && !changed.contains(pose));
+        of_changed > SPOILING * (of_changed + innocent.map(square).sum::<f64>())
     }
 }
 

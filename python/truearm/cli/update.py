@@ -164,7 +164,8 @@ def _verdict(found: "Update") -> str:
         )
     return (
         f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "
-        "Measure again and calibrate."
+        "Measure again and calibrate. If the measuring device scatters more than when the arm was "
+        "calibrated, say so in a column sigma_mm and update again."
     )
 
 

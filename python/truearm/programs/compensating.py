@@ -12,7 +12,13 @@ from truearm.programs.declaring import declared_controller, refuse_contradiction
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
-from truearm.programs.notices import frames_notices, payload_notices, still_notices, tool_notices
+from truearm.programs.notices import (
+    frames_notices,
+    payload_notices,
+    still_notices,
+    tool_notices,
+    update_notices,
+)
 from truearm.programs.program import Language
 from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
 from truearm.robot import Robot
@@ -70,6 +76,7 @@ def compensate_program(
         [
             *frames_notices(program, known),
             *payload_notices(program, calibration.robot),
+            *update_notices(calibration),
             *still_notices(done, calibration),
             *tool_notices(done, calibration),
             *(Notice("feature_range", f"{each}: corrections are guesses there.") for each in beyond),

@@ -62,6 +62,18 @@ def _unasked(program: Program, frames: Frames, kind: Kind) -> Notice | None:
     )
 
 
+def update_notices(calibration: Calibration) -> list[Notice]:
+    """A warning where an update found that the calibration no longer fits its arm."""
+    revision = calibration.revision
+    if revision is None or revision.report["verdict"] != "field":
+        return []
+    text = (
+        "The update that this calibration is of found that it no longer fits the arm: what it says of its "
+        "standard deviation does not hold, and corrections may miss. Measure again and calibrate."
+    )
+    return [Notice("update", text)]
+
+
 def still_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
     """Joints that stood still while the arm was measured, and move in the program."""
     rows, joints = calibration.learned_from, calibration.robot.joints

@@ -73,6 +73,10 @@ def acceptance_poses(candidates: Candidates, count: int, options: UpdateOptions 
     rows, values = choose_telling(unchanged + flat @ flat.T, unchanged, core, count)
     picked = np.array(rows, dtype=np.int64)
     told = _told(candidates, unchanged, columns, picked)
+    # An update keeps what the poses do not tell as it was; what else they tell of is then told better.
+    is_joint = np.array([name.startswith("joint") for name in names])
+    free = ~is_joint | (told < TOLD)
+    told[free] = _told(candidates, unchanged, columns[:, :, free], picked)
     return Acceptance(picked, np.array(values), _noticed(candidates.calibration.arm, chosen, names, told))
 
 

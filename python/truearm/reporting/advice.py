@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from truearm.doubts import SAME, STATED_TOO_LARGE, constants_do_better
 from truearm.errors import count_of
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
@@ -20,7 +21,6 @@ AT_THE_FLOOR: Final = 1.25
 LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
-SAME: Final = 0.97
 ROWS_NAMED: Final = 5
 SETUP_WORDS: Final = "the place of device or target"
 
@@ -87,8 +87,14 @@ def _left_out(facts: Facts) -> Iterator[Advice]:
         yield Advice("outliers", "Check the outliers.", words, 2.0 * facts.mean_mm())
 
 
+def _stated_sigma(facts: Facts) -> Iterator[Advice]:
+    words = [str(notice) for notice in facts.calibration.notices if notice.kind == STATED_TOO_LARGE]
+    if words:
+        yield Advice(STATED_TOO_LARGE, "Correct the column of sigma.", words[0], 2.0 * facts.mean_mm())
+
+
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
-    if facts.best != VARIABLE:
+    if facts.best != VARIABLE or any(_stated_sigma(facts)):
         return
     floor, mean = distance_at_floor_mm(facts), facts.mean_mm()
     left, noise = short(mean, floor)
@@ -236,7 +242,7 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
             "deviations."
         )
         yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
-    elif facts.best == VARIABLE and SAME * mean > constant:
+    elif facts.best == VARIABLE and constants_do_better(mean, constant):
         left, before = short(mean, constant)
         words = (
             f"The mean error is {left} mm with the variable model and {before} mm with constant parameters: "
@@ -258,6 +264,7 @@ RULES: Final = (
     _stood_still,
     _warm_up,
     _on_a_grid,
+    _stated_sigma,
     _noise_or_poses,
     _tail,
     _unseen,

@@ -174,11 +174,16 @@ class _Found:
         still = estimate(scene, spread, scene.unchanged(start), anew)
         judge = Judge(level, scale_freedom(self.calibration))
         changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
+        verdict = _verdict(changed, rest, level)
+        if verdict == "field":
+            # What is left says itself how much it scatters, and the calibration no longer does.
+            found = replace(found, covariance=found.covariance * max(rest.squares / rest.freedom, 1.0))
+            judge = replace(judge, known=min(judge.known, rest.freedom))
         frames, tools = motions(scene, found, judge)
         judged = left_out_errors(self.calibration, scene, found, spread)
         told = Update(
             calibration=self.calibration,
-            verdict=_verdict(changed, rest, level),
+            verdict=verdict,
             level=level,
             offsets=offsets(scene, found, self.held, judge),
             frames=frames,
