@@ -354,19 +354,6 @@ def test_other_kinds_of_arms(name):
     assert errors["variable"].position.mean < 1.05 * errors["constant"].position.mean
 
 
-def test_outliers_are_listed_and_kept_in_the_held_out_errors():
-    arm = VirtualArm.paper(seed=2)
-    table = arm.measure_table(arm.poses(120))
-    order = np.random.default_rng(7).permutation(120)
-    trained, held = order[3], order[100]
-    table.loc[[trained, held], "x"] += 0.02
-    calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table))
-    assert {entry["row"] for entry in calibration.summary["outliers"][:2]} == {trained + 1, held + 1}
-    assert calibration.summary["outliers"][0]["distance_mm"] > 15.0
-    assert calibration.validation.holdout["variable"].position.max > 15.0
-    assert calibration.validation.holdout["variable"].position.mean < 1.0
-
-
 def test_a_robust_constant_fit_withstands_a_gross_error():
     arm = ur10()
     table = arm.measure_table(arm.poses(60))

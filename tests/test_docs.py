@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 import truearm as ta
-from truearm import validation
+from truearm import doubts, validation
 from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.schema import checked
@@ -205,7 +205,7 @@ def test_every_key_of_a_summary_is_explained(tables):
 
 def test_the_report_page_has_the_rules_of_the_report():
     text = (ROOT / "docs" / "how-to" / "read-a-report.md").read_text()
-    named = set(re.findall(r'Advice\(\s*"\w+",\s*"([^"]+)"', Path(advice.__file__).read_text()))
+    named = set(re.findall(r'Advice\(\s*"?\w+"?,\s*"([^"]+)"', Path(advice.__file__).read_text()))
     assert set(re.findall(r"^\| ([A-Z][^|]*\.) \|", text, re.MULTILINE)) == named
     for rule in (
         f"at most {advice.AT_THE_FLOOR:g} times what noise alone would leave",
@@ -214,7 +214,7 @@ def test_the_report_page_has_the_rules_of_the_report():
         f"fewer than {validation.FEW_HELD} were",
         f"fewer than {validation.FEW_HELD} |",
         f"less than {advice.COVERED:.0%}".replace("%", " %"),
-        f"by less than {1.0 - advice.SAME:.0%}".replace("%", " %"),
+        f"by less than {1.0 - doubts.SAME:.0%}".replace("%", " %"),
         f"more than {gravity.STANDS_OUT:g} times what horizontal ones do",
         f"at least {gravity.LEAST:.0%}".replace("%", " %"),
     ):

@@ -310,6 +310,36 @@ def test_an_arm_that_fits_its_table_is_not_said_to_have_wrong_data(tmp_path, mon
     assert "nothing to gain" in Path("exact/report.html").read_text()
 
 
+@pytest.mark.parametrize(
+    ("column", "stated", "told"),
+    [("sigma_mm", 0.05, ""), ("sigma_mm", 2.0, "says 2 mm"), ("sigma", 0.025, "says 25 mm")],
+)
+def test_a_sigma_that_is_too_large_is_told(column, stated, told):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    table = arm.measure_table(arm.poses(90)).assign(**{column: stated})
+    calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table))
+    said = notice_of(calibration, "stated_too_large")
+    assert told in said
+    assert bool(said) == bool(told)
+    words = words_of(report(calibration).html)
+    assert ("Correct the column of sigma" in words) == bool(told)
+    assert not (told and "noise floor is reached" in words)
+
+
+def test_constants_that_do_better_are_told():
+    constant = Imperfections(share=0.0, noise_mm=0.3)
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3, imperfections=constant)
+    found = [ta.calibrate(arm.robot, arm.measure(arm.poses(40, seed=k), seed=k)) for k in range(6)]
+    ahead = []
+    for calibration in found:
+        errors = calibration.validation.holdout
+        ahead.append(0.97 * errors["variable"].position.mean > errors["constant"].position.mean)
+        said = notice_of(calibration, "constant_better")
+        assert bool(said) == ahead[-1]
+        assert ("Give --model constant" in said) == ahead[-1]
+    assert any(ahead)
+
+
 def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
     table = arm.measure_table(arm.poses(60))

@@ -87,6 +87,17 @@ def test_acceptance_poses_lie_apart_and_notice_small_changes(known):
     assert told.offsets[2].moved
 
 
+def test_a_change_of_the_tool_is_noticed_from_what_is_told_on():
+    """The last joint of a target on its axis is not told, and takes nothing from what is told of the tool."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(80)), model="constant")
+    candidates = Candidates(calibration, arm.poses(60, seed=2))
+    found = acceptance_poses(candidates, 12)
+    update = ta.update(calibration, arm.measure(candidates.readings[found.rows], seed=4))
+    std_mm = max(update.tools[0].shift_std_mm[0])
+    assert 1.0 < found.noticed["tool"] / std_mm < 12.0
+
+
 @pytest.mark.parametrize("freedom", [1, 4, 9])
 def test_a_change_of_so_many_standard_errors_is_noticed_in_95_of_100_cases(freedom):
     drawn = np.random.default_rng(0).normal(size=(40_000, freedom))

@@ -99,6 +99,22 @@ def test_another_field_is_noticed(known):
     assert found.outliers == ()
 
 
+def test_a_noisier_device_moves_no_joint_of_an_unchanged_arm(known):
+    """Its noise is seen in what is left, which then says how far offsets are known."""
+    arm, calibration = known
+    verdicts, moved = [], 0
+    for seed in range(8):
+        table = arm.measure_table(arm.poses(20, seed=9), seed=9)
+        table[["x", "y", "z"]] += np.random.default_rng(seed).normal(0.0, 1e-3, (20, 3))
+        found = ta.update(calibration, ta.Measurements.from_dataframe(table))
+        verdicts.append(found.verdict)
+        moved += sum(offset.moved for offset in found.offsets)
+        stated = ta.update(calibration, ta.Measurements.from_dataframe(table.assign(sigma_mm=1.0)))
+        assert stated.verdict == "holds"
+    assert verdicts == ["field"] * 8
+    assert moved <= 1
+
+
 def test_a_gross_error_is_left_out_and_named(known):
     arm, calibration = known
     table = remastered_table(arm, arm.poses(15, seed=9), SHIFT, seed=9)

@@ -142,9 +142,8 @@ pub fn fit_field(
         }
         let Judged { posterior, .. } = judged;
         let posterior = if spoilt && options.hyper.is_none() {
-            // Up, joints of the larger blocks and widths were chosen with the outliers as well.
             drop(posterior);
-            hyper = search.anew(&training, noise)?;
+            hyper = search.unspoilt(&training, hyper, noise)?;
             search.posterior(&training, &hyper)?
         } else if options.rough || large {
             // Where few rows of many change, hyper-parameters stay.
@@ -245,6 +244,30 @@ impl Search<'_> {
         if part || !hyper.waves.is_empty() {
             hyper = self.again(training, hyper)?;
         }
+        self.trusted_beyond(training, hyper)
+    }
+
+    /// Hyper-parameters without what outliers made of them: those that were found with them and polished without, or those of a
+    /// search from nothing, as up, joints of the larger blocks and widths were chosen with the outliers as well.
+    fn unspoilt(&mut self, training: &Training, hyper: Hyper, noise: [f64; 2]) -> Result<Hyper, FieldError> {
+        let rough = self.options.rough;
+        let polished =
+            if rough { self.again(&middle_of(training), hyper)? } else { self.cleaned(training, hyper)? };
+        let reached = (self.evidence, self.curvature.clone());
+        let other = self.anew(training, noise)?;
+        if self.evidence >= reached.0 {
+            return Ok(other);
+        }
+        (self.evidence, self.curvature) = reached;
+        if rough {
+            return Ok(polished);
+        }
+        let polished = self.widened(training, &polished)?;
+        self.trusted_beyond(training, polished)
+    }
+
+    /// Hyper-parameters with how far they are trusted where nothing was measured.
+    fn trusted_beyond(&self, training: &Training, mut hyper: Hyper) -> Result<Hyper, FieldError> {
         let large = part_of(&training.trusted(), ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
         hyper.extrapolation =
             extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;

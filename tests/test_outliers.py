@@ -1,0 +1,39 @@
+"""Outliers of a calibration: which they are, and that nothing of them stays in it."""
+
+import numpy as np
+
+import truearm as ta
+from truearm.simulation import VirtualArm
+
+
+def test_outliers_are_listed_and_kept_in_the_held_out_errors():
+    arm = VirtualArm.paper(seed=2)
+    table = arm.measure_table(arm.poses(120))
+    order = np.random.default_rng(7).permutation(120)
+    trained, held = order[3], order[100]
+    table.loc[[trained, held], "x"] += 0.02
+    calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table))
+    assert {entry["row"] for entry in calibration.summary["outliers"][:2]} == {trained + 1, held + 1}
+    assert calibration.summary["outliers"][0]["distance_mm"] > 15.0
+    assert calibration.validation.holdout["variable"].position.max > 15.0
+    assert calibration.validation.holdout["variable"].position.mean < 1.0
+
+
+def test_outliers_leave_nothing_behind_of_what_was_found_with_them():
+    """One row in ten is millimetres off: errors, noise and deviations are those of the others alone."""
+    arm = VirtualArm(ta.Robot.load("abb-irb-1200"), seed=3)
+    table = arm.measure_table(arm.poses(90))
+    rng = np.random.default_rng(3)
+    off = rng.choice(90, 9, replace=False)
+    spoilt = table.copy()
+    spoilt.loc[off, ["x", "y", "z"]] += rng.normal(0.0, 4e-3, (9, 3))
+    fresh = arm.poses(100, seed=5)
+    found = []
+    for each in (table.drop(index=off.tolist()), spoilt):
+        calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(each))
+        misses = ta.evaluate(calibration, arm.measure(fresh, seed=6), keep_frames=True).errors["variable"]
+        deviation = np.linalg.norm(calibration.position_std(fresh), axis=1).mean()
+        found.append((misses.position.mean, deviation, calibration.summary["noise_mm"]))
+    clean, cleaned = found
+    assert {entry["row"] - 1 for entry in calibration.summary["outliers"]} >= set(off.tolist())
+    assert np.max(np.divide(cleaned, clean)) < 1.5
