@@ -82,6 +82,13 @@ def test_a_driver_of_ones_own_may_lie_beside_the_cell_file(tmp_path):
     assert (found.__name__, settings.model_dump()) == ("Own", section)
 
 
+def test_a_driver_that_cannot_be_read_is_an_error_with_words(tmp_path):
+    (tmp_path / "broken_driver.py").write_text("class Own(:\n")
+    for name in ("broken_driver:Own", ":Own"):
+        with pytest.raises(InputError, match="cannot be imported: (SyntaxError|ValueError)"):
+            driver_and_settings({"driver": name}, ROBOTS, where="cell.toml, robot", folder=tmp_path)
+
+
 def test_patterns_need_their_groups():
     text = example("tracker").replace("(?P<z>", "(?P<h>")
     with pytest.raises(InputError, match=r"no group \(\?P<z>"):

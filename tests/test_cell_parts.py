@@ -266,5 +266,7 @@ def test_a_driver_that_raises_anything_while_it_lets_go_does_not_keep_the_other_
     noted: list[tuple[str, str]] = []
     cell = Mock(robot=Mock(close=Mock(side_effect=OSError("pulled out"))), arm=Robot.load("rv-m2"))
     Crew(cell, lambda kind, message: noted.append((kind, message))).quiet()
-    assert noted == [("failed", "close robot: pulled out")]
-    cell.sensor.close.assert_called_once_with()
+    cell.robot.close.side_effect = TimeoutError()
+    Crew(cell, lambda kind, message: noted.append((kind, message))).quiet()
+    assert noted == [("failed", "close robot: pulled out"), ("failed", "close robot: TimeoutError")]
+    assert cell.sensor.close.call_count == 2

@@ -89,6 +89,24 @@ def test_comments_and_layout_of_the_file_stay():
     assert frames.tool("tGripper").controller[:3, 3] == pytest.approx([0.02, -0.05, 0.179])
 
 
+@pytest.mark.parametrize(
+    "held",
+    [
+        "[tool]\ntGripper.xyz = [20, -50, 179]\ntGripper.quaternion_wxyz = [1, 0, 0, 0]\n",
+        "tool.tGripper.xyz = [20, -50, 179]\n",
+        "[tool.tGripper]\nxyz = [20, -50, 179]\n[object.t]\nxyz = [1, 2, 3]\n"
+        "[tool.tGripper.controller]\nxyz = [20, -50, 178]\n",
+    ],
+)
+def test_tables_in_pieces_are_put_together(held):
+    Path("cell.toml").write_text(held)
+    words = ["touches.csv", "--tool", "tGripper", "--orientation", "0,0,0", "-o", "cell.toml"]
+    assert main(["frame", "arm.calib", *words]) == 0
+    frames = Frames.load(Path("cell.toml"))
+    assert np.abs(frames.tool("tGripper").true[:3, 3] - TIP).max() < 1e-4
+    assert 0.1779 < frames.tool("tGripper").controller[2, 3] < 0.1791
+
+
 def test_what_the_file_held_becomes_what_the_controller_has(capsys):
     former = '[tool."tGripper"]\nxyz = [20, -50, 179]\neuler_zyx_deg = [10, 0, 0]\npayload_kg = 2.5\n'
     other = "[object.wWall]\nxyz = [1, 2, 3]\n"

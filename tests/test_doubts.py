@@ -326,6 +326,14 @@ def test_a_sigma_that_is_too_large_is_told(column, stated, told):
     assert not (told and "noise floor is reached" in words)
 
 
+def test_single_rows_that_nobody_trusts_say_nothing_of_the_others():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    table = arm.measure_table(arm.poses(60)).assign(sigma_mm=0.05)
+    table.loc[[3, 11, 30, 44], "sigma_mm"] = 10.0
+    calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+    assert notice_of(calibration, "stated_too_large") == ""
+
+
 def test_constants_that_do_better_are_told():
     constant = Imperfections(share=0.0, noise_mm=0.3)
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3, imperfections=constant)

@@ -1,6 +1,7 @@
 """Files are written whole, all of them or none, and only files are replaced."""
 
 import os
+import subprocess
 import sys
 import threading
 
@@ -30,6 +31,22 @@ def test_a_pipe_stays_one_and_is_written_to(tmp_path):
     reader.join(5.0)
     assert pipe.is_fifo()
     assert got == ["through"]
+
+
+def test_standard_output_is_written_to_through_a_pipe_and_into_a_file(tmp_path):
+    work = "from truearm.files import write_whole; from pathlib import Path; print('before', flush=True); "
+    work += "write_whole(Path('/dev/stdout'), 'whole\\n')"
+    piped = subprocess.run([sys.executable, "-c", work], capture_output=True, text=True, check=True)
+    assert piped.stdout == "before\nwhole\n"
+    with (tmp_path / "log").open("w") as log:
+        subprocess.run([sys.executable, "-c", work], stdout=log, check=True)
+    assert (tmp_path / "log").read_text() == "before\nwhole\n"
+
+
+def test_a_link_that_leads_to_itself_is_an_error(tmp_path):
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(InputError, match="leads to itself"):
+        write_whole(tmp_path / "loop", "text")
 
 
 def test_where_one_of_several_cannot_be_written_none_is(tmp_path):

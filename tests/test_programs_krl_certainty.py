@@ -85,6 +85,12 @@ def test_a_routine_begins_with_what_holds_at_its_calls():
     assert "callers" in why(again)
 
 
+def test_routines_that_call_each_other_twice_are_read_in_no_time():
+    deep = "".join(f"DEF r{k}()\nr{k + 1}()\nr{k + 1}()\nEND\n" for k in range(40))
+    body = f"DEF a()\nBASE_DATA[7]={{X 1,Y 2,Z 3,A 0,B 0,C 0}}\nr0()\nEND\n{deep}"
+    assert changed(f"{body}DEF r40()\n$TOOL=$NULLFRAME\n$BASE=BASE_DATA[7]\nLIN {THERE}\nEND\n") == [True]
+
+
 @pytest.mark.parametrize(
     ("calls", "reason"),
     [

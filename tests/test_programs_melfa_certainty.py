@@ -100,6 +100,18 @@ def test_a_tool_that_all_ways_to_a_motion_set_is_certain(robot, case):
     assert np.abs(result.nominal - Q).max() < 1e-4
 
 
+@pytest.mark.parametrize(
+    "setting", ["M_Tool(1)=2", "M_Tool=2", "Mov P2 Wth M_Tool=2", "Mov P2 WthIf M_In(1)=1,M_Tool=2"]
+)
+def test_the_number_of_a_tool_replaces_the_one_before(robot, setting):
+    assert "tool" in left(robot, [TOOL, setting, "Mov P1"])["P1"]
+
+
+def test_motions_that_track_a_conveyor_are_left(robot):
+    assert "Trk On" in left(robot, [TOOL, "Trk On,PX,P_Curr", "Mvs P1", "Trk Off"])["P1"]
+    assert left(robot, [TOOL, "Trk On,PX,P_Curr", "Trk Off", "Mvs P1"]) == {}
+
+
 @pytest.mark.parametrize("call", ['CallP "SETTOOL"', 'If M1=1 Then CallP "X",M2', "RelM"])
 def test_another_program_may_set_tool_and_base(robot, call):
     result = left(robot, [TOOL, "Mov P1", call, "Mov P2", TOOL, "Mov P3"])

@@ -345,6 +345,26 @@ def test_what_only_reads_a_work_object_leaves_it_certain(statement, routine):
     assert "pa" not in reasons(f"MoveJ pA,{GO}\n{statement}{own}", points())
 
 
+HANDLERS = ["ERROR\nPDispSet pd;\nRETRY;", "ENDPROC\nTRAP t1\nPDispSet pd;\nENDTRAP\nPROC more()"]
+
+
+@pytest.mark.parametrize("handler", HANDLERS)
+def test_what_is_executed_between_motions_may_displace_them(handler):
+    assert "displacement" in reasons(f"PDispOff;\nMoveJ pA,{GO}\n{handler}", points())["pa"]
+
+
+def test_an_if_in_an_if_is_no_routine():
+    found = reasons(f"IF ok IF ready MoveJ pA,{GO}\nMoveL pB,{GO}", points())
+    assert not {"pa", "pb"} & set(found)
+
+
+def test_a_path_that_sensors_correct_is_left():
+    found = reasons(f"MoveL pA,{GO.removesuffix(';')}\\Corr;\nMoveL pB,{GO}", points())
+    assert "run time" in found["pa"] or "comput" in found["pa"]
+    assert "pb" not in found
+    assert any("sensors" in reason for reason in found.values())
+
+
 def test_a_short_if_may_displace_what_comes_after():
     body = f"PDispOff;\nIF ok shift;\nMoveJ pA,{GO}\n{OTHER}()\nPDispSet pd;"
     assert "displacement" in reasons(body, points())["pa"]

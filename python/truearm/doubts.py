@@ -87,14 +87,14 @@ def stated_too_large(
     sigma_m: Floats | None, validation: Validation, best: str, *, distances: bool
 ) -> list[Notice]:
     """A warning where held-out rows are far nearer than the noise that rows (n,) state lets them be."""
-    stated = 0.0 if sigma_m is None else float(np.nan_to_num(sigma_m).mean()) * MM_PER_METRE
+    stated = 0.0 if sigma_m is None else float(np.median(np.nan_to_num(sigma_m))) * MM_PER_METRE
     left, noise = validation.holdout[best].position.mean, mean_distance(stated, distances=distances)
     if left > UNLIKELY * noise:
         return []
     text = (
-        f"The column of sigma says {stated:.3g} mm on average, which alone would leave a mean error of "
-        f"{noise:.3g} mm; on {validation.judged} rows it is {left:.3g} mm. So sigma is too large, and what "
-        "varies is taken for noise. Correct it (sigma is in m, sigma_mm in mm), or leave the column out."
+        f"The column of sigma typically says {stated:.3g} mm, which alone would leave a mean error of "
+        f"{noise:.3g} mm; on {validation.judged} rows it is {left:.3g} mm. So sigma is too large, and errors "
+        "of the arm are taken for noise. Correct it (sigma is in m, sigma_mm in mm), or leave the column out."
     )
     return [Notice(STATED_TOO_LARGE, text)]
 

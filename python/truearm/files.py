@@ -9,6 +9,7 @@ from typing import Any
 
 from truearm.errors import InputError, UsageError
 
+OPEN_HERE = {Path("/dev/stdout"), Path("/dev/stderr")}
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 ZIP = b"PK\x03\x04"
 _SIGNATURES = (
@@ -89,36 +90,57 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
     """Write files, each completely or not at all: neighbours of all are written, then renamed in this order.
 
-    A link is followed. What is no file, such as a pipe or /dev/stdout, is written to and not replaced.
+    A link is followed. What is no file, such as a pipe or /dev/stdout, is written to at the end and not
+    replaced.
 
     Raises:
         InputError: If a directory does not exist or may not be written to, or is what a path names; nothing
             is written then.
     """
-    written: list[tuple[Path, Path]] = []
+    streams: list[tuple[Path, bytes]] = []
+    neighbours: list[tuple[Path, Path]] = []
     try:
         for path, content in contents:
             data = content.encode() if isinstance(content, str) else content
-            place = path.resolve() if path.is_symlink() else path
-            written.append((_written(place, data), place))
-        for neighbour, place in written:
-            if neighbour != place:
-                neighbour.replace(place)
+            if _is_stream(path):
+                streams.append((path, data))
+            else:
+                place = followed(path) if path.is_symlink() else path
+                neighbours.append((_beside(place, data), place))
+        for neighbour, place in neighbours:
+            neighbour.replace(place)
     except BaseException:
-        for neighbour, place in written:
-            if neighbour != place:
-                neighbour.unlink(missing_ok=True)
+        for neighbour, _ in neighbours:
+            neighbour.unlink(missing_ok=True)
         raise
+    for path, data in streams:
+        with path.open("ab") as stream:
+            stream.write(data)
 
 
-def _written(path: Path, data: bytes) -> Path:
-    """The neighbour of a file that holds what is to come into it; the path itself where it is no file."""
+def followed(path: Path) -> Path:
+    """Where a path leads to: links are followed.
+
+    Raises:
+        InputError: If links lead to themselves.
+    """
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):
+        raise InputError("this link leads to itself", where=str(path)) from None
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether a path is a pipe, a device, or a name of what this process has open, which are written to."""
+    own = path in OPEN_HERE or path.parts[:3] in {("/", "dev", "fd"), ("/", "proc", "self")}
+    return own or (path.exists() and not path.is_dir() and not path.is_file())
+
+
+def _beside(path: Path, data: bytes) -> Path:
+    """A neighbour of a file that holds what is to come into it."""
     if path.is_dir():
         raise InputError("this is a directory", where=str(path), rule="A file is to be written")
-    if path.exists() and not path.is_file():
-        path.write_bytes(data)
-        return path
-    neighbour = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
+    neighbour = path.with_name(f".{secrets.token_hex(8)}")
     try:
         handle = os.open(neighbour, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     except FileNotFoundError:

@@ -172,4 +172,4 @@ class Crew:
         try:
             action()
         except Exception as error:  # noqa: BLE001  # a driver of a user's own may raise anything, here of all places
-            self._note("failed", f"{what}: {error or type(error).__name__}")
+            self._note("failed", f"{what}: {str(error) or type(error).__name__}")

@@ -55,9 +55,9 @@ def driver_and_settings(
         sys.path.append(beside)
     try:
         driver = getattr(import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+    except Exception as error:  # noqa: BLE001  # a module of a user's own may raise anything
         raise InputError(
-            f'driver "{name}" cannot be imported: {error}',
+            f'driver "{name}" cannot be imported: {type(error).__name__}: {error}',
             where=where,
             rule=f"Its module is installed, on PYTHONPATH or in {beside}",
         ) from None

@@ -1,12 +1,16 @@
 """Frames that were found, written into a frames file beside what it holds already."""
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import tomli_w
 import tomlkit
 from numpy.typing import NDArray
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import Item
 
 from truearm.errors import Notice
 from truearm.files import parsed, read_text, write_whole
@@ -46,26 +50,14 @@ def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -
     """Write a frame into a file, which is made if it is not there; other frames stay.
 
     Where the file held the frame already, what it held becomes what the controller has, unless it said
-    what the controller has. Comments of the file and its layout stay.
+    what the controller has. Comments of the file stay where they can.
 
     Raises:
         InputError: If the file breaks a rule or cannot be written.
     """
-    content: Any = tomlkit.parse(_text(path))
-    content.setdefault("format", FORMAT)
-    unit = LENGTHS_M[str(content.setdefault("length_unit", "mm"))]
-    written = {**_placement(found.transform, unit), "identified": _identified(found, data_hash)}
-    key = _key(content, found.kind, name)
-    former: dict[str, Any] = {}
-    if key is None:
-        content.setdefault(found.kind, {})[name] = written
-    else:
-        entry = content[found.kind][key]
-        former = {part: entry.pop(part).unwrap() for part in PLACEMENT if part in entry}
-        entry.update(written)
-        if former:
-            entry.setdefault("controller", former)
-    text = tomlkit.dumps(content)
+    content = _content(path)
+    former = _put(content, name, found, data_hash)
+    text = _commented(_text(path), content, lambda document: _put(document, name, found, data_hash))
     Frames.parse(text, where=str(path))
     write_whole(path, text)
     if not former:
@@ -77,6 +69,43 @@ def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -
             "the controller computes with. Take it out when the new numbers are in the controller",
         )
     ]
+
+
+def _put(content: Any, name: str, found: IdentifiedFrame, data_hash: str) -> dict[str, Any]:  # noqa: ANN401
+    """Put a frame into plain values or into a document with comments; gives what was in its place."""
+    content.setdefault("format", FORMAT)
+    unit = LENGTHS_M[str(content.setdefault("length_unit", "mm"))]
+    written = {**_placement(found.transform, unit), "identified": _identified(found, data_hash)}
+    key = _key(content, found.kind, name)
+    if key is None:
+        content.setdefault(found.kind, {})[name] = written
+        return {}
+    entry = content[found.kind][key]
+    former = {part: _plain(entry.pop(part)) for part in PLACEMENT if part in entry}
+    entry.update(written)
+    if former:
+        entry.setdefault("controller", former)
+    return former
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    return value.unwrap() if isinstance(value, Item) else value
+
+
+def _commented(text: str, content: Mapping[str, Any], put: Callable[[Any], object]) -> str:
+    """The text with a frame put in and its comments kept; `content` without comments where that goes wrong.
+
+    Tables that are written in pieces, as TOML allows, are more than the library can put something into.
+    """
+    try:
+        document = tomlkit.parse(text)
+        put(document)
+        edited = tomlkit.dumps(document)
+        if tomllib.loads(edited) == content:
+            return edited
+    except (IndexError, KeyError, TypeError, ValueError, TOMLKitError):
+        return tomli_w.dumps(content)
+    return tomli_w.dumps(content)
 
 
 def _content(path: Path) -> dict[str, Any]:

@@ -25,6 +25,7 @@ class Order:
         self._count, self._time = 0, 0
         self._assigned: dict[str, Place] = {}
         self._calls: dict[int, tuple[Place, ...]] = {}
+        self._known: dict[tuple[Place, int], bool] = {}
 
     def begin(self, calls: Sequence[Place]) -> None:
         """A routine begins; `calls` are all its calls, or none where not all of them are known."""
@@ -66,8 +67,13 @@ class Order:
     def _before(self, earlier: Place, later: Place) -> bool:
         if earlier.time < later.time and later.branches[: len(earlier.branches)] == earlier.branches:
             return True
-        calls = self._calls.get(later.branches[0], ())
-        return bool(calls) and all(self._before(earlier, call) for call in calls)
+        routine = later.branches[0]
+        known = self._known.get((earlier, routine))
+        if known is None:
+            calls = self._calls.get(routine, ())
+            known = bool(calls) and all(self._before(earlier, call) for call in calls)
+            self._known[earlier, routine] = known
+        return known
 
     def _new(self) -> int:
         self._count += 1

@@ -45,6 +45,10 @@ _KINDS: Final = {
 }
 _VARIABLE: Final = re.compile(rf"\s*\(?\s*({NAME})\s*\)?\s*\Z")
 _DISTANCE: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*\Z")
+_TOOL_SET: Final = re.compile(r"\bM_Tool\b[^=]*=", re.IGNORECASE)
+"""A tool that is set while a motion goes on (Wth)."""
+_TRACKED: Final = re.compile(r"\s*Trk\s+On\b", re.IGNORECASE)
+_LET_GO: Final = re.compile(r"\s*Trk\s+Off\b", re.IGNORECASE)
 _BRANCHING: Final = re.compile(
     r"(?<![\w.])(GoSub|GoTo|If|For|Next|While|WEnd|Select|Case|Break|CallP|Return|On|XRun|Act|Hlt)\b",
     re.IGNORECASE,
@@ -125,6 +129,10 @@ class Reader:
             setting = SETTING.match(statement.text)
             if setting is not None and (setting.group(1) or "m_tool").casefold() in _SET_BY[kind]:
                 found[place] = setting.group(2) if setting.group(1) else f"{_NUMBERED}{setting.group(3)}"
+        if kind == "tool":
+            for place, motions in self._moves.items():
+                if any(_TOOL_SET.search(motion.added) for motion in motions):
+                    found[place] = f"{_NUMBERED}?"
         return found
 
     def _set_at(self, kind: Kind, start: Frame, ways: Ways) -> dict[int, Frame]:
@@ -145,9 +153,19 @@ class Reader:
             line = self._source.place(self._statements[call].at)[0]
             called = Frame.missing(f"the program called in line {line} may have set another {kind}")
             found |= dict.fromkeys(self._moves.keys() & ways.behind([call], ends), called)
+        if kind == "base":
+            found |= dict.fromkeys(self._tracked(ways), Frame.missing("a conveyor is tracked there (Trk On)"))
         elsewhere = list({id(frame): frame for frame in found.values()}.values())
         only = elsewhere[0] if len(elsewhere) == 1 else unsure
         return dict.fromkeys(self._moves, only) | found
+
+    def _tracked(self, ways: Ways) -> set[int]:
+        """Motions while a conveyor may be tracked."""
+        on, off = (
+            [place for place, one in enumerate(self._statements) if pattern.match(one.text)]
+            for pattern in (_TRACKED, _LET_GO)
+        )
+        return self._moves.keys() & ways.behind(on, off)
 
     def _stated_tool(self, given: str) -> Frame:
         """Tool (x, y, z, a, b, c), of a variable, of a number, or of the arm itself."""

@@ -26,7 +26,9 @@ from truearm.programs.source import Source
 
 FLAGS: Final = 2
 FLAGGED: Final = EulerPose(columns=(2, 1, 0), configuration=FLAGS)
-SETTING: Final = re.compile(r"\s*(Tool|Base|Cnt)\b\s*(.*?)\s*\Z|\s*M_Tool\s*=\s*(.*?)\s*\Z", re.IGNORECASE)
+SETTING: Final = re.compile(
+    r"\s*(Tool|Base|Cnt)\b\s*(.*?)\s*\Z|\s*M_Tool\s*(?:\([^)]*\))?\s*=\s*(.*?)\s*\Z", re.IGNORECASE
+)
 COMBINED: Final = re.compile(
     rf"\s*({NAME})\s*([*/+-])\s*({NAME}|\([^()]*\)\s*(?:\([^()]*\))?)\s*\Z", re.IGNORECASE
 )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from truearm.errors import UsageError
-from truearm.files import write_all
+from truearm.files import followed, write_all
 from truearm.programs.program import Program
 
 
@@ -21,7 +21,7 @@ def output_paths(program: Program, output: Path) -> list[Path]:
     else:
         paths = [output, *(output.with_suffix(source.path.suffix) for source in program.sources[1:])]
     for path, source in zip(paths, program.sources, strict=True):
-        if path.resolve() == source.path.resolve():
+        if followed(path) == followed(source.path):
             raise UsageError(
                 "the output is the program itself",
                 where=str(path),

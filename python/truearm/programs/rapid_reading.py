@@ -37,6 +37,11 @@ from truearm.robot import Robot
 if TYPE_CHECKING:
     from truearm.programs.rapid import RAPID
 
+HANDLER: Final = re.compile(
+    r"^\s*(?:TRAP\b.*?^\s*ENDTRAP\b|ERROR\b.*?^\s*END(?:PROC|FUNC|TRAP)\b)",
+    re.IGNORECASE | re.MULTILINE | re.DOTALL,
+)
+"""What may be executed between any two motions."""
 DISPLACEMENT: Final = re.compile(r"\b(?:pdisp|eoffs)(?:set|on)\b", re.IGNORECASE)
 STRAIGHT: Final = (Motion.LINEAR,)
 ARC: Final = (Motion.VIA, Motion.CIRCULAR)
@@ -148,6 +153,9 @@ class RapidReading:
         self._fixed: dict[int, str] = {}
         self._read: dict[str, str] = {}
         self._displaces = DISPLACEMENT.search(self._source.text) is not None
+        self._displaced_anytime = any(
+            DISPLACEMENT.search(handler[0]) for handler in HANDLER.finditer(self._source.text)
+        )
         start = _Modal(np.eye(4), DISPLACED if self._displaces else "")
         self._flow = Flow(start, _joined, _same)
         self._used: list[int] = []
@@ -259,7 +267,7 @@ class RapidReading:
         state = self._flow.state
         self._flow.jump()
         if not reader.done:
-            self._statement(reader)
+            (self._short_if if reader.peek() == "if" else self._statement)(reader)
         self._flow.state = _joined(state, self._flow.state)
         self._flow.jump()
         while not reader.done:
@@ -307,13 +315,14 @@ class RapidReading:
     def _displace(self, word: str, found: Sequence[Token]) -> None:
         state = self._flow.state
         if word in {"pdispoff", "eoffsoff"}:
-            self._flow.state = replace(state, displacement=np.eye(4), problem="")
+            problem = DISPLACED if self._displaced_anytime else ""
+            self._flow.state = replace(state, displacement=np.eye(4), problem=problem)
             return
         name = found[1].text.lower() if len(found) == 2 else ""
         datum = self._declarations.data.get(name)
         certain = self._declarations.visible(name) and not self._declarations.doubt(name)
         pose = pose_of(datum.value) if datum is not None and datum.fixed and certain else None
-        if word == "pdispset" and pose is not None:
+        if word == "pdispset" and pose is not None and not self._displaced_anytime:
             self._flow.state = replace(state, displacement=pose[1], problem="")
         else:
             self._flow.state = replace(state, problem=DISPLACED)
@@ -325,6 +334,12 @@ class RapidReading:
         count = len(instruction.motions)
         if len(plain) <= instruction.tool:
             self._list(at, "it has fewer arguments than this instruction needs")
+            self._flow.jump()
+            return
+        if any("corr" in argument.options for argument in stated):
+            self._list(at, "its path is corrected by sensors (\\Corr)")
+            for argument in plain[:count]:
+                self._mention(argument.tokens, READ)
             self._flow.jump()
             return
         zone = plain[instruction.zone].tokens
