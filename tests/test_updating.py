@@ -6,6 +6,7 @@ import pytest
 import truearm as ta
 from tests.remastered import remastered, remastered_table
 from truearm._core import setup_jacobian, step_setup
+from truearm.programs.notices import update_notices
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.updating.squares import SquaresTest
 
@@ -97,6 +98,8 @@ def test_another_field_is_noticed(known):
     assert found.verdict == "field"
     assert found.rest.p < 1e-3
     assert found.outliers == ()
+    assert [notice.kind for notice in update_notices(found.calibration)] == ["update"]
+    assert update_notices(calibration) == []
 
 
 def test_a_noisier_device_moves_no_joint_of_an_unchanged_arm(known):

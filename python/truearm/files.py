@@ -5,11 +5,12 @@ import secrets
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from truearm.errors import InputError, UsageError
 
-OPEN_HERE = {Path("/dev/stdout"), Path("/dev/stderr")}
+OPEN_HERE: Final = frozenset({Path("/dev/stdout"), Path("/dev/stderr")})
+"""Names of what this process has open, whatever that is."""
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 ZIP = b"PK\x03\x04"
 _SIGNATURES = (
@@ -200,5 +201,5 @@ def refuse_same(output: Path, other: Path | None, *, option: str) -> None:
     Raises:
         UsageError: If both are the same.
     """
-    if other is not None and other.resolve() == output.resolve():
+    if other is not None and followed(other) == followed(output):
         raise UsageError(f"{other} is the output already", where=option, way_out="Name another file")

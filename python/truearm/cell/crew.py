@@ -171,5 +171,5 @@ class Crew:
     def _tried(self, what: str, action: Callable[[], None]) -> None:
         try:
             action()
-        except Exception as error:  # noqa: BLE001  # a driver of a user's own may raise anything, here of all places
+        except Exception as error:  # noqa: BLE001 - a driver of a user's own may raise anything
             self._note("failed", f"{what}: {str(error) or type(error).__name__}")

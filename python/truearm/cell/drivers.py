@@ -55,7 +55,7 @@ def driver_and_settings(
         sys.path.append(beside)
     try:
         driver = getattr(import_module(module), attribute)
-    except Exception as error:  # noqa: BLE001  # a module of a user's own may raise anything
+    except Exception as error:  # noqa: BLE001 - a module of a user's own may raise anything
         raise InputError(
             f'driver "{name}" cannot be imported: {type(error).__name__}: {error}',
             where=where,

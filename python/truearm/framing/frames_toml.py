@@ -30,7 +30,7 @@ def former_entry(path: Path, kind: str, name: str) -> tuple[FrameEntry, float] |
     Raises:
         InputError: If the file breaks a rule.
     """
-    content = _content(path)
+    content = parsed(_text(path), where=str(path))
     key = _key(content, kind, name)
     if key is None:
         return None
@@ -55,9 +55,11 @@ def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -
     Raises:
         InputError: If the file breaks a rule or cannot be written.
     """
-    content = _content(path)
+    held = _text(path)
+    content = parsed(held, where=str(path))
     former = _put(content, name, found, data_hash)
-    text = _commented(_text(path), content, lambda document: _put(document, name, found, data_hash))
+    edited = _edited(held, lambda document: _put(document, name, found, data_hash))
+    text = edited if _says(edited, content) else tomli_w.dumps(content)
     Frames.parse(text, where=str(path))
     write_whole(path, text)
     if not former:
@@ -92,24 +94,25 @@ def _plain(value: Any) -> Any:  # noqa: ANN401
     return value.unwrap() if isinstance(value, Item) else value
 
 
-def _commented(text: str, content: Mapping[str, Any], put: Callable[[Any], object]) -> str:
-    """The text with a frame put in and its comments kept; `content` without comments where that goes wrong.
+def _edited(text: str, put: Callable[[Any], object]) -> str:
+    """The text with something put in and its comments kept; empty where the library cannot.
 
-    Tables that are written in pieces, as TOML allows, are more than the library can put something into.
+    Tables that are written in pieces, as TOML allows, are more than it can put something into.
     """
     try:
         document = tomlkit.parse(text)
         put(document)
-        edited = tomlkit.dumps(document)
-        if tomllib.loads(edited) == content:
-            return edited
+        return tomlkit.dumps(document)
     except (IndexError, KeyError, TypeError, ValueError, TOMLKitError):
-        return tomli_w.dumps(content)
-    return tomli_w.dumps(content)
+        return ""
 
 
-def _content(path: Path) -> dict[str, Any]:
-    return parsed(_text(path), where=str(path))
+def _says(text: str, content: Mapping[str, Any]) -> bool:
+    """Whether a text is TOML that says just this."""
+    try:
+        return tomllib.loads(text) == content
+    except tomllib.TOMLDecodeError:
+        return False
 
 
 def _text(path: Path) -> str:

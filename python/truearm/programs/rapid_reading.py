@@ -266,8 +266,10 @@ class RapidReading:
         self._mention([reader.take() for _ in range(behind)], READ)
         state = self._flow.state
         self._flow.jump()
-        if not reader.done:
-            (self._short_if if reader.peek() == "if" else self._statement)(reader)
+        if reader.peek() == "if":
+            self._short_if(reader)
+        elif not reader.done:
+            self._statement(reader)
         self._flow.state = _joined(state, self._flow.state)
         self._flow.jump()
         while not reader.done:
