@@ -1,4 +1,4 @@
-"""Waves of gears and encoders: found in measurements, told in summary and report, kept in the file."""
+"""Waves of gears, encoders and screws: found in measurements, told in summary and report, kept in files."""
 
 import dataclasses
 
@@ -88,11 +88,27 @@ def test_corrections_reach_their_targets_where_a_wave_is_steep(found):
     assert np.abs(found.pose(corrected.q) - found.robot.pose(q)).max() < 1e-9
 
 
+def test_the_pitch_of_a_screw_is_found():
+    robot, pitch_mm, amplitude_mm = ta.Robot.load("adept-cobra-600"), 5.0, 0.06
+    arm = VirtualArm(robot, seed=2, imperfections=Imperfections(noise_mm=0.02))
+    q = arm.poses(300)
+    table = arm.measure_table(q)
+    table["q3"] = q[:, 2] + 1e-3 * amplitude_mm * np.sin(2.0 * np.pi * q[:, 2] / (1e-3 * pitch_mm))
+    calibration = ta.calibrate(robot, ta.Measurements.from_dataframe(table), refit=False)
+    (wave,) = waves_of(calibration)
+    assert wave["joints"] == [3]
+    assert wave["period_mm"] == pytest.approx(pitch_mm, rel=0.02)
+    assert wave["amplitudes"]["lengths_mm"] == pytest.approx(amplitude_mm, rel=0.15)
+    assert calibration.validation.holdout["variable"].position.mean < 0.05
+    says = [part.says for part in varying(Facts(calibration)).parts if isinstance(part, Figure)]
+    assert any("waves with a period of 4.99" in words or "waves with a period of 5" in words for words in says)
+
+
 @pytest.mark.parametrize(
     ("waves", "reason"),
     [
         ([2.0, 202.0], "three values a wave"),
-        ([9.0, 202.0, 1e-4], "does not turn"),
+        ([9.0, 202.0, 1e-4], "that the arm has not"),
         ([-1.0, 202.0, 1e-4], "joint -1"),
         ([1.0, 0.0, 1e-4], "no cycles of any drive"),
         ([1.0, 202.0, float("inf")], "no amplitude"),

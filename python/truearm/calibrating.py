@@ -16,6 +16,7 @@ from truearm.details import ConstantDetails, VariableDetails
 from truearm.doubts import (
     NO_HELP,
     Outliers,
+    at_few_values,
     constant_is_better,
     doubts,
     mounting,
@@ -49,6 +50,7 @@ from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
 from truearm.row_lag import fits_shifted
+from truearm.row_order import order_notices
 from truearm.splitting import Split, split_rows
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
@@ -85,7 +87,8 @@ def calibrate(
     robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given = given.deduplicated()
-    notices += stood_still(robot, given.readings) + on_a_grid(robot, given.readings)
+    for looked_at in (stood_still, on_a_grid, at_few_values):
+        notices += looked_at(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
     task = replace(task, sizes=() if split.planned else given.sizes)
@@ -113,7 +116,12 @@ def calibrate(
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(*notices, *_of_fit(task, final, variable), *drift_notices(validation.drift)),
+        notices=(
+            *notices,
+            *_of_fit(task, final, variable),
+            *order_notices(task, given, drift.progress),
+            *drift_notices(validation.drift),
+        ),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
@@ -144,9 +152,9 @@ def _task(robot: Robot, data: Measurements, options: Options, threads: int | Non
         check_turns(data, robot)
     if selection.distances and options.model == "variable":
         raise UsageError(
-            "distances alone cannot tell what varies over the workspace",
+            "the measurements are distances alone",
             where=where,
-            rule="From distances only the constant model is fitted",
+            rule="Only the constant model is built for distances, the variable one is not",
             way_out="Give --model constant (model='constant')",
         )
     if options.frame == "world" and len(data.groups) > 1:
@@ -238,9 +246,14 @@ def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> V
 
 
 def _kept_hyper(trained: Fits) -> KnownHyper:
-    """Hyper-parameters for the fit to all rows, which are found again where few rows trained."""
-    if trained.variable is None or len(trained.data) < ENOUGH_FOR_HYPER:
+    """Hyper-parameters for the fit to all rows, which are found again where few rows trained.
+
+    Not without those that were validated: a search may end at a lesser maximum.
+    """
+    if trained.variable is None:
         return NOTHING_KNOWN
+    if len(trained.data) < ENOUGH_FOR_HYPER:
+        return KnownHyper(near=trained.variable, contested=True)
     return KnownHyper(trained.variable.hyper)
 
 

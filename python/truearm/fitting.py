@@ -23,6 +23,7 @@ from truearm.core_set import Selection, core_set, distance_count
 from truearm.errors import InputError, UsageError, WorkError, count_of, list_names
 from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
+from truearm.inputs import is_payload
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.options import Options
@@ -54,11 +55,13 @@ class KnownHyper:
     Attributes:
         exactly: Those to keep; None to search.
         near: A fit to nearly the same rows, at whose the search begins; None to begin from nothing.
+        contested: Whether a search from nothing stands against that one, and the more probable wins.
         rough: Whether those of a search on a part of the rows are enough.
     """
 
     exactly: Hyper | None = None
     near: FieldFit | None = None
+    contested: bool = False
     rough: bool = False
 
 
@@ -235,10 +238,12 @@ def field_options(
         "driven": list(candidates.driven),
         "features": np.ascontiguousarray(features),
         "feature_ranges": list(ranges),
+        "payloads": [k for k, name in enumerate(task.options.features) if is_payload(name)],
         "degree": task.options.degree,
         "prior": task.options.prior,
         "hyper": known.exactly,
         "near": known.near,
+        "contested": known.contested,
         "rough": known.rough,
         "threads": task.threads,
     }

@@ -1,6 +1,7 @@
 """Inputs of a field: joint values, and features given by name."""
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,6 +10,15 @@ from truearm.arrays import check_finite
 from truearm.errors import InputError, UsageError, list_names
 
 Floats = NDArray[np.float64]
+
+
+PAYLOAD: Final = "payload"
+"""Features whose names begin so are weights that the arm carries."""
+
+
+def is_payload(feature: str) -> bool:
+    """Whether a feature is a weight that the arm carries: its name is payload_kg, or begins with payload."""
+    return feature.lower().startswith(PAYLOAD)
 
 
 def feature_columns(given: Mapping[str, ArrayLike] | None, names: Sequence[str], count: int) -> Floats:

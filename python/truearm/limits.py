@@ -8,6 +8,7 @@ import numpy as np
 
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM
 from truearm.errors import UsageError
+from truearm.kinds import check_number
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
@@ -48,9 +49,15 @@ class Limits:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name != "joint_limits" and value is not None and not value > 0.0:
+            if field.name == "joint_limits" or value is None:
+                continue
+            check_number(value, field.name)
+            if not value > 0.0:
                 raise UsageError(
-                    f"{value}", where=field.name, rule="A bound is positive", way_out="None switches it off"
+                    f"{value}",
+                    where=field.name,
+                    rule="A bound is positive",
+                    way_out="None switches it off, and inf on the command line",
                 )
 
     def core(self, robot: Robot) -> dict[str, Any]:

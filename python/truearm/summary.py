@@ -1,7 +1,10 @@
 """A calibration in numbers, for programs: the content of summary.json."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
 
 from truearm.units import MM_PER_METRE
 
@@ -9,6 +12,7 @@ if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
 MRAD_PER_RAD: Final = 1e3
+AXES: Final = 3
 WAVE: Final = "wave"
 OWN: Final = "own"
 FEWEST_RIPPLES: Final = 3.0
@@ -53,18 +57,32 @@ def error_to_repeatability(calibration: "Calibration") -> dict[str, float] | Non
 
 
 def noise_mm(calibration: "Calibration") -> float:
-    """Standard deviation of a coordinate that the best model leaves unexplained."""
+    """Standard deviation of a coordinate that the best model leaves unexplained, beside the rows' own sigma.
+
+    A scheme has no noise of its own: what it leaves of held-out rows counts, since it may follow those that
+    it was fitted to.
+    """
+    if calibration.scheme is not None:
+        return _held_out_mm(calibration)
     details = calibration.variable
     return MM_PER_METRE * (calibration.constant.noise_m if details is None else details.unexplained_m)
+
+
+def _held_out_mm(calibration: "Calibration") -> float:
+    """Root mean square of a coordinate's error on held-out rows, without what rows state as their sigma."""
+    square = calibration.validation.holdout[calibration.model_name].position.rms ** 2 / AXES
+    sigma = None if calibration.rows is None else calibration.rows.data.sigma_m
+    stated = 0.0 if sigma is None else float(np.square(MM_PER_METRE * np.nan_to_num(sigma)).mean())
+    return math.sqrt(max(square - stated, 0.0))
 
 
 def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:
     """Name, joints (from 1), features, length scales, amplitudes and number of cells of each block.
 
     Length scales are in rad for revolute joints, m for prismatic ones, and in the features' own units; a wave
-    has cycles a turn of its joint instead. Amplitudes are prior standard deviations; a wave's is what it
-    reaches. Curves of joints have ripples, about how many a turn, where their prior, which joints share,
-    knows of any.
+    has cycles a turn of its joint instead, or a period in mm where that slides. Amplitudes are prior standard
+    deviations; a wave's is what it reaches. Curves of joints have ripples, about how many a turn, where their
+    prior, which joints share, knows of any.
     """
     field, details = calibration.model.field, calibration.variable
     if field is None or details is None:
@@ -76,11 +94,15 @@ def _describe(
     block: dict[str, Any], calibration: "Calibration", hyper: dict[str, list[float]]
 ) -> dict[str, Any]:
     joints, name = calibration.robot.joint_count, block["name"]
-    lengths = _lengths(block, hyper)
+    lengths = _lengths(name, block["axes"], hyper)
     scales = [axis[1] for axis in block["axes"]]
     found: dict[str, Any] = {"name": name}
     if name == WAVE:
-        found["cycles"], scales = scales[0], []
+        slides = calibration.robot.joints[block["inputs"][0]] == "prismatic"
+        found |= _wave(scales[0], float(math.sqrt(2.0) * block["weights"].std()), slides=slides)
+        scales = []
+    else:
+        found["amplitudes"] = _amplitudes(name, hyper)
     if name == OWN and block["axes"][0][0] and (ripples := _ripples(hyper)) is not None:
         found["ripples"] = ripples
     cells = 1
@@ -90,10 +112,26 @@ def _describe(
         "joints": [k + 1 for k in block["inputs"] if k < joints],
         "features": [calibration.options.features[k - joints] for k in block["inputs"] if k >= joints],
         "lengths": [length / scale for length, scale in zip(lengths, scales, strict=True)],
-        "amplitudes": _amplitudes(block, hyper),
         "cells": cells,
         "parameters": len(block["outputs"]),
     }
+
+
+def _wave(phase: float, reached: float, *, slides: bool) -> dict[str, Any]:
+    """Cycles a turn or period in mm, and amplitude, of a wave of so much phase by its joint's value."""
+    if slides:
+        period = MM_PER_METRE * math.tau / phase
+        return {"period_mm": period, "amplitudes": {"lengths_mm": reached * MM_PER_METRE}}
+    return {"cycles": phase, "amplitudes": {"theta_mrad": reached * MRAD_PER_RAD}}
+
+
+def waves_in_words(waves: Sequence[Mapping[str, Any]], spec: str = ".4g") -> str:
+    """Of waves of one joint, as :func:`describe_blocks` has them: "202 cycles a turn", "a period of 20 mm"."""
+    cycles = sorted(wave["cycles"] for wave in waves if "cycles" in wave)
+    if cycles:
+        return f"{', '.join(format(each, spec) for each in cycles)} cycles a turn"
+    periods = sorted(wave["period_mm"] for wave in waves)
+    return f"a period of {', '.join(format(each, spec) for each in periods)} mm"
 
 
 def _ripples(hyper: dict[str, list[float]]) -> float | None:
@@ -102,18 +140,16 @@ def _ripples(hyper: dict[str, list[float]]) -> float | None:
     return cycles if cycles >= FEWEST_RIPPLES and cycles * length >= LEAST_OF_A_RIPPLE else None
 
 
-def _lengths(block: dict[str, Any], hyper: dict[str, list[float]]) -> list[float]:
+def _lengths(name: str, axes: Sequence[Any], hyper: dict[str, list[float]]) -> list[float]:
     """Length scales of a block's axes; none where it has no cells."""
-    name, axes = block["name"], len(block["axes"])
     if not axes or name == WAVE:
         return []
-    return hyper.get(f"{name}_lengths") or hyper[f"{name}_length"] * axes
+    turns = axes[0][0]
+    of_lines = None if turns else hyper.get(f"{name}_line_length")
+    return hyper.get(f"{name}_lengths") or (of_lines or hyper[f"{name}_length"]) * len(axes)
 
 
-def _amplitudes(block: dict[str, Any], hyper: dict[str, list[float]]) -> dict[str, float]:
-    name = block["name"]
-    if name == WAVE:
-        return {"theta_mrad": float(math.sqrt(2.0) * block["weights"].std()) * MRAD_PER_RAD}
+def _amplitudes(name: str, hyper: dict[str, list[float]]) -> dict[str, float]:
     if name == "sag":
         return {"theta_mrad_per_m": hyper["sag"][0] * MRAD_PER_RAD}
     values = hyper.get(f"{name}_amplitudes") or hyper[name]

@@ -145,7 +145,7 @@ impl Inverse {
         check_length("the readings", out.readings.len(), matrices.len() * self.joint_count())?;
         check_length("the residuals", out.residuals.len(), matrices.len() * RESIDUALS)?;
         for matrix in matrices {
-            Transform::from_matrix(matrix).check("a target pose")?;
+            Transform::from_matrix(matrix).check("target pose's")?;
         }
         Ok(())
     }

@@ -3,12 +3,12 @@
 //! What is added to the set-points follows the wanted correction with bounded rate and acceleration. Switched on or
 //! off it ramps. Where a set-point is refused, is not finite or comes late, the last correction is held for a
 //! moment and then ramped down, until good set-points come again. Where that would lead a joint out of its limits it
-//! stays at the limit.
+//! stays at the limit; with a set-point beyond them what leads farther out goes down to nothing.
 
 use std::sync::Arc;
 
 use crate::corrector::{Corrector, Workspace};
-use crate::error::{CompensateError, check_bounds};
+use crate::error::{CompensateError, check_bounds, check_finite};
 use crate::refusal::Refusal;
 
 /// Between two steps less than this nothing moves, s.
@@ -46,7 +46,8 @@ impl StreamOptions {
             ("the time of the ramp", self.ramp),
             ("the time that a correction is held", self.hold),
             ("the longest time between set-points", self.deadline),
-        ])
+        ])?;
+        check_finite("the time of the ramp", &[self.ramp])
     }
 }
 
@@ -108,13 +109,15 @@ pub struct Stream {
     started: bool,
     gain: f64,
     without: f64,
+    /// The last time between two steps that can be one, s: what counts where a clock gives none.
+    cycle: f64,
 }
 
 impl Stream {
     /// A stream that is switched on and has nothing applied.
     ///
     /// # Errors
-    /// [`CompensateError::Bound`] if an option is not positive.
+    /// [`CompensateError::Bound`] if an option is not positive, [`CompensateError::NotFinite`] if the ramp never ends.
     pub fn new(corrector: Arc<Corrector>, options: StreamOptions) -> Result<Stream, CompensateError> {
         options.check()?;
         let count = corrector.joint_count();
@@ -133,6 +136,7 @@ impl Stream {
             started: false,
             gain: 0.0,
             without: 0.0,
+            cycle: 0.0,
             corrector,
         })
     }
@@ -160,7 +164,7 @@ impl Stream {
     /// The corrected set-point to command; without allocation, lock or panic.
     ///
     /// `readings` (N) are the set-point, or None where none came in time, and `features` (F); `elapsed` (s) is the time since
-    /// the step before. `out` (N) is always finite, but not written before the first finite set-point.
+    /// the step before; one that is negative or NaN counts as late, and as long as the last good one. `out` (N) is always finite, but not written before the first finite set-point.
     pub fn step(
         &mut self,
         readings: Option<&[f64]>,
@@ -169,7 +173,7 @@ impl Stream {
         out: &mut [f64],
     ) -> Step {
         let late = self.started && !(0.0..=self.options.deadline).contains(&elapsed);
-        let elapsed = if elapsed.is_finite() { elapsed.clamp(0.0, self.options.deadline) } else { 0.0 };
+        let elapsed = self.since(elapsed);
         let fault = self.take(readings, features, late);
         if !self.started || out.len() != self.joints.len() {
             let fault = Some(if self.started { Fault::NotFinite } else { Fault::NotStarted });
@@ -180,14 +184,26 @@ impl Stream {
         let mut lag = 0.0_f64;
         for (joint, follower) in self.joints.iter_mut().enumerate() {
             let aim = share * self.wanted[joint];
-            follower.follow(aim, elapsed);
-            if let Some(limits) = self.corrector.options.limits.joints.get(joint) {
-                follower.confine(limits.map(|limit| limit - self.readings[joint]));
+            match self.corrector.options.limits.joints.get(joint) {
+                Some(limits) => {
+                    follower.follow_within(aim, elapsed, limits.map(|limit| limit - self.readings[joint]));
+                }
+                None => follower.follow(aim, elapsed),
             }
             lag = lag.max((aim - follower.applied).abs());
             out[joint] = self.readings[joint] + follower.applied;
         }
         Step { phase, gain: self.gain, lag, fault }
+    }
+
+    /// The time that a step counts, s.
+    fn since(&mut self, elapsed: f64) -> f64 {
+        if elapsed >= 0.0 {
+            let elapsed = elapsed.min(self.options.deadline);
+            self.cycle = if elapsed > 0.0 { elapsed } else { self.cycle };
+            return elapsed;
+        }
+        self.cycle
     }
 
     /// Takes in a set-point, and its correction if that is good.
@@ -265,25 +281,27 @@ impl Follower {
             let rate = (moving + closing).clamp(self.rate - brake, self.rate + brake);
             self.rate = rate.clamp(-self.largest_rate, self.largest_rate);
             self.applied += self.rate * elapsed;
-            self.settle(aim, brake * elapsed);
+            self.settle(aim, elapsed, brake.min(self.largest_rate));
             self.aim = aim;
         }
     }
 
-    /// Keeps the applied value within what is left to the limits, unless the set-point itself is beyond them.
-    fn confine(&mut self, [low, high]: [f64; 2]) {
-        if low <= 0.0 && 0.0 <= high && !(low..=high).contains(&self.applied) {
+    /// The same within what is left to the limits; where the set-point itself is beyond one, towards nothing on that side.
+    fn follow_within(&mut self, aim: f64, elapsed: f64, [low, high]: [f64; 2]) {
+        let inside = low <= 0.0 && 0.0 <= high;
+        self.follow(if inside { aim } else { aim.clamp(low.min(0.0), high.max(0.0)) }, elapsed);
+        if inside && !(low..=high).contains(&self.applied) {
             (self.applied, self.rate) = (self.applied.clamp(low, high), 0.0);
         }
     }
 
-    /// Arrives where only rounding is left.
-    fn settle(&mut self, aim: f64, reach: f64) {
-        let near = (aim - self.applied).abs() <= 1e-12 * reach;
+    /// Arrives where only rounding is left of a change by `rate`.
+    fn settle(&mut self, aim: f64, elapsed: f64, rate: f64) {
+        let near = (aim - self.applied).abs() <= 1e-12 * rate * elapsed;
         if near {
             self.applied = aim;
         }
-        if near && aim == self.aim && self.rate.abs() <= 1e-12 * self.largest_rate {
+        if near && aim == self.aim && self.rate.abs() <= 1e-12 * rate {
             self.rate = 0.0;
         }
     }

@@ -246,3 +246,61 @@ fn a_held_correction_leads_no_joint_out_of_its_limits() {
         }
     }
 }
+
+#[test]
+fn nothing_leads_farther_out_beyond_a_limit_or_jumps_about_it() {
+    let mut stream = stream();
+    let (mut out, mut readings) = ([0.0; JOINTS], START);
+    run(&mut stream, 0.0, 2.0);
+    let wanted: Vec<f64> = stream.applied().collect();
+    let joint = (0..JOINTS).find(|&joint| wanted[joint].abs() > 1e-5).unwrap();
+    let (limit, sign) = (3.0 * wanted[joint].signum(), wanted[joint].signum());
+    for k in 0..1400 {
+        let past = f64::from(k - 700).abs();
+        readings[joint] = limit + sign * (1e-4 - 1e-6 * past);
+        stream.step(Some(&readings), &[], CYCLE, &mut out);
+        let applied = stream.applied().nth(joint).unwrap();
+        let room = (limit - readings[joint]) * sign;
+        assert!(applied * sign <= room.max(0.0) + 1e-15, "{applied} at {room}");
+    }
+}
+
+#[test]
+fn the_rate_is_bounded_where_the_acceleration_is_not() {
+    let options = StreamOptions { acceleration: [f64::INFINITY; 2], ..StreamOptions::default() };
+    let mut stream = Stream::new(corrector(), options).unwrap();
+    run(&mut stream, 0.0, 2.0);
+    let (mut out, mut readings) = ([0.0; JOINTS], moved(2.0));
+    readings[1] += 0.8;
+    let mut before: Vec<f64> = stream.applied().collect();
+    let mut last = f64::INFINITY;
+    for _ in 0..200 {
+        last = stream.step(Some(&readings), &[], CYCLE, &mut out).lag;
+        for (joint, (now, before)) in stream.applied().zip(&mut before).enumerate() {
+            assert!((now - *before).abs() <= options.rate[0] * CYCLE + 1e-15, "joint {joint}");
+            *before = now;
+        }
+    }
+    assert_eq!(last, 0.0);
+}
+
+#[test]
+fn a_clock_that_gives_no_times_is_late_and_ends_in_nothing() {
+    for broken in [f64::NAN, f64::INFINITY, -1.0] {
+        let mut stream = stream();
+        run(&mut stream, 0.0, 2.0);
+        let mut out = [0.0; JOINTS];
+        let steps: Vec<_> =
+            (0..2000).map(|_| stream.step(Some(&moved(2.0)), &[], broken, &mut out)).collect();
+        assert!(steps.iter().all(|step| step.fault == Some(Fault::Late)));
+        assert_eq!((steps[0].phase, steps[1999].phase), (Phase::Holding, Phase::Off), "{broken}");
+        assert!(stream.applied().all(|applied| applied == 0.0));
+    }
+}
+
+#[test]
+fn a_ramp_that_never_ends_is_refused() {
+    let options = StreamOptions { ramp: f64::INFINITY, ..StreamOptions::default() };
+    let refused = Stream::new(corrector(), options).unwrap_err();
+    assert_eq!(refused, CompensateError::NotFinite { what: "the time of the ramp", value: f64::INFINITY });
+}

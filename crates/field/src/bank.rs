@@ -48,7 +48,10 @@ impl Bank {
         levers: Levers,
     ) -> Result<Self, FieldError> {
         let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
-        let sag = sag.map(|block| Sag { levers, outputs: block.outputs, weights: block.weights });
+        let sag = sag.map(|block| {
+            let payloads = block.grid.inputs.iter().skip(levers.joint_count()).map(|&input| (input, 1.0));
+            Sag { levers: levers.carrying(payloads), outputs: block.outputs, weights: block.weights }
+        });
         let bank = Self { input_count, parameter_count, blocks, sag };
         bank.check()?;
         Ok(bank)
@@ -93,11 +96,12 @@ impl Bank {
 
     fn check_sag(&self) -> Result<(), FieldError> {
         let Some(sag) = &self.sag else { return Ok(()) };
+        let inputs = sag.levers.input_count();
         let output = sag.outputs.iter().copied().max().unwrap_or(0);
         let lengths = [
             ("weights of the sag", sag.weights.len(), sag.levers.len()),
             ("outputs of the sag", sag.outputs.len(), sag.levers.len()),
-            ("joints of the sag", self.input_count.min(sag.levers.joint_count()), sag.levers.joint_count()),
+            ("inputs of the sag", self.input_count.min(inputs), inputs),
             ("outputs of the sag", (output + 1).max(self.parameter_count), self.parameter_count),
         ];
         for (what, found, expected) in lengths {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, exp};
 
 use crate::hyper::{Hyper, Product};
-use crate::kernel::{Input, Shape};
+use crate::kernel::{Input, InputKind, Shape};
 use crate::own::OwnKernel;
 use crate::pairs::{PairKernels, PairTable};
 use crate::sag::alike;
@@ -28,15 +28,18 @@ pub struct PoseKernels {
     /// Of each input, (I, count).
     pub own: Vec<OwnSlopes>,
     /// Summed over the inputs.
-    pub smooth: Slopes,
+    pub smooth: SmoothSlopes,
     /// For each product, (count,).
     pub products: Vec<Vec<f64>>,
 }
 
-/// Kernels and their derivatives by the logarithm of the length scale, (count,).
-pub struct Slopes {
+/// Kernels and their derivatives by the logarithms of the length scales, (count,).
+pub struct SmoothSlopes {
     pub kernel: Vec<f64>,
+    /// By that of angles.
     pub by_log_length: Vec<f64>,
+    /// By that of lines; empty without such inputs.
+    pub by_log_line_length: Vec<f64>,
 }
 
 /// The same of an `own` block.
@@ -126,10 +129,10 @@ impl Kernel for Fill<'_> {
     fn run<I: Isa>(self) -> PoseKernels {
         let Self { pairing: Pairing { distances, count, .. }, inputs, hyper } = self;
         let mut own = Vec::with_capacity(distances.len());
-        let mut smooth = Slopes::zeros(*count);
+        let mut smooth = SmoothSlopes::zeros(*count, inputs);
         for (input, distances) in inputs.iter().zip(distances) {
             own.push(OwnSlopes::new::<I>(OwnKernel::of(hyper, input.kind), distances));
-            smooth.add::<I>(Shape::SquaredExponential, distances, hyper.smooth_length);
+            smooth.add::<I>(input, distances, hyper);
         }
         let mut products = Vec::with_capacity(hyper.products.len());
         for product in &hyper.products {
@@ -156,17 +159,24 @@ impl OwnSlopes {
     }
 }
 
-impl Slopes {
-    fn zeros(count: usize) -> Self {
+impl SmoothSlopes {
+    fn zeros(count: usize, inputs: &[Input]) -> Self {
         let zeros = || vec![0.0; padded(count)];
-        Self { kernel: zeros(), by_log_length: zeros() }
+        let lines = inputs.iter().any(|input| input.kind == InputKind::Line);
+        let by_log_line_length = if lines { zeros() } else { Vec::new() };
+        Self { kernel: zeros(), by_log_length: zeros(), by_log_line_length }
     }
 
     #[inline(always)]
-    fn add<I: Isa>(&mut self, shape: Shape, distances: &[f64], length: f64) {
-        let (kernels, slopes) = (runs_mut(&mut self.kernel), runs_mut(&mut self.by_log_length));
-        for ((distance, kernel), slope) in runs(distances).iter().zip(kernels).zip(slopes) {
-            let value = shape.of::<I>(Lane(*distance), length);
+    fn add<I: Isa>(&mut self, input: &Input, distances: &[f64], hyper: &Hyper) {
+        let length = hyper.smooth_length_of(input);
+        let slopes = match input.kind {
+            InputKind::Angle => &mut self.by_log_length,
+            InputKind::Line => &mut self.by_log_line_length,
+        };
+        let kernels = runs_mut(&mut self.kernel);
+        for ((distance, kernel), slope) in runs(distances).iter().zip(kernels).zip(runs_mut(slopes)) {
+            let value = Shape::SquaredExponential.of::<I>(Lane(*distance), length);
             *kernel = (Lane(*kernel) + value.kernel).0;
             *slope = (Lane(*slope) + value.by_log_length).0;
         }

@@ -18,7 +18,7 @@ use crate::FieldError;
 use crate::continuous::{Continuous, Pairing, PoseKernels, dot, exponent_factors, padded, pairings};
 use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
-    AT_SMOOTH_LENGTH, Hyper, Product,
+    AT_SMOOTH_LENGTH, AT_SMOOTH_LINE_LENGTH, Hyper, Product,
 };
 use crate::pairs::{ByColumn, ClassSums, add_products, write_covariance};
 use crate::product::times;
@@ -327,6 +327,7 @@ impl PoseGradient<'_> {
             let variance = hyper.smooth[class].powi(2);
             gradient[AT_SMOOTH + class] += variance * dot(shares, &smooth.kernel);
             gradient[AT_SMOOTH_LENGTH] += 0.5 * variance * dot(shares, &smooth.by_log_length);
+            gradient[AT_SMOOTH_LINE_LENGTH] += 0.5 * variance * dot(shares, &smooth.by_log_line_length);
         }
     }
 

@@ -33,12 +33,16 @@ pub struct FieldOptions {
     pub driven: Vec<usize>,
     /// Further inputs of the field (features), and their values (n, F).
     pub features: Vec<Input>,
+    /// Which of them are weights that the arm carries.
+    pub payloads: Vec<usize>,
     /// Values of the features, (n, F) row-major.
     pub feature_values: Vec<f64>,
     /// Hyper-parameters to use instead of searching for them.
     pub hyper: Option<Hyper>,
     /// Where a fit to nearly the same measurements ended, which the search begins at.
     pub near: Option<Start>,
+    /// Whether a search from nothing stands against the one that begins near.
+    pub contested: bool,
     /// Whether hyper-parameters of a search on a part of the poses are enough.
     pub rough: bool,
     /// Looked at between evaluations.
@@ -143,7 +147,7 @@ pub fn fit_field(
         let Judged { posterior, .. } = judged;
         let posterior = if spoilt && options.hyper.is_none() {
             drop(posterior);
-            hyper = search.unspoilt(&training, hyper, noise)?;
+            hyper = search.contested(&training, hyper, noise)?;
             search.posterior(&training, &hyper)?
         } else if options.rough || large {
             // Where few rows of many change, hyper-parameters stay.
@@ -223,6 +227,9 @@ impl Search<'_> {
             }
             None => return self.anew(training, noise),
         };
+        if self.options.contested {
+            return self.contested(training, begun, noise);
+        }
         if self.options.rough {
             return self.again(&middle_of(training), begun);
         }
@@ -247,9 +254,11 @@ impl Search<'_> {
         self.trusted_beyond(training, hyper)
     }
 
-    /// Hyper-parameters without what outliers made of them: those that were found with them and polished without, or those of a
-    /// search from nothing, as up, joints of the larger blocks and widths were chosen with the outliers as well.
-    fn unspoilt(&mut self, training: &Training, hyper: Hyper, noise: [f64; 2]) -> Result<Hyper, FieldError> {
+    /// The more probable of hyper-parameters that were found on other rows, polished on these, and of those of a search from nothing.
+    ///
+    /// Where outliers were taken out, up, joints of the larger blocks and widths were chosen with them as well; where rows were
+    /// added, one of the two searches may have ended at a lesser maximum.
+    fn contested(&mut self, training: &Training, hyper: Hyper, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         let rough = self.options.rough;
         let polished =
             if rough { self.again(&middle_of(training), hyper)? } else { self.cleaned(training, hyper)? };

@@ -27,9 +27,10 @@ pub struct Product {
 pub struct Wave {
     /// The joint, from 0.
     pub joint: usize,
-    /// Cycles a turn of the joint.
+    /// Its phase by the joint's value: cycles a turn; where the joint slides, rad/m.
     pub cycles: f64,
-    /// Prior standard deviation of the weights of its cosine and its sine, rad.
+    /// Prior standard deviation of the weights of its cosine and its sine, rad (prismatic: times
+    /// [`truearm_estimate::ANGLE_ARM`] m).
     pub amplitude: f64,
 }
 
@@ -46,8 +47,10 @@ pub struct Hyper {
     pub own_cycles: f64,
     /// Amplitudes of `smooth` blocks by class.
     pub smooth: [f64; 3],
-    /// Length scale of `smooth` blocks.
+    /// Length scale of `smooth` blocks over angles.
     pub smooth_length: f64,
+    /// The same over slides and features, in parts of their range over pi: what rails do has nothing to do with turns.
+    pub smooth_line_length: f64,
     /// What every joint misses anew at every pose, rad (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
     pub repeatability: f64,
     /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
@@ -99,6 +102,9 @@ const OWN_CYCLES: Range = range(0.7, 0.1, 60.0, 1.7);
 const RIPPLE: f64 = 10.0;
 const SMOOTH: [Range; 3] = [amplitude(0.05), amplitude(0.05), amplitude(0.025)];
 const SMOOTH_LENGTH: Range = range(1.5, 0.5, 10.0, 0.7);
+const SMOOTH_LINE_LENGTH: Range = range(1.5, 0.05, 20.0, 1.0);
+/// Where a search for rails that bend often begins.
+const BENDS: f64 = 0.3;
 const REPEATABILITY: Range = range(0.03 * MILLI, 0.002 * MILLI, MILLI, 1.0);
 const SAG: Range = range(MILLI, 0.003 * MILLI, 100.0 * MILLI, 1.5);
 const MAJOR: [Range; 3] = [amplitude(0.1), amplitude(0.1), amplitude(0.05)];
@@ -118,9 +124,10 @@ pub const AT_OWN_LENGTH: usize = 4;
 pub const AT_OWN_CYCLES: usize = 5;
 pub const AT_SMOOTH: usize = 6;
 pub const AT_SMOOTH_LENGTH: usize = 9;
-pub const AT_REPEATABILITY: usize = 10;
-pub const AT_SAG: usize = 11;
-pub const AT_PRODUCTS: usize = 12;
+pub const AT_SMOOTH_LINE_LENGTH: usize = 10;
+pub const AT_REPEATABILITY: usize = 11;
+pub const AT_SAG: usize = 12;
+pub const AT_PRODUCTS: usize = 13;
 
 /// Name of the block whose joints the evidence chooses.
 pub const MAJOR_NAME: &str = "major";
@@ -168,6 +175,7 @@ impl Hyper {
             own_cycles: OWN_CYCLES.start,
             smooth: SMOOTH.map(|r| r.start),
             smooth_length: SMOOTH_LENGTH.start,
+            smooth_line_length: SMOOTH_LINE_LENGTH.start,
             repeatability: REPEATABILITY.start,
             sag: SAG.start,
             up: UPRIGHT,
@@ -191,7 +199,11 @@ impl Hyper {
             return refuse("a block varies with a joint that the arm has not");
         }
         let lengths = self.products.iter().flat_map(|product| &product.lengths);
-        let scales = lengths.chain(&self.constant).chain([&self.own_length, &self.smooth_length]);
+        let scales = lengths.chain(&self.constant).chain([
+            &self.own_length,
+            &self.smooth_length,
+            &self.smooth_line_length,
+        ]);
         if !scales.into_iter().all(|scale| *scale > 0.0 && scale.is_finite()) {
             return refuse("a length scale or a factor is not positive");
         }
@@ -202,8 +214,8 @@ impl Hyper {
             return refuse("there are more waves than an arm has drives");
         }
         for wave in &self.waves {
-            if inputs.get(wave.joint).is_none_or(|input| input.kind != InputKind::Angle) {
-                return refuse("a wave is of a joint that does not turn");
+            if inputs.get(wave.joint).is_none() {
+                return refuse("a wave is of a joint that the arm has not");
             }
             let of_drives = wave.cycles > 0.0 && wave.cycles <= MOST_CYCLES;
             let is_there = wave.amplitude > 0.0 && wave.amplitude.is_finite();
@@ -217,8 +229,8 @@ impl Hyper {
     /// Several starts: the evidence has more than one maximum.
     ///
     /// Beside the priors' centres, errors that sit in rippling curves of the joints and errors that sit in slow variations
-    /// of all joints together.
-    pub fn starts(major_joints: &[usize], joint_count: usize, noise: [f64; 2]) -> Vec<Self> {
+    /// of all joints together; with `lines` among the inputs, rails that bend often.
+    pub fn starts(major_joints: &[usize], joint_count: usize, noise: [f64; 2], lines: bool) -> Vec<Self> {
         let plain = Self::start(major_joints, joint_count, noise);
         let rippling = Self {
             constant: plain.constant.map(|factor| 0.3 * factor),
@@ -235,7 +247,10 @@ impl Hyper {
         for product in &mut slow.products {
             product.amplitudes = product.amplitudes.map(|amplitude| 3.0 * amplitude);
         }
-        vec![plain, rippling, slow]
+        let bending = Self { smooth_line_length: BENDS, ..plain.clone() };
+        let mut starts = vec![plain, rippling, slow];
+        starts.extend(lines.then_some(bending));
+        starts
     }
 
     /// Logarithms of all hyper-parameters.
@@ -244,7 +259,7 @@ impl Hyper {
         // Fields that do not ripple are near those that hardly do.
         values.extend([self.own, self.own_length, self.own_cycles.max(OWN_CYCLES.low)]);
         values.extend(self.smooth);
-        values.extend([self.smooth_length, self.repeatability, self.sag]);
+        values.extend([self.smooth_length, self.smooth_line_length, self.repeatability, self.sag]);
         for product in &self.products {
             values.extend(product.amplitudes);
             values.extend(&product.lengths);
@@ -272,11 +287,20 @@ impl Hyper {
             own_cycles: at(AT_OWN_CYCLES),
             smooth: three(AT_SMOOTH),
             smooth_length: at(AT_SMOOTH_LENGTH),
+            smooth_line_length: at(AT_SMOOTH_LINE_LENGTH),
             repeatability: at(AT_REPEATABILITY),
             sag: at(AT_SAG),
             products,
             noise: [at(first), at(first + 1)],
             ..self.clone()
+        }
+    }
+
+    /// Length scale of the `smooth` block over an input.
+    pub fn smooth_length_of(&self, input: &Input) -> f64 {
+        match input.kind {
+            InputKind::Angle => self.smooth_length,
+            InputKind::Line => self.smooth_line_length,
         }
     }
 
@@ -324,7 +348,7 @@ impl Hyper {
         let mut ranges = vec![CONSTANT; 3];
         ranges.extend([OWN, OWN_LENGTH, OWN_CYCLES]);
         ranges.extend(SMOOTH);
-        ranges.extend([SMOOTH_LENGTH, REPEATABILITY, SAG]);
+        ranges.extend([SMOOTH_LENGTH, SMOOTH_LINE_LENGTH, REPEATABILITY, SAG]);
         for product in &self.products {
             ranges.extend(Product::amplitude_ranges(&product.name));
             ranges.extend(vec![PRODUCT_LENGTH; product.lengths.len()]);
@@ -385,7 +409,7 @@ mod tests {
 
     #[test]
     fn hyper_parameters_of_no_arm_are_refused() {
-        let inputs: Vec<Input> = (0..6).map(|_| Input { kind: InputKind::Angle, scale: 1.0 }).collect();
+        let inputs = [Input::ANGLE; 6];
         let good = Hyper::start(&[1, 2], 6, [1e-4, 1e-4]);
         let waved = |joint, cycles, amplitude| {
             Hyper { waves: vec![Wave { joint, cycles, amplitude }], ..good.clone() }.check(&inputs)
@@ -419,7 +443,7 @@ mod tests {
 
     #[test]
     fn starts_lie_within_bounds() {
-        for hyper in Hyper::starts(&[0, 1], 7, [1e-4, 1e-4]) {
+        for hyper in Hyper::starts(&[0, 1], 7, [1e-4, 1e-4], true) {
             for (range, log) in hyper.ranges().iter().zip(hyper.to_logs()) {
                 assert!(range.low < log.exp() && log.exp() < range.high);
             }

@@ -22,14 +22,14 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
     let inputs: Vec<Input> =
         joint_inputs(problem).into_iter().chain(options.features.iter().copied()).collect();
     let own = layout.len() - layout.arm;
-    let geometry = Levers::new(problem.chain);
-    let joints = set.joints.chunks_exact(set.joint_count);
+    let values = input_values(problem, options);
+    let geometry = Levers::new(problem.chain).carrying(payloads(problem, options));
     let mut training = Training {
         columns,
         parameter_count: problem.chain.parameter_count(),
+        levers: values.chunks_exact(inputs.len()).flat_map(|values| geometry.at(values)).collect(),
         inputs,
-        values: input_values(problem, options),
-        levers: joints.flat_map(|joints| geometry.at(joints)).collect(),
+        values,
         geometry,
         offsets: vec![0],
         jacobian: Vec::new(),
@@ -113,6 +113,17 @@ fn joint_inputs(problem: &Problem) -> Vec<Input> {
         Input::line(high - low)
     };
     (0..problem.chain.joint_count()).map(input).collect()
+}
+
+/// The input of each payload, and the largest one: as heavy as a link, give or take, whatever its unit.
+fn payloads(problem: &Problem, options: &FieldOptions) -> Vec<(usize, f64)> {
+    let (joints, features) = (problem.chain.joint_count(), options.features.len());
+    let largest = |k: usize| {
+        let values = options.feature_values.iter().skip(k).step_by(features);
+        let largest = values.fold(0.0, |most: f64, value| most.max(value.abs()));
+        if largest > 0.0 { largest } else { 1.0 }
+    };
+    options.payloads.iter().map(|&k| (joints + k, largest(k))).collect()
 }
 
 /// Joint values, then features, of every pose, (n, I).

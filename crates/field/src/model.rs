@@ -52,7 +52,12 @@ impl Cells {
         };
         Self {
             own: (0..training.inputs.len()).map(own).collect(),
-            smooth: (0..training.inputs.len()).map(|k| smooth(k, hyper.smooth_length)).collect(),
+            smooth: training
+                .inputs
+                .iter()
+                .enumerate()
+                .map(|(k, input)| smooth(k, hyper.smooth_length_of(input)))
+                .collect(),
             products: hyper.products.iter().map(product).collect(),
             waves: hyper.waves.iter().map(wave).collect(),
             geometry: training.geometry.clone(),
@@ -252,7 +257,8 @@ impl Model {
         let terms = self.sag_terms();
         let any = terms.iter().find_map(parameter)?;
         let outputs = terms.iter().map(|term| parameter(term).unwrap_or(any)).collect();
-        Some(Sag { levers: self.training.geometry.clone(), outputs, weights })
+        let (levers, weights) = self.training.geometry.clone().in_own_units(weights);
+        Some(Sag { levers, outputs, weights })
     }
 
     /// Prior covariance of each column's CEP at one configuration and at others, (n, P).

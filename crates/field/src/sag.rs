@@ -4,6 +4,9 @@
 //! derivative by joint j of the height at which link k ends: the lever of that weight. Weights and stiffness are not
 //! known apart: the block has one number for each pair of joints, rad for each metre of lever. Levers are those of the
 //! nominal arm, and up is the z axis of the base unless another direction is given.
+//!
+//! A payload is a weight that an input tells: it multiplies levers, which have weights of their own for it. That these follow
+//! all links, not the last alone, lets its centre of gravity lie anywhere on the line from one's end to the next one's.
 
 use truearm_kinematics::{
     Chain, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters,
@@ -27,6 +30,15 @@ pub struct Levers {
     chain: Chain,
     nominal: SharedParameters,
     up: [f64; 3],
+    payloads: Vec<Payload>,
+}
+
+/// An input that tells what the arm carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Payload {
+    input: usize,
+    /// Of this much a priori as much is expected as of a link.
+    unit: f64,
 }
 
 /// Weights of the block.
@@ -36,7 +48,7 @@ pub struct Sag {
     pub levers: Levers,
     /// Parameter that each lever drives, (L,): 5 * link + (theta, d).
     pub outputs: Vec<usize>,
-    /// Its weight, (L,): rad/m, m/m where the joint slides.
+    /// Its weight, (L,): rad/m, m/m where the joint slides; those of a payload for each unit of its input.
     pub weights: Vec<f64>,
 }
 
@@ -45,6 +57,8 @@ pub struct Sag {
 pub struct SagScratch {
     joints: Vec<Lane>,
     loads: Vec<Lane>,
+    /// What one payload adds to the loads.
+    added: Vec<Lane>,
     frames: LeverScratch,
     one: OnePose,
 }
@@ -55,16 +69,20 @@ pub struct Loads {
     levers: Levers,
     /// Parameter that each joint's loads drive, (J,).
     pub outputs: Vec<usize>,
-    /// Of each lever its weight and those of the same joint behind it, (L,).
+    /// Of each of the arm's levers its weight and those of the same joint behind it, (L,).
     heights: Vec<f64>,
+    /// The same of each payload, with its input.
+    payloads: Vec<(usize, Vec<f64>)>,
 }
 
 impl Sag {
-    /// How it is stored: as a block over all joints without cells.
+    /// How it is stored: as a block over all joints and payloads without cells.
     pub fn stored(&self) -> Block {
+        let payloads = self.levers.payloads.iter().map(|payload| payload.input);
+        let inputs = (0..self.levers.joint_count()).chain(payloads).collect();
         Block {
             name: SAG_NAME.to_owned(),
-            grid: Grid { inputs: (0..self.levers.joint_count()).collect(), axes: Vec::new() },
+            grid: Grid { inputs, axes: Vec::new() },
             outputs: self.outputs.clone(),
             weights: self.weights.clone(),
         }
@@ -75,7 +93,23 @@ impl Levers {
     /// Of an arm as it was meant to be, standing upright.
     pub fn new(chain: &Chain) -> Self {
         let nominal = SharedParameters::new(&chain.nominal());
-        Self { nominal, arm: chain.clone(), chain: chain.clone(), up: UPRIGHT }
+        Self { nominal, arm: chain.clone(), chain: chain.clone(), up: UPRIGHT, payloads: Vec::new() }
+    }
+
+    /// The same with payloads: inputs, and of each how much is expected to bend the arm as a link does.
+    pub fn carrying(self, payloads: impl IntoIterator<Item = (usize, f64)>) -> Self {
+        let payload = |(input, unit)| Payload { input, unit };
+        Self { payloads: payloads.into_iter().map(payload).collect(), ..self }
+    }
+
+    /// Weights of levers by these for levers by payloads in their inputs' own units.
+    pub(crate) fn in_own_units(self, mut weights: Vec<f64>) -> (Self, Vec<f64>) {
+        let own = lever_count(self.joint_count());
+        for (payload, weights) in self.payloads.iter().zip(weights[own..].chunks_exact_mut(own)) {
+            weights.iter_mut().for_each(|weight| *weight /= payload.unit);
+        }
+        let inputs: Vec<_> = self.payloads.iter().map(|payload| (payload.input, 1.0)).collect();
+        (self.carrying(inputs), weights)
     }
 
     /// Of the same arm, where `up` is a direction in its base frame.
@@ -96,9 +130,14 @@ impl Levers {
         self.chain.joint_count()
     }
 
-    /// Number of levers, L: for each joint those of all links from its own on.
+    /// Number of inputs that they need at least: the joints, and all up to the last payload.
+    pub fn input_count(&self) -> usize {
+        self.payloads.iter().map(|payload| payload.input + 1).fold(self.joint_count(), usize::max)
+    }
+
+    /// Number of levers, L: for each joint those of all links from its own on; once for the arm, once for each payload.
     pub fn len(&self) -> usize {
-        lever_count(self.joint_count())
+        lever_count(self.joint_count()) * (1 + self.payloads.len())
     }
 
     /// Whether there are none.
@@ -109,18 +148,27 @@ impl Levers {
     /// Joint of each lever, (L,).
     pub fn joints(&self) -> impl Iterator<Item = usize> {
         let count = self.joint_count();
-        (0..count).flat_map(move |j| std::iter::repeat_n(j, count - j))
+        let own = move |_| (0..count).flat_map(move |j| std::iter::repeat_n(j, count - j));
+        (0..=self.payloads.len()).flat_map(own)
     }
 
-    /// Levers of one configuration, given its N joint values; what follows them is not looked at.
+    /// The first of the arm's levers about each joint, and how many there are.
+    fn first_levers(&self) -> impl Iterator<Item = (usize, usize)> {
+        let joints = self.joint_count();
+        (0..joints).map(move |j| (lever_count(joints) - lever_count(joints - j), joints - j))
+    }
+
+    /// Levers of one configuration, (L,), given its inputs, (I,): those for a payload times that.
     pub fn at(&self, values: &[f64]) -> Vec<f64> {
         let mut scratch = self.scratch();
         for (lane, value) in scratch.joints.iter_mut().zip(values) {
             *lane = Lane::splat(*value);
         }
-        let mut out = vec![Lane::ZERO; self.len()];
+        let mut out = vec![Lane::ZERO; lever_count(self.joint_count())];
         dispatch(At { levers: self, scratch: &mut scratch, out: &mut out });
-        out.iter().map(|lane| lane.0[0]).collect()
+        let shares = self.payloads.iter().map(|payload| values[payload.input] / payload.unit);
+        let share = |share: f64| out.iter().map(move |lane| share * lane.0[0]);
+        std::iter::once(1.0).chain(shares).flat_map(share).collect()
     }
 
     /// Room for a group of configurations.
@@ -128,6 +176,7 @@ impl Levers {
         let lanes = vec![Lane::ZERO; self.joint_count()];
         SagScratch {
             joints: lanes.clone(),
+            added: lanes.clone(),
             loads: lanes,
             frames: LeverScratch::new(&self.chain),
             one: OnePose::new(&self.nominal),
@@ -154,25 +203,37 @@ impl Kernel for At<'_> {
 
 /// For each of `joints` the sum of the products of its levers in two configurations: how alike its loads are.
 pub fn alike(joints: usize, a: &[f64], b: &[f64], out: &mut [f64]) {
-    let mut pairs = a.iter().zip(b);
-    for (j, sum) in out.iter_mut().enumerate().take(joints) {
-        *sum = pairs.by_ref().take(joints - j).map(|(x, y)| x * y).sum();
+    let own = lever_count(joints);
+    out.fill(0.0);
+    for (a, b) in a.chunks_exact(own).zip(b.chunks_exact(own)) {
+        let mut pairs = a.iter().zip(b);
+        for (j, sum) in out.iter_mut().enumerate().take(joints) {
+            *sum += pairs.by_ref().take(joints - j).map(|(x, y)| x * y).sum::<f64>();
+        }
     }
 }
 
 impl Loads {
     /// Of a sag.
     pub fn new(sag: &Sag) -> Self {
-        let joints = sag.levers.joint_count();
-        let (mut heights, mut outputs, mut at) = (sag.weights.clone(), Vec::new(), 0);
-        for own in (1..=joints).rev() {
-            for k in (at..at + own - 1).rev() {
-                heights[k] += heights[k + 1];
+        let own = lever_count(sag.levers.joint_count());
+        let (arm, carried) = sag.weights.split_at(own);
+        let heights = |weights: &[f64]| {
+            let mut heights = weights.to_vec();
+            for (first, count) in sag.levers.first_levers() {
+                for k in (first..first + count - 1).rev() {
+                    heights[k] += heights[k + 1];
+                }
             }
-            outputs.push(sag.outputs[at]);
-            at += own;
+            heights
+        };
+        let payloads = sag.levers.payloads.iter().zip(carried.chunks_exact(own));
+        Self {
+            outputs: sag.levers.first_levers().map(|(first, _)| sag.outputs[first]).collect(),
+            heights: heights(arm),
+            payloads: payloads.map(|(payload, weights)| (payload.input, heights(weights))).collect(),
+            levers: sag.levers.clone(),
         }
-        Self { levers: sag.levers.clone(), outputs, heights }
     }
 
     /// Room for a group of configurations.
@@ -188,7 +249,7 @@ impl Loads {
         alone: bool,
         scratch: &'a mut SagScratch,
     ) -> &'a [Lane] {
-        let SagScratch { joints, loads, frames, one } = scratch;
+        let SagScratch { joints, loads, added, frames, one } = scratch;
         for (k, lane) in joints.iter_mut().enumerate() {
             *lane = input(k);
         }
@@ -200,6 +261,13 @@ impl Loads {
             LaneParameters::Shared(nominal)
         };
         chain.loads::<I>(joints, parameters, &self.heights, frames, loads);
+        for (payload, heights) in &self.payloads {
+            chain.loads::<I>(joints, parameters, heights, frames, added);
+            let carried = input(*payload);
+            for (load, added) in loads.iter_mut().zip(added.iter()) {
+                *load = I::mul_add(carried, *added, *load);
+            }
+        }
         loads
     }
 }

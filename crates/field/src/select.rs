@@ -11,6 +11,7 @@ use truearm_estimate::Cancel;
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
+use crate::kernel::InputKind;
 use crate::optimise::{Curvature, Limits, maximise};
 use crate::training::Training;
 
@@ -62,7 +63,8 @@ pub fn select_major(
     let evidence = Evidence::new(training, cancel);
     let first = usual_joints(joints).next().unwrap_or_default();
     let (mut begun, mut usual) = (0, None::<Found>);
-    for start in Hyper::starts(&first, joints, noise) {
+    let lines = training.inputs.iter().any(|input| input.kind == InputKind::Line);
+    for start in Hyper::starts(&first, joints, noise, lines) {
         let found = refine(&evidence, start, None, FIRST)?;
         begun += found.evaluations;
         if usual.as_ref().is_none_or(|usual| found.value > usual.value) {

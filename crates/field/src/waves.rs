@@ -1,8 +1,9 @@
-//! Waves that gears and encoders leave in a joint's angle, finer than its own curve can be.
+//! Waves that gears, encoders and screws leave in a joint's angle or way, finer than its own curve can be.
 //!
 //! A toothed or harmonic drive errs once or twice a turn of its motor, an encoder once a pole: some hundred cycles a turn of
-//! the joint, at a fixed place in it. A cosine and a sine hold such a wave wherever the joint goes. With `s_i` how hard the
-//! residuals of pose i pull at the joint's angle (Rao's score of it under the present model), a wave of c cycles gains
+//! the joint, at a fixed place in it; a screw errs once a pitch. A cosine and a sine hold such a wave wherever the joint goes.
+//! With `s_i` how hard the residuals of pose i pull at the joint's angle (Rao's score of it under the present model), a wave of
+//! c cycles gains
 //!
 //! `1/2 z^T I^-1 z`,   z = sum s_i (cos c q_i, sin c q_i),   I = sum s_i^2 (cos, sin) (cos, sin)^T
 //!
@@ -23,19 +24,40 @@ use crate::kernel::InputKind;
 use crate::pairs::ByColumn;
 use crate::training::Training;
 
-/// Cycles a turn: fewer are for the joint's own curve, more are beyond gears and encoders.
-const CYCLES: [f64; 2] = [8.0, 520.0];
+/// What is sought of a kind of joint; cycles are in phase by value, so those a turn of one that turns.
+#[derive(Debug, Clone, Copy)]
+struct Sought {
+    /// Fewer are for the joint's own curve, more are beyond its drive.
+    cycles: [f64; 2],
+    /// Where the scan begins: too few cycles for a wave, but a grid of poses may show them as more.
+    from: f64,
+    /// Range of values that a joint must cover at the least, for its waves to be told from each other, and may at the most: a
+    /// reading beyond is no joint's.
+    covered: [f64; 2],
+    /// Cycles that the range must hold at the least.
+    fewest: f64,
+    /// Whether a whole number of cycles is likelier.
+    whole: bool,
+}
+
+/// Joints that turn: from 8 to 520 cycles a turn of gears and encoders, which have whole numbers of teeth and poles.
+const TURNING: Sought =
+    Sought { cycles: [8.0, 520.0], from: 1.0, covered: [0.1 * TAU, 16.0 * TAU], fewest: 0.0, whole: true };
+/// Joints that slide: pitches of 250 mm, of a pinion's turn, down to 1 mm.
+const SLIDING: Sought = Sought {
+    cycles: [4.0 * TAU, 1000.0 * TAU],
+    from: TAU,
+    covered: [0.02, 200.0],
+    fewest: 3.0,
+    whole: false,
+};
+
 /// Steps of the scan for each cycle more over the range that the joint covers: neighbours hardly differ.
 const STEPS: f64 = 5.0;
-/// Where the scan begins: too few cycles for a wave, but a grid of poses may show them as more.
-const FROM: f64 = 1.0;
-/// Turns that a joint must cover at the least, for its waves to be told from each other, and may at the most: a
-/// reading beyond is no joint's.
-const TURNS: [f64; 2] = [0.1, 16.0];
 /// Nats by which a wave has to be ahead of what the number of choices brings by chance: between two that are independent
 /// lie others, so that one fit in fifty finds a wave where there is none.
 const SURE: f64 = 6.0;
-/// Nats that a whole number of cycles may be behind: gears and encoders have whole numbers of teeth and poles.
+/// Nats that a whole number of cycles may be behind.
 const WHOLE: f64 = 1.0;
 /// Nats within which another number of cycles explains the same as well, and the least coherence of the two over the
 /// poses that makes it the same: a second wave has hardly any with the first.
@@ -62,20 +84,18 @@ pub fn find_waves(training: &Training, hyper: &Hyper, cancel: &Cancel) -> Result
         return Ok(found.waves);
     }
     let (evidence, by_column) = (Evidence::new(training, cancel), ByColumn::new(training));
-    let joints: Vec<(usize, usize)> = (0..training.inputs.len())
-        .filter(|&joint| training.inputs[joint].kind == InputKind::Angle)
-        .filter_map(|joint| by_column.own[joint].map(|(column, _)| (joint, column)))
-        .collect();
+    let joints: Vec<usize> =
+        (0..training.inputs.len()).filter(|&joint| by_column.own[joint].is_some()).collect();
     for _ in 0..ROUNDS {
         let pull = evidence.pull(&found)?;
-        let new: Vec<Wave> = joints
+        let new: Vec<(Wave, f64)> = joints
             .par_iter()
-            .filter_map(|&(joint, column)| Scan::new(training, joint, column, &pull).best(joints.len()))
+            .filter_map(|&joint| Scan::new(training, joint, by_column.own[joint]?, &pull).best(joints.len()))
             .collect();
         if new.is_empty() {
             break;
         }
-        new.into_iter().for_each(|wave| take(&mut found.waves, wave));
+        new.into_iter().for_each(|(wave, within)| take(&mut found.waves, wave, within));
     }
     Ok(found.waves)
 }
@@ -91,19 +111,19 @@ pub fn are_alike(first: &[Wave], second: &[Wave]) -> bool {
     first.len() == second.len() && first.iter().all(|one| second.iter().any(|other| alike(one, other)))
 }
 
-/// A wave beside the others; more of a known one makes that one larger.
-fn take(waves: &mut Vec<Wave>, wave: Wave) {
-    let same =
-        |known: &&mut Wave| known.joint == wave.joint && (known.cycles - wave.cycles).abs() < 1.0 / STEPS;
+/// A wave beside the others; more of a known one, whose cycles are the same within so many, makes that one larger.
+fn take(waves: &mut Vec<Wave>, wave: Wave, within: f64) {
+    let same = |known: &&mut Wave| known.joint == wave.joint && (known.cycles - wave.cycles).abs() < within;
     match waves.iter_mut().find(same) {
         Some(known) => known.amplitude = known.amplitude.hypot(wave.amplitude),
         None => waves.push(wave),
     }
 }
 
-/// One joint's values and how hard each pose pulls at its angle.
+/// One joint's values and how hard each pose pulls at its angle or way.
 struct Scan {
     joint: usize,
+    sought: Sought,
     values: Vec<f64>,
     scores: Vec<f64>,
 }
@@ -117,36 +137,41 @@ struct Sums {
 }
 
 impl Scan {
-    fn new(training: &Training, joint: usize, column: usize, pull: &[f64]) -> Self {
+    /// Of a joint whose column moves by `lever` for each rad of amplitude.
+    fn new(training: &Training, joint: usize, (column, lever): (usize, f64), pull: &[f64]) -> Self {
         let score = |pose: usize| -> f64 {
-            training.rows(pose).map(|row| training.jacobian_row(row)[column] * pull[row]).sum()
+            training.rows(pose).map(|row| lever * training.jacobian_row(row)[column] * pull[row]).sum()
         };
+        let turns = training.inputs[joint].kind == InputKind::Angle;
         let poses = 0..training.pose_count();
         Self {
             joint,
+            sought: if turns { TURNING } else { SLIDING },
             values: poses.clone().map(|pose| training.values_of(pose)[joint]).collect(),
             scores: poses.map(score).collect(),
         }
     }
 
-    /// The wave that gains most, where that is more than chance; so many joints are looked at.
-    fn best(&self, joints: usize) -> Option<Wave> {
+    /// The wave that gains most, where that is more than chance, and cycles within which another is the same; so many joints
+    /// are looked at.
+    fn best(&self, joints: usize) -> Option<(Wave, f64)> {
+        let Sought { cycles: [fewest, most], from, covered, .. } = self.sought;
         let (low, high) = range(&self.values);
-        let turns = (high - low) / TAU;
-        if !(TURNS[0]..=TURNS[1]).contains(&turns) {
+        if !(covered[0]..=covered[1]).contains(&(high - low)) {
             return None;
         }
         // Farther apart, numbers of cycles are different ones to poses that stand anywhere.
-        let (step, apart) = (1.0 / (STEPS * turns), 1.0 / turns);
-        let count = ((CYCLES[1] - FROM) / step) as usize;
-        let gains: Vec<f64> = self.sums(FROM, step, count).iter().map(Sums::gain).collect();
-        let cycles_at = |k: usize| FROM + step * k as f64;
-        let candidates = (0..count).filter(|&k| cycles_at(k) >= CYCLES[0]);
+        let apart = TAU / (high - low);
+        let (step, fewest) = (apart / STEPS, fewest.max(self.sought.fewest * apart));
+        let count = ((most - from) / step) as usize;
+        let gains: Vec<f64> = self.sums(from, step, count).iter().map(Sums::gain).collect();
+        let cycles_at = |k: usize| from + step * k as f64;
+        let candidates = (0..count).filter(|&k| cycles_at(k) >= fewest);
         let coarse = candidates.max_by(|&a, &b| gains[a].total_cmp(&gains[b])).map(cycles_at)?;
         let peak = self.peak(coarse - step, coarse + step);
         let best = self.at(peak).gain();
         // Independent choices: one for each cycle more over the range covered.
-        let choices = joints as f64 * (CYCLES[1] - CYCLES[0]) / apart;
+        let choices = joints as f64 * (most - fewest) / apart;
         if best < SURE + choices.max(1.0).ln() {
             return None;
         }
@@ -154,9 +179,11 @@ impl Scan {
         if rivals.filter(|rival| (rival - peak).abs() > apart).any(|rival| self.is_same(peak, rival)) {
             return None;
         }
-        let cycles = self.whole(peak, apart, best - WHOLE).unwrap_or(peak);
+        let whole = if self.sought.whole { self.whole(peak, apart, best - WHOLE) } else { None };
+        let cycles = whole.unwrap_or(peak);
         let [cosine, sine] = self.at(cycles).weights();
-        Some(Wave { joint: self.joint, cycles, amplitude: cosine.hypot(sine) * 0.5_f64.sqrt() })
+        let within = if self.sought.whole { 1.0 } else { apart } / STEPS;
+        Some((Wave { joint: self.joint, cycles, amplitude: cosine.hypot(sine) * 0.5_f64.sqrt() }, within))
     }
 
     /// The number of cycles of the largest power between two, which hold no other maximum: White's covariance, which holds the
@@ -173,7 +200,7 @@ impl Scan {
     /// The whole number of cycles, of all within `apart` of a peak that gain at least so much, of the largest power, as the
     /// peak is.
     fn whole(&self, peak: f64, apart: f64, least: f64) -> Option<f64> {
-        let fewest = (peak - apart).max(CYCLES[0]);
+        let fewest = (peak - apart).max(self.sought.cycles[0]);
         let numbers = (fewest.ceil() as usize..=(peak + apart).floor() as usize).map(|n| n as f64);
         let sums = numbers.map(|n| (n, self.at(n))).filter(|(_, sums)| sums.gain() > least);
         sums.max_by(|a, b| a.1.power().total_cmp(&b.1.power())).map(|(n, _)| n)
@@ -226,7 +253,7 @@ impl Sums {
         self.information[2] += s * s;
     }
 
-    /// `I^-1 z`: the weights of cosine and sine, rad; zero where the poses cannot tell one from the other.
+    /// `I^-1 z`: the weights of cosine and sine, rad (of a joint that slides for each metre of lever); zero where the poses cannot tell one from the other.
     fn weights(&self) -> [f64; 2] {
         let ([c, s], [cc, cs, ss]) = (self.score, self.information);
         let determinant = cc * ss - cs * cs;
@@ -267,7 +294,7 @@ mod tests {
         let noise = spread(5).map(|x| 1.2 * x);
         let sum = |q: &f64| waves.iter().map(|(size, cycles)| size * (cycles * q + 0.7).cos()).sum::<f64>();
         let scores = values.iter().zip(noise).map(|(q, noise)| sum(q) + noise).collect();
-        Scan { joint: 0, values, scores }
+        Scan { joint: 0, sought: TURNING, values, scores }
     }
 
     fn anywhere(within: f64) -> Vec<f64> {
@@ -277,7 +304,7 @@ mod tests {
     #[test]
     fn cycles_are_found_to_a_part_of_what_the_range_tells_apart() {
         for cycles in [202.55, 77.35, 400.1] {
-            let wave = scan(anywhere(3.0), &[(4.0, cycles)]).best(6).unwrap();
+            let (wave, _) = scan(anywhere(3.0), &[(4.0, cycles)]).best(6).unwrap();
             assert!((wave.cycles - cycles).abs() < 0.03, "{} in place of {cycles}", wave.cycles);
         }
     }
@@ -286,7 +313,7 @@ mod tests {
     fn over_a_short_way_the_whole_number_of_the_largest_power_is_taken() {
         for cycles in [100.0, 121.0, 360.0] {
             let found = scan(anywhere(0.4), &[(4.0, cycles)]);
-            let wave = found.best(6).unwrap();
+            let (wave, _) = found.best(6).unwrap();
             assert_eq!(wave.cycles, cycles);
         }
     }
@@ -302,12 +329,28 @@ mod tests {
                 assert!(scan(degrees(step, shaken), &[(2.0, cycles)]).best(6).is_none(), "{step} deg");
             }
         }
-        assert!(scan(degrees(0.1, 0.0), &[(2.0, 202.0)]).best(6).is_some_and(|wave| wave.cycles == 202.0));
+        assert!(
+            scan(degrees(0.1, 0.0), &[(2.0, 202.0)]).best(6).is_some_and(|(wave, _)| wave.cycles == 202.0)
+        );
+    }
+
+    #[test]
+    fn screws_are_found_where_poses_stand_anywhere() {
+        for (pitch, way) in [(0.02, 1.2), (0.005, 0.3), (0.016, 0.1), (0.2, 3.0)] {
+            let mut found = scan(anywhere(0.5 * way), &[(4.0, TAU / pitch)]);
+            found.sought = SLIDING;
+            let (wave, _) = found.best(6).unwrap();
+            let behind = (TAU / wave.cycles - pitch).abs() / pitch;
+            assert!(behind * way / pitch < 0.05, "{} m in place of {pitch}", TAU / wave.cycles);
+        }
+        let mut slow = scan(anywhere(0.05), &[(4.0, 4.0 * TAU)]);
+        slow.sought = SLIDING;
+        assert!(slow.best(6).is_none());
     }
 
     #[test]
     fn a_second_wave_is_no_rival() {
-        let wave = scan(anywhere(2.0), &[(1.0, 202.0), (1.0, 240.0)]).best(6).unwrap();
+        let (wave, _) = scan(anywhere(2.0), &[(1.0, 202.0), (1.0, 240.0)]).best(6).unwrap();
         assert!([202.0, 240.0].contains(&wave.cycles), "{}", wave.cycles);
     }
 

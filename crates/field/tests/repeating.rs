@@ -46,7 +46,7 @@ fn threads_do_not_change_weight_space() {
     let set = Measure::poses(2100).of(&arm);
     let mut hyper = Hyper::start(&[0, 1], 4, [3e-5, 1e-4]);
     hyper.own_length = 1.0;
-    hyper.smooth_length = 3.0;
+    (hyper.smooth_length, hyper.smooth_line_length) = (3.0, 3.0);
     hyper.products.truncate(1);
     hyper.products[0].lengths.fill(3.0);
     let fits = [1, 2, 4].map(|threads| {

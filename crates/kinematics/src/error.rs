@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::transform::RIGID_TOLERANCE;
+
 /// Why a chain could not be made or a batch not be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum KinematicsError {
@@ -26,7 +28,8 @@ pub enum KinematicsError {
     },
     /// A base or end transform that is no rigid motion.
     #[error(
-        "the {name} transform is not rigid: R^T R differs from the identity by {deviation:.1e} or det R is not +1; give an orthonormal rotation"
+        "the {name} transform is not rigid: R^T R differs from the identity by {deviation:.1e} (at most {:e} may be left, of numbers in double precision), det R is not +1, or a number is not finite; give an orthonormal rotation",
+        RIGID_TOLERANCE
     )]
     NotRigid {
         /// Which transform.

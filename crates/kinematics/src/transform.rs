@@ -3,7 +3,7 @@
 use crate::error::KinematicsError;
 
 /// How far R^T R of a given transform may be from the identity: loose enough for numbers of nine digits.
-const RIGID_TOLERANCE: f64 = 1e-8;
+pub(crate) const RIGID_TOLERANCE: f64 = 1e-8;
 
 /// A rigid motion `a_from_b`: a point in b is `rotation * point + translation` in a.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -44,6 +44,9 @@ pub fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         own_cycles: values.get("own_cycles").map_or(Ok(UNRIPPLED), |_| one("own_cycles"))?,
         smooth: three("smooth")?,
         smooth_length: one("smooth_length")?,
+        smooth_line_length: values
+            .get("smooth_line_length")
+            .map_or_else(|| one("smooth_length"), |_| one("smooth_line_length"))?,
         repeatability: one("repeatability")?,
         products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
         waves: values.get("waves").map_or_else(|| Ok(Vec::new()), |stored| waves_from(stored))?,
@@ -86,6 +89,7 @@ pub fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         ("own_cycles".to_owned(), vec![hyper.own_cycles]),
         ("smooth".to_owned(), hyper.smooth.to_vec()),
         ("smooth_length".to_owned(), vec![hyper.smooth_length]),
+        ("smooth_line_length".to_owned(), vec![hyper.smooth_line_length]),
         ("repeatability".to_owned(), vec![hyper.repeatability]),
         ("noise_position".to_owned(), vec![hyper.noise[0]]),
         ("noise_orientation".to_owned(), vec![hyper.noise[1]]),

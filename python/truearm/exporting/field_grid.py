@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import UNLIMITED, flange_poses
 from truearm.parameters import KINDS
 from truearm.robot import Robot
-from truearm.summary import WAVE, describe_blocks
+from truearm.summary import WAVE, describe_blocks, waves_in_words
 from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
@@ -98,9 +98,15 @@ def grid_table(
     `theta1_deg`, `d1_mm` and so on.
 
     Raises:
-        WorkError: If the calibration has no field.
+        WorkError: If the calibration has no field: it is constant, or of one of the paper's schemes.
         UsageError: If features are missing, or the grid has more than two million points.
     """
+    if calibration.scheme is not None:
+        raise WorkError(
+            f"this calibration is of the scheme {calibration.model_name}",
+            rule="Samples are those of a field, which a variable model has",
+            way_out="Calibrate with --model variable; --to urdf and --to dh-toml hold the constant part",
+        )
     if calibration.variable is None:
         raise WorkError(
             "this calibration has no field: its parameters are constant",
@@ -146,13 +152,13 @@ def grid_text(
 
 def _waves_in_words(calibration: Calibration) -> list[str]:
     """Of each joint with waves that the samples hold, and that no table between them can follow."""
-    cycles: dict[int, list[str]] = {}
+    waves: dict[int, list[dict[str, Any]]] = {}
     for block in describe_blocks(calibration):
         if block["name"] == WAVE:
-            cycles.setdefault(block["joints"][0], []).append(f"{block['cycles']:{SHOWN}}")
+            waves.setdefault(block["joints"][0], []).append(block)
     return [
-        f"Samples hold waves of joint {joint} with {', '.join(found)} cycles a turn, lost between them"
-        for joint, found in sorted(cycles.items())
+        f"Samples hold waves of joint {joint} with {waves_in_words(found, SHOWN)}, lost between them"
+        for joint, found in sorted(waves.items())
     ]
 
 

@@ -14,6 +14,7 @@ from truearm.reporting.parts import Choice, Figure
 from truearm.reporting.style import SEQUENTIAL
 from truearm.reporting.sweeps import deviations, own_name, sweep
 from truearm.reporting.waves import strongest_wave
+from truearm.summary import waves_in_words
 
 Floats = NDArray[np.float64]
 
@@ -138,11 +139,10 @@ def _wave(q: Floats, values: Floats, joint_unit: str, unit: str) -> str:
 
 def _fine_waves(facts: Facts, joint: int) -> str:
     """What the field holds besides, too fine to be drawn."""
-    cycles = sorted(wave["cycles"] for wave in facts.waves(joint))
-    if not cycles:
+    waves = facts.waves(joint)
+    if not waves:
         return ""
-    words = ", ".join(f"{each:.4g}" for each in cycles)
-    return f" Not drawn: waves with {words} cycles a turn, as gears and encoders leave them."
+    return f" Not drawn: waves with {waves_in_words(waves)}, as gears, encoders and screws leave them."
 
 
 def _four(value: float) -> str:

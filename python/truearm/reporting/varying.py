@@ -11,6 +11,7 @@ from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.region_tree import region_tree
 from truearm.reporting.slices import slices
 from truearm.reporting.sweeps import influence_mm
+from truearm.summary import WAVE, waves_in_words
 
 
 def varying(facts: Facts) -> Section:
@@ -44,8 +45,8 @@ def _blocks(facts: Facts) -> Table:
     for block in blocks:
         amplitudes = block["amplitudes"]
         inputs = [f"joint {joint}" for joint in block["joints"]] + list(block["features"])
-        if "cycles" in block:
-            inputs.append(f"{block['cycles']:.4g} cycles a turn")
+        if block["name"] == WAVE:
+            inputs.append(waves_in_words([block]))
         if "ripples" in block:
             inputs.append(f"may ripple about {block['ripples']:.0f} times a turn")
         rows.append(

@@ -3,7 +3,7 @@
 use truearm_estimate::{Cancel, EstimateError};
 
 use super::oracle::{Exact, Oracle};
-use super::sets::{hyper, line_inputs, poses_in_two_groups, positions, rippling, several_shots};
+use super::sets::{hyper, line_inputs, loaded, poses_in_two_groups, positions, rippling, several_shots};
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
@@ -78,6 +78,25 @@ fn gradient_and_value_with_several_shots_of_poses() {
 fn gradient_with_a_prismatic_joint_and_a_feature() {
     let training = line_inputs(16);
     check_gradient(&training, &hyper(&training, 4));
+}
+
+#[test]
+fn gradient_and_value_with_a_payload() {
+    let training = loaded(18);
+    check_value(&training, &hyper(&training, 6));
+    check_gradient(&training, &hyper(&training, 6));
+}
+
+#[test]
+fn levers_of_a_payload_are_those_of_the_arm_in_proportion_to_the_largest() {
+    let training = loaded(6);
+    let own = training.levers_of(0).len() / 2;
+    assert_eq!(own, 21);
+    for pose in 0..6 {
+        let (arm, payload) = training.levers_of(pose).split_at(own);
+        let share = [0.0, 0.5, 1.0][pose % 3];
+        arm.iter().zip(payload).for_each(|(arm, payload)| assert_eq!(*payload, share * arm));
+    }
 }
 
 #[test]

@@ -52,7 +52,13 @@ impl Kernels for Exact<'_> {
     }
 
     fn smooth(&self, input: usize, a: f64, b: f64) -> f64 {
-        self.squared_exponential(input, a, b, self.1.smooth_length)
+        let line = self.0.inputs[input].kind == InputKind::Line;
+        self.squared_exponential(
+            input,
+            a,
+            b,
+            if line { self.1.smooth_line_length } else { self.1.smooth_length },
+        )
     }
 
     fn product(&self, product: usize, axis: usize, input: usize, a: f64, b: f64) -> f64 {

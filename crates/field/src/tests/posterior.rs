@@ -4,7 +4,7 @@ use truearm_estimate::Cancel;
 
 use super::common::Random;
 use super::oracle::{OfCells, Oracle, dot, squared};
-use super::sets::{line_inputs, long, poses_in_two_groups, positions};
+use super::sets::{line_inputs, loaded, long, poses_in_two_groups, positions};
 use crate::data_space::{DataSpace, LeftOut};
 use crate::model::Model;
 use crate::posterior::{LeaveOneOut, Posterior, Solution};
@@ -25,9 +25,9 @@ pub fn spaces(training: &Training, joints: usize) -> [Posterior; 2] {
     [data_space(training, joints, 2), weight_space(training, joints, 2)]
 }
 
-/// The sets with their number of joints: positions; poses, groups, own sigma and weight; prismatic joint and feature.
-pub fn sets() -> [(Training, usize); 3] {
-    [(positions(22), 6), (poses_in_two_groups(18), 6), (line_inputs(16), 4)]
+/// The sets with their number of joints: positions; poses, groups, own sigma and weight; prismatic joint and feature; a payload.
+pub fn sets() -> [(Training, usize); 4] {
+    [(positions(22), 6), (poses_in_two_groups(18), 6), (line_inputs(16), 4), (loaded(18), 6)]
 }
 
 pub fn close(found: &[f64], wanted: &[f64], share: f64, what: &str) {

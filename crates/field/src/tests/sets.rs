@@ -73,6 +73,18 @@ pub fn line_inputs(poses: usize) -> Training {
     })
 }
 
+/// Two features, a payload before another one.
+pub fn loaded(poses: usize) -> Training {
+    let arm = six_axes(Truth::BENDING);
+    let set = Measure::poses(poses).of(&arm);
+    rows_of(&arm, &set, |options| {
+        options.features = vec![Input::line(5.0), Input::line(12.0)];
+        options.payloads = vec![0];
+        let of = |pose: usize| [2.5 * (pose % 3) as f64, 20.0 + 12.0 * (pose as f64 * 0.618).fract()];
+        options.feature_values = (0..poses).flat_map(of).collect();
+    })
+}
+
 /// Hyper-parameters away from the centre of their priors.
 pub fn hyper(training: &Training, joints: usize) -> Hyper {
     let mut start = Hyper::start(&[1, 2], joints, [4e-5, 1.2e-4]);
@@ -96,7 +108,7 @@ pub fn rippling(training: &Training, joints: usize) -> Hyper {
 pub fn long(training: &Training, joints: usize) -> Hyper {
     let mut hyper = hyper(training, joints);
     hyper.own_length = 0.9;
-    hyper.smooth_length = 3.0;
+    (hyper.smooth_length, hyper.smooth_line_length) = (3.0, 3.0);
     hyper.products.iter_mut().for_each(|product| product.lengths.fill(4.0));
     hyper
 }

@@ -25,7 +25,7 @@ fn both(training: &Training, hyper: &Hyper) -> [Posterior; 2] {
 /// Short length scales, so that the data ends somewhere.
 fn short(training: &Training) -> Hyper {
     let mut hyper = hyper(training, 6);
-    hyper.smooth_length = 0.5;
+    (hyper.smooth_length, hyper.smooth_line_length) = (0.5, 0.5);
     hyper.own_length = 0.1;
     hyper.products.truncate(1);
     hyper.products.iter_mut().for_each(|product| product.lengths.fill(0.6));
@@ -108,7 +108,7 @@ fn many_rows() -> (Training, Hyper) {
     let training = rows_of(&arm, &Measure::poses(2300).of(&arm), |_| ());
     let mut hyper = Hyper::start(&[0, 1], 4, [3e-5, 1e-4]);
     hyper.own_length = 1.0;
-    hyper.smooth_length = 3.0;
+    (hyper.smooth_length, hyper.smooth_line_length) = (3.0, 3.0);
     hyper.products.truncate(1);
     hyper.products[0].lengths.fill(3.0);
     (training, hyper)

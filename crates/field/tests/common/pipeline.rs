@@ -37,9 +37,11 @@ pub fn options(arm: &Arm, set: &MeasurementSet) -> Result<(ConstantFit, FieldOpt
         determined: determined.iter().map(position).collect(),
         driven: (0..arm.columns.len()).collect(),
         features: Vec::new(),
+        payloads: Vec::new(),
         feature_values: Vec::new(),
         hyper: None,
         near: None,
+        contested: false,
         rough: false,
         cancel: Cancel::default(),
     };
