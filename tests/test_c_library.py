@@ -118,6 +118,10 @@ def tool_of(robot):
     return robot.tool @ tool
 
 
+def test_programs_look_for_the_shared_library_by_its_name(library):
+    assert b"\0libtruearm.so\0" in library.read_bytes()
+
+
 @pytest.mark.parametrize("model", ["variable", "constant"])
 def test_it_computes_what_python_computes(model, data, library, tmp_path):
     robot, measured = data

@@ -1,5 +1,6 @@
 """Calibration files: everything comes back bit for bit, and no altered byte goes unnoticed."""
 
+import hashlib
 import json
 
 import numpy as np
@@ -11,6 +12,7 @@ from safetensors.numpy import save as save_arrays
 import truearm as ta
 from tests.calibration_file_support import read_calibration_file, write_calibration_file
 from truearm import calibration_file
+from truearm.calibration_file import DIGEST, NO_DIGEST
 from truearm.simulation import VirtualArm
 
 
@@ -156,6 +158,48 @@ def test_another_schema_version_is_said(monkeypatch, tmp_path):
 def test_a_missing_key_is_said(tmp_path):
     write_calibration_file(tmp_path / "odd.calib", {"a": np.zeros(2)}, {"version": "0.1.0"})
     with pytest.raises(ta.InputError, match="has no '"):
+        ta.Calibration.load(tmp_path / "odd.calib")
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        (("conservative",), 0, "what this calibration holds cannot be read: .*It is whole, but not as"),
+        (("conservative", "level", 0), None, "what this calibration holds cannot be read"),
+        (("models",), None, "what this calibration holds cannot be read"),
+        (("models", "variable", "blocks"), 1.5, "what this calibration holds cannot be read"),
+        (("models", "variable", "blocks", 0, "axes", 0, 4), 10**12, "what this calibration holds cannot be"),
+        (("options", "rate"), [], r"rate is \[\]. It must be a number"),
+        (("robot",), 1.5, "what this calibration holds cannot be read"),
+        (("selection", "targets"), 1.5, "'selection.targets' is 1.5. Input should be a valid list"),
+        (("variable", "hyper", "sag"), "1", "'variable.hyper.sag' is '1'. Input should be a valid list"),
+        (("groups",), ["morning"], "the calibration names 1 set-ups. Its models have 2"),
+        (("version",), 7, "'version' is 7"),
+    ],
+)
+def test_odd_values_under_a_valid_digest_are_refused_by_name(written, tmp_path, place, value, words):
+    arrays, content = read_calibration_file(written)
+    part = content
+    for key in place[:-1]:
+        part = part[key]
+    part[place[-1]] = value
+    write_calibration_file(tmp_path / "odd.calib", arrays, {**content, "sha256": NO_DIGEST})
+    with pytest.raises(ta.InputError, match=f"odd.calib.*{words}") as raised:
+        ta.Calibration.load(tmp_path / "odd.calib")
+    assert raised.value.__cause__ is not None
+
+
+def test_numbers_beyond_all_are_refused(written, tmp_path):
+    arrays, content = read_calibration_file(written)
+    content["constant"]["noise_m"] = 0.12345
+    write_calibration_file(tmp_path / "odd.calib", arrays, {**content, "sha256": NO_DIGEST})
+    blank = (tmp_path / "odd.calib").read_bytes().replace(b"0.12345", b"1.0e999")
+    digits = DIGEST.search(blank)
+    assert digits is not None
+    zeros = blank[: digits.start(1)] + NO_DIGEST.encode() + blank[digits.end(1) :]
+    digest = hashlib.sha256(zeros).hexdigest().encode()
+    (tmp_path / "odd.calib").write_bytes(zeros.replace(NO_DIGEST.encode(), digest, 1))
+    with pytest.raises(ta.InputError, match=r"odd.calib: this calibration has been altered"):
         ta.Calibration.load(tmp_path / "odd.calib")
 
 

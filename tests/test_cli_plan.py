@@ -11,7 +11,7 @@ import pytest
 import truearm as ta
 from tests.cell_support import cell_text
 from truearm.cell import Cell
-from truearm.cell.ordering import motion_seconds, paper_order, short_order
+from truearm.cell.ordering import motion_seconds, paper_order, short_order, there_and_back
 from truearm.cell.poses_file import Poses
 from truearm.cell.rehearsal import rehearse
 from truearm.cli import main
@@ -27,7 +27,8 @@ def test_a_plan_for_a_cell_can_be_measured_there(tmp_path, capsys, monkeypatch):
     told = json.loads(capsys.readouterr().out)
     assert told["purposes"] == {"train": 20, "validate": 5, "repeat": 6}
     assert told["after"]["log_det"] > told["before"]["log_det"]
-    assert told["motion_s"]["short"] <= told["motion_s"]["paper"]
+    assert told["order"] == "there-and-back"
+    assert told["motion_s"]["short"] <= min(told["motion_s"]["paper"], told["motion_s"]["there-and-back"])
     expected = list(told["expected_mm"].values())
     assert expected == sorted(expected, reverse=True)
     assert (tmp_path / "poses.png").stat().st_size > 1000
@@ -60,6 +61,16 @@ def test_both_orders_go_from_low_to_high_once_through_all():
         assert np.diff(points[order][:, 2]).min() > -0.08
     short = motion_seconds(readings, short_order(points, readings, 1.0), 1.0)
     assert short < 0.8 * motion_seconds(readings, paper_order(points), 1.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 40, 41])
+def test_there_and_back_once_through_all_height_tells_nothing_of_time(count):
+    order = there_and_back(np.arange(count))
+    assert sorted(order) == list(range(count))
+    assert order[0] == 0
+    if count > 2:
+        assert abs(np.corrcoef(order, np.arange(count))[0, 1]) < 0.1
+        assert np.abs(np.diff(order)).max() == 2
 
 
 @pytest.mark.parametrize(

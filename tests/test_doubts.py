@@ -14,7 +14,7 @@ from tests.report_support import words_of
 from truearm.cli import main
 from truearm.conventions import Convention
 from truearm.doubts import no_help
-from truearm.grids import grid_steps
+from truearm.grids import grid_steps, grid_words
 from truearm.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
 from truearm.reporting.report import report
@@ -38,11 +38,15 @@ def on_grid(readings, step_deg=STEP_DEG, offset_deg=3.0, jitter_deg=0.02):
 @pytest.mark.parametrize("count", [30, 400])
 def test_a_grid_is_found_with_its_step(step_deg, count):
     readings = np.random.default_rng(1).uniform(-2.8, 2.8, (count, 6))
-    readings[:, :2] = on_grid(readings[:, :2], step_deg)
+    readings[:, 1] = 1e-2 * np.degrees(on_grid(readings[:, 1], step_deg, jitter_deg=0.004))
+    readings[:, 0] = on_grid(readings[:, 0], step_deg)
     kinds = ["revolute", "prismatic", *["revolute"] * 4]
     found = grid_steps(readings, kinds)
-    assert list(found) == [1]
+    assert list(found) == [1, 2]
     assert found[1] == pytest.approx(step_deg, rel=1e-3)
+    assert found[2] == pytest.approx(10.0 * step_deg, rel=1e-3)
+    assert "joint 2 on a grid of" in (words := grid_words(found, kinds))
+    assert " mm" in words
     assert grid_steps(readings[:25], kinds) == {}
 
 

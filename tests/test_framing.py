@@ -162,6 +162,32 @@ def test_measured_points_give_the_tip(exact, tmp_path):
         find_tool(model, data)
 
 
+def poses_of(robot, q, path):
+    """Poses of the tool at readings, measured by a device that stands where it stands."""
+    world = np.eye(4)
+    world[:3, :3], world[:3, 3] = OBJECT[:3, :3], [2.0, -1.0, 0.5]
+    poses = world @ robot.pose(q) @ TOOL
+    columns = dict(zip(["x_m", "y_m", "z_m"], poses[:, :3, 3].T, strict=True))
+    columns |= dict(zip(["qw", "qx", "qy", "qz"], quaternion_from_matrix(poses[:, :3, :3]).T, strict=True))
+    return as_data(readings(q, **columns), path)
+
+
+def test_measured_poses_that_do_not_tell_the_tool_are_refused(exact, tmp_path):
+    model, robot = exact
+    middle = np.radians([17.0, -70.0, 80.0, -40.0, 60.0, 10.0])
+    free = middle + np.random.default_rng(0).uniform(-0.6, 0.6, (3, 6))
+    assert np.abs(find_tool(model, poses_of(robot, free, tmp_path / "3.csv")).transform - TOOL).max() < 1e-7
+    with pytest.raises(WorkError, match="2 measured poses of the tool tell no more than is unknown"):
+        find_tool(model, poses_of(robot, free[:2], tmp_path / "2.csv"))
+    parallel = np.tile(middle, (8, 1))
+    parallel[:, 1:3] += np.linspace([-0.6, 0.4], [0.6, -0.4], 8) ** [1, 3]
+    with pytest.raises(WorkError, match="measured poses hardly turn the flange's direction"):
+        find_tool(model, poses_of(robot, parallel, tmp_path / "plane.csv"))
+    points = replace(poses_of(robot, parallel, tmp_path / "points.csv"), orientations=None)
+    with pytest.raises(WorkError, match="measured points hardly turn the flange's direction"):
+        find_tool(model, points, orientation=np.eye(3))
+
+
 def test_through_the_calibrated_arm_the_real_tool_is_found_better(arm, calibration, tmp_path):
     rng = np.random.default_rng(1)
     points = np.tile([0.6, 0.1, 0.2], (12, 1)) + rng.normal(scale=TIP_NOISE_M, size=(12, 3))
@@ -298,6 +324,21 @@ def test_places_in_another_unit_and_mirrored_ones_are_refused(exact, tmp_path):
         find_object(model, placed(robot, tmp_path, PLACES, PLACES * [1.0, -1.0, 1.0]), TOOL)
     flat = PLACES * [1.0, 1.0, 0.0]
     assert find_object(model, placed(robot, tmp_path, flat, flat), TOOL).distances_mm.max() < 1e-6
+
+
+def test_points_of_one_plane_do_not_tell_a_mirror_image(exact, tmp_path):
+    model, robot = exact
+    flat = PLACES * [1.0, 1.0, 0.0]
+    assert find_object(model, placed(robot, tmp_path, flat, flat), TOOL).notices == ()
+    for mirror in ([1.0, -1.0, 1.0], [-1.0, 1.0, 1.0]):
+        for count in (3, 6):
+            touched_places = flat[:count]
+            data = placed(robot, tmp_path, touched_places, touched_places * mirror)
+            (notice,) = find_object(model, data, TOOL).notices
+            assert "its z axis points away from where the tool came from" in notice.message
+            assert notice.kind == "one_plane"
+    (notice,) = find_object(model, placed(robot, tmp_path, flat, flat[:, [2, 0, 1]]), TOOL).notices
+    assert "an object and its mirror image are alike: check the signs" in notice.message
 
 
 def test_points_that_were_touched_once_are_told_of_the_column(exact, tmp_path):

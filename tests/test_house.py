@@ -2,6 +2,7 @@
 
 import ast
 import importlib.metadata
+import importlib.resources
 import json
 import re
 import shutil
@@ -72,6 +73,12 @@ def test_one_version_for_all():
     assert "version" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dynamic"]
     assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text()
     assert _core.__version__ == importlib.metadata.version("truearm")
+
+
+def test_type_checkers_find_the_types_of_the_package():
+    package = importlib.resources.files("truearm")
+    assert package.joinpath("py.typed").is_file()
+    assert package.joinpath("_core.pyi").is_file()
 
 
 def test_nothing_asks_for_one_processor():

@@ -172,6 +172,12 @@ def test_two_tables_are_joined_row_by_row(tmp_path: Path) -> None:
         ),
         (JOINTS.replace("nr", "point"), POINTS, None, '"point" says "1" in row 1, and "2" in .*--on point'),
         (
+            JOINTS.replace("nr", "point"),
+            POINTS.replace("2.0", "1").replace("\n1.0", "\n2").replace("7.0", "2"),
+            None,
+            '"point" says "3" in row 3, and "2" in .*where neither says a thing twice: --on point',
+        ),
+        (
             STAMPS,
             STAMPS.replace("J", "p").replace("001,", "002,").replace("011,", "012,"),
             "t",

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import truearm as ta
-from truearm.euler_orders import VECTOR, twin
+from truearm.euler_orders import VECTOR, otherwise_read, twin
 from truearm.rotations import quaternion_from_euler
 from truearm.simulation import VirtualArm
 from truearm.turning_sense import check_turns
@@ -142,3 +142,17 @@ def test_an_arm_that_does_not_turn_its_tool_gives_no_frame_to_doubt():
     columns |= dict(zip("xyz", station.apply(gantry.position(q)).T, strict=True))
     table = pd.DataFrame(columns | dict(zip(QUATERNION, quaternions.T, strict=True)))
     check_turns(ta.Measurements.from_dataframe(table), gantry)
+
+
+def test_orientations_that_no_instrument_measured_are_refused():
+    robot, table = posed()
+    for constant in ([1.0, 0.0, 0.0, 0.0], [0.5, -0.5, 0.5, 0.5]):
+        wrong = with_quaternions(table, np.tile(constant, (len(table), 1)))
+        with pytest.raises(ta.InputError, match=r"all 60 orientations are the same, while.*--use position"):
+            ta.calibrate(robot, wrong, model="constant")
+
+
+def test_what_is_not_turned_can_be_read_otherwise():
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
+    for _, _, other in otherwise_read(still):
+        np.testing.assert_allclose(np.linalg.norm(other, axis=1), 1.0)

@@ -10,7 +10,9 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from truearm import streaming
 from truearm.compensation import TOOLS_KEPT
+from truearm.framing import find_object, find_tool
 from truearm.simulation import VirtualArm
 
 
@@ -80,6 +82,7 @@ def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
 
 
 api: Any = ta
+streams: Any = streaming
 WRONG = {
     "a robot for a calibration": (
         lambda r, d, c: api.evaluate(r, d),
@@ -120,6 +123,27 @@ WRONG = {
         lambda r, d, c: api.Measurements.from_dataframe("m.csv"),
         "table is of type str",
     ),
+    "no path": (lambda r, d, c: api.Calibration.load(None), "the file is of type NoneType. A path is needed"),
+    "a list for a path": (lambda r, d, c: api.Measurements.read_csv(["m.csv"]), "the file is of type list"),
+    "a bound in words": (lambda r, d, c: api.Limits(largest_mm="5"), "largest_mm is '5'. It must be"),
+    "a rate in words": (lambda r, d, c: api.Options.of(rate="1"), "rate is '1'. It must be a number"),
+    "a level in words": (lambda r, d, c: api.UpdateOptions(level="1"), "level is '1'. It must be a number"),
+    "a ramp in words": (
+        lambda r, d, c: streams.StreamOptions(ramp_s="1"),
+        "ramp_s is '1'. It must be a number",
+    ),
+    "a time in words": (
+        lambda r, d, c: streams.CorrectionStream(api.Compensator(c)).step(None, "1"),
+        "elapsed_s is '1'. It must be a number",
+    ),
+    "a touching tool in words": (
+        lambda r, d, c: find_object(c, d, "gripper"),
+        "the tool is not numbers",
+    ),
+    "a tool turned in words": (
+        lambda r, d, c: find_tool(c, d, orientation="down"),
+        "the entries of the orientation are not numbers",
+    ),
     "a convention": (
         lambda r, d, c: api.Robot.from_dict({**r.to_dict(), "convention": "craig"}),
         'convention: "craig" is not known. Either standard or modified',
@@ -132,6 +156,13 @@ def test_wrong_arguments_are_told_what_is_needed(case, robot, data, calibration)
     call, words = WRONG[case]
     with pytest.raises(ta.InputError, match=words):
         call(robot, data, calibration)
+
+
+def test_one_file_is_read_as_a_list_of_one(data, tmp_path):
+    path = tmp_path / "m.csv"
+    VirtualArm(ta.Robot.load("ur10"), seed=2).measure_table(data.readings[:5]).to_csv(path, index=False)
+    one, several = ta.Measurements.read_files(str(path)), ta.Measurements.read_files([path])
+    assert one.hash() == several.hash()
 
 
 def test_lists_of_measurements_are_put_together(data, calibration):
@@ -153,9 +184,30 @@ def test_types_that_are_needed_are_called_by_their_package(robot):
         ta.calibrate(robot, "data.csv")  # type: ignore[arg-type]
 
 
-def test_a_missing_feature_is_told_with_the_ways_to_give_it(robot):
+@pytest.fixture(scope="module")
+def warm(robot):
+    """A calibration with a feature."""
     arm = VirtualArm(robot, seed=2)
     table = arm.measure_table(arm.poses(60)).assign(temperature_C=np.linspace(20.0, 25.0, 60))
-    found = ta.calibrate(robot, ta.Measurements.from_dataframe(table), features=["temperature_C"])
+    return ta.calibrate(robot, ta.Measurements.from_dataframe(table), features=["temperature_C"])
+
+
+def test_a_missing_feature_is_told_with_the_ways_to_give_it(warm):
     with pytest.raises(ta.UsageError, match=r"Give --feature temperature_C=NUMBER, or in Python features="):
-        found.position(np.zeros(6))
+        warm.position(np.zeros(6))
+
+
+def test_of_no_readings_there_are_no_predictions(warm):
+    none, features = np.zeros((0, 6)), {"temperature_C": 22.0}
+    shapes = {
+        "parameters": (0, 6, 5),
+        "position": (0, 3),
+        "pose": (0, 4, 4),
+        "parameter_jacobian": (0, 3, 30),
+        "position_std": (0, 3),
+        "pose_std": (0, 6),
+        "conservative_std": (0, 2),
+    }
+    assert {name: getattr(warm, name)(none, features=features).shape for name in shapes} == shapes
+    assert warm.variation_std(none, ["theta2", "a3"], features=features).shape == (0, 2)
+    assert warm.solve(np.zeros((0, 4, 4)), np.zeros(6), features=features).shape == (0, 6)

@@ -142,6 +142,11 @@ def test_a_dictionary_without_numbers_is_refused(table: object) -> None:
         Robot.from_dict({**Robot.load("ur10").to_dict(), "table": table})
 
 
+def test_a_dictionary_with_a_flange_that_is_not_rigid_is_refused() -> None:
+    with pytest.raises(InputError, match="values of flange are not rigid"):
+        Robot.from_dict({**Robot.load("ur10").to_dict(), "flange": np.diag([1.0, 1.5, 1.0, 1.0]).tolist()})
+
+
 @pytest.mark.parametrize("name", library_names())
 def test_dictionary_and_toml_bring_back_the_same_robot(name: str) -> None:
     robot = Robot.load(name)

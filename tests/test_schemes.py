@@ -1,6 +1,7 @@
 """The paper's schemes as models of a calibration: fitted, judged, kept, refused where they cannot serve."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,18 @@ def test_schemes_beat_the_constants_where_errors_vary(calibrations, model):
     assert held_out[model].position.mean < 0.8 * held_out["constant"].position.mean
 
 
+def test_what_a_scheme_leaves_is_its_own(calibrations, data, arm):
+    found = calibrations["regions"]
+    unexplained = found.summary["noise_mm"]
+    held_out = found.validation.holdout
+    assert unexplained == pytest.approx(held_out["regions"].position.rms / np.sqrt(3.0))
+    assert unexplained < 0.9 * held_out["constant"].position.rms / np.sqrt(3.0)
+    stated = replace(data, sigma_m=np.full(len(data), 1e-5))
+    with_sigma = calibrate(arm.robot, stated, model="regions", **QUICK)
+    rms = with_sigma.validation.holdout["regions"].position.rms
+    assert with_sigma.summary["noise_mm"] == pytest.approx(np.sqrt(rms**2 / 3.0 - 0.01**2))
+
+
 def test_predictions_are_those_of_the_scheme(calibrations, arm):
     found = calibrations["fcmac"]
     assert found.model_name == "fcmac"
@@ -45,6 +58,7 @@ def test_predictions_are_those_of_the_scheme(calibrations, arm):
     missed = np.linalg.norm(found.position(q, group=found.groups[0]) - seen, axis=1)
     assert missed.mean() < found.validation.holdout["constant"].position.mean * 1e-3
     assert np.ptp(found.parameters(q), axis=0).max() > 0.0
+    assert found.position(q[:0]).shape == (0, 3)
 
 
 @pytest.mark.parametrize("model", ["regions", "fcmac", "cmac"])
@@ -122,6 +136,21 @@ def test_an_arm_has_only_its_joints(data):
         calibrate(Robot.load("rv-m2"), data, model="regions", scheme_joints=(1, 2, 9))
 
 
+def test_commands_propose_none_that_refuses_a_scheme(calibrations, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    calibrations["cmac"].save("a.calib")
+    assert main(["strip", "a.calib", "-o", "b.calib"]) == 0
+    assert "truearm serve" not in capsys.readouterr().out
+    assert main(["export", "a.calib", "--to", "urdf", "-o", "a.urdf"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "truearm compensate does not know the scheme cmac" in told
+    assert "rewritten by truearm compensate" not in told
+    assert main(["export", "a.calib", "--to", "field-csv", "-o", "a.csv"]) == 1
+    refused = capsys.readouterr().err
+    assert "of the scheme cmac" in refused
+    assert "constant" not in refused.split("--to urdf")[0]
+
+
 def test_from_the_command_line(arm, tmp_path, capsys):
     table = arm.measure_table(arm.poses(300, held=(4, 5)))
     table.to_csv(tmp_path / "m.csv", index=False)
@@ -130,6 +159,8 @@ def test_from_the_command_line(arm, tmp_path, capsys):
     assert main([*words, "--regions", "8", "--scheme-joints", "1,2", "--repeatability-mm", "0.1"]) == 0
     printed = capsys.readouterr().out
     assert "regions have CEPs of their own" in printed
+    assert "truearm evaluate" in printed
+    assert "truearm compensate" not in printed
     assert "repeatability" in printed
     summary = json.loads((out / "summary.json").read_text())
     ratio = summary["error_to_repeatability"]["regions"]

@@ -14,6 +14,7 @@ from truearm.studies.metrics import over_seeds, quantiles
 from truearm.studies.panels import save_panels
 from truearm.studies.paper import run
 from truearm.studies.paper_results import PaperStudy, conduct_study, save_pictures
+from truearm.studies.statements import STATEMENTS, checked
 
 SCHEMES = {"uncalibrated", "conventional", "regional", "fcmac", "fcmac_shrunk", "variable"}
 FEW_POSES = 400
@@ -72,6 +73,23 @@ def test_the_papers_own_numbers_are_checked(study):
     assert agreed["15 of 25 parameters are observable, by name"]
     assert agreed["39 sensor cells, 2057 association cells, 27 a point"]
     assert {True, False} == set(agreed.values())
+
+
+@pytest.mark.parametrize(("noisy_mm", "agrees"), [(0.083, True), (0.728, False)])
+def test_with_noise_results_are_similar_where_the_largest_error_stays_below_the_conventional_one(
+    noisy_mm, agrees
+):
+    def sizes(mean, largest):
+        each = {"mean_mm": {"median": mean}, "max_mm": {"median": largest}}
+        return {"path": each, "workspace": each}
+
+    clean = {"conventional": sizes(0.066, 0.198), "fcmac": sizes(0.010, 0.072)}
+    noisy = {"conventional": sizes(0.066, 0.199), "fcmac": sizes(0.056, noisy_mm)}
+    assert not any("noise" in each["paper"] for each in checked({"noise": noisy}))
+    similar = [each for each in STATEMENTS if each.figures == "figure6 noise"]
+    found = [each.check({"figure6": clean, "noise": noisy}) for each in similar]
+    assert [agreed for _, agreed in found] == [agrees, agrees]
+    assert all(f"0.072 and {noisy_mm:.3f} mm; conventional" in words for words, _ in found)
 
 
 def test_every_claim_is_judged_and_stands_in_the_page(study):

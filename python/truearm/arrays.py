@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.errors import InputError, list_rows
 
 RIGID_WITHIN: Final = 1e-8
+"""How far R^T R of a rotation may be from the identity, as in the core."""
 
 
 def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
@@ -83,20 +84,24 @@ def as_transforms(values: ArrayLike, *, what: str) -> tuple[NDArray[np.float64],
         InputError: If these are no numbers, the shape is another, a value is not finite, a last row is not
             0 0 0 1, or a rotation is not orthonormal to eight digits.
     """
-    shape = np.shape(values)
-    if len(shape) not in {2, 3} or shape[-2:] != (4, 4):
-        raise InputError(f"{what} have shape {shape}", rule="The shape must be (4, 4) or (n, 4, 4)")
-    rows = as_rows(np.reshape(values, (-1, 16)), 16, what=what)[0].reshape(-1, 4, 4)
+    given = as_numbers(values, what=what)
+    if given.ndim not in {2, 3} or given.shape[-2:] != (4, 4):
+        raise InputError(f"{what} have shape {given.shape}", rule="The shape must be (4, 4) or (n, 4, 4)")
+    rows = given.reshape(-1, 4, 4)
+    check_finite(rows, what=what)
     turned = rows[:, :3, :3]
     square = np.abs(turned.transpose(0, 2, 1) @ turned - np.eye(3)).max(axis=(1, 2), initial=0.0)
     whole = (rows[:, 3] == [0.0, 0.0, 0.0, 1.0]).all(axis=1) & (np.linalg.det(turned) > 0.0)
     bad = np.flatnonzero((square > RIGID_WITHIN) | ~whole)
     if len(bad):
         raise InputError(
-            f"{what} are not rigid in {list_rows(bad.tolist())} (counted from 0)",
-            rule="A rotation must be orthonormal without a mirror, and the last row 0 0 0 1",
+            f"{what} are not rigid in {list_rows(bad.tolist())} (counted from 0): R^T R differs from "
+            f"the identity by up to {square[bad].max():.1e}",
+            rule=f"A rotation R is orthonormal within {RIGID_WITHIN:g} and no mirror, the last row 0 0 0 1",
+            way_out="Give them in double precision (float64), with the nearest rotations: u @ vt of "
+            "u, s, vt = np.linalg.svd(R)",
         )
-    return rows, len(shape) == 2
+    return rows, given.ndim == 2
 
 
 def as_row_numbers(index: ArrayLike, count: int) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.endpoints import Endpoint, at_target, at_tool
 from truearm.errors import Notice, WorkError
-from truearm.files import read_bytes, write_whole
+from truearm.files import as_path, read_bytes, write_whole
 from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
@@ -104,7 +104,7 @@ class Calibration:
             InputError: If there is no such file, it is none of ours, is cut short or altered, or has a
                 layout that this version does not know.
         """
-        return cls.from_bytes(read_bytes(Path(path)), where=str(path))
+        return cls.from_bytes(read_bytes(as_path(path)), where=str(path))
 
     @classmethod
     def from_bytes(cls, data: bytes, *, where: str) -> "Calibration":
@@ -136,7 +136,7 @@ class Calibration:
             with_rows: Whether to keep the measurements; without them a variable model has no exact
                 standard deviations, but keeps their bounds.
         """
-        write_whole(Path(path), self.to_bytes(with_rows=with_rows))
+        write_whole(as_path(path), self.to_bytes(with_rows=with_rows))
 
     def to_bytes(self, *, with_rows: bool = True) -> bytes:
         """What `save` writes."""
@@ -373,6 +373,8 @@ class Calibration:
         picked = np.zeros((len(rows), count, self.arm.table.size))
         for k, name in enumerate(names):
             picked[:, k, self.arm.candidates.column(name)] = 1.0
+        if not len(rows):
+            return np.empty((0, len(names)))
         together = self.spread.joint(self.field_inputs(rows, features), picked)
         covariance = np.einsum("ikjk->kij", together.reshape(len(rows), count, len(rows), count))
         centred = covariance - covariance.mean(axis=1, keepdims=True)
@@ -433,7 +435,7 @@ class Calibration:
         """Inputs (n, I) of the field at readings (n, N): joint values, then features."""
         columns = feature_columns(features, self.options.features, len(rows))
         values = self.robot.values_of(rows)
-        return np.hstack([values, columns]) if columns.size else values
+        return np.hstack([values, columns]) if columns.shape[1] else values
 
     def _at(self, rows: Floats, features: Features | None) -> tuple[Floats, Floats]:
         """Joint values (n, N) and parameters (n, L, 5) of readings."""

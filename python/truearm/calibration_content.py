@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from truearm import conservative, revision, rows_content, schemes
 from truearm._core import Field, Setup
+from truearm.calibration_checks import check_plain, check_set_ups
+from truearm.calibration_file import AGAIN
 from truearm.core_set import Selection
 from truearm.defaults import NO_DRIFT
 from truearm.details import ConstantDetails, VariableDetails
@@ -71,12 +73,22 @@ def unpack(arrays: Arrays, content: Mapping[str, Any], *, where: str) -> dict[st
     """Arguments of Calibration.
 
     Raises:
-        InputError: If a key or an array is missing.
+        InputError: If a key or an array is missing, or holds what no calibration does.
     """
     try:
+        check_plain(content)
         return _fields(arrays, content)
     except KeyError as error:
         raise InputError(f"the calibration has no {error}", where=where) from None
+    except InputError as error:
+        raise error.at(where) from error
+    except Exception as error:
+        raise InputError(
+            f"what this calibration holds cannot be read: {error}",
+            where=where,
+            rule="It is whole, but not as truearm writes one",
+            way_out=AGAIN,
+        ) from error
 
 
 def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
@@ -90,6 +102,8 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     models = {
         name: _read_model(name, stored, arrays, (inputs, arm)) for name, stored in content["models"].items()
     }
+    for model in models.values():
+        check_set_ups(len(content["groups"]), len(model.setup.frames))
     return {
         "robot": robot,
         "options": options,

@@ -6,6 +6,7 @@ version of the layout and the digest: SHA-256 over the whole file with the diges
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Mapping
 from typing import Any, Final
@@ -87,12 +88,20 @@ def _content(header: dict[str, Any], where: str) -> dict[str, Any]:
     if not isinstance(text, str):
         raise _not_ours(where, "this is a safetensors file, but no calibration")
     try:
-        content = json.loads(text)
+        content = json.loads(text, parse_float=_finite, parse_constant=_finite)
     except ValueError:
         raise _altered(where, "its metadata is no JSON") from None
     if not isinstance(content, dict):
         raise _altered(where, "its metadata is no JSON object")
     return content
+
+
+def _finite(text: str) -> float:
+    """A number of the text; ValueError where it is none, or beyond all that a float holds."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
 
 
 def _check_schema(content: dict[str, Any], where: str) -> None:

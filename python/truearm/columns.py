@@ -105,7 +105,7 @@ def read_joint_layout(names: Sequence[str], stated: StatedUnits, *, where: str) 
 
 def lookalikes(names: Sequence[str]) -> list[str]:
     """Names that would mean something if case and blanks were written otherwise, such as "Sigma mm"."""
-    return [name for name in names if _means_something(name.casefold().replace(" ", "_").replace("-", "_"))]
+    return [name for name in names if means_something(name.casefold().replace(" ", "_").replace("-", "_"))]
 
 
 class _Finder:
@@ -225,6 +225,7 @@ def _unit_in_words(column: Column) -> str:
     return column.unit or "SI units, as it names none"
 
 
-def _means_something(name: str) -> bool:
+def means_something(name: str) -> bool:
+    """Whether a column of this name is no feature: a joint, part of a measurement, or a word about it."""
     patterns = (JOINT, TARGET, SIGMA, DISTANCE)
     return name in QUATERNION + WORDS or any(pattern.fullmatch(name) for pattern in patterns)

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import CoreError, Corrector, Solver
-from truearm.arrays import as_rows
+from truearm.arrays import as_rows, as_transforms
 from truearm.calibration import Calibration
 from truearm.endpoints import at_tool
 from truearm.errors import InputError, WorkError
 from truearm.kinds import required
 from truearm.limits import Limits, Task
 from truearm.robot import Robot
-from truearm.solving import as_poses, as_seed, calibrated_model, core_options, feature_values, plain_model
+from truearm.solving import as_seed, calibrated_model, core_options, feature_values, plain_model
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -164,7 +164,7 @@ class Compensator:
         Raises:
             InputError: If targets, seed or tool are none.
         """
-        poses, _ = as_poses(base_from_tool)
+        poses, _ = as_transforms(base_from_tool, what="the poses")
         seeds, flange_from_tool = as_seed(self.programming, seed, len(poses)), self._tool(tool)
         options = core_options(self.programming, self.task, None, self.limits)
         try:

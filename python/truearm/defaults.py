@@ -8,6 +8,9 @@ HOLDOUT: Final = 0.3
 SEED: Final = 7
 """Seed of splits and draws of rows."""
 
+THERE_AND_BACK: Final = "there-and-back"
+"""Order in which planned poses are measured."""
+
 LARGEST_MM: Final = 5.0
 """Shift of the tool that a correction may be."""
 

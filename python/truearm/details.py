@@ -73,15 +73,18 @@ class Jump:
     Attributes:
         between: The two measured rows between which it came, in words.
         mm: How far.
+        poses_change: Whether the poses change there as well, from one sort to another.
     """
 
     between: str
     mm: float
+    poses_change: bool = False
 
     @property
     def words(self) -> str:
         """How far, and where."""
-        return f"{self.mm:.2g} mm of it at once, between {self.between}"
+        where = ", where the poses change as well" if self.poses_change else ""
+        return f"{self.mm:.2g} mm of it at once, between {self.between}{where}"
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,12 @@ class DriftDetails:
             group: tuple(Jump(**jump) for jump in found) for group, found in values.get("jumps", {}).items()
         }
         return cls(values["moved_mm"], values["left_in_mean_mm"], jumps)
+
+    @property
+    def slips(self) -> dict[str, list[Jump]]:
+        """Of each set-up the jumps that no change of the poses explains; set-ups without any are left out."""
+        found = {group: [jump for jump in own if not jump.poses_change] for group, own in self.jumps.items()}
+        return {group: own for group, own in found.items() if own}
 
     def way(self, group: str) -> str:
         """How far a set-up moved, and what of it at once."""

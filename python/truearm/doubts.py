@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.details import VariableDetails
 from truearm.errors import Notice
+from truearm.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.grids import BETWEEN, grid_steps, grid_words
 from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
@@ -43,6 +44,7 @@ NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 ON_A_GRID: Final = "on_a_grid"
+FEW_VALUES: Final = "few_values"
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
     "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1) and "
@@ -145,11 +147,25 @@ def on_a_grid(robot: Robot, readings: Floats) -> list[Notice]:
     if not steps:
         return []
     text = (
-        f"The measured poses have {grid_words(steps)}. Errors that vary within a step, as gears leave "
-        "them, are not seen there, and held-out poses on the same grid do not show them: between its values "
-        f"the arm may be further off than the errors say. {BETWEEN}."
+        f"The measured poses have {grid_words(steps, robot.joints)}. Errors that vary within a step, as "
+        "gears and screws leave them, are not seen there, and held-out poses on the same grid do not show "
+        f"them: between its values the arm may be further off than the errors say. {BETWEEN}."
     )
     return [Notice(ON_A_GRID, text)]
+
+
+def at_few_values(robot: Robot, readings: Floats) -> list[Notice]:
+    """A warning where joints have a few values alone in readings (n, N), wide apart, and stand on no grid."""
+    on_grids = grid_steps(readings, robot.joints)
+    found = {k: own for k, own in few_values(readings, robot.joints).items() if k not in on_grids}
+    if not found:
+        return []
+    text = (
+        f"The measured poses have {values_words(found, robot.joints)} alone. What errors do in between "
+        "was not measured, and held-out poses at the same values do not show it: there the arm may be "
+        f"further off than errors and standard deviations say. {BETWEEN_THEM}."
+    )
+    return [Notice(FEW_VALUES, text)]
 
 
 def helps(before_mm: float, after_mm: float) -> bool:

@@ -20,6 +20,7 @@ from truearm.errors import Notice
 from truearm.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, VARIABLE
+from truearm.row_order import places, poses_change
 from truearm.unexplained import unexplained
 from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
@@ -251,17 +252,19 @@ def drift_details(
         left_in[name] = float(MM_PER_METRE * np.nanmean(distance))
     spans = {group: MM_PER_METRE * span for group, span in drift.spans(data).items()}
     jumps = {
-        group: tuple(_jump(data, drift, rows) for rows in drift.jumps[group])
+        group: tuple(_jump(task, data, drift, group, rows) for rows in drift.jumps[group])
         for group in spans
         if drift.jumps.get(group)
     }
     return DriftDetails(spans, left_in, jumps)
 
 
-def _jump(data: Measurements, drift: Drift, rows: tuple[int, int]) -> Jump:
+def _jump(task: Task, data: Measurements, drift: Drift, group: str, rows: tuple[int, int]) -> Jump:
     names = [data.row_names(np.arange(len(data)) == row) for row in rows]
     far_m = np.linalg.norm(drift.moved[rows[1]] - drift.moved[rows[0]])
-    return Jump(" and ".join(names), float(MM_PER_METRE * far_m))
+    times = float(drift.progress[rows[0]]), float(drift.progress[rows[1]])
+    changed = poses_change(*places(task, data, drift.progress, group), times)
+    return Jump(" and ".join(names), float(MM_PER_METRE * far_m), changed)
 
 
 def drift_notices(details: DriftDetails | None) -> list[Notice]:
@@ -271,9 +274,11 @@ def drift_notices(details: DriftDetails | None) -> list[Notice]:
     ways = [f"{group} by {details.way(group)}" for group in details.moved_mm]
     slowly = "Arms and instruments that warm up do so."
     at_once = "Something gave way there: a target or a tripod that was touched, play in a joint."
+    with_poses = "As the poses change there too, this may be what varies with them, and nothing gave way."
+    why = at_once if details.slips else with_poses if details.jumps else slowly
     text = (
         f"The set-up moved while it was measured, whatever the pose: {'; '.join(ways)}. "
-        f"{at_once if details.jumps else slowly} It is taken out of all measurements, the held-out ones too. "
+        f"{why} It is taken out of all measurements, the held-out ones too. "
         "Rows are taken to be in the order of measuring: if they are not, give --drift none."
     )
     return [Notice("drift", text)]

@@ -1,12 +1,12 @@
 """The point or frame that a prediction is of: the robot's tool, another tool, or a measured target."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import check_finite
+from truearm.arrays import RIGID_WITHIN, check_finite
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.robot import Robot
 
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
-
-RIGID: Final = 1e-8
-"""How far a rotation may be from orthonormal, as in the core."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +55,12 @@ def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
         )
     turn = given[:3, :3]
     off = float(np.abs(turn.T @ turn - np.eye(3)).max())
-    if off > RIGID or np.linalg.det(turn) < 0.0 or np.abs(given[3] - [0.0, 0.0, 0.0, 1.0]).max() > RIGID:
+    last = float(np.abs(given[3] - [0.0, 0.0, 0.0, 1.0]).max())
+    if max(off, last) > RIGID_WITHIN or np.linalg.det(turn) < 0.0:
         raise InputError(
             "the tool is no rigid motion",
-            rule=f"Its rotation is orthonormal and right-handed within {RIGID:g}, its last row 0 0 0 1",
+            rule=f"Its rotation is orthonormal within {RIGID_WITHIN:g} and right-handed, "
+            "its last row 0 0 0 1",
         )
     return given
 

@@ -19,6 +19,7 @@ MOVING: Final = tuple(dict.fromkeys([*USUAL, *ORDERS]))
 FIXED: Final = tuple(order.lower() for order in MOVING)
 VECTOR: Final = "rotation vector"
 TURN: Final = 2.0 * np.pi
+LEAST_TURN: Final = 1e-12
 
 
 def otherwise_read(quaternions: Floats) -> Iterator[tuple[str, str, Floats]]:
@@ -60,7 +61,10 @@ def _numbers(rotation: Rotation, kind: str) -> tuple[Floats, Floats]:
     if kind == VECTOR:
         vectors = rotation.as_rotvec()
         angle = np.linalg.norm(vectors, axis=1, keepdims=True)
-        return vectors, vectors * (1.0 - TURN / np.maximum(angle, np.finfo(float).tiny))
+        # What is not turned has no axis: a whole turn may be about any.
+        turned = angle > LEAST_TURN
+        axes = np.where(turned, vectors, [1.0, 0.0, 0.0]) / np.where(turned, angle, 1.0)
+        return vectors, (angle - TURN) * axes
     with warnings.catch_warnings():
         # Where the first and the third axis are parallel any of their angles will do.
         warnings.simplefilter("ignore", UserWarning)

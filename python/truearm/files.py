@@ -24,6 +24,17 @@ _SIGNATURES = (
 )
 
 
+def as_path(given: object) -> Path:
+    """`given`, a text or a path that names a file, as a path.
+
+    Raises:
+        UsageError: If it is anything else.
+    """
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    raise UsageError(f"the file is of type {type(given).__name__}", rule="A path is needed, as text or Path")
+
+
 def read_bytes(path: Path) -> bytes:
     """The content of a file.
 

@@ -192,8 +192,9 @@ def _fit_scheme(
 ) -> SchemeFit:
     if task.selection.distances:
         raise WorkError(
-            "distances alone cannot tell regions apart",
+            "the measurements are distances alone",
             where=", ".join(data.files),
+            rule="The paper's schemes are built for positions",
             way_out="Give --model constant (model='constant')",
         )
     determined = task.columns(found.determined)

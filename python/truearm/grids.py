@@ -6,23 +6,29 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.units import RADIANS_PER_DEGREE
+from truearm.few_values import few_values
+from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 
+SHOWN: Final = {"revolute": 1.0 / RADIANS_PER_DEGREE, "prismatic": MM_PER_METRE}
 FEWEST_ROWS: Final = 30
 FEWEST_VALUES: Final = 4
-FINEST_DEG: Final = 0.5
-"""Gears and encoders leave up to 520 cycles a turn: readings on a finer grid than this show most of them."""
-JITTER_DEG: Final = 0.1
-"""How far from its value of the grid a controller may have stopped."""
+FINEST: Final = {"revolute": 0.5, "prismatic": 2.0}
+"""Deg, mm: gears and encoders leave up to 520 cycles a turn, screws one in some millimetres, and readings on
+a finer grid than this show most of them."""
+JITTER: Final = 0.1
+"""How far from its value of the grid a controller may have stopped, deg or mm."""
 SHARE: Final = 0.98
 """Of the rows that have to stand on the grid: more off it show what lies between its values."""
 MOST_AT_ONE: Final = 0.5
 """Of the rows that one value may hold: a joint that mostly stands still stands on no grid."""
 CHANCE: Final = 0.01
 """How likely as few values as these may fall on some grid at random."""
-BIN_DEG: Final = 0.02
+OF_A_GAP: Final = 0.5
+"""Part of the least gap of a few values below which a step is that of round numbers, and no grid."""
+BIN: Final = 0.02
+"""Deg or mm."""
 FINER: Final = 8
 """Steps that are tried lie so close that their grids differ by a part of this of a step at the far end."""
 ALIKE: Final = 0.9
@@ -35,7 +41,9 @@ BETWEEN: Final = (
 
 
 def grid_steps(readings: Floats, joints: Sequence[str]) -> dict[int, float]:
-    """Steps of the grids that revolute joints stand on, deg, by the number of the joint from 1.
+    """Steps of the grids that joints stand on, deg or mm, by the number of the joint from 1.
+
+    A few values that stand on one because they are round numbers are no grid.
 
     Args:
         readings: Joint readings (n, N), rad or m.
@@ -43,53 +51,59 @@ def grid_steps(readings: Floats, joints: Sequence[str]) -> dict[int, float]:
     """
     if len(readings) < FEWEST_ROWS:
         return {}
+    few = few_values(readings, joints)
     found = {
-        joint: _step(readings[:, joint - 1] / RADIANS_PER_DEGREE)
+        joint: _step(readings[:, joint - 1] * SHOWN[kind], FINEST[kind])
         for joint, kind in enumerate(joints, start=1)
-        if kind == "revolute"
     }
-    return {joint: step for joint, step in found.items() if step is not None}
+    return {
+        joint: step
+        for joint, step in found.items()
+        if step is not None and not (joint in few and step < OF_A_GAP * np.diff(few[joint]).min())
+    }
 
 
-def grid_words(steps: Mapping[int, float]) -> str:
+def grid_words(steps: Mapping[int, float], joints: Sequence[str]) -> str:
     """Grids of joints, of which there must be one, in words: "joints 1 and 2 on a grid of 10 deg"."""
     by_step: dict[str, list[str]] = {}
     for joint, step in steps.items():
-        by_step.setdefault(f"{step:.3g}", []).append(str(joint))
+        unit = "mm" if joints[joint - 1] == "prismatic" else "deg"
+        shown = f"{step:.3g}" if step < 999.5 else f"{step:.0f}"
+        by_step.setdefault(f"{shown} {unit}", []).append(str(joint))
     return ", ".join(
         f"joint{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:-1])}"
-        f"{' and ' if len(numbers) > 1 else ''}{numbers[-1]} on a grid of {step} deg"
+        f"{' and ' if len(numbers) > 1 else ''}{numbers[-1]} on a grid of {step}"
         for step, numbers in by_step.items()
     )
 
 
-def _step(readings: Floats) -> float | None:
-    """The largest step of a grid that readings (n,) of a joint stand on, deg; None where there is none."""
+def _step(readings: Floats, finest: float) -> float | None:
+    """The largest step of a grid that readings (n,) stand on, deg or mm; None where there is none."""
     low, span = float(readings.min()), float(np.ptp(readings))
-    if span < (FEWEST_VALUES - 1) * FINEST_DEG:
+    if span < (FEWEST_VALUES - 1) * finest:
         return None
-    counts = np.bincount(np.rint((readings - low) / BIN_DEG).astype(np.int64))
+    counts = np.bincount(np.rint((readings - low) / BIN).astype(np.int64))
     length = FINER * len(counts)
     likeness = np.abs(np.fft.rfft(counts, length)) / len(readings)
-    per_deg = np.arange(len(likeness)) / (length * BIN_DEG)
-    least, most = (FEWEST_VALUES - 1) / (span + JITTER_DEG), 1.0 / FINEST_DEG + per_deg[1]
-    tried = np.flatnonzero((likeness > ALIKE) & (per_deg >= least) & (per_deg <= most))
+    per_unit = np.arange(len(likeness)) / (length * BIN)
+    least, most = (FEWEST_VALUES - 1) / (span + JITTER), 1.0 / finest + per_unit[1]
+    tried = np.flatnonzero((likeness > ALIKE) & (per_unit >= least) & (per_unit <= most))
     peaks = [k for k in tried if likeness[k] >= max(likeness[k - 1], likeness[k + 1])]
-    fits = (_fitted(readings - low, 1.0 / float(per_deg[k])) for k in peaks)
+    fits = (_fitted(readings - low, 1.0 / float(per_unit[k])) for k in peaks)
     found = next((fit for fit in fits if fit[1] > ALIKE), None)
     if found is None:
         return None
     step, share, counts = found
-    likely = 2.0 * span / step * (2.0 * JITTER_DEG / step) ** (len(counts) - 2)
+    likely = 2.0 * span / step * (2.0 * JITTER / step) ** (len(counts) - 2)
     varied = len(counts) >= FEWEST_VALUES and counts.max() <= MOST_AT_ONE * len(readings)
     return step if share >= SHARE and varied and likely < CHANCE else None
 
 
 def _fitted(places: Floats, step: float) -> tuple[float, float, NDArray[np.int64]]:
-    """The step that fits places (n,) best, deg, what share stand on its grid, and how many on each value."""
+    """The step that fits places (n,) best, what share stand on its grid, and how many on each value."""
     turned = np.exp(2j * np.pi * places / step).mean()
     numbers = np.rint(places / step - np.angle(turned) / (2.0 * np.pi))
     basis = np.stack([np.ones_like(numbers), numbers], axis=1)
     fitted = np.linalg.lstsq(basis, places)[0]
-    on = np.abs(places - basis @ fitted) <= JITTER_DEG
+    on = np.abs(places - basis @ fitted) <= JITTER
     return float(fitted[1]), float(on.mean()), np.unique(numbers[on], return_counts=True)[1]

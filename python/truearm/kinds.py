@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
+from numbers import Integral, Real
 from typing import Any, Final, TypeVar
 
 from truearm.errors import UsageError, did_you_mean, list_names
@@ -29,6 +30,13 @@ def required(value: object, kind: type[T], noun: str) -> T:
         rule=f"A {kind.__module__.partition('.')[0]}.{kind.__name__} is needed",
         way_out=WAYS.get(kind.__name__, ""),
     )
+
+
+def check_number(value: object, name: str, kind: type = Real) -> None:
+    """Raise UsageError unless the argument or option `name` is a number, of `kind` Integral a whole one."""
+    if not isinstance(value, kind):
+        words = "a whole number" if kind is Integral else "a number"
+        raise UsageError(f"{name} is {value!r}", rule=f"It must be {words}")
 
 
 def chosen(

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.arrays import as_row_numbers
 from truearm.columns import StatedUnits
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
+from truearm.files import as_path
 from truearm.kinds import required
 from truearm.measured_fields import read_fields
 from truearm.reading import read_csv_table, table_from_frame
@@ -142,7 +143,8 @@ class Measurements:
             InputError: If the file is no such CSV, columns are missing, or values break a rule.
         """
         stated = StatedUnits(length_unit, angle_unit, joints)
-        read = cls._read(Path(path), stated, group=Path(path).stem)
+        file = as_path(path)
+        read = cls._read(file, stated, group=file.stem)
         read.require_joint_count(joint_count if joints is None else len(joints))
         return read
 
@@ -161,15 +163,15 @@ class Measurements:
             InputError: As for read_csv.
         """
         stated = StatedUnits(length_unit, angle_unit, joints)
-        table = read_csv_table(Path(path))
-        read = cls(**read_fields(table, stated, default_group=Path(path).stem, measured=False))
+        file = as_path(path)
+        read = cls(**read_fields(read_csv_table(file), stated, default_group=file.stem, measured=False))
         read.require_joint_count(None if joints is None else len(joints))
         return read
 
     @classmethod
     def read_files(
         cls,
-        paths: Sequence[str | Path],
+        paths: str | Path | Sequence[str | Path],
         *,
         length_unit: str | None = None,
         angle_unit: str | None = None,
@@ -180,7 +182,7 @@ class Measurements:
         Groups are named after their files, with the folders where two files have the same name.
 
         Args:
-            paths: The files.
+            paths: The files, or one.
             length_unit: As for read_csv.
             angle_unit: As for read_csv.
             joints: As for read_csv.
@@ -188,7 +190,7 @@ class Measurements:
         Raises:
             InputError: As for read_csv, and if a file is named twice.
         """
-        files = [Path(path) for path in paths]
+        files = [as_path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
         for path in files:
             if files.count(path) > 1:
                 raise UsageError("the file is named twice", where=str(path))

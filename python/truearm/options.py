@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any, Final, Literal
 
 from truearm.core_set import FIRST_TARGET, USES, Use
 from truearm.defaults import NO_DRIFT
 from truearm.errors import UsageError
 from truearm.identified import Frame
-from truearm.kinds import check_name
+from truearm.kinds import check_name, check_number
 from truearm.parameters import PARALLEL_WITHIN_DEG
 from truearm.scheme_options import SchemeOptions
 from truearm.schemes import SCHEMES
@@ -140,12 +140,12 @@ class Options:
 
 
 def _check_numbers(given: Mapping[str, Any]) -> None:
-    whole = {name: given[name] for name in WHOLE if given.get(name) is not None}
-    numbers = {name: given[name] for name in NUMBERS if name in given}
-    for values, kind, words in ((whole, Integral, "a whole number"), (numbers, Real, "a number")):
-        for name, value in values.items():
-            if not isinstance(value, kind):
-                raise UsageError(f"{name} is {value!r}", rule=f"It must be {words}")
+    for name in WHOLE:
+        if given.get(name) is not None:
+            check_number(given[name], name, Integral)
+    for name in NUMBERS:
+        if name in given:
+            check_number(given[name], name)
 
 
 def _words(value: Any) -> tuple[str, ...]:  # noqa: ANN401

@@ -297,15 +297,24 @@ def _check_order(first: RawTable, second: RawTable) -> None:
         if name not in second.parts:
             continue
         ours, theirs = ([_key(cell) for cell in table.texts(name).tolist()] for table in (first, second))
-        told_apart = len(set(ours)) == len(ours) == len(set(theirs))
-        if told_apart and ours != theirs and 2 * len(set(ours) & set(theirs)) > len(ours):
+        if ours != theirs and _tell_rows_apart(ours, theirs):
             row = next(k for k, (one, other) in enumerate(zip(ours, theirs, strict=True)) if one != other)
             raise InputError(
                 f'"{name}" says "{ours[row]}" in row {row + 1}, and "{theirs[row]}" in {second.where}',
                 where=first.where,
                 rule="Row by row, both must be in the same order",
-                way_out=f"Join them by it: --on {name}",
+                way_out=f"Join them by it, where neither says a thing twice: --on {name}. If it does not "
+                "tell rows apart, rename it in one of them",
             )
+
+
+def _tell_rows_apart(ours: Sequence[str], theirs: Sequence[str]) -> bool:
+    """Whether a column of as many rows in both tables says which rows are meant, and mostly the same ones.
+
+    One table where it says nothing twice is enough: in the other, a row may be named wrongly.
+    """
+    apart = max(len(set(ours)), len(set(theirs))) == len(ours)
+    return apart and 2 * len(set(ours) & set(theirs)) > len(ours)
 
 
 def _key(cell: str) -> str:

@@ -7,13 +7,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.arrays import as_numbers
+from truearm.arrays import as_numbers, as_transforms
 from truearm.errors import InputError
 from truearm.robot_data import Payload, RobotData
 from truearm.urdf_names import UrdfNames
 
 TEXTS: Final = ("name", "source", "convention")
-ARRAYS: Final = ("table", "base", "flange", "tool", "coupling")
+TRANSFORMS: Final = ("base", "flange", "tool")
+ARRAYS: Final = ("table", *TRANSFORMS, "coupling")
 
 
 def to_dict(robot: RobotData) -> dict[str, Any]:
@@ -40,14 +41,16 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of a Robot from what to_dict gave.
 
     Raises:
-        InputError: If a key is missing, or an array holds something else than numbers.
+        InputError: If a key is missing, an array holds something else than numbers, or a transform is not
+            rigid.
     """
     keys = (*TEXTS, *ARRAYS, "joints", "base_row", "limits", "payload")
     missing = [key for key in keys if key not in content]
     if missing:
         raise InputError(f'key "{missing[0]}" is missing', where="robot")
     fields: dict[str, Any] = {key: content[key] for key in TEXTS}
-    fields |= {key: as_numbers(content[key], what=f"values of {key}") for key in ARRAYS}
+    fields |= {key: as_numbers(content[key], what=f"values of {key}") for key in ("table", "coupling")}
+    fields |= {key: as_transforms([content[key]], what=f"values of {key}")[0][0] for key in TRANSFORMS}
     fields["joints"] = tuple(content["joints"])
     row = content["base_row"]
     fields["base_row"] = None if row is None else as_numbers(row, what="values of base_row")

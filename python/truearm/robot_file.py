@@ -77,7 +77,10 @@ class Link(Row):
     @classmethod
     def _ordered(cls, value: list[float] | None) -> list[float] | None:
         if value is not None and value[0] >= value[1]:
-            raise ValueError(f"{value[0]:g} to {value[1]:g}; the lower limit comes first")
+            raise ValueError(
+                f"{value[0]:g} to {value[1]:g}; the lower limit comes first, and a joint that never moves "
+                "needs some room too, such as -1 to 1"
+            )
         return value
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from truearm.errors import UsageError
+from truearm.kinds import check_number
 from truearm.units import MM_PER_METRE
 
 MAJOR_JOINTS: Final = (1, 2, 3)
@@ -76,8 +77,10 @@ class SchemeOptions:
             "tolerance_mm",
             "epochs",
         ):
+            check_number(getattr(self, name), name)
             if not getattr(self, name) > 0:
                 raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
+        check_number(self.demanded_mm, "demanded_mm")
         if not 0.0 <= self.demanded_mm < math.inf:
             raise UsageError(f"{self.demanded_mm}", where="demanded_mm", rule="Zero or more, and finite")
         if not self.scheme_joints or len(set(self.scheme_joints)) < len(self.scheme_joints):

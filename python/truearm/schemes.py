@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Network, Regions
-from truearm.parameters import KIND_COUNT
 
 Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
@@ -105,7 +104,7 @@ def add_ceps(parameters: Floats, columns: Sequence[int], ceps: Floats) -> Floats
     """Parameters (n, L, 5): those of (L, 5) with CEPs (n, P) added to their columns."""
     found = np.repeat(parameters.reshape(1, -1), len(ceps), axis=0)
     found[:, list(columns)] += ceps
-    return found.reshape(len(ceps), -1, KIND_COUNT)
+    return found.reshape(len(ceps), *parameters.shape)
 
 
 def training_pairs(regions: Regions, ceps: Floats) -> tuple[Floats, Floats]:

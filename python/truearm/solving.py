@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import ArmModel, CoreError, Solver
-from truearm.arrays import as_numbers, as_rows, check_finite
+from truearm.arrays import as_rows, as_transforms
 from truearm.endpoints import at_tool
 from truearm.errors import InputError, UsageError, WorkError, list_rows
 from truearm.inputs import feature_columns
@@ -98,23 +98,6 @@ def beyond_learnt(calibration: "Calibration", values: Sequence[float]) -> list[s
     return found
 
 
-def as_poses(base_from_tool: ArrayLike) -> tuple[Floats, bool]:
-    """Poses (n, 4, 4) or (4, 4) as a C-contiguous (n, 4, 4) array, and whether it was one.
-
-    Raises:
-        InputError: If the shape is another, a number is not finite, or a last row is not 0 0 0 1.
-    """
-    poses = as_numbers(base_from_tool, what="the poses")
-    single = poses.ndim == 2
-    poses = poses[None] if single else poses
-    if poses.ndim != 3 or poses.shape[1:] != (4, 4):
-        raise InputError(f"the poses have shape {np.shape(base_from_tool)}", rule="(n, 4, 4), or (4, 4)")
-    check_finite(poses, what="the poses")
-    if (poses[:, 3] != [0.0, 0.0, 0.0, 1.0]).any():
-        raise InputError("the last row of a pose is not 0 0 0 1", rule="Poses are homogeneous matrices")
-    return poses, single
-
-
 def as_seed(robot: Robot, seed: ArrayLike, count: int) -> Floats:
     """A seed (N,) for a path, or (count, N) for each pose.
 
@@ -143,7 +126,7 @@ def solve(
 ) -> Floats:
     """Readings for which the calibrated arm puts the tool at poses, see Calibration.solve."""
     robot = calibration.robot
-    poses, single = as_poses(base_from_tool)
+    poses, single = as_transforms(base_from_tool, what="the poses")
     seeds = as_seed(robot, seed, len(poses))
     options = core_options(robot, task, None, Limits())
     values = feature_values(calibration, features)

@@ -1,7 +1,7 @@
 """Corrections of a stream of set-points, never applied or dropped at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,7 @@ from truearm.arrays import as_numbers
 from truearm.compensation import Compensator
 from truearm.defaults import DEADLINE_S, HOLD_S, RAMP_S
 from truearm.errors import InputError, UsageError
+from truearm.kinds import check_number
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -37,6 +38,10 @@ class StreamOptions:
     ramp_s: float = RAMP_S
     hold_s: float = HOLD_S
     deadline_s: float = DEADLINE_S
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            check_number(getattr(self, field.name), field.name)
 
     def core(self) -> dict[str, object]:
         """The core's options, SI."""
@@ -112,6 +117,7 @@ class CorrectionStream:
         Raises:
             InputError: If these are no numbers, or not one for each joint. Nothing has become of it then.
         """
+        check_number(elapsed_s, "elapsed_s")
         readings = None if q is None else as_numbers(q, what="the readings of a set-point")
         if readings is not None and readings.shape != (self._joints,):
             raise InputError(

@@ -126,7 +126,7 @@ def _wave(phase: float, reached: float, *, slides: bool) -> dict[str, Any]:
 
 
 def waves_in_words(waves: Sequence[Mapping[str, Any]], spec: str = ".4g") -> str:
-    """Of waves of one joint, as :func:`describe_blocks` has them: "202 cycles a turn", "a period of 20 mm"."""
+    """Of waves of one joint as :func:`describe_blocks` has them: "202 cycles a turn", "a period of 20 mm"."""
     cycles = sorted(wave["cycles"] for wave in waves if "cycles" in wave)
     if cycles:
         return f"{', '.join(format(each, spec) for each in cycles)} cycles a turn"

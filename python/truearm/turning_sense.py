@@ -30,6 +30,8 @@ ABOUT_ONE: Final = 0.02
 """An arm turns its tool about one axis, as a SCARA does, where turns about others are less than this part."""
 STILL: Final = 0.05
 """And about none where turns are less than this, rad."""
+SAME: Final = 1e-3
+"""Orientations that are within so much of one of them, rad, were not measured where the arm turned."""
 
 COMPONENTS: Final = "wxyz"
 READINGS: Final = tuple(product(permutations(range(4)), (False, True)))[1:]
@@ -41,7 +43,8 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
 
     Raises:
         InputError: If it does not, and does so once the quaternions are read in another order or
-            sense, or the angles that they were made from are of another kind.
+            sense, or the angles that they were made from are of another kind; or if all orientations
+            are the same while the arm turns.
     """
     turned = measurements.orientations
     if turned is None:
@@ -57,6 +60,7 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
         flanges = robot.pose(rows.readings)
         if _misfit(flanges, *poses) < MISFIT:
             continue
+        _check_they_turn(rows, poses[1], group)
         ways = [_other_columns(flanges, *poses), _other_angles(flanges, *poses)]
         if any(ways):
             fitting = ", or if ".join(filter(None, ways))
@@ -66,6 +70,18 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
                 rule="qw qx qy qz, w first, turn vectors of the target into the world",
                 way_out="Put that right (truearm import --rotation), or use positions alone: --use position",
             )
+
+
+def _check_they_turn(rows: Measurements, quaternions: Floats, group: str) -> None:
+    """Raise InputError if quaternions (n, 4) of an arm that turns are all the same."""
+    if np.abs(quaternions @ quaternions[0]).min() < np.cos(0.5 * SAME):
+        return
+    raise InputError(
+        f"all {len(quaternions)} orientations are the same, while the arm turns the target",
+        where=f"{', '.join(rows.files)}, group {group}",
+        rule="Orientations are columns of what measures them: many instruments fill them in without",
+        way_out="Leave out qw qx qy qz, or use positions alone: --use position",
+    )
 
 
 def _other_columns(flanges: Floats, points: Floats, quaternions: Floats) -> str:

@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LengthUnit = Literal["m", "mm"]
+StatedLengthUnit = Literal["in", "m", "mm"]
 AngleUnit = Literal["rad", "deg"]
 
 LENGTH_UNITS: Final = ("m", "mm")

@@ -89,5 +89,5 @@ fn a_pose_that_is_none_is_refused() {
     let (mut out, mut residuals) = (vec![0.0; 6], vec![0.0; 2]);
     let solved = Solved { readings: &mut out, residuals: &mut residuals };
     let error = inverse(&scene).each(&[1.0; 16], &[0.0; 6], &[], solved, &Run::default()).unwrap_err();
-    assert!(error.to_string().contains("a target pose"), "{error}");
+    assert!(error.to_string().contains("the target pose's transform is not rigid"), "{error}");
 }

@@ -9,8 +9,8 @@
 //! all links, not the last alone, lets its centre of gravity lie anywhere on the line from one's end to the next one's.
 
 use truearm_kinematics::{
-    Chain, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters,
-    dispatch, lever_count,
+    Chain, InstructionSet, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose,
+    SharedParameters, dispatch, dispatch_on, lever_count,
 };
 
 use crate::bank::Block;
@@ -57,7 +57,9 @@ pub struct Sag {
 pub struct SagScratch {
     joints: Vec<Lane>,
     loads: Vec<Lane>,
-    /// What one payload adds to the loads.
+    /// The payloads.
+    carried: Vec<Lane>,
+    /// What one of them adds to the loads.
     added: Vec<Lane>,
     frames: LeverScratch,
     one: OnePose,
@@ -176,6 +178,7 @@ impl Levers {
         let lanes = vec![Lane::ZERO; self.joint_count()];
         SagScratch {
             joints: lanes.clone(),
+            carried: vec![Lane::ZERO; self.payloads.len()],
             added: lanes.clone(),
             loads: lanes,
             frames: LeverScratch::new(&self.chain),
@@ -249,7 +252,7 @@ impl Loads {
         alone: bool,
         scratch: &'a mut SagScratch,
     ) -> &'a [Lane] {
-        let SagScratch { joints, loads, added, frames, one } = scratch;
+        let SagScratch { joints, loads, frames, one, .. } = scratch;
         for (k, lane) in joints.iter_mut().enumerate() {
             *lane = input(k);
         }
@@ -261,13 +264,41 @@ impl Loads {
             LaneParameters::Shared(nominal)
         };
         chain.loads::<I>(joints, parameters, &self.heights, frames, loads);
-        for (payload, heights) in &self.payloads {
+        if !self.payloads.is_empty() {
+            for (carried, (payload, _)) in scratch.carried.iter_mut().zip(&self.payloads) {
+                *carried = input(*payload);
+            }
+            self.carry(I::LEVEL, alone, scratch);
+        }
+        &scratch.loads
+    }
+
+    /// Adds what the payloads bring to the loads; rare, and so compiled once and not wherever loads are needed.
+    #[inline(never)]
+    fn carry(&self, level: InstructionSet, alone: bool, scratch: &mut SagScratch) {
+        dispatch_on(level, Carry { loads: self, alone, scratch });
+    }
+}
+
+struct Carry<'a> {
+    loads: &'a Loads,
+    alone: bool,
+    scratch: &'a mut SagScratch,
+}
+
+impl Kernel for Carry<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        let Levers { chain, nominal, .. } = &self.loads.levers;
+        let SagScratch { joints, loads, carried, added, frames, one } = self.scratch;
+        let parameters = if self.alone { LaneParameters::One(one) } else { LaneParameters::Shared(nominal) };
+        for (carried, (_, heights)) in carried.iter().zip(&self.loads.payloads) {
             chain.loads::<I>(joints, parameters, heights, frames, added);
-            let carried = input(*payload);
             for (load, added) in loads.iter_mut().zip(added.iter()) {
-                *load = I::mul_add(carried, *added, *load);
+                *load = I::mul_add(*carried, *added, *load);
             }
         }
-        loads
     }
 }

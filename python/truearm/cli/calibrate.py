@@ -17,6 +17,7 @@ from truearm.cli.arguments import (
 )
 from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
+from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
 from truearm.defaults import HOLDOUT, SEED
@@ -141,15 +142,7 @@ def suggest_next(calibration: "Calibration", file: Path) -> None:
     if any(notice.kind in OF_NO_USE for notice in calibration.notices):
         suggest(f"truearm report {typed(file)}")
     else:
-        suggest(f"truearm evaluate {typed(file)} OTHER.csv", compensate_command(calibration, file))
-
-
-def compensate_command(calibration: "Calibration", file: Path, more: str = "") -> str:
-    """The command that shows what a calibration does to a program, with more options, each after a space."""
-    from truearm.programs.declaring import may_differ
-
-    declared = " --controller MODEL" if may_differ(calibration.robot) else ""
-    return f"truearm compensate {typed(file)} PROGRAM{declared}{more} --dry-run"
+        suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate_commands(calibration, file))
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:

@@ -37,7 +37,9 @@ def tell(text: str) -> None:
 
 
 def suggest(*commands: str, when: str = "Try next:") -> None:
-    """Name the commands that come next at the end of a command's results, one a line."""
+    """Name the commands that come next, if there are any, at the end of a command's results, one a line."""
+    if not commands:
+        return
     say(when)
     for command in commands:
         say(f"  {command}")

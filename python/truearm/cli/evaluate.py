@@ -5,9 +5,9 @@ from typing import Annotated
 import typer
 
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, MeasurementFiles, Use
-from truearm.cli.calibrate import compensate_command
 from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.interrupt import ends_promptly
+from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
 from truearm.errors import count_of, typed
@@ -74,5 +74,5 @@ def command(
     print_errors(found.errors, count_of(found.n_judged, "row"))
     others = " ".join(map(typed, measurements))
     useful = all(notice.kind not in (*OF_NO_USE, FAR_ROWS) for notice in found.notices)
-    next_one = [compensate_command(known, calibration)] if useful else []
+    next_one = compensate_commands(known, calibration) if useful else []
     suggest(f"truearm report {typed(calibration)} {others} -o other.html", *next_one)

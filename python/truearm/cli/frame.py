@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit
-from truearm.cli.calibrate import compensate_command
 from truearm.cli.console import print_json, suggest, warn
+from truearm.cli.next_commands import compensate_commands
 from truearm.errors import UsageError, typed
 
 
@@ -77,7 +77,7 @@ def command(
         print_json({"name": name, "file": str(output), **found.to_dict()})
         return
     print_frame(found, name, known, output)
-    suggest(compensate_command(known, calibration, f" --frames {typed(output)}"))
+    suggest(*compensate_commands(known, calibration, f" --frames {typed(output)}"))
 
 
 def _asked(tool: str | None, work_object: str | None) -> tuple[str, str]:

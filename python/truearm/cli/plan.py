@@ -10,6 +10,7 @@ from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
+from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError, count_of, list_names, typed
 from truearm.files import refuse_own_input, refuse_same
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from truearm.robot import Robot
 
 NUMBERS: Final = (20, 40, 60, 100, 200)
-ORDERS: Final = ("short", "paper")
 MEASURED: Final = "Measure them; then:"
 PICTURES: Final = (".png", ".svg", ".pdf")
 
@@ -36,7 +36,7 @@ def command(
     acceptance: option.Acceptance = None,
     known: option.Known = None,
     group: option.Group = None,
-    order: option.Order = "short",
+    order: option.Order = THERE_AND_BACK,
     sigma_mm: option.SigmaMm = 0.1,
     seed: option.Seed = 0,
     picture: option.Picture = None,
@@ -46,7 +46,7 @@ def command(
 
     A quarter as many are added to judge by, spread over the space, and a tenth are repeated: at once from
     the other side, and at the end. They come from lower and higher joint readings in turn, in an order from
-    low to high. The expected accuracy for several numbers of poses helps to choose N.
+    low to high and back. The expected accuracy for several numbers of poses helps to choose N.
 
     With --from CALIB: --next proposes the poses that reduce the expected error over the workspace most given
     what is known already; --acceptance those that show best whether the calibration still holds.
@@ -92,6 +92,7 @@ def command(
 
 def _check_words(criterion: str, order: str) -> None:
     """Raise UsageError where a criterion or an order is not known."""
+    from truearm.cell.plan import ORDERS
     from truearm.planning.choosing import CRITERIA
 
     for word, allowed in ((criterion, CRITERIA), (order, ORDERS)):
@@ -217,8 +218,8 @@ def _print_proposed(proposed: "Proposed", output: Path) -> None:
 
 
 def _motion(seconds: "dict[str, float]") -> str:
-    paper, short = seconds["paper"], seconds["short"]
-    return f"Motion: {paper:.0f} s in the paper's order, {short:.0f} s in the shorter one."
+    back, short, paper = seconds[THERE_AND_BACK], seconds["short"], seconds["paper"]
+    return f"Motion: {back:.0f} s there and back, {short:.0f} s in short order, {paper:.0f} s in the paper's."
 
 
 def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:

@@ -41,7 +41,7 @@ Group: TypeAlias = Annotated[
     typer.Option(metavar="NAME", help="--next, --acceptance: set-up to measure in.  [default: the last]"),
 ]
 Order: TypeAlias = Annotated[
-    str, typer.Option(metavar="short|paper", help="In which order they are measured.")
+    str, typer.Option(metavar="there-and-back|short|paper", help="In which order they are measured.")
 ]
 SigmaMm: TypeAlias = Annotated[float, typer.Option(metavar="MM", help="Noise of a measured coordinate.")]
 Seed: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of the candidates.")]

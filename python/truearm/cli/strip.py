@@ -8,8 +8,8 @@ import typer
 from truearm.cli.arguments import AsJson, CalibFile
 from truearm.cli.console import print_json, say, suggest
 from truearm.cli.interrupt import ends_promptly
+from truearm.cli.next_commands import serve_commands
 from truearm.cli.progress import told_stages
-from truearm.errors import typed
 from truearm.files import refuse_own_input
 
 
@@ -36,4 +36,4 @@ def command(
         print_json({"calibration": str(output), "bytes": after, "bytes_before": before})
         return
     say(f"{output}: {after / 1e3:.0f} kB without the measurements, {before / 1e3:.0f} kB with them.")
-    suggest(f"truearm serve {typed(output)}")
+    suggest(*serve_commands(known, output))

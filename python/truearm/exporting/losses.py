@@ -37,12 +37,17 @@ def field_is_lost(calibration: Calibration, export_format: str) -> list[str]:
         return []
     validation = calibration.validation
     errors = validation.holdout
+    whole = (
+        "Programs rewritten by truearm compensate have all of it"
+        if calibration.scheme is None
+        else f"truearm compensate does not know the scheme {calibration.model_name}; calibrate with "
+        "--model variable for programs that have all of it"
+    )
     constant, variable = (errors[name].position.mean for name in (CONSTANT, calibration.model_name))
     return [
         f"The parameters of this calibration vary over the workspace; {FORMAT_WORDS[export_format]} holds "
         f"the constant part alone. On {validation.n_holdout} {validation.judged} rows the constant part "
-        f"left {constant:.3f} mm in the mean, the whole calibration {variable:.3f} mm. Programs rewritten by "
-        "truearm compensate have all of it"
+        f"left {constant:.3f} mm in the mean, the whole calibration {variable:.3f} mm. {whole}"
     ]
 
 

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import RIGID_WITHIN
+from truearm.arrays import RIGID_WITHIN, as_numbers
 from truearm.calibration import Calibration
+from truearm.endpoints import at_tool
 from truearm.errors import InputError, Notice, UsageError
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.frames_toml import former_entry, tip_covariance, write_frame
@@ -18,8 +20,12 @@ from truearm.framing.touching import tool_from_touches
 from truearm.kinds import required
 from truearm.measurements import Measurements
 from truearm.plausibility import check_points, check_readings
+from truearm.rotations import rigid_inverse
 
 Floats = NDArray[np.float64]
+
+BEHIND_FLANGE: Final = (0.0, 0.0, -0.1, 1.0)
+"""A point of the wrist in the flange's frame, m."""
 
 __all__ = ["IdentifiedFrame", "find_object", "find_tool", "former_entry", "tip_covariance", "write_frame"]
 
@@ -36,7 +42,8 @@ def find_tool(
     Args:
         calibration: The arm.
         data: Readings alone: touches of one point, four or more. With positions, or poses, of target 1: those
-            of the tool, in the frame of a device that stands anywhere; seven or more.
+            of the tool, in the frame of a device that stands anywhere; four positions or three poses, and
+            better twice as many.
         orientation: Orientation of the tool, flange_from_tool (3, 3), unless poses were measured.
         points: Name of the point of each touch; one point by default.
 
@@ -87,23 +94,26 @@ def find_object(
             where=", ".join(data.files),
             rule="Each row needs where the point truly is, in the object's own frame",
         )
-    given = np.asarray(flange_from_tool, dtype=np.float64)
-    tool = np.eye(4)
-    if given.shape == (3,):
-        tool[:3, 3] = given
-    else:
-        tool = given
-    in_tool = None if covariance is None else tool[:3, :3].T @ np.asarray(covariance) @ tool[:3, :3]
+    tool = at_tool(calibration.robot, flange_from_tool)
+    in_tool = None if covariance is None else tool[:3, :3].T @ _covariance(covariance) @ tool[:3, :3]
     poses = calibrated_poses(calibration, data, tool)
-    return _with(notices, object_from_points(poses, data.targets[:, 0], data.rows, in_tool))
+    wrist = (rigid_inverse(tool) @ BEHIND_FLANGE)[:3]
+    return _with(notices, object_from_points(poses, data.targets[:, 0], data.rows, wrist, in_tool))
 
 
 def _with(notices: Sequence[Notice], found: IdentifiedFrame) -> IdentifiedFrame:
     return replace(found, notices=(*notices, *found.notices))
 
 
+def _covariance(given: ArrayLike) -> Floats:
+    covariance = as_numbers(given, what="the entries of the covariance")
+    if covariance.shape != (3, 3):
+        raise InputError(f"the covariance has shape {covariance.shape}", rule="That of a point's is (3, 3)")
+    return covariance
+
+
 def _rotation(orientation: ArrayLike) -> Floats:
-    given = np.asarray(orientation, dtype=np.float64)
+    given = as_numbers(orientation, what="the entries of the orientation")
     square = given.shape == (3, 3)
     off = np.abs(given.T @ given - np.eye(3)).max() if square else np.nan
     if not off <= RIGID_WITHIN or np.linalg.det(given) < 0:

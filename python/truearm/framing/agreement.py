@@ -17,7 +17,9 @@ Rows = NDArray[np.int64]
 CHANCE: Final = 1e-3
 """That a row is named although all are as good as each other."""
 WORST_M: Final = 0.01
-"""Touching by eye is good to a tenth of a millimetre; what leaves more than this is no touch of one thing."""
+"""What leaves more than this is no touch of one thing."""
+BY_EYE_M: Final = 1e-4
+"""How good touching by eye is."""
 TWICE: Final = 2.0
 MUCH_BETTER: Final = 0.2
 UNIT_FACTOR: Final = (500.0, 2000.0)
@@ -103,6 +105,15 @@ def check_places(touched: Floats, places: Floats) -> None:
             rule="The axes x, y and z of an object are right-handed",
             way_out="Check the signs and the order of x, y and z, and which point each row touched",
         )
+
+
+def tell_handedness(touched: Floats, places: Floats) -> bool:
+    """Whether touched points (n, 3) fit their places on an object (n, 3) better than its mirror image's.
+
+    Those of one plane do not: turned over, its mirror image is the same there.
+    """
+    plain, mirrored = _misfit(touched, places), _misfit(touched, places * [1.0, 1.0, -1.0])
+    return plain < MUCH_BETTER * mirrored and mirrored > BY_EYE_M
 
 
 def _size(points: Floats) -> float:

@@ -24,13 +24,13 @@ PLACEMENT: Final = ("xyz", *ORIENTATIONS)
 FORMAT: Final = 1
 
 
-def former_entry(path: Path, kind: str, name: str) -> tuple[FrameEntry, float] | None:
+def former_entry(path: str | Path, kind: str, name: str) -> tuple[FrameEntry, float] | None:
     """What a frames file, if it is there, says of a tool or object, and its length unit in m.
 
     Raises:
         InputError: If the file breaks a rule.
     """
-    content = parsed(_text(path), where=str(path))
+    content = parsed(_text(Path(path)), where=str(path))
     key = _key(content, kind, name)
     if key is None:
         return None
@@ -46,7 +46,7 @@ def tip_covariance(entry: FrameEntry) -> Floats | None:
     return np.asarray(stated, dtype=np.float64)[:3, :3] * 1e-6
 
 
-def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -> list[Notice]:
+def write_frame(path: str | Path, name: str, found: IdentifiedFrame, data_hash: str) -> list[Notice]:
     """Write a frame into a file, which is made if it is not there; other frames stay.
 
     Where the file held the frame already, what it held becomes what the controller has, unless it said
@@ -55,13 +55,13 @@ def write_frame(path: Path, name: str, found: IdentifiedFrame, data_hash: str) -
     Raises:
         InputError: If the file breaks a rule or cannot be written.
     """
-    held = _text(path)
+    held = _text(Path(path))
     content = parsed(held, where=str(path))
     former = _put(content, name, found, data_hash)
     edited = _edited(held, lambda document: _put(document, name, found, data_hash))
     text = edited if _says(edited, content) else tomli_w.dumps(content)
     Frames.parse(text, where=str(path))
-    write_whole(path, text)
+    write_whole(Path(path), text)
     if not former:
         return []
     return [

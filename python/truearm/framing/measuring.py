@@ -7,10 +7,11 @@ from truearm._core import fit_constant
 from truearm.calibration import Calibration
 from truearm.core_set import Selection, core_set, select
 from truearm.errors import WorkError
-from truearm.fitting import Task, core_errors, fit_options
+from truearm.fitting import Task, core_errors, fit_options, frame_unknowns
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.identified_frame import IdentifiedFrame
+from truearm.framing.turning import check_turned
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_motion
@@ -35,16 +36,18 @@ def tool_from_measurements(
     """
     selection = _selection(calibration, data, stated=orientation is not None)
     task = Task(calibration.arm, selection, data.groups, calibration.options)
+    first, width = frame_unknowns(task), 6 if selection.orientation else 3
+    freedom = len(data) * width - first - width
+    noun = "poses" if selection.orientation else "points"
+    _check_told(calibration, data, freedom, f"measured {noun}")
     model = calibration.model
     parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
     measured = core_set(task.arm.robot, data, selection, task.groups)
     with core_errors(data):
         fit = fit_constant(task.problem(measured, []), fit_options(task, parameters=parameters))
-    width = 6 if selection.orientation else 3
     residuals = np.asarray(fit.residuals).reshape(len(data), width)
     transform, covariance = np.eye(4), np.zeros((6, 6))
     transform[:3, 3] = fit.setup.targets[0, 0]
-    first = 0 if task.arm.world_is_known else 6
     turned = np.eye(6)
     if selection.orientation:
         transform[:3, :3] = turned[3:, 3:] = fit.setup.rotations[0]
@@ -52,9 +55,8 @@ def tool_from_measurements(
         transform[:3, :3] = orientation
     own = fit.covariance[first : first + width, first : first + width]
     covariance[:width, :width] = turned[:width, :width] @ own @ turned[:width, :width].T
-    freedom = residuals.size - first - width
     noise, rows = fit.noise[0], data.rows
-    what = f"{len(data)} measured {'poses' if selection.orientation else 'points'} of it"
+    what = f"{len(data)} measured {noun} of it"
     notices = far_rows(residuals[:, :3], _by_frame_and_tip(calibration, data, transform), rows)
     check_agreement(noise, notices)
     return IdentifiedFrame(
@@ -72,6 +74,22 @@ def _selection(calibration: Calibration, data: Measurements, *, stated: bool) ->
     if selection.orientation:
         check_turns(data, calibration.robot)
     return selection
+
+
+def _check_told(calibration: Calibration, data: Measurements, freedom: int, noun: str) -> None:
+    """Raise WorkError where rows do not tell the tool, by how many values there are and how they turn it.
+
+    The fit itself does not fail there: it holds targets near the flange.
+    """
+    if freedom <= 0:
+        raise WorkError(
+            f"{len(data)} {noun} of the tool tell no more than is unknown",
+            rule="There must be more measured values than unknowns",
+            way_out=f"Give more {noun}, with the tool turned about two axes between them",
+        )
+    if not calibration.arm.world_is_known:
+        turns = calibrated_poses(calibration, data, np.eye(4))[:, :3, :3]
+        check_turned(turns - turns.mean(axis=0), noun)
 
 
 def _by_frame_and_tip(calibration: Calibration, data: Measurements, flange_from_tool: Floats) -> Floats:

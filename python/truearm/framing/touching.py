@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from truearm.errors import WorkError, count_of
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.identified_frame import IdentifiedFrame
+from truearm.framing.turning import check_turned
 
 Floats = NDArray[np.float64]
 
 FEWEST: Final = 4
-LEAST_TURN_DEG: Final = 3.0
 
 
 def tool_from_touches(
@@ -49,7 +49,7 @@ def tool_from_touches(
         )
     turns, origins = base_from_flange[:, :3, :3], base_from_flange[:, :3, 3]
     apart, shifts = _without_points(turns, number), _without_points(origins, number)
-    _check_turned(apart)
+    check_turned(apart, "touches")
     stacked = apart.reshape(-1, 3)
     tip, *_ = np.linalg.lstsq(stacked, -shifts.reshape(-1), rcond=None)
     residuals = np.einsum("nij,j->ni", apart, tip) + shifts
@@ -80,16 +80,3 @@ def _without_points(values: Floats, number: NDArray[np.int64]) -> Floats:
     for k in range(int(number.max()) + 1):
         left[number == k] -= values[number == k].mean(axis=0)
     return left
-
-
-def _check_turned(apart: Floats) -> None:
-    """Raise WorkError unless the touches turn every direction of the flange."""
-    mean = np.einsum("nij,nik->jk", apart, apart) / len(apart)
-    sizes, directions = np.linalg.eigh(mean)
-    if np.sqrt(max(sizes[0], 0.0)) < np.radians(LEAST_TURN_DEG):
-        x, y, z = directions[:, 0] * np.sign(directions[np.abs(directions[:, 0]).argmax(), 0])
-        raise WorkError(
-            f"the touches hardly turn the flange's direction [{x:.2f}, {y:.2f}, {z:.2f}]",
-            rule="Where that direction does not move, neither is the tool's length along it told",
-            way_out="Tilt the tool by 20 deg or more about two axes between touches",
-        )

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from scipy.spatial.transform import Rotation
 
 from truearm.errors import InputError
-from truearm.files import parsed, read_text
+from truearm.files import as_path, parsed, read_text
 from truearm.programs.environment import Frame, Transform
 from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
 
@@ -116,7 +116,7 @@ class Frames:
         Raises:
             InputError: If it cannot be read or breaks a rule; names the key.
         """
-        return cls.parse(read_text(Path(path)), where=str(path))
+        return cls.parse(read_text(as_path(path)), where=str(path))
 
     @classmethod
     def parse(cls, text: str, *, where: str = "frames") -> "Frames":

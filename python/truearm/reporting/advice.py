@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import SAME, STATED_TOO_LARGE, constants_do_better
+from truearm.doubts import FEW_VALUES, SAME, STATED_TOO_LARGE, constants_do_better
 from truearm.errors import count_of
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
@@ -14,6 +14,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.numbers import listed, percent, short, shown_readings
+from truearm.row_order import ORDER_OF_POSES
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -88,9 +89,8 @@ def _left_out(facts: Facts) -> Iterator[Advice]:
 
 
 def _stated_sigma(facts: Facts) -> Iterator[Advice]:
-    words = [str(notice) for notice in facts.calibration.notices if notice.kind == STATED_TOO_LARGE]
-    if words:
-        yield Advice(STATED_TOO_LARGE, "Correct the column of sigma.", words[0], 2.0 * facts.mean_mm())
+    if words := facts.noticed(STATED_TOO_LARGE):
+        yield Advice(STATED_TOO_LARGE, "Correct the column of sigma.", words, 2.0 * facts.mean_mm())
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
@@ -99,7 +99,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     floor, mean = distance_at_floor_mm(facts), facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
-        if facts.grids:
+        if facts.grids or facts.noticed(FEW_VALUES):
             return
         words = (
             f"The mean error is {left} mm, and noise alone would leave {noise} mm. More poses will hardly "
@@ -127,8 +127,8 @@ def _warm_up(facts: Facts) -> Iterator[Advice]:
         f"is {mean} mm, and {left} mm with it left in. Whether arm or measuring device moved, these data do "
         "not tell: "
     )
-    if drift.jumps:
-        jumps = [(group, jump) for group, own in drift.jumps.items() for jump in own]
+    if drift.slips:
+        jumps = [(group, jump) for group, own in drift.slips.items() for jump in own]
         places = "; ".join(
             f"{group}, between {jump.between}, {short(jump.mm)[0]} mm" for group, jump in jumps
         )
@@ -151,6 +151,16 @@ def _on_a_grid(facts: Facts) -> Iterator[Advice]:
             f"above know of what varies within a step. {BETWEEN}."
         )
         yield Advice("between_the_grid", "Measure between the grid's values.", words, facts.mean_mm())
+
+
+def _at_few_values(facts: Facts) -> Iterator[Advice]:
+    if words := facts.noticed(FEW_VALUES):
+        yield Advice("between_few_values", "Measure in between.", words, facts.mean_mm())
+
+
+def _in_order(facts: Facts) -> Iterator[Advice]:
+    if words := facts.noticed(ORDER_OF_POSES):
+        yield Advice("another_order", "Measure in another order.", words, 0.5 * facts.mean_mm())
 
 
 def _tail(facts: Facts) -> Iterator[Advice]:
@@ -264,6 +274,8 @@ RULES: Final = (
     _stood_still,
     _warm_up,
     _on_a_grid,
+    _at_few_values,
+    _in_order,
     _stated_sigma,
     _noise_or_poses,
     _tail,

@@ -148,10 +148,13 @@ class Facts:
     def grids(self) -> str:
         """What stood on which grid, in words; empty where nothing did, or neither rows nor notices tell."""
         if self.readings is None:
-            noticed = any(notice.kind == ON_A_GRID for notice in self.calibration.notices)
-            return "readings on a grid" if noticed else ""
+            return "readings on a grid" if self.noticed(ON_A_GRID) else ""
         steps = grid_steps(self.readings, self.joints)
-        return grid_words(steps) if steps else ""
+        return grid_words(steps, self.joints) if steps else ""
+
+    def noticed(self, kind: str) -> str:
+        """The calibration's notice of a kind; empty where there is none."""
+        return next((str(notice) for notice in self.calibration.notices if notice.kind == kind), "")
 
     @cached_property
     def still(self) -> str:

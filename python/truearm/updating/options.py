@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from truearm.core_set import Use
 from truearm.errors import UsageError
+from truearm.kinds import check_number
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,10 @@ class UpdateOptions:
 
     def __post_init__(self) -> None:
         for name in ("offset_deg", "offset_mm", "tool_mm", "tool_deg"):
+            check_number(getattr(self, name), name)
             if not getattr(self, name) > 0.0:
                 raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
+        check_number(self.level, "level")
         if not 0.0 < self.level < 1.0:
             raise UsageError(f"{self.level}", where="level", rule="Between 0 and 1, such as 0.01")
         if self.keep_tool and self.new_tool:
