@@ -10,7 +10,7 @@ import tomli_w
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.cell_support import cell_text, measured, possible_readings, virtual
+from tests.cell_support import cell_text, measured, merge, possible_readings, virtual
 from truearm.cell import Cell, Connected, EmergencyStopError, Expected, RefusedError, StoppedError, movemaster
 from truearm.cell.channels import ConnectionEndedError
 from truearm.cell.conformance import ConformanceError, check_robot, check_sensor
@@ -27,6 +27,8 @@ from truearm.files import parsed
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 
+SLOW = 5.0
+"""Times as fast as real: motions last long enough to be stopped."""
 SIX_PLACES = [np.full(6, 0.1), np.radians([60.0, -40.0, 80.0, 10.0, 20.0, 30.0])]
 FIVE_PLACES = [np.radians([0.0, 60.0, -100.0, 0.0, 0.0]), np.radians([90.0, 30.0, -60.0, 10.0, 20.0])]
 LINE_ROBOT = {
@@ -77,7 +79,9 @@ def test_a_pose_beside_a_limit_is_approached_within_it(tmp_path):
 @pytest.mark.parametrize("name", texts())
 def test_drivers_keep_to_the_protocols(name):
     text, places = texts()[name]
-    with virtual(text) as (_, found):
+    content = parsed(text, where=name)
+    merge(content, {"simulate": {"speed": SLOW}})
+    with virtual(tomli_w.dumps(content)) as (_, found):
         assert len(check_robot(lambda: Cell.from_toml(found).robot, places)) == 8
         cell = Cell.from_toml(found)
         readings = places[1] if cell.file.world is None else possible_readings(cell, 1)[0]
@@ -93,7 +97,7 @@ def test_playback_keeps_to_the_protocols(tmp_path):
     arm = VirtualArm(Robot.load("ur5"), seed=1)
     arm.measure_table(np.array(SIX_PLACES)).to_csv(tmp_path / "recorded.csv", index=False)
     settings = PlaybackSensor.Settings(file=tmp_path / "recorded.csv")
-    check_robot(lambda: PlaybackRobot(PlaybackRobot.Settings(), arm.robot), SIX_PLACES)
+    check_robot(lambda: PlaybackRobot(PlaybackRobot.Settings(), arm.robot), SIX_PLACES, stops_within_s=None)
     expected = Expected(SIX_PLACES[0], np.zeros(3), 0.01, np.array([0.0, 0.0, 1.0]))
     check_sensor(lambda: PlaybackSensor(settings, arm.robot), expected)
     with (
@@ -204,7 +208,8 @@ def test_groups_that_some_lines_lack_are_means_of_the_others(monkeypatch):
     settings = LineSensor.Settings(port="tcp://127.0.0.1:1", answer=answer, average=3, settle_s=0.0)
     sensor = LineSensor(settings, Robot.load("ur5e"))
     lines = iter(["1 2 3 s0.04 t20", "1 2 3.05 s0.06", "damaged", "1 2 3.1"])
-    monkeypatch.setattr(sensor, "_port", Mock(receive=Mock(side_effect=lambda **_: next(lines))))
+    monkeypatch.setattr(sensor._port, "receive", lambda *_, **__: next(lines))
+    monkeypatch.setattr(sensor._port, "drain", list)
     reading = sensor.measure()
     assert reading.valid
     assert reading.point_in_world == pytest.approx([1e-3, 2e-3, 3.05e-3])

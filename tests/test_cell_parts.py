@@ -4,6 +4,7 @@ import contextlib
 import os
 import re
 import socket
+import threading
 import time
 import tty
 from concurrent.futures import ThreadPoolExecutor
@@ -248,7 +249,7 @@ def test_what_ended_a_way_is_raised_where_the_sensor_fails_too():
     cell = Mock(arm=Robot.load("rv-m2"))
     cell.robot.move_joints.side_effect = EmergencyStopError("pressed", where="arm")
     cell.sensor.stop.side_effect = DeviceSilentError("no answer", where="table")
-    crew = Crew(cell, lambda kind, message: noted.append((kind, message)))
+    crew = Crew(cell, lambda kind, message: noted.append((kind, message)), threading.Event())
     with pytest.raises(EmergencyStopError, match="pressed"):
         crew._together([np.zeros(5)], Mock())
     assert noted == [("failed", "stop sensor: table: no answer.")]
@@ -259,14 +260,14 @@ def test_joints_that_are_no_numbers_are_an_error_of_the_device():
     cell.robot.name = "own robot"
     cell.robot.read_joints.return_value = np.array([0.1, np.nan, 0.0, 0.0, 0.0])
     with pytest.raises(DeviceError, match=r"own robot: it reads its joints as \[0.1, nan"):
-        Crew(cell, Mock()).connect()
+        Crew(cell, Mock(), threading.Event()).connect()
 
 
 def test_a_driver_that_raises_anything_while_it_lets_go_does_not_keep_the_other_open():
     noted: list[tuple[str, str]] = []
     cell = Mock(robot=Mock(close=Mock(side_effect=OSError("pulled out"))), arm=Robot.load("rv-m2"))
-    Crew(cell, lambda kind, message: noted.append((kind, message))).quiet()
+    Crew(cell, lambda kind, message: noted.append((kind, message)), threading.Event()).quiet()
     cell.robot.close.side_effect = TimeoutError()
-    Crew(cell, lambda kind, message: noted.append((kind, message))).quiet()
+    Crew(cell, lambda kind, message: noted.append((kind, message)), threading.Event()).quiet()
     assert noted == [("failed", "close robot: pulled out"), ("failed", "close robot: TimeoutError")]
     assert cell.sensor.close.call_count == 2

@@ -12,7 +12,8 @@ import truearm as ta
 from tests.cell_support import cell_text, measured, poses_of, virtual, write_poses
 from tests.trials import measuring, simulated
 from truearm.cell import Cell
-from truearm.cell.accepted import accepted_table, measurements_of, points_of_last_check
+from truearm.cell.accepted import accepted_table, measurements_of
+from truearm.cell.checks import last_check
 from truearm.cell.examples import EXAMPLES, SIMULATED
 from truearm.cell.measuring import ACCURATE, DONE, Progress
 from truearm.cell.poses_file import Poses
@@ -242,13 +243,12 @@ def test_a_check_is_held_against_the_same_pose_where_the_first_contact_was_given
         for step in steps[1:]:
             point = np.array([step.pose, step.step, 0.0])
             known.add_reading(step.step, 1, Reading(point, 1e-4, 0.0, True, ""), np.zeros(5), point)
-            assert points_of_last_check(known) is None
+            assert last_check(known) is None
             known.add_outcome(step.step, "measured", attempts=[1])
-        pair = points_of_last_check(known)
-    assert pair is not None
-    first, check = pair
-    np.testing.assert_array_equal(first, [7.0, 3.0, 0.0])
-    np.testing.assert_array_equal(check, [7.0, 4.0, 0.0])
+        check = last_check(known)
+    assert check is not None
+    np.testing.assert_array_equal(check.first, [7.0, 3.0, 0.0])
+    np.testing.assert_array_equal(check.now, [7.0, 4.0, 0.0])
 
 
 def test_orientations_near_a_half_turn_are_averaged_in_files_of_any_name(tmp_path):

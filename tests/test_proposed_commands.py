@@ -52,6 +52,17 @@ def test_files_with_blanks_are_proposed_as_one_word(folder, capsys):
     assert "'my arm.toml'" in capsys.readouterr().out
 
 
+def test_commands_for_a_calibration_with_features_name_them(folder, capsys):
+    table = pd.read_csv("my data.csv").assign(temperature_C=[20.0 + k / 10 for k in range(40)])
+    table.to_csv("warm.csv", index=False)
+    words = ["calibrate", "my arm.toml", "warm.csv", "-o", "out", "--features", "temperature_C"]
+    assert main([*words, "--no-refit"]) == 0
+    assert "--feature temperature_C=NUMBER --dry-run" in capsys.readouterr().out
+    assert main(["strip", "out/calibration.calib", "-o", "small.calib"]) == 0
+    words = proposed(capsys.readouterr().out, "serve")
+    assert words == ["truearm", "serve", "small.calib", "--feature", "temperature_C=NUMBER"]
+
+
 def test_next_poses_measured_and_calibrated_from_as_proposed_share_the_set_up(folder, capsys):
     assert main(["calibrate", "my arm.toml", "my data.csv", "-o", "out", "--model", "constant"]) == 0
     capsys.readouterr()
@@ -76,14 +87,16 @@ def test_a_session_s_arm_is_called_as_the_library_knows_it(name, word, folder, m
             assert not writing
 
         def __enter__(self):
-            return SimpleNamespace(meta=lambda _: ta.Robot.load(name).to_dict())
+            robot = ta.Robot.load(name).to_dict()
+            return SimpleNamespace(meta=lambda key: robot if key == "arm" else None, rows=lambda *_: [])
 
         def __exit__(self, *_):
             return None
 
     monkeypatch.setattr("truearm.cell.session.Session", Session)
     monkeypatch.setattr(
-        "truearm.cell.accepted.accepted_table", lambda _: pd.DataFrame({"step": [1], "q1": [0.0]})
+        "truearm.cell.accepted.accepted_table",
+        lambda _: pd.DataFrame({"step": [1], "pose": [1], "q1": [0.0]}),
     )
     session_export.command(Path("session.db"))
     assert proposed(capsys.readouterr().out, "calibrate")[2] == word

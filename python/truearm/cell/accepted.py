@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from truearm.cell.checks import unsure_steps
+from truearm.cell.poses_file import GROUP
 from truearm.cell.session import Session
 from truearm.measurements import Measurements
 
@@ -21,18 +23,12 @@ FROM (SELECT * FROM outcomes JOIN steps USING (step)
 JOIN readings r USING (step)
 WHERE r.valid ORDER BY o.step, r.attempt
 """
-LAST_CHECK = """
-WITH done AS (SELECT * FROM outcomes JOIN steps USING (step) WHERE outcome = 'measured'),
-     last AS (SELECT * FROM done WHERE kind = 'check' ORDER BY step DESC LIMIT 1)
-SELECT done.step, done.attempts, last.step, last.attempts
-FROM done, last WHERE done.pose = last.pose AND done.step < last.step
-ORDER BY done.step LIMIT 1
-"""
 COLUMNS = (
     "step", "pose", "purpose", "approach", "attempts", "time_s", "attempt", "joints", "x", "y", "z",
     "qw", "qx", "qy", "qz", "sigma", "temperature_c", "features",
 )  # fmt: skip
 TURN = ["qw", "qx", "qy", "qz"]
+SET_UP = "session"
 
 
 def accepted_table(session: Session, kind: str = "pose", *, most: int | None = None) -> pd.DataFrame:
@@ -41,6 +37,9 @@ def accepted_table(session: Session, kind: str = "pose", *, most: int | None = N
     Columns: pose (from 1, in the list of poses), q1 ... qN, x, y, z, sigma, qw ... qz where orientation was
     measured, approach, readings (how many were accepted), temperature_c where there is one, other features.
     Where there are purposes, purpose too. sigma is that of the mean.
+
+    Poses also have a group where the list of poses gave one, and where something moved: those between a check
+    that found the cell in its place and one that did not are a set-up of their own.
 
     Args:
         session: The session.
@@ -52,30 +51,23 @@ def accepted_table(session: Session, kind: str = "pose", *, most: int | None = N
         row = dict(zip(COLUMNS, values, strict=True))
         if row["attempt"] in json.loads(row["attempts"]):
             grouped.setdefault(row["step"], []).append(row)
-    return pd.DataFrame([_merged(rows) for rows in grouped.values()])
+    table = pd.DataFrame([_merged(rows) for rows in grouped.values()])
+    if kind == "pose" and not table.empty:
+        table = _with_group(table, session)
+    return table
 
 
 def measurements_of(session: Session, *, most: int | None = None, where: str = "session") -> Measurements:
-    """The accepted poses as Measurements of one set-up."""
-    return Measurements.from_dataframe(_kept(accepted_table(session, most=most)), name=where)
+    """The accepted poses as Measurements of one set-up: without those while something moved."""
+    table = accepted_table(session, most=most)
+    in_place = table[~table["pose"].isin(moved_poses(session, table))]
+    return Measurements.from_dataframe(in_place.drop(columns=["step", "pose"]), name=where)
 
 
-def points_of_last_check(session: Session) -> tuple[Floats, Floats] | None:
-    """The point (3,) of the pose checked last, as it was first measured, and as checked, m.
-
-    None before there are both: a contact for the frame may have been given up.
-    """
-    rows = session.rows(LAST_CHECK)
-    if not rows:
-        return None
-    first, check = (_mean_point(session, step, attempts) for step, attempts in (rows[0][:2], rows[0][2:]))
-    return first, check
-
-
-def _mean_point(session: Session, step: int, attempts: str) -> Floats:
-    accepted = json.loads(attempts)
-    points = [each.point for each in session.readings_of(step) if each.attempt in accepted]
-    return np.asarray(np.mean([point for point in points if point is not None], axis=0))
+def moved_poses(session: Session, table: pd.DataFrame) -> list[int]:
+    """Poses of an accepted table, from 1, that were measured while something moved: see unsure_steps."""
+    moved = [step for steps in unsure_steps(session) for step in steps]
+    return [] if table.empty else table["pose"][table["step"].isin(moved)].tolist()
 
 
 def points_and_joints(session: Session, kind: str) -> tuple[list[int], Floats, Floats]:
@@ -110,5 +102,12 @@ def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return merged
 
 
-def _kept(table: pd.DataFrame) -> pd.DataFrame:
-    return table.drop(columns=["step", "pose"])
+def _with_group(table: pd.DataFrame, session: Session) -> pd.DataFrame:
+    """The table with a column "group", if there is something to say in it."""
+    group, moved = session.meta(GROUP), unsure_steps(session)
+    if group is None and not moved:
+        return table
+    groups = pd.Series(group or SET_UP, index=table.index)
+    for number, steps in enumerate(moved, start=1):
+        groups[table["step"].isin(list(steps))] = f"{group or SET_UP}, moved {number}"
+    return table.assign(group=groups)

@@ -74,6 +74,7 @@ class ProcessSection(Section):
     check_every: Annotated[int, Field(ge=0)] = 50
     drift_mm: Positive = 0.4
     approach_deg: Positive = 3.0
+    approach_mm: Positive = 3.0
     together: bool = True
     stretch: Annotated[int, Field(ge=0)] = 20
     model: Literal["constant", "variable"] = "variable"
@@ -186,6 +187,18 @@ class Cell:
     def targets_in_base(self, readings: Floats) -> Floats:
         """Nominal points of the target (n, 3) in the base frame, m, of readings (n, N)."""
         return np.asarray((self._flange(readings) @ self.flange_from_target)[:, :3, 3])
+
+    def beside(self, readings: Floats, side: int) -> Floats:
+        """Where joints start that are to come to readings from one side, within the limits.
+
+        Args:
+            readings: Where they are to come to (N,).
+            side: 1 from lower readings, -1 from higher ones.
+        """
+        process = self.file.process
+        turned, slid = to_si(process.approach_deg, "deg"), to_si(process.approach_mm, "mm")
+        away = np.array([turned if kind == "revolute" else slid for kind in self.arm.joints])
+        return np.asarray(np.clip(readings - side * away, *self.arm.limits.T))
 
     def target_seen_from(self, frame_from_base: Floats) -> Seen:
         """What gives the nominal target (3,), m, and the direction of the tool there (3,), of readings (N,).

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import select
 import socket
 import termios
@@ -20,6 +21,9 @@ SLICE_S: Final = 0.02
 CHUNK: Final = 4096
 # No descriptor.
 CLOSED: Final = -1
+TCP: Final = "tcp://"
+TCP_PLACE: Final = re.compile(r"(?:\[(?P<bracketed>[^\[\]]+)\]|(?P<host>[^\[\]:/\s]+)):(?P<port>\d{1,5})")
+MOST_PORT: Final = 65535
 
 
 class ConnectionEndedError(OSError):
@@ -110,16 +114,16 @@ def open_tcp(device: str, host: str, port: int, limit_s: float) -> Channel:
     Raises:
         PortUnavailableError: If nobody listens there, or not within the limit.
     """
-    place = f"tcp://{host}:{port}"
+    place = tcp_address(host, port)
     try:
         opened = socket.create_connection((host, port), timeout=limit_s)
     except TimeoutError:
         raise PortUnavailableError(
             f"no connection within {limit_s:g} s", where=f"{device} at {place}"
         ) from None
-    except OSError as error:
+    except (OSError, UnicodeError) as error:  # UnicodeError: a name that no host can have
         raise PortUnavailableError(
-            f"no connection: {error.strerror or error} (limit {limit_s:g} s)",
+            f"no connection: {getattr(error, 'strerror', None) or error} (limit {limit_s:g} s)",
             where=f"{device} at {place}",
             way_out="Check that the device is on and listens at this port",
         ) from None
@@ -136,10 +140,35 @@ def open_channel(
     Raises:
         PortUnavailableError: If it cannot be opened; says why.
     """
-    if address.startswith("tcp://"):
-        host, _, port = address.removeprefix("tcp://").rpartition(":")
-        return open_tcp(device, host, int(port), limit_s)
+    try:
+        place = tcp_place(address)
+    except ValueError as error:
+        raise PortUnavailableError(str(error), where=device) from None
+    if place is not None:
+        return open_tcp(device, *place, limit_s)
     return open_serial(device, address, baud, limit_s, frame=frame)
+
+
+def tcp_address(host: str, port: int) -> str:
+    """The address of a TCP port; an IPv6 host stands in brackets."""
+    return f"{TCP}[{host}]:{port}" if ":" in host else f"{TCP}{host}:{port}"
+
+
+def tcp_place(address: str) -> tuple[str, int] | None:
+    """Host and number of the TCP port of an address; None for the name of a serial port.
+
+    Raises:
+        ValueError: If it begins as that of a TCP port and goes on otherwise; for pydantic's validators.
+    """
+    if not address.startswith(TCP):
+        return None
+    match = TCP_PLACE.fullmatch(address.removeprefix(TCP))
+    if match is None or not 1 <= int(match["port"]) <= MOST_PORT:
+        raise ValueError(
+            f'"{address}" is no TCP port: {TCP}HOST:PORT with a number from 1 to {MOST_PORT}, '
+            f"{TCP}[HOST]:PORT with an IPv6 address"
+        )
+    return match["bracketed"] or match["host"], int(match["port"])
 
 
 def _ended(error: Exception) -> ConnectionEndedError:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
-from truearm.cell.device_errors import DeviceError, RefusedError
+from truearm.cell.device_errors import DeviceError, RefusedError, StoppedError, calls
+from truearm.cell.protocols import Device
 from truearm.cell.reading import Expected
 from truearm.cell.table_panel import TablePanel
 
@@ -28,10 +29,13 @@ class Crew:
     A table moves together with the arm where they cannot meet on the way; else it goes out of the way first,
     no farther than it has to, and comes when the arm is there; and if that does not help either, the arm goes
     by where it was at first.
+
+    Nothing is connected or set in motion once `halted` is set: a stop alone ends what is under way, and not
+    what comes behind it.
     """
 
-    def __init__(self, cell: Cell, note: Callable[[str, str], None]) -> None:
-        self._cell, self._note = cell, note
+    def __init__(self, cell: Cell, note: Callable[[str, str], None], halted: threading.Event) -> None:
+        self._cell, self._note, self._halted = cell, note, halted
         self._table = cell.sensor if isinstance(cell.sensor, TablePanel) else None
         self._aside = ThreadPoolExecutor(1, thread_name_prefix="sensor")
         self._clearance: Clearance | None = None
@@ -39,10 +43,16 @@ class Crew:
         self._refuge = np.clip(np.zeros(cell.arm.joint_count), *cell.arm.limits.T)
 
     def connect(self) -> None:
-        """Connect the sensor, get it out of the way, then the robot."""
-        self._cell.sensor.connect()
-        self._cell.sensor.release()
-        self._cell.robot.connect()
+        """Connect the sensor, get it out of the way, then the robot.
+
+        Raises:
+            StoppedError: If the process is ended meanwhile.
+        """
+        sensor, robot = self._cell.sensor, self._cell.robot
+        for device, action in ((sensor, sensor.connect), (sensor, sensor.release), (robot, robot.connect)):
+            self.raise_if_halted()
+            with calls(device):
+                action()
         self._refuge = self._where()
 
     def go(self, way: list[Floats], expected: Expected, world_from_base: Floats | None) -> Floats:
@@ -58,10 +68,13 @@ class Crew:
 
         Raises:
             RefusedError: If link and table would meet whatever goes first, or a device refuses.
+            StoppedError: If the process is ended meanwhile.
         """
         if self._table is None:
             self._along(way)
-            self._cell.sensor.prepare(expected)
+            self.raise_if_halted()
+            with calls(self._cell.sensor):
+                self._cell.sensor.prepare(expected)
         else:
             self._with_table(self._table, way, expected, world_from_base)
         return self._where()
@@ -86,8 +99,10 @@ class Crew:
             by = np.array([carriage, *over, end])
             if apart(arm[:1], by[:-1]) and apart(arm, by[-2:-1]) and apart(arm[-1:], by[-2:]):
                 for place in over:
+                    self.raise_if_halted()
                     table.go_to(place)
                 self._along(first)
+                self.raise_if_halted()
                 table.prepare(expected)
                 return
         raise RefusedError("link or tool would meet the table on every way there", where="the arm")
@@ -112,6 +127,7 @@ class Crew:
         return self._clearance
 
     def _together(self, way: list[Floats], expected: Expected) -> None:
+        self.raise_if_halted()
         coming = self._aside.submit(self._cell.sensor.prepare, expected)
         try:
             self._along(way)
@@ -124,28 +140,45 @@ class Crew:
 
     def _along(self, way: list[Floats]) -> None:
         for place in way:
+            self.raise_if_halted()
             self._here = None
-            self._cell.robot.move_joints(place)
+            with calls(self._cell.robot):
+                self._cell.robot.move_joints(place)
             self._here = place
 
     def _where(self) -> Floats:
-        here = self._cell.robot.read_joints()
-        if not all(map(math.isfinite, here.tolist())):
-            raise DeviceError(f"it reads its joints as {here.tolist()}", where=self._cell.robot.name)
+        robot = self._cell.robot
+        with calls(robot):
+            told = robot.read_joints()
+        try:
+            here = np.array(told, dtype=np.float64)
+        except (TypeError, ValueError):
+            here = np.empty(0)
+        if here.shape != (self._cell.arm.joint_count,) or not all(map(math.isfinite, here.tolist())):
+            raise DeviceError(f"it reads its joints as {np.asarray(told).tolist()}", where=robot.name)
         self._here = here
         return here
 
     def recover(self) -> None:
-        """Connect both devices anew, as carefully as at the start."""
+        """Stop the arm while it can still be told to, and connect both devices anew, as at the start."""
+        self._stop(self._cell.robot)
         self.quiet()
         self._here = None
         self.connect()
 
+    def raise_if_halted(self) -> None:
+        """Raise StoppedError once the process is to end."""
+        if self._halted.is_set():
+            raise StoppedError("the process was ended")
+
     def stop(self) -> None:
         """Stop both devices at once, from any thread."""
+        self._stop(self._cell.robot, self._cell.sensor)
+
+    def _stop(self, *devices: Device) -> None:
         together = [
             threading.Thread(target=self._tried, args=(f"stop {device.name}", device.stop), daemon=True)
-            for device in (self._cell.robot, self._cell.sensor)
+            for device in devices
         ]
         for thread in together:
             thread.start()

@@ -1,6 +1,22 @@
 """What goes wrong with devices, each with the device, its port and the time limit in the message."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
 from truearm.errors import WorkError
+
+
+class Addressed(Protocol):
+    """What has a name and is somewhere."""
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+
+    @property
+    def address(self) -> str:
+        """The port it is at."""
 
 
 class DeviceError(WorkError):
@@ -37,10 +53,42 @@ class EmergencyStopError(DeviceError):
     recoverable = False
 
 
+class ProtectiveStopError(EmergencyStopError):
+    """The arm stopped itself, as where it met something."""
+
+
+class NotReadyError(DeviceError):
+    """The device is there and cannot work before somebody makes it ready, as an arm that is powered off."""
+
+    recoverable = False
+
+
 class StoppedError(DeviceError):
     """The call was ended by `stop` from another thread."""
 
     recoverable = False
+
+
+class MalformedReadingError(DeviceError):
+    """A driver gave something that is no reading: connecting anew does not help."""
+
+    recoverable = False
+
+
+@contextmanager
+def calls(device: Addressed) -> Iterator[None]:
+    """Calls of a driver: errors of the system that it lets through, or of its readings, name the device.
+
+    Raises:
+        DeviceError: With the device and its port.
+    """
+    where = f"{device.name} at {device.address}"
+    try:
+        yield
+    except OSError as error:
+        raise DeviceError(f"{type(error).__name__}: {error}", where=where) from error
+    except MalformedReadingError as error:
+        raise MalformedReadingError(error.what, where=where, rule=error.rule, way_out=error.way_out) from None
 
 
 def silent(device: str, port: str, limit_s: float, *, doing: str = "") -> DeviceSilentError:

@@ -3,17 +3,22 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Final, Literal, Self
+from typing import Final, Literal, Self, TypeVar
 
-from truearm.cell.channels import Channel, ConnectionEndedError, open_channel
-from truearm.cell.device_errors import DeviceError, gone, silent, stopped
+from pydantic import field_validator
+
+from truearm.cell.channels import Channel, ConnectionEndedError, open_channel, tcp_place
+from truearm.cell.device_errors import DeviceError, DeviceSilentError, gone, silent, stopped
 from truearm.cell.schema import Frame, Positive, Section
+from truearm.errors import count_of
 
 LONGEST_LINE: Final = 65536
 ENDS: Final = (b"\r", b"\n")
 TERMINATORS: Final = {"lf": b"\n", "cr": b"\r", "crlf": b"\r\n"}
+LONGEST_SHOWN: Final = 60
+T = TypeVar("T")
 
 
 class PortSection(Section):
@@ -24,6 +29,12 @@ class PortSection(Section):
     baud: int = 9600
     frame: Frame = "8N1"
     timeout_s: Positive = 2.0
+
+    @field_validator("port")
+    @classmethod
+    def _port(cls, value: str) -> str:
+        tcp_place(value)
+        return value
 
 
 class LineSection(PortSection):
@@ -91,7 +102,6 @@ class LinePort:
         """
         if self._channel is not None:
             raise DeviceError("connected already", where=self.where, way_out="Close it first")
-        self._interrupted.clear()
         self._channel = open_channel(
             self.device, self.address, self.limit_s, baud=self._baud, frame=self._frame
         )
@@ -174,6 +184,39 @@ class LinePort:
                 raise silent(self.device, self.address, limit, doing=doing)
         return self._lines.popleft()
 
+    def answer(self, meaning: Callable[[str], T | None], *, doing: str, key: str, way_out: str = "") -> T:
+        """What the first line that has a meaning means; devices say other things before it, as they like.
+
+        Args:
+            meaning: Gives what a line means, None for one that is something else.
+            doing: What the device was asked to do, for the message.
+            key: Of the cell file, which says what lines have a meaning.
+            way_out: What else may be done about lines that have none, for the message.
+
+        Raises:
+            DeviceSilentError: If no such line came within the limit of the port.
+            DeviceGoneError: If the connection has ended.
+            StoppedError: If another thread interrupted.
+        """
+        until, lines, last = time.monotonic() + self.limit_s, 0, ""
+        while (left := until - time.monotonic()) > 0.0:
+            try:
+                last = self.receive(left, doing=doing)
+            except DeviceSilentError:
+                break
+            lines += 1
+            found = meaning(last)
+            if found is not None:
+                return found
+        if not lines:
+            raise silent(self.device, self.address, self.limit_s, doing=doing)
+        raise DeviceSilentError(
+            f"{count_of(lines, 'line')} came within {self.limit_s:g} s, none fits `{key}`, "
+            f'the last was "{last[:LONGEST_SHOWN]}"',
+            where=self.where,
+            way_out=f"Correct `{key}` of the cell file{way_out}",
+        )
+
     def pause(self, seconds: float) -> None:
         """Wait.
 
@@ -183,10 +226,12 @@ class LinePort:
         if self._interrupted.wait(seconds):
             raise stopped(self.device, self.address)
 
-    def drain(self) -> None:
-        """Forget what has come and was not asked for."""
+    def drain(self) -> list[str]:
+        """Forget what has come and was not asked for: these lines."""
         self._take_waiting()
+        lines = list(self._lines)
         self._lines.clear()
+        return lines
 
     def newest(self) -> str | None:
         """The newest of the lines that have come, None where none has."""

@@ -1,5 +1,7 @@
 """Driver of any instrument that tells points in lines: when asked, or in a stream as laser trackers do."""
 
+import contextlib
+import re
 import threading
 import time
 from typing import Annotated, Final
@@ -8,32 +10,38 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from truearm.cell.device_errors import DeviceSilentError, silent
+from truearm.cell.device_errors import DeviceSilentError
 from truearm.cell.line_port import LinePort, LineSection
-from truearm.cell.patterns import numbers_in, pattern_of
-from truearm.cell.reading import Expected, Reading
+from truearm.cell.patterns import expression, numbers_in, pattern_of
+from truearm.cell.reading import Expected, Reading, is_column
 from truearm.cell.schema import Positive
 from truearm.robot import Robot
-from truearm.units import MM_PER_METRE, LengthUnit, to_si
+from truearm.units import MM_PER_METRE, StatedLengthUnit, to_si
 
 Floats = NDArray[np.float64]
+Numbers = dict[str, float]
 
 XYZ: Final = ("x", "y", "z")
+KNOWN: Final = (*XYZ, "sigma", "ok", "temperature")
+SENDINGS: Final = 3
+NO_POINT: Final = ", or give `nothing`, which lines that mean that there is no point fit"
 
 
 class LineSensor:
     """An instrument whose lines match `answer`, a pattern with groups x, y, z; sigma, ok, temperature if any.
 
     With `trigger` it is asked for every line; without, it streams, and the lines that come after the arm has
-    settled are averaged. A group `ok` must be 1 for the point to count. All other groups become features.
+    settled are averaged. A group `ok` must be 1 for the point to count. All other groups become features. A
+    line that matches `nothing` says that there is no point, as where a tracker does not see its target.
     """
 
     class Settings(LineSection):
         """Keys of [sensor] with driver "line"."""
 
         driver: str = "line"
-        length_unit: LengthUnit = "mm"
+        length_unit: StatedLengthUnit = "mm"
         answer: str
+        nothing: str | None = None
         trigger: str | None = None
         setup: tuple[str, ...] = ()
         average: Annotated[int, Field(ge=1)] = 1
@@ -44,13 +52,26 @@ class LineSensor:
         @field_validator("answer")
         @classmethod
         def _answer(cls, value: str) -> str:
-            pattern_of(value, XYZ)
+            taken = [
+                name for name in pattern_of(value, XYZ).groupindex if name not in KNOWN and is_column(name)
+            ]
+            if taken:
+                raise ValueError(
+                    f"group (?P<{taken[0]}>...) would be a feature, and measurement files have a column of "
+                    "that name already; it needs another name"
+                )
             return value
+
+        @field_validator("nothing")
+        @classmethod
+        def _nothing(cls, value: str | None) -> str | None:
+            return None if value is None else expression(value)
 
     def __init__(self, settings: Settings, arm: Robot) -> None:
         del arm
         self._settings = settings
         self._answer = pattern_of(settings.answer, XYZ)
+        self._nothing = None if settings.nothing is None else re.compile(settings.nothing)
         self._port = LinePort.of(self.name, settings, terminator=settings.terminator)
         self._busy = threading.RLock()
 
@@ -75,18 +96,15 @@ class LineSensor:
 
     def measure(self) -> Reading:
         """See Sensor. The mean of `average` lines; not valid if they spread, or the instrument says so."""
+        lines: list[tuple[str, Numbers]] = []
         with self._busy:
-            time.sleep(self._settings.settle_s)
+            self._port.pause(self._settings.settle_s)
             self._port.drain()
-            until = time.monotonic() + self._settings.timeout_s * self._settings.average
-            lines: list[tuple[str, dict[str, float]]] = []
             while len(lines) < self._settings.average:
-                if time.monotonic() > until:
-                    raise silent(self.name, self.address, self._settings.timeout_s, doing="measure")
-                line = self._line()
-                numbers = None if line is None else numbers_in(self._answer, line)
-                if line is not None and numbers is not None and numbers.keys() >= set(XYZ):
-                    lines.append((line, numbers))
+                line, numbers = self._line()
+                if not numbers:
+                    return Reading(None, self._stated_m, time.time(), False, line, f'it says "{line}"')
+                lines.append((line, numbers))
         return self._reading(lines)
 
     def release(self) -> None:
@@ -100,38 +118,71 @@ class LineSensor:
         """See Device."""
         self._port.close()
 
-    def _line(self) -> str | None:
+    def _line(self) -> tuple[str, Numbers]:
+        """The next line that says a point, or that there is none; asked for, and again where it is lost."""
         if self._settings.trigger is not None:
-            self._port.drain()
-            self._port.send(self._settings.trigger)
-        try:
-            return self._port.receive(doing="measure")
-        except DeviceSilentError:
-            if self._settings.trigger is None:
-                raise
-            return None
+            for _ in range(SENDINGS - 1):
+                with contextlib.suppress(DeviceSilentError):
+                    return self._asked(self._settings.trigger)
+            return self._asked(self._settings.trigger)
+        return self._next()
 
-    def _reading(self, lines: list[tuple[str, dict[str, float]]]) -> Reading:
+    def _asked(self, trigger: str) -> tuple[str, Numbers]:
+        self._port.drain()
+        self._port.send(trigger)
+        return self._next()
+
+    def _next(self) -> tuple[str, Numbers]:
+        return self._port.answer(self._meaning, doing="measure", key="answer", way_out=NO_POINT)
+
+    def _meaning(self, line: str) -> tuple[str, Numbers] | None:
+        """A line with its numbers; with none where it says that there is no point."""
+        if self._nothing is not None and self._nothing.search(line):
+            return line, {}
+        numbers = numbers_in(self._answer, line)
+        return None if numbers is None or not numbers.keys() >= set(XYZ) else (line, numbers)
+
+    @property
+    def _stated_m(self) -> float:
+        return to_si(self._settings.sigma_mm, "mm")
+
+    def _sigma_m(self, told: Floats) -> float:
+        """Mean of what lines (n,) say of sigma, that of the cell file where none says what one can be."""
+        believed = told[np.isfinite(told) & (told > 0.0)]
+        return to_si(float(believed.mean()), self._settings.length_unit) if believed.size else self._stated_m
+
+    def _reading(self, lines: list[tuple[str, Numbers]]) -> Reading:
         names = dict.fromkeys(name for _, each in lines for name in each)
         numbers = {name: np.array([each.get(name, np.nan) for _, each in lines]) for name in names}
-        unit = self._settings.length_unit
-        points = to_si(np.column_stack([numbers.pop(axis) for axis in XYZ]), unit)
-        sigma = numbers.pop("sigma", None)
-        stated = to_si(self._settings.sigma_mm, "mm")
-        sigma_m = stated if sigma is None else to_si(float(np.nanmean(sigma)), unit)
-        temperature = numbers.pop("temperature", None)
-        reason = ""
-        if not np.all(numbers.pop("ok", np.ones(1)) == 1.0):
-            reason = "the instrument does not vouch for it"
-        elif np.ptp(points, axis=0).max() > to_si(self._settings.spread_mm, "mm"):
-            reason = f"the lines spread by {MM_PER_METRE * np.ptp(points, axis=0).max():.2f} mm"
+        points = to_si(np.column_stack([numbers.pop(axis) for axis in XYZ]), self._settings.length_unit)
+        sigma_m = self._sigma_m(numbers.pop("sigma", np.zeros(0)))
+        vouched = bool(np.all(numbers.pop("ok", np.ones(1)) == 1.0))
+        means = {name: _mean(values) for name, values in numbers.items()}
+        reason = self._doubt(points, vouched=vouched)
         return Reading(
-            points.mean(axis=0),
+            points.mean(axis=0) if np.isfinite(points).all() else None,
             sigma_m,
             time.time(),
             not reason,
             "; ".join(line for line, _ in lines),
             reason,
-            temperature_c=None if temperature is None else float(np.nanmean(temperature)),
-            features={name: float(np.nanmean(values)) for name, values in numbers.items()},
+            temperature_c=means.pop("temperature", None),
+            features={name: value for name, value in means.items() if value is not None},
         )
+
+    def _doubt(self, points: Floats, *, vouched: bool) -> str:
+        """Why points (n, 3) of one reading do not count; empty where they do."""
+        if not vouched:
+            return "the instrument does not vouch for it"
+        if not np.isfinite(points).all():
+            return "a coordinate is no number"
+        spread_m = float(np.ptp(points, axis=0).max())
+        if spread_m > to_si(self._settings.spread_mm, "mm"):
+            return f"the lines spread by {MM_PER_METRE * spread_m:.2f} mm"
+        return ""
+
+
+def _mean(values: Floats) -> float | None:
+    """Mean of those that are finite; None where none is."""
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if finite.size else None

@@ -10,13 +10,22 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.accepted import points_and_joints, points_of_last_check
+from truearm.cell.accepted import points_and_joints
 from truearm.cell.cell_file import Cell
+from truearm.cell.checks import last_check
 from truearm.cell.crew import Crew
-from truearm.cell.device_errors import DeviceError, PortUnavailableError, RefusedError, StoppedError
+from truearm.cell.device_errors import (
+    DeviceError,
+    EmergencyStopError,
+    PortUnavailableError,
+    ProtectiveStopError,
+    RefusedError,
+    StoppedError,
+    calls,
+)
 from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
-from truearm.cell.reading import Expected, Reading
+from truearm.cell.reading import Expected, Reading, checked_reading
 from truearm.cell.registering import register_cell
 from truearm.cell.session import Session, Step, Stored
 from truearm.cell.stretches import boundaries, calibrate_so_far, good_enough
@@ -25,6 +34,13 @@ from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
 
+# Between the last look whether to go on and the moment at which a device can be stopped.
+BEGINS_WITHIN_S: Final = 0.05
+# Steps in a row that are given up because devices fail there each time; then it is not the steps.
+GIVEN_UP_IN_A_ROW: Final = 3
+EMERGENCY, PROTECTIVE = "emergency stop", "protective stop"
+# Stops at a step after which it is not tried again.
+MOST_STOPS: Final = {PROTECTIVE: 1, EMERGENCY: 2}
 DONE: Final = "all poses are done"
 ACCURATE: Final = "the target accuracy is met"
 DONE_STEPS: Final = "SELECT coalesce(max(step), -1) + 1 FROM outcomes"
@@ -59,9 +75,9 @@ class Process:
         self._process = cell.file.process
         self._agree_m = to_si(self._process.agree_mm, "mm")
         self._prediction = Prediction(cell)
-        self._crew = Crew(cell, session.add_event)
-        self._halted = threading.Event()
-        self._recoveries = 0
+        self._halted, self._ended = threading.Event(), threading.Event()
+        self._crew = Crew(cell, session.add_event, self._halted)
+        self._recoveries = self._given_up = 0
         self._total = session.rows("SELECT count(*) FROM steps")[0][0]
         self._poses = session.rows("SELECT count(*) FROM steps WHERE kind = 'pose'")[0][0]
         self._boundaries = boundaries(self._process.stretch, self._poses)
@@ -77,10 +93,10 @@ class Process:
             WorkError: If the frame is implausible, the cell drifts, or a device fails for good.
         """
         self._resume()
-        if good_enough(self._session, self._process.target_mm):
-            return ACCURATE
-        if self._session.next_step() is None:
-            return DONE
+        end = self._end()
+        if end is not None:
+            self._check_drift()
+            return end
         try:
             self._connect()
             return self._steps()
@@ -92,26 +108,43 @@ class Process:
                 self._session.add_event("stopped", str(error))
             raise
         finally:
+            self._ended.set()
             self._crew.dismiss()
 
     def halt(self) -> None:
-        """End `run` from another thread."""
+        """End `run` from another thread.
+
+        What was just about to begin as the first stop came is ended by a second.
+        """
         self._halted.set()
         self._crew.stop()
+        if not self._ended.wait(BEGINS_WITHIN_S):
+            self._crew.stop()
+
+    def _end(self) -> str | None:
+        """How the session has ended; None while there is something to measure."""
+        if good_enough(self._session, self._process.target_mm):
+            return ACCURATE
+        return DONE if self._session.next_step() is None else None
 
     def _steps(self) -> str:
         for step in self._session.steps_left():
-            if step.kind != "registration" and not self._prediction.is_registered:
+            if step.kind == "pose" and not self._prediction.is_registered:
                 self._register()
             measured = self._do(step)
             if step.kind == "check":
                 self._check_drift()
+                self._check_resumed(step, measured=measured)
             if step.kind == "pose" and measured and self._after_pose():
                 return ACCURATE
         return DONE
 
     def _do(self, step: Step) -> bool:
         """Measure a step until its readings can be believed, or it is given up; whether it is measured."""
+        stops = self._stops_at(step)
+        if stops:
+            self._skip(step, stops)
+            return False
         expected = self._prediction.expected(step)
         point, likely_m = self._prediction.point(expected), self._prediction.likely_m
         rules = Rules(self._process.contacts, self._process.attempts, self._agree_m, likely_m)
@@ -119,19 +152,21 @@ class Process:
         verdict = judge(readings, point, rules)
         self._decide(step, verdict)
         while verdict.decision == "again":
-            self._raise_if_halted()
             try:
                 if not placed:
                     joints, placed = self._placed(step, expected, anew=verdict.suspicious), True
-                reading = self._cell.sensor.measure()
+                self._crew.raise_if_halted()
+                with calls(self._cell.sensor):
+                    reading = checked_reading(self._cell.sensor.measure())
             except RefusedError as error:
                 self._skip(step, str(error))
                 return False
             except DeviceError as error:
-                self._recover(error, step)
+                if not self._try_again(error, step):
+                    return False
                 placed = False
                 continue
-            self._recoveries = 0
+            self._recoveries = self._given_up = 0
             readings.append(_stored(len(readings) + 1, reading))
             verdict = judge(readings, point, rules)
             self._keep(step, reading, joints, point, verdict, len(readings))
@@ -140,8 +175,11 @@ class Process:
         return verdict.decision == "accept"
 
     def _known_of(self, step: Step) -> list[Stored]:
-        """Readings that a former process left; it can have left some of its last step alone."""
-        return self._session.readings_of(step.step) if step.step == self._done_before else []
+        """Readings that a former process left; it can have left some of its last step alone.
+
+        Before that step a session that is gone on with may have a check.
+        """
+        return self._session.readings_of(step.step) if step.step <= self._done_before + 1 else []
 
     def _keep(
         self, step: Step, reading: Reading, joints: Floats, expected: Floats, verdict: Verdict, attempt: int
@@ -164,6 +202,37 @@ class Process:
         self._done = step.step + 1
         self._session.add_outcome(step.step, "skipped", reason=reason)
         self._session.add_event("skipped", reason, step.step)
+        self._say(f"{step.kind} {step.pose + 1} skipped: {reason}")
+
+    def _stops_at(self, step: Step) -> str:
+        """Why a step is not tried again, where stops of the arm ended former processes; else empty.
+
+        A check is always tried again: nothing else says whether arm and instrument stand still.
+        """
+        if step.kind == "check":
+            return ""
+        kinds = [row[0] for row in self._session.rows("SELECT kind FROM events WHERE step = ?", (step.step,))]
+        stops = {kind: kinds.count(kind) for kind in MOST_STOPS}
+        told = [kind for kind, most in MOST_STOPS.items() if stops[kind] >= most]
+        return f"{told[0]} on the way here before" if told else ""
+
+    def _try_again(self, error: DeviceError, step: Step) -> bool:
+        """Connect anew after a failure at a step; whether to try it again, as otherwise it is skipped.
+
+        Raises:
+            DeviceError: If connecting does not help either, or steps before were given up as well.
+        """
+        if self._recoveries < self._process.recoveries:
+            self._recover(error, step)
+            return True
+        tries, self._recoveries = self._recoveries + 1, 0
+        self._given_up += 1
+        if self._given_up > GIVEN_UP_IN_A_ROW:
+            raise error
+        self._recover(error, step)
+        self._recoveries = 0
+        self._skip(step, f"tried {tries} times: {error}")
+        return False
 
     def _placed(self, step: Step, expected: Expected, *, anew: bool) -> Floats:
         """Bring arm and sensor to a step; where the arm is.
@@ -186,9 +255,7 @@ class Process:
         side = step.approach or int(anew)
         if side == 0:
             return [step.readings]
-        away = np.radians(self._process.approach_deg)
-        via = np.clip(step.readings - side * away, *self._cell.arm.limits.T)
-        return [via, step.readings]
+        return [self._cell.beside(step.readings, side), step.readings]
 
     def _connect(self) -> None:
         """Connect for the first time; a port that cannot be opened then is not tried again."""
@@ -202,9 +269,9 @@ class Process:
     def _recover(self, error: DeviceError, step: Step | None) -> None:
         """Connect anew, if that may help and did not fail too often."""
         while True:
-            self._raise_if_halted()
+            self._crew.raise_if_halted()
             self._recoveries += 1
-            self._session.add_event("device", str(error), None if step is None else step.step)
+            self._session.add_event(_kind(error), str(error), None if step is None else step.step)
             if not error.recoverable or self._recoveries > self._process.recoveries:
                 raise error
             try:
@@ -213,10 +280,6 @@ class Process:
                 error = again
             else:
                 return
-
-    def _raise_if_halted(self) -> None:
-        if self._halted.is_set():
-            raise StoppedError("the process was ended")
 
     def _register(self) -> None:
         _, joints, points = points_and_joints(self._session, "registration")
@@ -231,7 +294,6 @@ class Process:
         known = self._session.registration()
         if known is not None:
             self._prediction.register(known[0], known[1] / MM_PER_METRE)
-            self._check_drift()
         past = [count for count in self._boundaries if count <= self._measured]
         if past:
             self._learn(past[-1])
@@ -259,30 +321,48 @@ class Process:
 
     def _check_drift(self) -> None:
         """Raise if the last check of the first contact shows that something has moved."""
-        points = points_of_last_check(self._session)
-        if points is None:
-            return
-        off_mm = MM_PER_METRE * math.dist(*points)
-        if off_mm > self._process.drift_mm:
+        check = last_check(self._session)
+        if check is not None and check.off_mm > self._process.drift_mm:
             raise WorkError(
-                f"the first contact is now {off_mm:.2f} mm from where it was",
+                f"the first contact is now {check.off_mm:.2f} mm from where it was",
                 where="check",
                 rule=f"The cell may drift by {self._process.drift_mm:g} mm (drift_mm)",
-                way_out="Find what moves; then measure the rest as a new session: a set-up of its own",
+                way_out="Find what moves. Once it is in its place again the same command goes on; else "
+                "measure the rest as a new session: a set-up of its own",
             )
+
+    def _check_resumed(self, step: Step, *, measured: bool) -> None:
+        """Raise if the check with which a session goes on was not measured: something may have moved."""
+        if measured or step.step != self._done_before:
+            return
+        raise WorkError(
+            "the first contact could not be measured again",
+            where="check",
+            rule="A session goes on where it finds arm and instrument in their places",
+            way_out="truearm session show tells why. Put that right, then the same command goes on",
+        )
 
     def _tell(self, step: Step, verdict: Verdict) -> None:
         self._done = step.step + 1
         if verdict.decision == "give up":
             self._say(f"{step.kind} {step.pose + 1} skipped: {verdict.reason}")
             return
-        residual_mm = MM_PER_METRE * verdict.off_m
-        self._say(f"{step.kind} {step.pose + 1} stored, {residual_mm:.3f} mm from the prediction")
+        off = f"{MM_PER_METRE * verdict.off_m:.3f} mm from the prediction"
+        if not math.isfinite(self._prediction.likely_m):
+            off = "its place was not known before"
+        self._say(f"{step.kind} {step.pose + 1} stored, {off}")
 
     def _say(self, text: str) -> None:
         new = self._done - self._done_before
         left_s = (self._total - self._done) * (time.monotonic() - self._began) / new if new else None
         self._report(Progress(self._done, self._total, text, left_s))
+
+
+def _kind(error: DeviceError) -> str:
+    """The kind of event that an error of a device is."""
+    if isinstance(error, ProtectiveStopError):
+        return PROTECTIVE
+    return EMERGENCY if isinstance(error, EmergencyStopError) else "device"
 
 
 def _stored(attempt: int, reading: Reading) -> Stored:

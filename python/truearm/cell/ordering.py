@@ -1,4 +1,4 @@
-"""In which order poses are measured: the paper's, and a shorter one; both from low to high."""
+"""In which order poses are measured: the paper's and a shorter one from low to high, and there and back."""
 
 from itertools import pairwise
 from typing import Final
@@ -41,6 +41,14 @@ def short_order(points: Floats, readings: Floats, speed: float) -> Order:
         order += _path(members, readings, speed, order[-1] if order else None)
     found, plain = np.array(order, dtype=np.int64), paper_order(points)
     return min(found, plain, key=lambda each: motion_seconds(readings, each, speed))
+
+
+def there_and_back(order: Order) -> Order:
+    """Every other pose of an order, then the rest of them from its end to its beginning.
+
+    Each stretch of the order comes early and late, so that what drifts is not what varies along the order.
+    """
+    return np.concatenate([order[::2], order[1::2][::-1]])
 
 
 def motion_seconds(readings: Floats, order: Order, speed: float) -> float:

@@ -2,7 +2,7 @@
 
 import re
 import string
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from truearm.errors import InputError
@@ -18,10 +18,29 @@ def filled(template: str, values: Mapping[str, float]) -> str:
     """
     try:
         return template.format(**values)
-    except (KeyError, IndexError, ValueError) as error:
+    except (KeyError, IndexError, ValueError, AttributeError, TypeError) as error:
         raise InputError(
             f'"{template}" cannot be filled: {error}', rule=f"Known here: {', '.join(values)}"
         ) from None
+
+
+def check_template(template: str, known: Sequence[str], needed: Sequence[str] = ()) -> None:
+    """Raise InputError unless a template can be filled with known numbers, and names all needed ones."""
+    filled(template, dict.fromkeys(known, 0.0))
+    named = {name for _, name, _, _ in string.Formatter().parse(template)}
+    missing = [name for name in needed if name not in named]
+    if missing:
+        raise InputError(f'"{template}" leaves out {{{missing[0]}}}', rule=f"It names {', '.join(needed)}")
+
+
+def expression(text: str) -> str:
+    """A regular expression as it stands in the cell file.
+
+    Raises:
+        ValueError: If it is none; for pydantic's validators.
+    """
+    pattern_of(text, ())
+    return text
 
 
 def numbers_in(pattern: re.Pattern[str], line: str) -> dict[str, float] | None:

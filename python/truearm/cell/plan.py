@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
-from truearm.cell.ordering import motion_seconds, paper_order, short_order
+from truearm.cell.ordering import motion_seconds, paper_order, short_order, there_and_back
 from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
 from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
 from truearm.columns import REPEAT, VALIDATE
+from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError, WorkError
 from truearm.identified import IdentifiedArm
 from truearm.planning.choosing import SETUP_KINDS, Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
@@ -32,6 +33,7 @@ JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
 JOINT_SPEED_RAD_S: Final = 1.0
 PRIOR_M: Final = 2e-3
 FREE: Final = 1e3
+ORDERS: Final = (THERE_AND_BACK, "short", "paper")
 
 
 @dataclass(frozen=True)
@@ -42,14 +44,14 @@ class PlanOptions:
         count: Poses to fit to.
         criterion: What of their Jacobian is best.
         seed: Seed of the pool.
-        order: "short" or "paper".
+        order: "there-and-back", "short" or "paper".
         sigma_mm: Standard deviation of a measured coordinate, for the expected accuracy.
     """
 
     count: int = 60
     criterion: Criterion = "d"
     seed: int = 0
-    order: str = "short"
+    order: str = THERE_AND_BACK
     sigma_mm: float = 0.1
 
     def __post_init__(self) -> None:
@@ -65,7 +67,7 @@ class Plan:
         poses: With purpose "train", "validate" or "repeat", and alternating directions of approach.
         points: Targets in the base frame (n, 3), m.
         choice: What the choice did to the indices.
-        seconds: Motion time in the paper's and in the short order.
+        seconds: Motion time in each order by name.
         expected: Expected standard deviation of the calibrated position over the pool, mm, by number.
     """
 
@@ -98,7 +100,7 @@ def plan_poses(
     choice = choose(identified, pool, options.count, wanted)
     rows, purposes = _with_others(pool, choice.rows)
     points = targets_of(arm, pool[rows], flange_from_target)
-    orders = both_orders(points, pool[rows])
+    orders = orders_of(points, pool[rows])
     repeats = max(LEAST_REPEATED, round(REPEATED_SHARE * options.count))
     poses, measured = in_order(pool[rows], purposes, orders[options.order], min(repeats, options.count))
     return Plan(
@@ -110,12 +112,10 @@ def plan_poses(
     )
 
 
-def both_orders(points: Floats, readings: Floats) -> dict[str, NDArray[np.int64]]:
-    """The paper's order of targets (n, 3) and readings (n, N), and a shorter one, by name."""
-    return {
-        "paper": paper_order(points),
-        "short": short_order(points, readings, JOINT_SPEED_RAD_S),
-    }
+def orders_of(points: Floats, readings: Floats) -> dict[str, NDArray[np.int64]]:
+    """The orders of targets (n, 3) and readings (n, N) by name."""
+    short = short_order(points, readings, JOINT_SPEED_RAD_S)
+    return dict(zip(ORDERS, (there_and_back(short), short, paper_order(points)), strict=True))
 
 
 def expected_mm(

@@ -1,6 +1,7 @@
 """A recorded measurement file that plays the part of the robot and of the sensor."""
 
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Final
 
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.device_errors import DeviceError, RefusedError
+from truearm.cell.poses_file import APPROACH
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive, Section
 from truearm.errors import InputError
@@ -91,7 +93,7 @@ class PlaybackSensor:
         self._settings, self._arm = settings, arm
         self._data: Measurements | None = None
         self._rows = np.empty(0, dtype=np.int64)
-        self._next = 0
+        self._told: Counter[int] = Counter()
 
     @property
     def name(self) -> str:
@@ -113,13 +115,18 @@ class PlaybackSensor:
         self._data = data
 
     def prepare(self, expected: Expected) -> None:
-        """See Sensor. Find the rows of the expected readings.
+        """See Sensor. Find the rows of the expected readings, of those the ones approached from that side.
 
         Raises:
             RefusedError: If the recording does not have them.
         """
-        off = np.abs(self._recorded().readings - expected.readings).max(axis=1)
-        self._rows, self._next = np.flatnonzero(off <= SAME_RAD), 0
+        data = self._recorded()
+        off = np.abs(data.readings - expected.readings).max(axis=1)
+        self._rows = np.flatnonzero(off <= SAME_RAD)
+        sides = data.features.get(APPROACH)
+        if expected.approach and sides is not None:
+            same_side = self._rows[sides[self._rows] == expected.approach]
+            self._rows = same_side if same_side.size else self._rows
         if not self._rows.size:
             raise RefusedError(
                 f"the nearest recorded readings are {off.min():.3g} rad away",
@@ -128,12 +135,13 @@ class PlaybackSensor:
             )
 
     def measure(self) -> Reading:
-        """See Sensor. The rows of the same readings come in turn."""
+        """See Sensor. The rows of the same readings come in turn, also when they are come back to."""
         data = self._recorded()
         if not self._rows.size:
             raise DeviceError("it is not prepared", where=self.name)
-        row = int(self._rows[self._next % len(self._rows)])
-        self._next += 1
+        first = int(self._rows[0])
+        row = int(self._rows[self._told[first] % len(self._rows)])
+        self._told[first] += 1
         point = data.targets[row, 0]
         valid = bool(np.isfinite(point).all())
         pose = None

@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.columns import PURPOSE, StatedUnits
-from truearm.errors import InputError, list_rows
+from truearm.errors import InputError, list_names, list_rows
 from truearm.measured_fields import read_joint_columns
-from truearm.reading import read_csv_table
+from truearm.reading import Table, read_csv_table
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
 
 APPROACH: Final = "approach"
+GROUP: Final = "group"
+MOST_NAMED: Final = 3
 DIRECTIONS: Final = (-1.0, 0.0, 1.0)
 
 
@@ -40,10 +42,13 @@ class Poses:
 
     @classmethod
     def read_csv(cls, path: str | Path, arm: Robot) -> "Poses":
-        """Read a file with columns q1 ... qN, units in their names or rad and m, and maybe approach, purpose.
+        """Read a file with columns q1 ... qN, units in their names or rad and m.
+
+        Columns approach, purpose and group may be there.
 
         Raises:
-            InputError: If a column is missing, a value breaks a rule, or a pose is beyond the joint limits.
+            InputError: If a column is missing, a value breaks a rule, a pose is beyond the joint limits, or
+                they are meant for several set-ups.
         """
         table = read_csv_table(Path(path))
         readings = read_joint_columns(table, StatedUnits(joints=arm.joints))
@@ -71,4 +76,19 @@ class Poses:
                 rule="1 from lower readings, -1 from higher ones, 0 from anywhere",
             )
         purpose = tuple(table.texts(PURPOSE).tolist()) if PURPOSE in table.names else ("",) * len(readings)
-        return cls(readings, approach.astype(np.int64), purpose)
+        return cls(readings, approach.astype(np.int64), purpose, _group(table))
+
+
+def _group(table: Table) -> str | None:
+    """The one set-up that a list of poses is meant for; None where it does not say."""
+    if GROUP not in table.names:
+        return None
+    named = list(dict.fromkeys(text for text in table.texts(GROUP).tolist() if text))
+    if len(named) > 1:
+        raise InputError(
+            f'column "{GROUP}" holds {list_names(named[:MOST_NAMED])}',
+            where=table.where,
+            rule="Poses are measured in one set-up at a time",
+            way_out="Leave the column out, or make a list of each set-up",
+        )
+    return named[0] if named else None

@@ -29,7 +29,8 @@ class Prediction:
         world_from_base: Where the base stands (4, 4), as well as is known; None where nothing is.
         is_registered: Whether that comes from contacts.
         radius_m: How far the target may be from where the nominal arm has it.
-        likely_m: How far a reading may be from what is predicted without being suspicious.
+        likely_m: How far a reading may be from what is predicted without being suspicious; infinite where
+            nothing is known.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -44,7 +45,7 @@ class Prediction:
         if world is not None:
             turned = np.radians(world.uncertain_deg) * REACH_M
             self.radius_m += to_si(world.uncertain_mm, "mm") + float(turned)
-        self.likely_m = self.radius_m
+        self.likely_m = np.inf if world is None else self.radius_m
         self._calibration: Calibration | None = None
         self._group = ""
 
@@ -64,8 +65,8 @@ class Prediction:
         """What the sensor is prepared for; where nothing is known, the middle of nowhere with no bound."""
         point, direction = self._seen(step.readings)
         if self.world_from_base is None:
-            return Expected(step.readings, np.zeros(3), np.inf, direction)
-        return Expected(step.readings, point, self.radius_m, direction)
+            return Expected(step.readings, np.zeros(3), np.inf, direction, step.approach)
+        return Expected(step.readings, point, self.radius_m, direction, step.approach)
 
     def point(self, expected: Expected) -> Floats:
         """The point (3,) by which a reading is judged."""

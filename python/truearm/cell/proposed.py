@@ -13,12 +13,13 @@ from truearm.cell.plan import (
     JOINT_SPEED_RAD_S,
     LEAST_POOL,
     POOL_PER_POSE,
-    both_orders,
     in_order,
     measurable_pool,
+    orders_of,
     targets_of,
 )
 from truearm.cell.poses_file import Poses
+from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError
 from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
 from truearm.robot import Robot
@@ -39,13 +40,13 @@ class ProposalOptions:
     Attributes:
         count: How many poses.
         seed: Seed of the candidates, and of the workspace.
-        order: "short" or "paper".
+        order: "there-and-back", "short" or "paper".
         group: Set-up in which they will be measured; the calibration's last one by default.
     """
 
     count: int
     seed: int = 0
-    order: str = "short"
+    order: str = THERE_AND_BACK
     group: str | None = None
 
 
@@ -56,7 +57,7 @@ class Proposed:
     Attributes:
         poses: With purpose "train" or "acceptance", approached from both sides in turn.
         points: Targets in the base frame (n, 3), m.
-        seconds: Motion time in the paper's and in the short order.
+        seconds: Motion time in each order by name.
         found: What was chosen, and what is expected of it.
     """
 
@@ -142,7 +143,7 @@ def _ordered(
     arm = candidates.calibration.robot
     readings = candidates.readings[rows]
     points = targets_of(arm, readings, arm.tool if cell is None else cell.flange_from_target)
-    orders = both_orders(points, readings)
+    orders = orders_of(points, readings)
     poses, measured = in_order(readings, [purpose] * len(rows), orders[options.order], 0)
     seconds = {name: motion_seconds(readings, each, JOINT_SPEED_RAD_S) for name, each in orders.items()}
     return Proposed(poses, points[measured], seconds, found)

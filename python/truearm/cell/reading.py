@@ -1,11 +1,22 @@
 """What passes between the process and its devices: where a point is expected, and what was measured."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.cell.device_errors import MalformedReadingError
+from truearm.columns import PURPOSE, means_something
+
 Floats = NDArray[np.float64]
+
+TOLERANCE: Final = 1e-3
+LONGEST_SHOWN: Final = 60
+OWN_COLUMNS: Final = ("step", "pose", PURPOSE, "approach", "readings", "temperature_c")
+"""Columns of a session's measurements beside those that measurement files know."""
+NOT_FINITE: Final = "the driver gave a point that is not finite"
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,12 +28,14 @@ class Expected:
         point_in_world: Where the target should be (3,), m.
         radius_m: How far from there it may be.
         pointing_in_world: Unit vector (3,) along the tool, from flange to target.
+        approach: From which side joints come: 1 from lower readings, -1 from higher, 0 from anywhere.
     """
 
     readings: Floats
     point_in_world: Floats
     radius_m: float
     pointing_in_world: Floats
+    approach: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,3 +63,99 @@ class Reading:
     pose_in_world: Floats | None = None
     temperature_c: float | None = None
     features: dict[str, float] = field(default_factory=dict)
+
+
+def is_column(name: str) -> bool:
+    """Whether a measurement file has a column of this name already, so that no feature can be called so."""
+    return name in OWN_COLUMNS or means_something(name)
+
+
+def checked_reading(reading: object) -> Reading:
+    """What a driver gave as a reading, with Python's own numbers and arrays of float64.
+
+    Numbers of numpy and lists are taken as well. A point that is not finite is not valid.
+
+    Raises:
+        MalformedReadingError: If it is no reading, or a part of it is not what Reading says.
+    """
+    if not isinstance(reading, Reading):
+        raise _wrong(f"measure gave {_shown(reading)}", "It gives a Reading, valid or not")
+    if not isinstance(reading.valid, bool | np.bool_):
+        raise _wrong(f"valid is {_shown(reading.valid)}", "It is True or False")
+    for key in ("raw", "reason"):
+        if not isinstance(getattr(reading, key), str):
+            raise _wrong(f"{key} is {_shown(getattr(reading, key))}", "It is text")
+    valid, reason, point = bool(reading.valid), str(reading.reason), reading.point_in_world
+    if point is None and valid:
+        raise _wrong("a valid reading has no point", "Where nothing was measured valid is False")
+    if point is not None:
+        point = _array(point, (3,), "point_in_world")
+        if not np.isfinite(point).all():
+            valid, reason, point = False, reason or NOT_FINITE, None
+    sigma_m = _number(reading.sigma_m, "sigma_m")
+    if not 0.0 < sigma_m < math.inf:
+        raise _wrong(f"sigma_m is {sigma_m:g}", "It is above 0, in m")
+    celsius = reading.temperature_c
+    return replace(
+        reading,
+        point_in_world=point,
+        sigma_m=sigma_m,
+        time_s=_number(reading.time_s, "time_s"),
+        valid=valid,
+        raw=str(reading.raw),
+        reason=reason,
+        pose_in_world=None if reading.pose_in_world is None or not valid else _pose(reading.pose_in_world),
+        temperature_c=None if celsius is None else _number(celsius, "temperature_c"),
+        features=_features(reading.features),
+    )
+
+
+def _features(features: object) -> dict[str, float]:
+    if not isinstance(features, dict):
+        raise _wrong(f"features are {_shown(features)}", "They are numbers by name")
+    taken = [name for name in features if not isinstance(name, str) or is_column(name)]
+    if taken:
+        raise _wrong(
+            f"a feature is called {_shown(taken[0])}", "Names of columns of a measurement file are taken"
+        )
+    return {str(name): _number(value, f'feature "{name}"') for name, value in features.items()}
+
+
+def _pose(pose: object) -> Floats:
+    found = _array(pose, (4, 4), "pose_in_world")
+    turn = found[:3, :3]
+    off = np.abs(turn.T @ turn - np.eye(3)).max()
+    if not off < TOLERANCE or np.linalg.det(turn) < 0.0:
+        raise _wrong("pose_in_world is no turn and place", "It is world_from_target (4, 4), a rotation in it")
+    return found
+
+
+def _array(value: Any, shape: tuple[int, ...], what: str) -> Floats:  # noqa: ANN401 - whatever a driver gave
+    try:
+        found = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise _wrong(f"{what} is {_shown(value)}", f"It is an array {shape} of numbers") from None
+    if found.shape != shape:
+        raise _wrong(f"{what} has the shape {found.shape}", f"It is an array {shape} of numbers")
+    return found
+
+
+def _number(value: Any, what: str) -> float:  # noqa: ANN401 - whatever a driver gave
+    try:
+        number = None if isinstance(value, str | bytes) else float(value)
+    except (TypeError, ValueError):
+        number = None
+    if number is None:
+        raise _wrong(f"{what} is {_shown(value)}", "It is a number")
+    return number
+
+
+def _wrong(what: str, rule: str) -> MalformedReadingError:
+    return MalformedReadingError(
+        what, rule=rule, way_out="Mend the driver: truearm.cell.conformance tries it"
+    )
+
+
+def _shown(value: object) -> str:
+    shown = repr(value)
+    return shown if len(shown) <= LONGEST_SHOWN else f"{shown[:LONGEST_SHOWN]} ..."

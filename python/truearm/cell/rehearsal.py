@@ -20,9 +20,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A step as it is planned: where its target is expected in the world, and why it cannot be, if so."""
+    """A step as it is planned.
+
+    Attributes:
+        step: The step.
+        beside: Where the joints start (N,) so that all come from one side; None where any will do.
+        point_in_world: Where its target is expected (3,), m; None where that is not known.
+        problem: Why it cannot be measured; empty where it can.
+    """
 
     step: Step
+    beside: Floats | None
     point_in_world: Floats | None
     problem: str
 
@@ -52,13 +60,17 @@ def rehearse(cell: Cell, poses: Poses) -> Rehearsal:
         expected = prediction.expected(step)
         known = np.isfinite(expected.radius_m) and prediction.world_from_base is not None
         problem = problem_of(cell, prediction, step) if known else ""
-        planned.append(Planned(step, expected.point_in_world if known else None, problem))
+        beside = cell.beside(step.readings, step.approach) if step.approach else None
+        planned.append(Planned(step, beside, expected.point_in_world if known else None, problem))
     possible = len(planned) - len([each for each in planned if each.problem])
     return Rehearsal(planned, cell.file.process.seconds_per_pose * possible)
 
 
 def problem_of(cell: Cell, prediction: Prediction, step: Step) -> str:
-    """Why the table cannot measure a step; empty where it can, and for sensors that stay away."""
+    """Why the table cannot measure a step, or not from the side that is asked for; empty where it can.
+
+    Sensors that stay away have no problem.
+    """
     if not isinstance(cell.sensor, TablePanel) or prediction.world_from_base is None:
         return ""
     try:
@@ -69,4 +81,11 @@ def problem_of(cell: Cell, prediction: Prediction, step: Step) -> str:
     gap = clearance.meets(step.readings, carriage, prediction.world_from_base)
     if gap is not None:
         return f"link and table come within {MM_PER_METRE * gap:.0f} mm"
+    if not step.approach:
+        return ""
+    # The table lets the arm by as far out of its way as it can go.
+    beside, away = cell.beside(step.readings, step.approach), cell.sensor.released(carriage)
+    gap = clearance.meets(beside, away, prediction.world_from_base)
+    if gap is not None:
+        return f"link and table come within {MM_PER_METRE * gap:.0f} mm beside it, where the joints start"
     return ""

@@ -1,12 +1,15 @@
-"""Running a process so that Ctrl-C, or a request to end, stops the devices at once and ends it within 2 s."""
+"""Running a process so that Ctrl-C, a request to end, or the end of its terminal stops the devices at once.
 
+It ends within 2 s.
+"""
+
+import contextlib
 import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final
 
 from truearm.cell.measuring import Process
@@ -20,7 +23,7 @@ def run(process: Process) -> str:
     """What the process returns; it works in a thread of its own, so that nothing delays a stop.
 
     Raises:
-        KeyboardInterrupt: After Ctrl-C or a request to end, when devices are stopped and the file is closed.
+        KeyboardInterrupt: After such a signal, when devices are stopped and the file is closed.
         Exception: What the process raises.
     """
     outcome: list[str] = []
@@ -53,24 +56,31 @@ def _end(process: Process, worker: threading.Thread) -> None:
     for thread in (worker, halting):
         thread.join(max(0.0, until - time.monotonic()))
     if worker.is_alive():
-        sys.stderr.write("Interrupted.\n")
-        sys.stderr.flush()
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            sys.stderr.write("Interrupted.\n")
+            sys.stderr.flush()
         os._exit(INTERRUPTED)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _interrupts() -> Iterator[threading.Event]:
-    """An event that Ctrl-C and a request to end set, where this is the main thread."""
+    """An event that Ctrl-C, a request to end and the end of the terminal set, in the main thread."""
     event = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield event
         return
-    before = {
-        number: signal.signal(number, lambda _number, _frame: event.set())
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
+    before = {number: signal.signal(number, lambda _number, _frame: event.set()) for number in _signals()}
     try:
         yield event
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _signals() -> list[signal.Signals]:
+    """What asks for an end; that of the terminal where there is such a signal and nohup does not hide it."""
+    found = [signal.SIGINT, signal.SIGTERM]
+    hung_up: signal.Signals | None = getattr(signal, "SIGHUP", None)
+    if hung_up is not None and signal.getsignal(hung_up) != signal.SIG_IGN:
+        found.append(hung_up)
+    return found

@@ -16,20 +16,20 @@ DRAWN: Final = 17
 def steps_of(poses: Poses, process: ProcessSection) -> list[Step]:
     """The steps of a session.
 
-    Registration takes poses at random, always the same for the same list. Every `check_every` poses the first
-    of them is measured again, so that a cell that drifts is noticed.
+    Registration takes different poses at random, always the same for the same list. Every `check_every` poses
+    the first of them is measured again, so that a cell that drifts is noticed.
 
     Raises:
-        InputError: If there are fewer poses than registration needs.
+        InputError: If there are fewer different poses than registration needs.
     """
-    if len(poses) < process.registration_poses:
+    drawn = _drawn(poses)[: process.registration_poses]
+    if len(drawn) < process.registration_poses:
         raise InputError(
-            f"there are {len(poses)} poses",
-            rule=f"Registration needs {process.registration_poses} different ones",
+            f"there are {len(drawn)} different poses",
+            rule=f"Registration needs {process.registration_poses}",
             way_out="Give more poses, or lower registration_poses, to 4 at least",
         )
-    drawn = np.random.default_rng(DRAWN).permutation(len(poses))[: process.registration_poses]
-    plan = [("registration", int(pose)) for pose in sorted(drawn)]
+    plan = [("registration", pose) for pose in sorted(drawn)]
     reference = plan[0][1]
     for pose in range(len(poses)):
         if process.check_every and pose and pose % process.check_every == 0:
@@ -41,6 +41,14 @@ def steps_of(poses: Poses, process: ProcessSection) -> list[Step]:
         Step(k, kind, pose, poses.purpose[pose], int(poses.approach[pose]), poses.readings[pose])
         for k, (kind, pose) in enumerate(plan)
     ]
+
+
+def _drawn(poses: Poses) -> list[int]:
+    """All poses in random order, of those with the same readings the one that is drawn first."""
+    _, which = np.unique(poses.readings, axis=0, return_inverse=True)
+    order = np.random.default_rng(DRAWN).permutation(len(poses))
+    _, first = np.unique(which.reshape(-1)[order], return_index=True)
+    return [int(pose) for pose in order[np.sort(first)]]
 
 
 def fingerprint(poses: Poses) -> str:

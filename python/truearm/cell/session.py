@@ -7,7 +7,7 @@ import json
 import sqlite3
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -30,6 +30,22 @@ STEPS_LEFT: Final = (
     "SELECT * FROM steps WHERE step > coalesce((SELECT max(step) FROM outcomes), -1) ORDER BY step LIMIT ?"
 )
 STEPS_AT_ONCE: Final = 100
+FIRST_MEASURED: Final = (
+    "SELECT pose, purpose, approach, readings FROM steps JOIN outcomes USING (step) "
+    "WHERE outcome = 'measured' ORDER BY step LIMIT 1"
+)
+ADD_STEP: Final = "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?)"
+# One step on, by way of negative numbers: no two may have the same one at any time.
+MOVE_AWAY: Final = (
+    "UPDATE steps SET step = -1 - step WHERE step >= ?",
+    "UPDATE readings SET step = -1 - step WHERE step >= ?",
+    "UPDATE events SET step = -1 - step WHERE step >= ?",
+)
+MOVE_BACK: Final = (
+    "UPDATE steps SET step = -step WHERE step < 0",
+    "UPDATE readings SET step = -step WHERE step < 0",
+    "UPDATE events SET step = -step WHERE step < 0",
+)
 NO_FEATURES: Final = "{}"
 MAGIC: Final = b"SQLite format 3\x00"
 
@@ -74,40 +90,46 @@ class Session:
                     "this is no session file", where=str(path), rule="truearm measure makes them"
                 )
         self.path = path
-        self._closed = False
-        self._lock = FileLock(f"{path}.lock") if writing else None
+        self._keeps = writing
+        place = path.resolve()
+        self._lock = FileLock(f"{place}.lock") if writing else None
         self._acquire()
         mode = "rwc" if writing else "ro"
         self._db = sqlite3.connect(
-            f"{path.resolve().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
+            f"{place.as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
         )
         try:
             self._check_version()
             if writing:
-                self._db.execute("PRAGMA journal_mode=WAL")
-                self._db.execute("PRAGMA synchronous=FULL")
+                self._write("PRAGMA journal_mode=WAL")
+                self._write("PRAGMA synchronous=FULL")
         except BaseException:
             self.close()
             raise
 
     @classmethod
     def create(cls, path: Path, steps: Sequence[Step], meta: dict[str, Any]) -> "Session":
-        """Make a new file; it is complete, or not there."""
-        neighbour = path.with_name(f".{path.name}.new")
+        """Make a new file; it is complete, or not there.
+
+        Raises:
+            InputError: If it cannot be written.
+        """
+        file = path.resolve()
+        neighbour = file.with_name(f".{file.name}.new")
         neighbour.unlink(missing_ok=True)
+        values = {"version": VERSION, "created_s": time.time(), **meta}
         try:
-            with sqlite3.connect(neighbour, isolation_level=None) as database:
+            with closing(sqlite3.connect(neighbour, isolation_level=None)) as database:
                 database.executescript(SCHEMA)
                 database.execute("BEGIN")
-                values = {"version": VERSION, "created_s": time.time(), **meta}
                 rows = [(key, json.dumps(value)) for key, value in values.items()]
                 database.executemany("INSERT INTO meta VALUES (?, ?)", rows)
-                database.executemany("INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?)", map(_step_row, steps))
+                database.executemany(ADD_STEP, map(_step_row, steps))
                 database.execute("COMMIT")
-            database.close()
-        except sqlite3.OperationalError as error:
+            neighbour.replace(file)
+        except (sqlite3.OperationalError, OSError) as error:
+            neighbour.unlink(missing_ok=True)
             raise InputError(f"cannot be written: {error}", where=str(path)) from None
-        neighbour.replace(path)
         return cls(path, writing=True)
 
     def __enter__(self) -> Self:
@@ -120,7 +142,7 @@ class Session:
 
     def close(self) -> None:
         """Close the file and let others write to it."""
-        self._closed = True
+        self._keeps = False
         if hasattr(self, "_db"):
             self._db.close()
         if self._lock is not None:
@@ -130,6 +152,10 @@ class Session:
         """A value of the head of the file."""
         row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         return None if row is None else json.loads(row[0])
+
+    def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - a JSON value
+        """Keep a value of the head of the file, in the place of the one that may be there."""
+        self._write("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, json.dumps(value)))
 
     def next_step(self) -> Step | None:
         """The first step that has no outcome."""
@@ -167,18 +193,22 @@ class Session:
             json.dumps(reading.features) if reading.features else NO_FEATURES,
             reading.raw,
         )
-        self._db.execute(ADD_READING, (*head, *point, *turn, *quality, *expected.tolist(), *tail))
+        self._write(ADD_READING, (*head, *point, *turn, *quality, *expected.tolist(), *tail))
 
     def add_outcome(self, step: int, outcome: str, *, reason: str = "", attempts: Sequence[int] = ()) -> None:
         """Keep what became of a step, and which of its readings are the accepted ones."""
         row = (step, outcome, reason, str(list(attempts)), time.time())
-        self._db.execute("INSERT INTO outcomes VALUES (?, ?, ?, ?, ?)", row)
+        self._write("INSERT INTO outcomes VALUES (?, ?, ?, ?, ?)", row)
 
     def add_event(self, kind: str, message: str, step: int | None = None) -> None:
-        """Keep a remark about the process; one that comes after the file is closed is dropped."""
-        if self._closed:
+        """Keep a remark about the process.
+
+        One that comes after the file is closed is dropped, or after something could not be written, which
+        has been raised.
+        """
+        if not self._keeps:
             return
-        self._db.execute(
+        self._write(
             "INSERT INTO events (time_s, step, kind, message) VALUES (?, ?, ?, ?)",
             (time.time(), step, kind, message),
         )
@@ -191,14 +221,14 @@ class Session:
     def set_registration(self, world_from_base: Floats, residual_mm: float, poses: int) -> None:
         """Keep where the base stands."""
         row = (json.dumps(world_from_base.tolist()), residual_mm, poses, time.time())
-        self._db.execute("INSERT INTO registration VALUES (1, ?, ?, ?, ?)", row)
+        self._write("INSERT INTO registration VALUES (1, ?, ?, ?, ?)", row)
 
     def add_stretch(
         self, measured: int, model: str, mean_mm: float, p95_mm: float, expected_mm: float
     ) -> None:
         """Keep what the calibration so far is worth."""
         row = (measured, model, mean_mm, p95_mm, expected_mm, time.time())
-        self._db.execute("INSERT OR REPLACE INTO stretches VALUES (?, ?, ?, ?, ?, ?)", row)
+        self._write("INSERT OR REPLACE INTO stretches VALUES (?, ?, ?, ?, ?, ?)", row)
 
     def rows(self, query: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
         """Rows of a query that reads."""
@@ -211,16 +241,50 @@ class Session:
                       "WHERE kind = 'pose' AND outcome = 'measured'")[0][0]
         )  # fmt: skip
 
+    def check_next(self) -> None:
+        """Have the contact that was measured first measured again, before any step that is left.
+
+        It becomes a step of its own; those that are left, and readings that one of them has, count on from
+        it. Nothing is to be done where the next step is a check, or none is left, or nothing is measured.
+        """
+        step, first = self.next_step(), self.rows(FIRST_MEASURED)
+        if step is None or step.kind == "check" or not first:
+            return
+        with self.together():
+            for query in MOVE_AWAY:
+                self._write(query, (step.step,))
+            for query in MOVE_BACK:
+                self._write(query)
+            self._write(ADD_STEP, (step.step, "check", *first[0]))
+
     @contextmanager
     def together(self) -> Iterator[None]:
         """What is added inside is committed together."""
-        self._db.execute("BEGIN IMMEDIATE")
+        self._write("BEGIN IMMEDIATE")
         try:
             yield
+            self._write("COMMIT")
         except BaseException:
-            self._db.execute("ROLLBACK")
+            # A full disk ends a transaction by itself.
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
             raise
-        self._db.execute("COMMIT")
+
+    def _write(self, query: str, values: Sequence[Any] = ()) -> None:
+        """Do what changes the file.
+
+        Raises:
+            WorkError: If that fails, as on a full disk.
+        """
+        try:
+            self._db.execute(query, values)
+        except sqlite3.OperationalError as error:
+            self._keeps = False
+            raise WorkError(
+                f"the session cannot be written: {error}",
+                where=str(self.path),
+                way_out="What it says is stored is there. Make room, then the same command goes on",
+            ) from None
 
     def _acquire(self) -> None:
         if self._lock is None:

@@ -71,8 +71,9 @@ def calibrate_so_far(
             cell.arm, measurements_of(session, most=measured), model=model, by_purpose=False, drift=NO_DRIFT
         )
         expected_mm = _expected_mm(calibration, session)
-    except TruearmError as error:
-        note("calibration", f"not yet: {error}")
+    except Exception as error:  # noqa: BLE001 - measuring goes on, whatever a calibration so far fails at
+        said = str(error) if isinstance(error, TruearmError) else f"{type(error).__name__}: {error}"
+        note("calibration", f"not yet: {said}")
         return None
     errors = calibration.validation.holdout[model].position
     return Stretch(measured, model, errors.mean, errors.p95, expected_mm, calibration)

@@ -12,18 +12,20 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from truearm.cell import ur_packets
-from truearm.cell.channels import Channel, ConnectionEndedError, open_tcp
+from truearm.cell.channels import Channel, ConnectionEndedError, open_tcp, tcp_address
 from truearm.cell.device_errors import (
     DeviceError,
     DeviceRestartedError,
     EmergencyStopError,
+    NotReadyError,
+    ProtectiveStopError,
     RefusedError,
     gone,
     silent,
     stopped,
 )
 from truearm.cell.line_port import LinePort
-from truearm.cell.schema import Positive, Section
+from truearm.cell.schema import Positive, Section, TcpPort
 from truearm.errors import InputError
 from truearm.robot import Robot
 
@@ -47,8 +49,8 @@ class UniversalRobots:
 
         driver: str = "ur"
         host: str
-        script_port: int = 30002
-        realtime_port: int = 30003
+        script_port: TcpPort = 30002
+        realtime_port: TcpPort = 30003
         timeout_s: Positive = 2.0
         speed_rad_s: Positive = 1.0
         acceleration_rad_s2: Positive = 1.4
@@ -58,7 +60,7 @@ class UniversalRobots:
         if arm.joint_count != JOINTS:
             raise InputError(f"{arm.name} has {arm.joint_count} joints", rule="These arms have six")
         self._settings, self._arm = settings, arm
-        address = f"tcp://{settings.host}:{settings.script_port}"
+        address = tcp_address(settings.host, settings.script_port)
         self._script = LinePort(self.name, address, settings.timeout_s)
         self._stream: _Stream | None = None
         self._interrupted = threading.Event()
@@ -72,7 +74,7 @@ class UniversalRobots:
     @property
     def address(self) -> str:
         """See Device."""
-        return f"tcp://{self._settings.host}:{self._settings.realtime_port}"
+        return tcp_address(self._settings.host, self._settings.realtime_port)
 
     def connect(self) -> None:
         """Open both ports and wait for the first state."""
@@ -112,10 +114,12 @@ class UniversalRobots:
     def stop(self) -> None:
         """See Device."""
         self._interrupted.set()
-        if self._script.is_open:
-            self._script.send(f"stopj({STOP_RAD_S2:g})")
-        with self._busy:
-            self._interrupted.clear()
+        try:
+            if self._script.is_open:
+                self._script.send(f"stopj({STOP_RAD_S2:g})")
+        finally:
+            with self._busy:
+                self._interrupted.clear()
 
     def close(self) -> None:
         """See Device."""
@@ -129,10 +133,28 @@ class UniversalRobots:
         options = f"a={self._settings.acceleration_rad_s2:g}, v={self._settings.speed_rad_s:g}"
         with self._busy:
             for _ in range(SENDINGS):
+                self._check_ready()
                 self._script.send(f"movej({place}, {options})")
                 if self._arrives(target):
                     return
-        raise silent(self.name, self.address, self._settings.timeout_s, doing=f"move ({SENDINGS} times)")
+            self._check_ready()
+        raise DeviceError(
+            f"the arm did not get there ({SENDINGS} tries)",
+            where=self._script.where,
+            rule=f"It must begin to move within {STARTS_WITHIN_S + self._settings.settle_s:g} s",
+            way_out="See what its teach pendant says; an e-Series arm obeys under remote control only",
+        )
+
+    def _check_ready(self) -> None:
+        """Raise if the controller says that somebody has to make the arm ready before it can move."""
+        mode = self._state().robot_mode
+        if mode != ur_packets.RUNNING:
+            words = ur_packets.ROBOT_MODES.get(int(mode), f"in robot mode {mode:g}")
+            raise NotReadyError(
+                f"the arm is {words}",
+                where=f"{self.name} at {self.address}",
+                way_out="Make it ready at the teach pendant and start again: the session continues",
+            )
 
     def _arrives(self, target: Floats | None) -> bool:
         """Wait for the end of a motion; False if it never began, or ended elsewhere."""
@@ -141,8 +163,8 @@ class UniversalRobots:
         until, last_moved, moved = time.monotonic() + limit, time.monotonic(), False
         while time.monotonic() < until:
             state = self._state()
-            if np.abs(state.speeds).max() > STILL_RAD_S or not np.array_equal(state.readings, begin.readings):
-                moved = True
+            # Encoders and speeds flicker; what has moved is farther off than they do.
+            moved = moved or bool(np.abs(state.readings - begin.readings).max() > THERE_RAD)
             if np.abs(state.speeds).max() > STILL_RAD_S:
                 last_moved = time.monotonic()
             still_s = time.monotonic() - last_moved
@@ -174,7 +196,9 @@ class UniversalRobots:
         state = self._connected().newest(self._settings.timeout_s)
         if state.safety_mode not in ur_packets.MOVING_ALLOWED:
             words = ur_packets.SAFETY_MODES.get(int(state.safety_mode), f"safety mode {state.safety_mode:g}")
-            raise EmergencyStopError(
+            stopped_itself = state.safety_mode == ur_packets.PROTECTIVE_STOP
+            kind = ProtectiveStopError if stopped_itself else EmergencyStopError
+            raise kind(
                 f"the arm is in {words}",
                 where=f"{self.name} at {self.address}",
                 way_out="Clear it at the teach pendant and start again: the session continues",

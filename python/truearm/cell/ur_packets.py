@@ -28,6 +28,18 @@ ONE: Final = struct.Struct(">d")
 RUNNING: Final = 7.0
 NORMAL: Final = 1.0
 MOVING_ALLOWED: Final = (1.0, 2.0)
+PROTECTIVE_STOP: Final = 3.0
+ROBOT_MODES: Final = {
+    -1: "without a controller",
+    0: "disconnected",
+    1: "waiting for its safety settings to be confirmed",
+    2: "booting",
+    3: "powered off",
+    4: "powered on, its brakes not released",
+    5: "idle, its brakes not released",
+    6: "moved by hand",
+    8: "updating its firmware",
+}
 SAFETY_MODES: Final = {
     3: "protective stop",
     4: "recovery mode",
@@ -49,6 +61,7 @@ class State:
         speeds: Joint speeds (6,), rad/s.
         temperature_c: Mean temperature of the motors.
         safety_mode: 1 normal, 2 reduced; above that the arm does not move.
+        robot_mode: 7 where it runs; in any other mode the arm does not move.
     """
 
     time_s: float
@@ -56,6 +69,7 @@ class State:
     speeds: Floats
     temperature_c: float
     safety_mode: float
+    robot_mode: float = RUNNING
 
 
 def parse(packet: bytes) -> State:
@@ -66,6 +80,7 @@ def parse(packet: bytes) -> State:
         speeds=np.array(SIX.unpack_from(packet, QD_ACTUAL_AT)),
         temperature_c=sum(SIX.unpack_from(packet, MOTOR_TEMPERATURE_AT)) / 6.0,
         safety_mode=ONE.unpack_from(packet, SAFETY_MODE_AT)[0],
+        robot_mode=ONE.unpack_from(packet, ROBOT_MODE_AT)[0],
     )
 
 
@@ -77,7 +92,7 @@ def build(state: State) -> bytes:
     SIX.pack_into(packet, Q_ACTUAL_AT, *state.readings)
     SIX.pack_into(packet, QD_ACTUAL_AT, *state.speeds)
     SIX.pack_into(packet, MOTOR_TEMPERATURE_AT, *[state.temperature_c] * 6)
-    ONE.pack_into(packet, ROBOT_MODE_AT, RUNNING)
+    ONE.pack_into(packet, ROBOT_MODE_AT, state.robot_mode)
     ONE.pack_into(packet, SAFETY_MODE_AT, state.safety_mode)
     return bytes(packet)
 

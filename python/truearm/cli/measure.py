@@ -13,6 +13,7 @@ from truearm.errors import count_of, typed
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
+    from truearm.cell.cell_file import Cell
     from truearm.cell.rehearsal import Rehearsal
 
 
@@ -51,7 +52,7 @@ def command(
     known = Cell.load(cell)
     wanted = Poses.read_csv(poses, known.arm)
     if dry_run:
-        _print_rehearsal(rehearse(known, wanted), as_json=as_json)
+        _print_rehearsal(known, rehearse(known, wanted), as_json=as_json)
         if not as_json:
             suggest(f"truearm measure {typed(cell)} {typed(poses)} -o {typed(output)}")
         return
@@ -70,7 +71,14 @@ def command(
     suggest(f"truearm session export {typed(output)} -o measurements.csv")
 
 
-def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:
+def _away(cell: "Cell") -> str:
+    """How far beside a pose the joints of an arm start, in words."""
+    process = cell.file.process
+    ways = {"revolute": f"{process.approach_deg:g} deg", "prismatic": f"{process.approach_mm:g} mm"}
+    return " and ".join(way for kind, way in ways.items() if kind in cell.arm.joints)
+
+
+def _print_rehearsal(cell: "Cell", plan: "Rehearsal", *, as_json: bool) -> None:
     if as_json:
         rows = [
             {
@@ -78,6 +86,7 @@ def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:
                 "kind": each.step.kind,
                 "pose": each.step.pose + 1,
                 "readings": each.step.readings.tolist(),
+                "beside": None if each.beside is None else each.beside.tolist(),
                 "point_in_world_mm": None
                 if each.point_in_world is None
                 else (MM_PER_METRE * each.point_in_world).tolist(),
@@ -93,6 +102,9 @@ def _print_rehearsal(plan: "Rehearsal", *, as_json: bool) -> None:
         f"{count_of(contacts, 'contact')} for the frame, {count_of(poses, 'pose')}, "
         f"{count_of(checks, 'check')}: about {plan.seconds / 60:.0f} min."
     )
+    beside = [each for each in plan.steps if each.beside is not None]
+    if beside:
+        say_wrapped(f"At {len(beside)} of them all joints start {_away(cell)} beside the pose.")
     for each in plan.steps:
         place = (
             ""

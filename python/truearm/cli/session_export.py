@@ -6,8 +6,8 @@ from typing import Annotated, Final
 import typer
 
 from truearm.cli.arguments import AsJson, SessionFile
-from truearm.cli.console import print_json, say, suggest
-from truearm.errors import UsageError, count_of, typed
+from truearm.cli.console import print_json, say, suggest, warn
+from truearm.errors import Notice, UsageError, count_of, list_rows, typed
 
 DEFAULT: Final = Path("measurements.csv")
 
@@ -27,7 +27,7 @@ def command(
     Examples:
       truearm session export session.db -o measurements.csv
     """
-    from truearm.cell.accepted import accepted_table
+    from truearm.cell.accepted import accepted_table, moved_poses
     from truearm.cell.session import Session
     from truearm.cli.naming import name_of
     from truearm.errors import WorkError
@@ -40,11 +40,23 @@ def command(
     refuse_own_input(target, session)
     with Session(session, writing=False) as known:
         table, arm = accepted_table(known), Robot.from_dict(known.meta("arm"))
+        moved = moved_poses(known, table)
     if table.empty:
         raise WorkError("no pose is measured yet", where=str(session))
     write_whole(target, table.drop(columns="step").to_csv(index=False, lineterminator="\n"))
+    if moved:
+        warn([_told_of(moved)])
     if as_json:
-        print_json({"measurements": str(target), "rows": len(table)})
+        print_json({"measurements": str(target), "rows": len(table), "moved": moved})
         return
     say(f"{count_of(len(table), 'measurement')}: {target}")
     suggest(f"truearm calibrate {name_of(arm)} {typed(target)} -o result")
+
+
+def _told_of(moved: list[int]) -> Notice:
+    return Notice(
+        "moved",
+        f"{list_rows(moved, 'pose')}: something moved while they were measured, before or after, as the next "
+        "check found the first contact elsewhere (drift_mm). They are set-ups of their own in the column "
+        '"group". Measure them again, or see that each has enough poses to stand alone.',
+    )

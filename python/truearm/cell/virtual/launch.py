@@ -44,6 +44,8 @@ TIMES: Final = {
     "motion_timeout_s": 0.2,
     "origin_timeout_s": 1.0,
     "settle_s": 0.02,
+    "starts_within_s": 0.2,
+    "still_s": 0.02,
 }
 SPEEDS: Final = ("speed_mm_s", "touch_speed_mm_s")
 # Pseudo-terminals have no parity bits.

@@ -1,0 +1,191 @@
+"""A session that is gone on with: its first contact is measured again; what moved is told and kept apart."""
+
+import json
+from contextlib import contextmanager
+from itertools import islice
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import truearm as ta
+from truearm.cell import Cell
+from truearm.cell.accepted import accepted_table, measurements_of
+from truearm.cell.checks import unsure_steps
+from truearm.cell.measuring import DONE, Process
+from truearm.cell.opening import open_session
+from truearm.cell.poses_file import Poses
+from truearm.cell.reading import Reading
+from truearm.cell.session import Session
+from truearm.cli import main
+from truearm.errors import InputError, WorkError
+from truearm.simulation import VirtualArm
+
+COUNT = 20
+CELL = """
+name = "recorded"
+arm = "ur10e"
+robot = { driver = "playback" }
+sensor = { driver = "playback", file = "FILE" }
+[process]
+contacts = 1
+stretch = 0
+registration_mm = 300
+"""
+
+
+class KilledError(Exception):
+    """What ends a process in the middle."""
+
+
+class Recorded:
+    """A recording of an arm, and one of the same with the instrument 20 mm elsewhere."""
+
+    def __init__(self, folder):
+        self.folder, self.session = folder, folder / "session.db"
+        arm = VirtualArm(ta.Robot.load("ur10e"), seed=1)
+        self.poses = Poses(arm.poses(COUNT), np.zeros(COUNT, dtype=np.int64), ("",) * COUNT)
+        table = arm.measure_table(self.poses.readings)
+        table.to_csv(folder / "there.csv", index=False)
+        table.assign(x=table["x"] + 0.02).to_csv(folder / "moved.csv", index=False)
+
+    def measure(self, recording="there", *, until="", text=CELL):
+        """Measure until something is told, or to the end; what was told, and how it ended."""
+        told: list[str] = []
+
+        def tell(progress):
+            told.append(progress.text)
+            if until and progress.text.startswith(until):
+                raise KilledError
+
+        cell = Cell.from_toml(text.replace("FILE", str(self.folder / f"{recording}.csv")))
+        with open_session(self.session, cell, self.poses) as session:
+            end = Process(cell, session, tell).run()
+        return told, end
+
+    def killed(self, recording="there", **options):
+        with pytest.raises(KilledError):
+            self.measure(recording, **options)
+
+    @contextmanager
+    def read(self):
+        with Session(self.session, writing=False) as session:
+            yield session
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    return Recorded(tmp_path)
+
+
+@pytest.mark.parametrize("until", ["registration", "pose 8 stored"])
+def test_an_instrument_that_was_moved_is_noticed_before_anything_else_is_measured(recorded, until):
+    recorded.killed(until=until)
+    with recorded.read() as session:
+        before = session.measured_poses()
+    for _ in range(2):
+        with pytest.raises(WorkError, match=r"the first contact is now 20\.00 mm from where it was"):
+            recorded.measure("moved")
+    with recorded.read() as session:
+        assert session.measured_poses() == before
+
+
+def test_a_session_goes_on_once_all_is_in_its_place_again(recorded):
+    recorded.killed(until="pose 8 stored")
+    told, end = recorded.measure()
+    assert end == DONE
+    assert told[0].startswith("check ")
+    with recorded.read() as session:
+        assert session.measured_poses() == COUNT
+        assert unsure_steps(session) == []
+        assert "group" not in accepted_table(session).columns
+
+
+def test_steps_that_are_left_keep_their_readings_and_remarks(recorded):
+    recorded.killed(until="pose 3 stored")
+    cell = Cell.from_toml(CELL.replace("FILE", str(recorded.folder / "there.csv")))
+    with Session(recorded.session, writing=True) as session:
+        step = session.next_step()
+        assert step is not None
+        reading = Reading(np.ones(3), 1e-4, 0.0, True, "kept")
+        session.add_reading(step.step, 1, reading, step.readings, np.zeros(3))
+        session.add_event("device", "remark", step.step)
+    for _ in range(2):
+        with open_session(recorded.session, cell, recorded.poses) as session:
+            steps = list(islice(session.steps_left(), COUNT - 1))
+            kinds = [each.kind for each in steps]
+            assert kinds == ["check", *["pose"] * (COUNT - 3), "check"]
+            assert [each.step for each in steps] == list(range(step.step, step.step + len(steps)))
+            assert [each.point for each in session.readings_of(step.step + 1)] == [(1.0, 1.0, 1.0)]
+            assert session.rows("SELECT step FROM events WHERE message = 'remark'") == [(step.step + 1,)]
+
+
+def test_a_check_that_cannot_be_measured_does_not_let_a_session_go_on(recorded):
+    recorded.killed(until="pose 8 stored")
+    table = pd.read_csv(recorded.folder / "there.csv")
+    with recorded.read() as session:
+        first = session.steps("registration")[0].pose
+    table.drop(index=first).to_csv(recorded.folder / "without.csv", index=False)
+    with pytest.raises(WorkError, match="the first contact could not be measured again"):
+        recorded.measure("without")
+    assert recorded.measure()[1] == DONE
+
+
+def test_what_was_measured_before_a_failed_check_is_a_set_up_of_its_own(recorded, capsys):
+    text = f"{CELL}check_every = 5\n"
+    recorded.killed(until="pose 8 stored", text=text)
+    with pytest.raises(WorkError, match="the first contact is now"):
+        recorded.measure("moved", text=text)
+    recorded.measure(text=text)
+    output = recorded.folder / "out.csv"
+    assert main(["session", "export", str(recorded.session), "-o", str(output), "--json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["moved"] == [6, 7, 8]
+    assert "Warning: poses 6, 7 and 8: something moved" in said.err
+    data = ta.Measurements.read_csv(output)
+    assert data.groups == ["session", "session, moved 1"]
+    np.testing.assert_array_equal(np.flatnonzero(data.group == "session, moved 1"), [5, 6, 7])
+    with recorded.read() as session:
+        assert len(measurements_of(session)) == COUNT - 3
+    assert main(["session", "export", str(recorded.session), "-o", str(output), "--json"]) == 0
+
+
+def test_a_finished_session_whose_last_check_failed_says_so_again(recorded):
+    table = pd.read_csv(recorded.folder / "there.csv")
+    cell = Cell.from_toml(CELL.replace("FILE", str(recorded.folder / "there.csv")))
+    with open_session(recorded.session, cell, recorded.poses) as session:
+        first = session.steps("check")[-1].pose
+    # The recording has the first contact a third time, elsewhere: as its contact, its pose and its check.
+    moved = table.iloc[[first]].assign(x=table["x"][first] + 0.02)
+    pd.concat([table, table.iloc[[first]], moved]).to_csv(recorded.folder / "at_last.csv", index=False)
+    for _ in range(2):
+        with pytest.raises(WorkError, match="the first contact is now 20"):
+            recorded.measure("at_last")
+    with recorded.read() as session:
+        assert session.measured_poses() == COUNT
+
+
+def test_a_session_keeps_the_set_up_that_its_poses_are_meant_for(recorded, tmp_path):
+    readings = {f"q{j + 1}": column for j, column in enumerate(recorded.poses.readings.T)}
+    pd.DataFrame(readings).assign(group="hall 2").to_csv(tmp_path / "poses.csv", index=False)
+    arm = ta.Robot.load("ur10e")
+    plain, recorded.poses = recorded.poses, Poses.read_csv(tmp_path / "poses.csv", arm)
+    recorded.measure()
+    with recorded.read() as session:
+        assert measurements_of(session).groups == ["hall 2"]
+    recorded.poses = plain
+    with pytest.raises(InputError, match="another set-up"):
+        recorded.measure()
+    pd.DataFrame(readings).assign(group=["a", "b"] * (COUNT // 2)).to_csv(tmp_path / "two.csv", index=False)
+    with pytest.raises(InputError, match='column "group" holds "a" and "b".*one set-up at a time'):
+        Poses.read_csv(tmp_path / "two.csv", arm)
+
+
+def test_without_a_guess_of_the_frame_no_contact_is_suspicious(recorded):
+    told, _ = recorded.measure()
+    contacts = [text for text in told if text.startswith("registration")]
+    assert len(contacts) == 8
+    assert not any("prediction" in text for text in contacts)
+    assert any("from the prediction" in text for text in told)
+    with recorded.read() as session:
+        assert all(len(session.readings_of(step.step)) == 1 for step in session.steps("registration"))
