@@ -162,14 +162,18 @@ def test_a_base_that_is_corrected_is_read(library, tmp_path):
     assert known.pose(q) == pytest.approx(calibration.pose(q), abs=1e-12)
 
 
-def test_features_are_passed(data, library, tmp_path):
+@pytest.mark.parametrize("name", ["temperature", "payload_kg"])
+def test_features_are_passed(data, library, tmp_path, name):
     robot, measured = data
     rng = np.random.default_rng(0)
     warm = measured.select(np.arange(len(measured)))
-    warm.features["temperature"] = rng.uniform(18.0, 30.0, len(warm))
-    calibration = ta.calibrate(robot, warm, features=("temperature",))
+    warm.features[name] = rng.uniform(18.0, 30.0, len(warm))
+    calibration = ta.calibrate(robot, warm, features=(name,))
     calibration.save(tmp_path / "arm.calib", with_rows=False)
+    (sag,) = (block for block in calibration.summary["blocks"] if block["name"] == "sag")
+    assert sag["features"] == ([name] if name == "payload_kg" else [])
     known = Library(library, tmp_path / "arm.calib", robot.tool)
-    for degrees in (19.0, 28.0):
-        expected = calibration.pose(HOME, features={"temperature": degrees})
-        assert known.pose(HOME, [degrees]) == pytest.approx(expected, abs=1e-12)
+    for value in (19.0, 28.0):
+        expected = calibration.pose(HOME, features={name: value})
+        assert known.pose(HOME, [value]) == pytest.approx(expected, abs=1e-12)
+    assert known.pose(HOME, [19.0]) != pytest.approx(known.pose(HOME, [28.0]), abs=1e-9)

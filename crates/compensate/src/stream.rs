@@ -109,7 +109,7 @@ pub struct Stream {
     started: bool,
     gain: f64,
     without: f64,
-    /// The last time between two steps that can be one, s: what counts where a clock gives none.
+    /// The last time between two steps that was no later than the deadline, s: what counts where a clock gives none.
     cycle: f64,
 }
 
@@ -164,7 +164,8 @@ impl Stream {
     /// The corrected set-point to command; without allocation, lock or panic.
     ///
     /// `readings` (N) are the set-point, or None where none came in time, and `features` (F); `elapsed` (s) is the time since
-    /// the step before; one that is negative or NaN counts as late, and as long as the last good one. `out` (N) is always finite, but not written before the first finite set-point.
+    /// the step before: one that is negative or no finite number counts as late, and as long as the last good one. `out` (N) is
+    /// always finite, but not written before the first finite set-point.
     pub fn step(
         &mut self,
         readings: Option<&[f64]>,
@@ -172,7 +173,8 @@ impl Stream {
         elapsed: f64,
         out: &mut [f64],
     ) -> Step {
-        let late = self.started && !(0.0..=self.options.deadline).contains(&elapsed);
+        let good = elapsed.is_finite() && (0.0..=self.options.deadline).contains(&elapsed);
+        let late = self.started && !good;
         let elapsed = self.since(elapsed);
         let fault = self.take(readings, features, late);
         if !self.started || out.len() != self.joints.len() {
@@ -198,12 +200,13 @@ impl Stream {
 
     /// The time that a step counts, s.
     fn since(&mut self, elapsed: f64) -> f64 {
-        if elapsed >= 0.0 {
-            let elapsed = elapsed.min(self.options.deadline);
-            self.cycle = if elapsed > 0.0 { elapsed } else { self.cycle };
-            return elapsed;
+        if !(elapsed.is_finite() && elapsed >= 0.0) {
+            return self.cycle;
         }
-        self.cycle
+        if elapsed > SHORTEST && elapsed <= self.options.deadline {
+            self.cycle = elapsed;
+        }
+        elapsed.min(self.options.deadline)
     }
 
     /// Takes in a set-point, and its correction if that is good.

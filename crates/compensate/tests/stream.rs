@@ -286,12 +286,19 @@ fn the_rate_is_bounded_where_the_acceleration_is_not() {
 
 #[test]
 fn a_clock_that_gives_no_times_is_late_and_ends_in_nothing() {
-    for broken in [f64::NAN, f64::INFINITY, -1.0] {
-        let mut stream = stream();
+    let clocks = [f64::NAN, f64::INFINITY, -1.0]
+        .map(|broken| [0.05, f64::INFINITY].map(|deadline| (broken, deadline)));
+    for (broken, deadline) in clocks.into_iter().flatten() {
+        let options = StreamOptions { deadline, ..StreamOptions::default() };
+        let mut stream = Stream::new(corrector(), options).unwrap();
         run(&mut stream, 0.0, 2.0);
-        let mut out = [0.0; JOINTS];
-        let steps: Vec<_> =
-            (0..2000).map(|_| stream.step(Some(&moved(2.0)), &[], broken, &mut out)).collect();
+        let (mut out, mut steps) = ([0.0; JOINTS], Vec::new());
+        for _ in 0..2000 {
+            let before: Vec<f64> = stream.applied().collect();
+            steps.push(stream.step(Some(&moved(2.0)), &[], broken, &mut out));
+            let changes = stream.applied().zip(before).map(|(now, before)| (now - before).abs());
+            assert!(changes.fold(0.0, f64::max) <= options.rate[0] * CYCLE + 1e-15, "{broken}");
+        }
         assert!(steps.iter().all(|step| step.fault == Some(Fault::Late)));
         assert_eq!((steps[0].phase, steps[1999].phase), (Phase::Holding, Phase::Off), "{broken}");
         assert!(stream.applied().all(|applied| applied == 0.0));

@@ -48,6 +48,15 @@ impl Bank {
         levers: Levers,
     ) -> Result<Self, FieldError> {
         let sag = blocks.iter().position(|block| block.name == SAG_NAME).map(|place| blocks.remove(place));
+        if let Some(block) = &sag {
+            let (own, payloads) =
+                block.grid.inputs.split_at(levers.joint_count().min(block.grid.inputs.len()));
+            let ordered = payloads.is_sorted_by(|a, b| a < b);
+            let known = payloads.iter().all(|input| (levers.joint_count()..input_count).contains(input));
+            if !(own.iter().copied().eq(0..levers.joint_count()) && ordered && known) {
+                return Err(FieldError::NotFinite { what: "inputs of the sag" });
+            }
+        }
         let sag = sag.map(|block| {
             let payloads = block.grid.inputs.iter().skip(levers.joint_count()).map(|&input| (input, 1.0));
             Sag { levers: levers.carrying(payloads), outputs: block.outputs, weights: block.weights }
@@ -97,6 +106,12 @@ impl Bank {
     fn check_sag(&self) -> Result<(), FieldError> {
         let Some(sag) = &self.sag else { return Ok(()) };
         let inputs = sag.levers.input_count();
+        let mut of_joint = vec![None; sag.levers.joint_count()];
+        for (joint, output) in sag.levers.joints().zip(&sag.outputs) {
+            if of_joint[joint].get_or_insert(*output) != output {
+                return Err(FieldError::NotFinite { what: "one output of the sag for each joint" });
+            }
+        }
         let output = sag.outputs.iter().copied().max().unwrap_or(0);
         let lengths = [
             ("weights of the sag", sag.weights.len(), sag.levers.len()),

@@ -78,7 +78,7 @@ impl Axis {
         Self { input, origin, spacing, count, closed: false, degree }
     }
 
-    /// An axis for waves of so many cycles a turn: cells over one cycle.
+    /// An axis for waves of so much phase by the value: cells over one cycle.
     pub fn over_cycle(cycles: f64, degree: usize) -> Self {
         let input = Input { kind: InputKind::Angle, scale: cycles };
         let spacing = TAU / CELLS_OF_CYCLE as f64;

@@ -260,11 +260,12 @@ impl Search<'_> {
     /// added, one of the two searches may have ended at a lesser maximum.
     fn contested(&mut self, training: &Training, hyper: Hyper, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         let rough = self.options.rough;
+        let judges = if rough { middle_of(training) } else { part_of(training, ROWS_FOR_POLISH, 0) };
         let polished =
             if rough { self.again(&middle_of(training), hyper)? } else { self.cleaned(training, hyper)? };
         let reached = (self.evidence, self.curvature.clone());
         let other = self.anew(training, noise)?;
-        if self.evidence >= reached.0 {
+        if self.value(&judges, &other)? >= self.value(&judges, &polished)? {
             return Ok(other);
         }
         (self.evidence, self.curvature) = reached;
@@ -331,6 +332,12 @@ impl Search<'_> {
         let found = refine(&evidence, hyper, self.curvature.take(), POLISH)?;
         self.note(&found);
         Ok(found.hyper)
+    }
+
+    /// Logarithm of the evidence of hyper-parameters on some rows.
+    fn value(&mut self, training: &Training, hyper: &Hyper) -> Result<f64, FieldError> {
+        self.evaluations += 1;
+        Evidence::new(&training.clone().lifted(hyper.up)?, &self.options.cancel).value(hyper)
     }
 
     fn note(&mut self, found: &Found) {

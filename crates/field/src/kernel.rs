@@ -21,7 +21,7 @@ pub enum InputKind {
 pub struct Input {
     /// Kind of values.
     pub kind: InputKind,
-    /// Values are multiplied with this (one for angles, the cycles a turn for those of a wave).
+    /// Values are multiplied with this (one for angles, the phase by the value for those of a wave).
     pub scale: f64,
 }
 

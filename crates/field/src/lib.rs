@@ -7,7 +7,7 @@
 //!
 //! Blocks: `constant` (the constants, kernel one), `own` (theta of a revolute joint, d of a prismatic one, over that
 //! joint), `sag` (the same parameter in proportion to the levers of the links behind the joint), `wave` (the angle of a
-//! joint by a cosine and a sine of some hundred cycles a turn, where gears or encoders leave one),
+//! joint by a cosine and a sine of some hundred cycles a turn, where gears, encoders or screws leave one),
 //! `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
 //! together: those that the evidence chooses, and the last three).
 

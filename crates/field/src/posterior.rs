@@ -111,7 +111,7 @@ impl Posterior {
     /// # Errors
     /// [`FieldError::NotPositiveDefinite`], [`FieldError::Hyper`], and [`FieldError::Kinematics`] if `up` is no direction.
     pub fn new(training: Training, hyper: Hyper, degree: usize, cancel: &Cancel) -> Result<Self, FieldError> {
-        hyper.check(&training.inputs)?;
+        hyper.check(&training.inputs, training.geometry.joint_count())?;
         let rows = training.row_count();
         let model = Model::new(training.lifted(hyper.up)?, hyper, degree);
         if rows <= FEW_ROWS {

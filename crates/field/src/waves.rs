@@ -253,7 +253,7 @@ impl Sums {
         self.information[2] += s * s;
     }
 
-    /// `I^-1 z`: the weights of cosine and sine, rad (of a joint that slides for each metre of lever); zero where the poses cannot tell one from the other.
+    /// `I^-1 z`: the weights of cosine and sine, rad (of a joint that slides times [`truearm_estimate::ANGLE_ARM`] m); zero where the poses cannot tell one from the other.
     fn weights(&self) -> [f64; 2] {
         let ([c, s], [cc, cs, ss]) = (self.score, self.information);
         let determinant = cc * ss - cs * cs;

@@ -22,7 +22,7 @@ pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<
     Ok(stored)
 }
 
-/// The sag as a block over all joints without cells, and which way is up in it.
+/// The sag as a block over all joints and payloads without cells, and which way is up in it.
 pub(crate) fn sag_into<'py>(py: Python<'py>, sag: &Sag) -> PyResult<Bound<'py, PyDict>> {
     let stored = block_into(py, &sag.stored())?;
     stored.set_item(UP, sag.levers.up().to_vec())?;

@@ -60,7 +60,7 @@ pub fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
     })
 }
 
-/// Of each wave its joint, its cycles a turn and its amplitude.
+/// Of each wave its joint, its phase by the joint's value and its amplitude.
 fn waves_from(stored: &[f64]) -> PyResult<Vec<Wave>> {
     let (waves, left) = stored.as_chunks();
     if !left.is_empty() {

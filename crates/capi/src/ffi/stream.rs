@@ -9,8 +9,8 @@ use super::types::StreamState;
 
 /// Corrects the next set-point of a robot.
 ///
-/// `readings` may be null where none came in time. `elapsed_s` is the time since the call before; above the deadline the
-/// set-point counts as missed. TRUEARM_STATUS_OK or TRUEARM_STATUS_HELD: `out` is written and finite; HELD says that this set-point
+/// `readings` may be null where none came in time. `elapsed_s` is the time since the call before; above the deadline, below
+/// zero or not finite the set-point counts as missed. TRUEARM_STATUS_OK or TRUEARM_STATUS_HELD: `out` is written and finite; HELD says that this set-point
 /// has no correction of its own, and that the last one is held or on its ramp down (`state` says why). Where the
 /// set-point itself is not finite, `out` is the last finite one, corrected. TRUEARM_STATUS_NOT_STARTED: there was
 /// none yet, and `out` is not written. `state` may be null.
