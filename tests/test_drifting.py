@@ -271,6 +271,7 @@ def test_what_was_bumped_is_told_with_its_rows(measured, tmp_path, after):
 def test_a_file_of_before_does_not_claim_it(settled):
     arrays, content = pack(settled, with_rows=True)
     del content["options"]["drift"]
+    content = json.loads(json.dumps(content))
     assert unpack(arrays, content, where="old.calib")["options"].drift == "none"
 
 

@@ -229,7 +229,7 @@ def test_what_is_out_of_reach_is_said_by_number():
         (np.eye(3), np.zeros(6), r"shape \(3, 3\)"),
         (2.0 * np.eye(4), np.zeros(6), "not rigid in row 0"),
         (np.full((4, 4), np.nan), np.zeros(6), "NaN"),
-        (np.diag([1.0, 1.0, -1.0, 1.0]), np.zeros(6), "without a mirror"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), np.zeros(6), "no mirror"),
         (np.eye(4), np.zeros(5), r"\(n, 6\)"),
         (np.eye(4), np.full(6, np.nan), "seeds hold NaN"),
         (np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 6)), "3 seeds for 2 poses"),
