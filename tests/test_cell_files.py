@@ -132,6 +132,15 @@ def test_registration_comes_first_and_checks_repeat_its_first_contact(cell, pose
         steps_of(poses, process.model_copy(update={"registration_poses": 9}))
 
 
+def test_the_frame_is_registered_from_different_poses(cell, poses):
+    process = cell.file.process.model_copy(update={"registration_poses": 8})
+    twice = Poses(np.repeat(poses.readings, 2, axis=0), np.tile([1, -1], 8), ("",) * 16)
+    steps = [step for step in steps_of(twice, process) if step.kind == "registration"]
+    assert len(np.unique([step.readings for step in steps], axis=0)) == len(steps) == 8
+    with pytest.raises(InputError, match="there are 8 different poses.*Registration needs 9"):
+        steps_of(twice, process.model_copy(update={"registration_poses": 9}))
+
+
 def test_a_session_belongs_to_its_arm_and_poses(cell, poses, tmp_path):
     path = tmp_path / "session.db"
     open_session(path, cell, poses).close()
@@ -154,6 +163,43 @@ def test_one_process_writes_and_any_reads(cell, poses, tmp_path):
             assert step is not None
             assert step.step == 0
     open_session(path, cell, poses).close()
+
+
+def test_a_link_to_a_session_is_that_session(cell, poses, tmp_path):
+    path, link = tmp_path / "session.db", tmp_path / "link.db"
+    link.symlink_to(path)
+    with open_session(link, cell, poses), pytest.raises(WorkError, match="another process"):
+        open_session(path, cell, poses)
+    assert link.is_symlink()
+    with open_session(path, cell, poses), pytest.raises(WorkError, match="another process"):
+        open_session(link, cell, poses)
+    assert not (tmp_path / "link.db.lock").exists()
+
+
+def test_a_full_disk_is_one_line_and_what_was_stored_stays(cell, poses, tmp_path):
+    path = tmp_path / "session.db"
+    with open_session(path, cell, poses) as session:
+        session.add_event("remark", "before")
+        pages = session.rows("PRAGMA page_count")[0][0]
+        session.rows(f"PRAGMA max_page_count = {pages}")
+        with (
+            pytest.raises(WorkError, match=r"session\.db: the session cannot be written: .*full"),
+            session.together(),
+        ):
+            session.add_event("remark", "x" * 100_000)
+        session.add_event("stopped", "after what could not be written")
+    with open_session(path, cell, poses) as session:
+        assert session.rows("SELECT message FROM events") == [("before",)]
+
+
+def test_a_session_that_cannot_be_begun_leaves_nothing(cell, poses, tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise sqlite3.OperationalError("database or disk is full")
+
+    monkeypatch.setattr("truearm.cell.session.json.dumps", full)
+    with pytest.raises(InputError, match=r"session\.db: cannot be written: database or disk is full"):
+        open_session(tmp_path / "session.db", cell, poses)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_no_session_is_told(tmp_path):

@@ -1,8 +1,10 @@
 """A session that is gone on with: its first contact is measured again; what moved is told and kept apart."""
 
 import json
-from contextlib import contextmanager
+import sqlite3
+from contextlib import closing, contextmanager
 from itertools import islice
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -173,6 +175,9 @@ def test_a_session_keeps_the_set_up_that_its_poses_are_meant_for(recorded, tmp_p
     recorded.measure()
     with recorded.read() as session:
         assert measurements_of(session).groups == ["hall 2"]
+    with closing(sqlite3.connect(recorded.session, isolation_level=None)) as older:
+        older.execute("DELETE FROM meta WHERE key = 'group'")
+    assert recorded.measure()[1] == DONE
     recorded.poses = plain
     with pytest.raises(InputError, match="another set-up"):
         recorded.measure()
@@ -189,3 +194,11 @@ def test_without_a_guess_of_the_frame_no_contact_is_suspicious(recorded):
     assert any("from the prediction" in text for text in told)
     with recorded.read() as session:
         assert all(len(session.readings_of(step.step)) == 1 for step in session.steps("registration"))
+
+
+def test_a_calibration_so_far_that_fails_ends_no_session(recorded, monkeypatch):
+    monkeypatch.setattr("truearm.cell.stretches.calibrate", Mock(side_effect=ValueError("no norm")))
+    assert recorded.measure(text=CELL.replace("stretch = 0", "stretch = 15"))[1] == DONE
+    with recorded.read() as session:
+        notes = session.rows("SELECT message FROM events WHERE kind = 'calibration'")
+    assert notes == [("not yet: ValueError: no norm",)]

@@ -17,6 +17,7 @@ from truearm.cell import (
     EmergencyStopError,
     ProtectiveStopError,
     Reading,
+    RefusedError,
     StoppedError,
     rehearsal,
 )
@@ -200,3 +201,23 @@ def test_a_pose_at_which_the_arm_was_stopped_is_skipped_later(kind, stops, tmp_p
 def registered(folder):
     with Session(folder / "session.db", writing=False) as session:
         return session.registration() is not None
+
+
+def test_what_answers_a_stop_is_no_refusal_of_the_pose(tmp_path, monkeypatch):
+    made, begin = [], Process.__init__
+
+    def beginning(process, *given):
+        made.append(process)
+        begin(process, *given)
+
+    def fails(pose):
+        if pose != 5:
+            return None
+        made[-1].halt()
+        return RefusedError("aborted", where="arm")
+
+    monkeypatch.setattr(Process, "__init__", beginning)
+    with pytest.raises(StoppedError):
+        measured_with(tmp_path, fails)
+    with Session(tmp_path / "session.db", writing=False) as session:
+        assert session.rows("SELECT step FROM outcomes WHERE outcome = 'skipped'") == []

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import truearm as ta
 from truearm.few_values import few_values, values_words
+from truearm.grids import grid_steps
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
@@ -75,3 +76,10 @@ def test_a_few_values_are_told_with_the_way_out_and_in_the_report():
     kinds = {notice.kind for notice in ta.calibrate(arm.robot, arm.measure(readings)).notices}
     assert "on_a_grid" in kinds
     assert "few_values" not in kinds
+
+
+def test_grids_of_long_rails_and_of_values_far_away_are_looked_for_in_wider_bins():
+    rng = np.random.default_rng(0)
+    rail = np.append(1.5 * rng.integers(0, 41, 400), 60.0)
+    assert grid_steps(rail[:, None], ["prismatic"])[1] == pytest.approx(1500.0)
+    assert grid_steps(np.append(rng.uniform(0.0, 3.0, 400), 1e6)[:, None], ["prismatic"]) == {}

@@ -29,6 +29,8 @@ OF_A_GAP: Final = 0.5
 """Part of the least gap of a few values below which a step is that of round numbers, and no grid."""
 BIN: Final = 0.02
 """Deg or mm."""
+MOST_BINS: Final = 1 << 19
+"""Rails of more than ten metres have wider bins."""
 FINER: Final = 8
 """Steps that are tried lie so close that their grids differ by a part of this of a step at the far end."""
 ALIKE: Final = 0.9
@@ -82,10 +84,11 @@ def _step(readings: Floats, finest: float) -> float | None:
     low, span = float(readings.min()), float(np.ptp(readings))
     if span < (FEWEST_VALUES - 1) * finest:
         return None
-    counts = np.bincount(np.rint((readings - low) / BIN).astype(np.int64))
-    length = FINER * len(counts)
+    wide = max(BIN, span / MOST_BINS)
+    counts = np.bincount(np.rint((readings - low) / wide).astype(np.int64))
+    length = 1 << (FINER * len(counts) - 1).bit_length()
     likeness = np.abs(np.fft.rfft(counts, length)) / len(readings)
-    per_unit = np.arange(len(likeness)) / (length * BIN)
+    per_unit = np.arange(len(likeness)) / (length * wide)
     least, most = (FEWEST_VALUES - 1) / (span + JITTER), 1.0 / finest + per_unit[1]
     tried = np.flatnonzero((likeness > ALIKE) & (per_unit >= least) & (per_unit <= most))
     peaks = [k for k in tried if likeness[k] >= max(likeness[k - 1], likeness[k + 1])]

@@ -155,7 +155,7 @@ class Crew:
         except (TypeError, ValueError):
             here = np.empty(0)
         if here.shape != (self._cell.arm.joint_count,) or not all(map(math.isfinite, here.tolist())):
-            raise DeviceError(f"it reads its joints as {np.asarray(told).tolist()}", where=robot.name)
+            raise DeviceError(f"it reads its joints as {told!r}", where=robot.name)
         self._here = here
         return here
 

@@ -187,6 +187,8 @@ class LineRobot:
             self._port.pause(ASKS_EVERY_S)
             now = self._where()
             if self._refusal:
+                # What it answers to a stop may look like a refusal.
+                self._port.pause(0.0)
                 raise RefusedError(f'it answers "{self._refusal}"', where=self._port.where)
             if not self._agree(now, rests_at):
                 rests_at, since = now, time.monotonic()

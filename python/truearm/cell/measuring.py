@@ -159,8 +159,7 @@ class Process:
                 with calls(self._cell.sensor):
                     reading = checked_reading(self._cell.sensor.measure())
             except RefusedError as error:
-                self._skip(step, str(error))
-                return False
+                return self._refused(step, error)
             except DeviceError as error:
                 if not self._try_again(error, step):
                     return False
@@ -203,6 +202,12 @@ class Process:
         self._session.add_outcome(step.step, "skipped", reason=reason)
         self._session.add_event("skipped", reason, step.step)
         self._say(f"{step.kind} {step.pose + 1} skipped: {reason}")
+
+    def _refused(self, step: Step, error: RefusedError) -> bool:
+        """Skip a step that a device refuses; what answers a stop may look like a refusal, and is none."""
+        self._crew.raise_if_halted()
+        self._skip(step, str(error))
+        return False
 
     def _stops_at(self, step: Step) -> str:
         """Why a step is not tried again, where stops of the arm ended former processes; else empty.
@@ -265,6 +270,7 @@ class Process:
             raise
         except DeviceError as error:
             self._recover(error, None)
+            self._recoveries = 0
 
     def _recover(self, error: DeviceError, step: Step | None) -> None:
         """Connect anew, if that may help and did not fail too often."""
@@ -327,9 +333,19 @@ class Process:
                 f"the first contact is now {check.off_mm:.2f} mm from where it was",
                 where="check",
                 rule=f"The cell may drift by {self._process.drift_mm:g} mm (drift_mm)",
-                way_out="Find what moves. Once it is in its place again the same command goes on; else "
-                "measure the rest as a new session: a set-up of its own",
+                way_out=self._after_drift(),
             )
+
+    def _after_drift(self) -> str:
+        if self._session.next_step() is None:
+            return (
+                "Find what moves. truearm session export keeps apart what was measured since the last good "
+                "check"
+            )
+        return (
+            "Find what moves. Once it is in its place again the same command goes on; else measure the rest "
+            "as a new session: a set-up of its own"
+        )
 
     def _check_resumed(self, step: Step, *, measured: bool) -> None:
         """Raise if the check with which a session goes on was not measured: something may have moved."""

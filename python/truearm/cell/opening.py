@@ -42,7 +42,7 @@ def open_session(path: Path, cell: Cell, poses: Poses) -> Session:
         return Session.create(path, steps_of(poses, cell.file.process), head)
     session = Session(path, writing=True)
     for key, words in SAME.items():
-        if session.meta(key) != identity[key]:
+        if (key != GROUP or session.has_meta(GROUP)) and session.meta(key) != identity[key]:
             session.close()
             raise InputError(
                 f"this session is of {words}",
@@ -52,6 +52,7 @@ def open_session(path: Path, cell: Cell, poses: Poses) -> Session:
             )
     try:
         session.set_meta(DRIFT_MM, drift_mm)
+        session.set_meta(GROUP, poses.group)
         session.check_next()
     except BaseException:
         session.close()

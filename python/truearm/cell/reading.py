@@ -92,6 +92,9 @@ def checked_reading(reading: object) -> Reading:
         point = _array(point, (3,), "point_in_world")
         if not np.isfinite(point).all():
             valid, reason, point = False, reason or NOT_FINITE, None
+    time_s = _number(reading.time_s, "time_s")
+    if not math.isfinite(time_s):
+        raise _wrong(f"time_s is {time_s:g}", "It is in seconds since the epoch")
     sigma_m = _number(reading.sigma_m, "sigma_m")
     if not 0.0 < sigma_m < math.inf:
         raise _wrong(f"sigma_m is {sigma_m:g}", "It is above 0, in m")
@@ -100,7 +103,7 @@ def checked_reading(reading: object) -> Reading:
         reading,
         point_in_world=point,
         sigma_m=sigma_m,
-        time_s=_number(reading.time_s, "time_s"),
+        time_s=time_s,
         valid=valid,
         raw=str(reading.raw),
         reason=reason,

@@ -153,6 +153,10 @@ class Session:
         row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         return None if row is None else json.loads(row[0])
 
+    def has_meta(self, key: str) -> bool:
+        """Whether the head of the file holds a value; sessions of before hold fewer."""
+        return bool(self.rows("SELECT 1 FROM meta WHERE key = ?", (key,)))
+
     def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - a JSON value
         """Keep a value of the head of the file, in the place of the one that may be there."""
         self._write("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, json.dumps(value)))

@@ -134,6 +134,8 @@ class UniversalRobots:
         with self._busy:
             for _ in range(SENDINGS):
                 self._check_ready()
+                if self._interrupted.is_set():
+                    raise stopped(self.name, self.address)
                 self._script.send(f"movej({place}, {options})")
                 if self._arrives(target):
                     return
@@ -165,10 +167,11 @@ class UniversalRobots:
             state = self._state()
             # Encoders and speeds flicker; what has moved is farther off than they do.
             moved = moved or bool(np.abs(state.readings - begin.readings).max() > THERE_RAD)
-            if np.abs(state.speeds).max() > STILL_RAD_S:
+            moves = bool(np.abs(state.speeds).max() > STILL_RAD_S)
+            if moves:
                 last_moved = time.monotonic()
             still_s = time.monotonic() - last_moved
-            if target is not None and still_s > 0.0 and np.abs(state.readings - target).max() < THERE_RAD:
+            if target is not None and not moves and np.abs(state.readings - target).max() < THERE_RAD:
                 return True
             if still_s > self._settings.settle_s + (0.0 if moved else STARTS_WITHIN_S):
                 return moved and target is None
