@@ -16,11 +16,10 @@ from truearm.details import ConstantDetails, VariableDetails
 from truearm.doubts import (
     NO_HELP,
     Outliers,
-    at_few_values,
     constant_is_better,
     doubts,
     mounting,
-    on_a_grid,
+    seen_at_values,
     stated_too_large,
     stood_still,
 )
@@ -87,8 +86,7 @@ def calibrate(
     robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given = given.deduplicated()
-    for looked_at in (stood_still, on_a_grid, at_few_values):
-        notices += looked_at(robot, given.readings)
+    notices += stood_still(robot, given.readings) + seen_at_values(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
     task = replace(task, sizes=() if split.planned else given.sizes)
@@ -116,16 +114,16 @@ def calibrate(
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(
-            *notices,
-            *_of_fit(task, final, variable),
-            *order_notices(task, given, drift.progress),
-            *drift_notices(validation.drift),
-        ),
+        notices=(*notices, *_of_fit(task, final, variable), *_over_time(task, given, drift, validation)),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
     return replace(found, notices=(*found.notices, *_doubts(task, found, given, stages)))
+
+
+def _over_time(task: Task, data: Measurements, drift: Drift, judged: Validation) -> list[Notice]:
+    """What the order of the rows tells and hides."""
+    return [*order_notices(task, data, drift.progress), *drift_notices(judged.drift)]
 
 
 def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:

@@ -141,9 +141,14 @@ def stood_still(robot: Robot, readings: Floats) -> list[Notice]:
     return [Notice("stood_still", text)] if text else []
 
 
-def on_a_grid(robot: Robot, readings: Floats) -> list[Notice]:
-    """A warning where joint readings (n, N) stand on a grid, which hides what varies between its values."""
+def seen_at_values(robot: Robot, readings: Floats) -> list[Notice]:
+    """Warnings where readings (n, N) stand on a grid or at a few values: what varies in between is hidden."""
     steps = grid_steps(readings, robot.joints)
+    few = {k: own for k, own in few_values(readings, robot.joints).items() if k not in steps}
+    return [*_on_a_grid(robot, steps), *_at_few_values(robot, few)]
+
+
+def _on_a_grid(robot: Robot, steps: Mapping[int, float]) -> list[Notice]:
     if not steps:
         return []
     text = (
@@ -154,14 +159,11 @@ def on_a_grid(robot: Robot, readings: Floats) -> list[Notice]:
     return [Notice(ON_A_GRID, text)]
 
 
-def at_few_values(robot: Robot, readings: Floats) -> list[Notice]:
-    """A warning where joints have a few values alone in readings (n, N), wide apart, and stand on no grid."""
-    on_grids = grid_steps(readings, robot.joints)
-    found = {k: own for k, own in few_values(readings, robot.joints).items() if k not in on_grids}
-    if not found:
+def _at_few_values(robot: Robot, values: Mapping[int, list[float]]) -> list[Notice]:
+    if not values:
         return []
     text = (
-        f"The measured poses have {values_words(found, robot.joints)} alone. What errors do in between "
+        f"The measured poses have {values_words(values, robot.joints)} alone. What errors do in between "
         "was not measured, and held-out poses at the same values do not show it: there the arm may be "
         f"further off than errors and standard deviations say. {BETWEEN_THEM}."
     )
