@@ -54,7 +54,7 @@ impl Bank {
             let ordered = payloads.is_sorted_by(|a, b| a < b);
             let known = payloads.iter().all(|input| (levers.joint_count()..input_count).contains(input));
             if !(own.iter().copied().eq(0..levers.joint_count()) && ordered && known) {
-                return Err(FieldError::NotFinite { what: "inputs of the sag" });
+                return Err(FieldError::Block { what: "the sag does not go over all joints, then payloads" });
             }
         }
         let sag = sag.map(|block| {
@@ -69,7 +69,7 @@ impl Bank {
     /// Checks that weights, grids and indices fit together, once, where a bank comes from outside.
     ///
     /// # Errors
-    /// [`FieldError::Length`], [`FieldError::NotFinite`].
+    /// [`FieldError::Length`], [`FieldError::NotFinite`], [`FieldError::Block`].
     pub fn check(&self) -> Result<(), FieldError> {
         self.check_sag()?;
         for block in &self.blocks {
@@ -109,7 +109,7 @@ impl Bank {
         let mut of_joint = vec![None; sag.levers.joint_count()];
         for (joint, output) in sag.levers.joints().zip(&sag.outputs) {
             if of_joint[joint].get_or_insert(*output) != output {
-                return Err(FieldError::NotFinite { what: "one output of the sag for each joint" });
+                return Err(FieldError::Block { what: "the sag drives several parameters of one joint" });
             }
         }
         let output = sag.outputs.iter().copied().max().unwrap_or(0);

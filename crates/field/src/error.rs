@@ -37,6 +37,12 @@ pub enum FieldError {
         /// What is wrong.
         what: &'static str,
     },
+    /// A block that no fit makes, as a file that was changed may hold.
+    #[error("a block of the field is of no use: {what}; calibrate again")]
+    Block {
+        /// What is wrong.
+        what: &'static str,
+    },
     /// The constant stage failed.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
