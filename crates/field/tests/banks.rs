@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::{Random, with_threads};
-use truearm_field::{Axis, Bank, Block, Compiled, FieldError, Grid, Input};
+use common::{Random, Truth, six_axes, with_threads};
+use truearm_field::{Axis, Bank, Block, Compiled, FieldError, Grid, Input, Levers};
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
 const INPUTS: usize = 3;
@@ -247,4 +247,37 @@ fn slopes_are_derivatives_of_what_inputs_add_to_their_own_parameters() {
         }
         assert!(slopes.iter().all(|slope| slope.0.iter().any(|value| value.abs() > 0.1)));
     }
+}
+
+#[test]
+fn a_sag_that_no_fit_makes_is_refused() {
+    let arm = six_axes(Truth::RIGID);
+    let (levers, parameters) = (Levers::new(&arm.chain), arm.chain.parameter_count());
+    let outputs: Vec<usize> = levers.joints().map(|joint| 5 * joint).collect();
+    let restored = |inputs: &[usize], outputs: &[usize]| {
+        let times = inputs.len().saturating_sub(5);
+        let block = Block {
+            name: "sag".to_owned(),
+            grid: Grid { inputs: inputs.to_vec(), axes: Vec::new() },
+            outputs: outputs.repeat(times),
+            weights: vec![1e-4; outputs.len() * times],
+        };
+        Bank::restored(8, parameters, vec![block], levers.clone())
+    };
+    let payload = restored(&[0, 1, 2, 3, 4, 5, 7], &outputs).unwrap();
+    assert_eq!(payload.sag.unwrap().stored().grid.inputs, [0, 1, 2, 3, 4, 5, 7]);
+    for inputs in [
+        &[6, 1, 2, 3, 4, 5][..],
+        &[0, 1, 2, 3, 4],
+        &[0, 1, 2, 3, 4, 5, 5],
+        &[0, 1, 2, 3, 4, 5, 7, 6],
+        &[0, 1, 2, 3, 4, 5, 8],
+        &[0, 1, 2, 3, 4, 5, usize::MAX],
+    ] {
+        let refused = restored(inputs, &outputs).unwrap_err();
+        assert!(matches!(refused, FieldError::Block { .. }), "{inputs:?}: {refused}");
+    }
+    let mut elsewhere = outputs.clone();
+    elsewhere[1] = 5;
+    assert!(matches!(restored(&[0, 1, 2, 3, 4, 5], &elsewhere), Err(FieldError::Block { .. })));
 }
