@@ -13,7 +13,7 @@ import truearm as ta
 from truearm.cell import Cell, DeviceError, Expected, Reading, StoppedError
 from truearm.cell.conformance import ConformanceError, check_robot, check_sensor
 from truearm.cell.crew import Crew
-from truearm.cell.device_errors import calls
+from truearm.cell.device_errors import Calls
 from truearm.cell.examples import example
 from truearm.cell.playback import PlaybackRobot, PlaybackSensor
 from truearm.cell.reading import checked_reading
@@ -79,7 +79,7 @@ def test_a_point_that_is_not_finite_is_a_reading_that_failed():
 def test_what_is_no_reading_names_the_driver_and_is_not_tried_again(reading, message):
     device = Mock(address="there")
     device.name = "own sensor"
-    with pytest.raises(DeviceError, match=f"own sensor at there: {message}") as raised, calls(device):
+    with pytest.raises(DeviceError, match=f"own sensor at there: {message}") as raised, Calls(device):
         checked_reading(reading)
     assert not raised.value.recoverable
 

@@ -14,13 +14,19 @@ Floats = NDArray[np.float64]
 
 DRIFT_MM: Final = "drift_mm"
 """In the head of a session: how far the first contact may have moved, mm."""
+# Joined crosswise the tables are looked through in this order: the last check is found at their end and the
+# first contact at their beginning, however long a session is.
 CHECKS: Final = """
-WITH done AS (SELECT * FROM outcomes JOIN steps USING (step) WHERE outcome = 'measured'),
-     first AS (SELECT pose, min(step) AS step FROM done GROUP BY pose)
-SELECT done.step, done.attempts, first.step, outcomes.attempts
-FROM done JOIN first USING (pose) JOIN outcomes ON outcomes.step = first.step
-WHERE done.kind = 'check' AND first.step < done.step
-ORDER BY done.step DESC LIMIT ?
+SELECT now.step, now.attempts, first.step, first.attempts
+FROM outcomes AS now
+CROSS JOIN steps AS checked USING (step)
+CROSS JOIN outcomes AS first ON first.step = (
+    SELECT outcomes.step FROM outcomes CROSS JOIN steps USING (step)
+    WHERE outcome = 'measured' AND pose = checked.pose
+    ORDER BY outcomes.step LIMIT 1
+)
+WHERE checked.kind = 'check' AND now.outcome = 'measured' AND first.step < now.step
+ORDER BY now.step DESC LIMIT ?
 """
 
 

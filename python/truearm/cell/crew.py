@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
-from truearm.cell.device_errors import DeviceError, RefusedError, StoppedError, calls
+from truearm.cell.device_errors import Calls, DeviceError, RefusedError, StoppedError
 from truearm.cell.protocols import Device
 from truearm.cell.reading import Expected
 from truearm.cell.table_panel import TablePanel
@@ -51,7 +51,7 @@ class Crew:
         sensor, robot = self._cell.sensor, self._cell.robot
         for device, action in ((sensor, sensor.connect), (sensor, sensor.release), (robot, robot.connect)):
             self.raise_if_halted()
-            with calls(device):
+            with Calls(device):
                 action()
         self._refuge = self._where()
 
@@ -73,7 +73,7 @@ class Crew:
         if self._table is None:
             self._along(way)
             self.raise_if_halted()
-            with calls(self._cell.sensor):
+            with Calls(self._cell.sensor):
                 self._cell.sensor.prepare(expected)
         else:
             self._with_table(self._table, way, expected, world_from_base)
@@ -142,13 +142,13 @@ class Crew:
         for place in way:
             self.raise_if_halted()
             self._here = None
-            with calls(self._cell.robot):
+            with Calls(self._cell.robot):
                 self._cell.robot.move_joints(place)
             self._here = place
 
     def _where(self) -> Floats:
         robot = self._cell.robot
-        with calls(robot):
+        with Calls(robot):
             told = robot.read_joints()
         try:
             here = np.array(told, dtype=np.float64)

@@ -1,7 +1,6 @@
 """What goes wrong with devices, each with the device, its port and the time limit in the message."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from types import TracebackType
 from typing import Protocol
 
 from truearm.errors import WorkError
@@ -75,20 +74,33 @@ class MalformedReadingError(DeviceError):
     recoverable = False
 
 
-@contextmanager
-def calls(device: Addressed) -> Iterator[None]:
+class Calls:
     """Calls of a driver: errors of the system that it lets through, or of its readings, name the device.
 
-    Raises:
-        DeviceError: With the device and its port.
+    Used by `with`, which raises DeviceError with the device and its port.
     """
-    where = f"{device.name} at {device.address}"
-    try:
-        yield
-    except OSError as error:
-        raise DeviceError(f"{type(error).__name__}: {error}", where=where) from error
-    except MalformedReadingError as error:
-        raise MalformedReadingError(error.what, where=where, rule=error.rule, way_out=error.way_out) from None
+
+    __slots__ = ("_device",)
+
+    def __init__(self, device: Addressed) -> None:
+        self._device = device
+
+    def __enter__(self) -> None:
+        """Nothing has to be done before a call."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Name the device in an error that does not."""
+        if isinstance(error, OSError):
+            raise DeviceError(f"{type(error).__name__}: {error}", where=self._where()) from error
+        if isinstance(error, MalformedReadingError):
+            raise MalformedReadingError(
+                error.what, where=self._where(), rule=error.rule, way_out=error.way_out
+            ) from None
+
+    def _where(self) -> str:
+        return f"{self._device.name} at {self._device.address}"
 
 
 def silent(device: str, port: str, limit_s: float, *, doing: str = "") -> DeviceSilentError:

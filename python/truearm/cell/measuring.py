@@ -15,13 +15,13 @@ from truearm.cell.cell_file import Cell
 from truearm.cell.checks import last_check
 from truearm.cell.crew import Crew
 from truearm.cell.device_errors import (
+    Calls,
     DeviceError,
     EmergencyStopError,
     PortUnavailableError,
     ProtectiveStopError,
     RefusedError,
     StoppedError,
-    calls,
 )
 from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
@@ -156,7 +156,7 @@ class Process:
                 if not placed:
                     joints, placed = self._placed(step, expected, anew=verdict.suspicious), True
                 self._crew.raise_if_halted()
-                with calls(self._cell.sensor):
+                with Calls(self._cell.sensor):
                     reading = checked_reading(self._cell.sensor.measure())
             except RefusedError as error:
                 return self._refused(step, error)
@@ -174,11 +174,15 @@ class Process:
         return verdict.decision == "accept"
 
     def _known_of(self, step: Step) -> list[Stored]:
-        """Readings that a former process left; it can have left some of its last step alone.
+        """Readings that a former process left."""
+        return self._session.readings_of(step.step) if self._was_begun(step) else []
+
+    def _was_begun(self, step: Step) -> bool:
+        """Whether a former process may have begun a step: that is its last one alone.
 
         Before that step a session that is gone on with may have a check.
         """
-        return self._session.readings_of(step.step) if step.step <= self._done_before + 1 else []
+        return step.step <= self._done_before + 1
 
     def _keep(
         self, step: Step, reading: Reading, joints: Floats, expected: Floats, verdict: Verdict, attempt: int
@@ -214,7 +218,7 @@ class Process:
 
         A check is always tried again: nothing else says whether arm and instrument stand still.
         """
-        if step.kind == "check":
+        if step.kind == "check" or not self._was_begun(step):
             return ""
         kinds = [row[0] for row in self._session.rows("SELECT kind FROM events WHERE step = ?", (step.step,))]
         stops = {kind: kinds.count(kind) for kind in MOST_STOPS}

@@ -1,7 +1,7 @@
 """What passes between the process and its devices: where a point is expected, and what was measured."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from truearm.columns import PURPOSE, means_something
 
 Floats = NDArray[np.float64]
 
+TRUTHS: Final = (bool, np.bool_)
 TOLERANCE: Final = 1e-3
 LONGEST_SHOWN: Final = 60
 OWN_COLUMNS: Final = ("step", "pose", PURPOSE, "approach", "readings", "temperature_c")
@@ -80,17 +81,17 @@ def checked_reading(reading: object) -> Reading:
     """
     if not isinstance(reading, Reading):
         raise _wrong(f"measure gave {_shown(reading)}", "It gives a Reading, valid or not")
-    if not isinstance(reading.valid, bool | np.bool_):
+    if not isinstance(reading.valid, TRUTHS):
         raise _wrong(f"valid is {_shown(reading.valid)}", "It is True or False")
-    for key in ("raw", "reason"):
-        if not isinstance(getattr(reading, key), str):
-            raise _wrong(f"{key} is {_shown(getattr(reading, key))}", "It is text")
+    for key, text in (("raw", reading.raw), ("reason", reading.reason)):
+        if not isinstance(text, str):
+            raise _wrong(f"{key} is {_shown(text)}", "It is text")
     valid, reason, point = bool(reading.valid), str(reading.reason), reading.point_in_world
     if point is None and valid:
         raise _wrong("a valid reading has no point", "Where nothing was measured valid is False")
     if point is not None:
         point = _array(point, (3,), "point_in_world")
-        if not np.isfinite(point).all():
+        if not all(map(math.isfinite, point.tolist())):
             valid, reason, point = False, reason or NOT_FINITE, None
     time_s = _number(reading.time_s, "time_s")
     if not math.isfinite(time_s):
@@ -98,19 +99,11 @@ def checked_reading(reading: object) -> Reading:
     sigma_m = _number(reading.sigma_m, "sigma_m")
     if not 0.0 < sigma_m < math.inf:
         raise _wrong(f"sigma_m is {sigma_m:g}", "It is above 0, in m")
-    celsius = reading.temperature_c
-    return replace(
-        reading,
-        point_in_world=point,
-        sigma_m=sigma_m,
-        time_s=time_s,
-        valid=valid,
-        raw=str(reading.raw),
-        reason=reason,
-        pose_in_world=None if reading.pose_in_world is None or not valid else _pose(reading.pose_in_world),
-        temperature_c=None if celsius is None else _number(celsius, "temperature_c"),
-        features=_features(reading.features),
-    )
+    pose, celsius, features = reading.pose_in_world, reading.temperature_c, reading.features
+    pose = None if pose is None or not valid else _pose(pose)
+    celsius = None if celsius is None else _number(celsius, "temperature_c")
+    features = {} if features == {} else _features(features)
+    return Reading(point, sigma_m, time_s, valid, str(reading.raw), reason, pose, celsius, features)
 
 
 def _features(features: object) -> dict[str, float]:
