@@ -114,7 +114,8 @@ def long_session(found: dict) -> list[str]:
             f"memory flat, below {MOST_MS_A_POSE:g} ms of process time a pose beside waiting",
             f"{content['process_ms_a_pose']:.2f} ms a pose{missed}, two readings each, beside "
             f"{content['system_ms_a_pose']:.2f} ms in which the system serves disk and ports; memory "
-            f"changed by {content['grown_mb']:+.1f} MB to {content['memory_mb']:.0f} MB in the last three quarters",
+            f"changed by {content['grown_mb']:+.1f} MB to {content['memory_mb']:.0f} MB in the last three "
+            "quarters",
         )
     ]
 
