@@ -11,6 +11,7 @@ from truearm.details import VariableDetails
 from truearm.errors import Notice
 from truearm.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.grids import BETWEEN, grid_steps, grid_words
+from truearm.held_tool import TURN_MORE, held_tool, held_words
 from truearm.identified import IdentifiedArm
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
@@ -45,6 +46,9 @@ SINGLE_ROWS: Final = "single_rows"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 ON_A_GRID: Final = "on_a_grid"
 FEW_VALUES: Final = "few_values"
+HELD_TOOL: Final = "held_tool"
+HIDING: Final = (FEW_VALUES, HELD_TOOL)
+"""What leaves a part of the errors out of held-out poses too; grids do as well."""
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
     "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1) and "
@@ -142,10 +146,13 @@ def stood_still(robot: Robot, readings: Floats) -> list[Notice]:
 
 
 def seen_at_values(robot: Robot, readings: Floats) -> list[Notice]:
-    """Warnings where readings (n, N) stand on a grid or at a few values: what varies in between is hidden."""
+    """Warnings where readings (n, N) leave out what is between or beside them: it shows in no held-out pose.
+
+    They stand on a grid, or at a few values, or hold the tool one way.
+    """
     steps = grid_steps(readings, robot.joints)
     few = {k: own for k, own in few_values(readings, robot.joints).items() if k not in steps}
-    return [*_on_a_grid(robot, steps), *_at_few_values(robot, few)]
+    return [*_on_a_grid(robot, steps), *_at_few_values(robot, few), *_held_one_way(robot, readings)]
 
 
 def _on_a_grid(robot: Robot, steps: Mapping[int, float]) -> list[Notice]:
@@ -168,6 +175,18 @@ def _at_few_values(robot: Robot, values: Mapping[int, list[float]]) -> list[Noti
         f"further off than errors and standard deviations say. {BETWEEN_THEM}."
     )
     return [Notice(FEW_VALUES, text)]
+
+
+def _held_one_way(robot: Robot, readings: Floats) -> list[Notice]:
+    held = held_tool(robot, readings)
+    if held is None:
+        return []
+    text = (
+        f"The measured poses have {held_words(held)}. What errors do where it is held otherwise was not "
+        "measured, and held-out poses do not show it: there the arm may be further off than errors and "
+        f"standard deviations say. {TURN_MORE}."
+    )
+    return [Notice(HELD_TOOL, text)]
 
 
 def helps(before_mm: float, after_mm: float) -> bool:

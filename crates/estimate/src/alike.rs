@@ -3,16 +3,22 @@
 //! A set-up may be open by the nature of the arm: on a SCARA frame and targets cannot be told apart along its
 //! axes, wherever it goes, and no prediction depends on it. What matters is what these poses leave open and
 //! others would not, so their rank is compared with that of as many poses drawn over all turns of the joints.
+//!
+//! Poses that go about in space with one orientation of the tool, as in palletising, leave open where a target
+//! sits on the flange. For tools that are held so it makes no difference: targets are then kept near the flange.
 
 use std::ops::Range;
 
+use faer::{Mat, Side};
+
 use crate::EstimateError;
 use crate::MeasurementSet;
-use crate::layout::{Layout, Problem};
-use crate::minimise::State;
+use crate::layout::{HELD_PRECISION, Layout, Problem, TARGET_PRECISION};
 use crate::packets::Packets;
 use crate::pass::{Normal, normal_equations};
 use crate::rows::Point;
+use crate::setup::Setup;
+use crate::start::flange_poses;
 
 /// A column is open at the poses when less than this share of it stands out of the others' span: 0.3 mrad of turn,
 /// which moves a target less than it is measured to, and more than corrections of parallel axes bring.
@@ -20,11 +26,48 @@ const OPEN: f64 = 3e-4;
 /// A column is closed at other poses when more than this share stands out.
 const CLOSED: f64 = 1e-2;
 
-/// Refuses poses that leave more of the set-up open than the arm's nature does.
+/// Flanges that are no farther from a plane than this, m, are in it.
+const THIN: f64 = 0.02;
+
+/// What poses leave open of the set-up that the arm's nature does not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Open {
+    Nothing,
+    /// Where targets sit on the flange, against where the arm stands.
+    Targets,
+    More,
+}
+
+/// Whether poses leave open where targets sit on the flange, and nothing else that the arm's nature does not.
 ///
 /// # Errors
-/// [`EstimateError::Singular`], [`EstimateError::Kinematics`].
-pub fn check_poses(problem: &Problem, state: &State, normal: &Normal) -> Result<(), EstimateError> {
+/// [`EstimateError::Singular`] where they leave more of the set-up open, [`EstimateError::Kinematics`].
+pub fn leave_targets_open(problem: &Problem, point: Point, normal: &Normal) -> Result<bool, EstimateError> {
+    match open(problem, point, normal)? {
+        Open::Nothing => Ok(false),
+        Open::Targets => Ok(true),
+        Open::More => Err(EstimateError::Singular {
+            unknowns: Layout::new(problem).len(),
+            rows: problem.measurements.measured_values(),
+        }),
+    }
+}
+
+/// Prior precision of steps of the set-up (len - arm,) beside a field, from the constants' set-up.
+///
+/// Where poses leave targets open these stay where the constants have them: what calibrated joints turn the tool is
+/// itself an estimate, and beside errors of the arm it would look like a tool of a metre. Asked of the nominal arm.
+///
+/// # Errors
+/// [`EstimateError::Kinematics`].
+pub fn setup_precision(problem: &Problem, setup: &Setup) -> Result<Vec<f64>, EstimateError> {
+    let point = Point { parameters: &problem.chain.nominal(), setup };
+    let normal = normal_equations(problem, &Packets::new(problem.measurements), point, None)?;
+    let held = open(problem, point, &normal)? == Open::Targets;
+    Ok(Layout::new(problem).setup_precision(if held { HELD_PRECISION } else { TARGET_PRECISION }))
+}
+
+fn open(problem: &Problem, point: Point, normal: &Normal) -> Result<Open, EstimateError> {
     let layout = Layout::new(problem);
     let open: Vec<_> = blocks(problem, &layout)
         .into_iter()
@@ -32,18 +75,41 @@ pub fn check_poses(problem: &Problem, state: &State, normal: &Normal) -> Result<
         .filter(|(rank, block)| *rank < block.len())
         .collect();
     if open.is_empty() {
-        return Ok(());
+        return Ok(Open::Nothing);
     }
     let elsewhere =
         MeasurementSet { joints: spread(&problem.measurements.joints), ..problem.measurements.clone() };
     let moved = Problem { measurements: &elsewhere, ..*problem };
-    let point = Point { parameters: &state.parameters, setup: &state.setup };
     let other = normal_equations(&moved, &Packets::new(&elsewhere), point, None)?;
-    if open.into_iter().any(|(found, block)| found < rank(&other, block, CLOSED)) {
-        let rows = problem.measurements.measured_values();
-        return Err(EstimateError::Singular { unknowns: layout.len(), rows });
+    let lost: Vec<_> =
+        open.into_iter().filter(|(found, block)| *found < rank(&other, block.clone(), CLOSED)).collect();
+    if lost.is_empty() {
+        return Ok(Open::Nothing);
     }
-    Ok(())
+    let known = |block: &Range<usize>| rank(normal, block.start..block.start + 6, OPEN) == 6;
+    let frames = layout.frame == 6 && lost.iter().all(|(_, block)| known(block));
+    Ok(if frames && go_about_in_space(problem, point)? { Open::Targets } else { Open::More })
+}
+
+/// Whether the flanges of every group are in no plane.
+fn go_about_in_space(problem: &Problem, point: Point) -> Result<bool, EstimateError> {
+    let set = problem.measurements;
+    for group in 0..set.group_count {
+        let used = |&pose: &usize| set.group[pose] == group && set.weight[pose] > 0.0;
+        let poses: Vec<usize> = (0..set.pose_count()).filter(used).collect();
+        let flanges = flange_poses(problem, point.parameters, &poses)?;
+        let mean_of = |value: &dyn Fn(&[f64; 3]) -> f64| {
+            flanges.iter().map(|flange| value(&flange.translation)).sum::<f64>() / flanges.len() as f64
+        };
+        let centre: [f64; 3] = std::array::from_fn(|k| mean_of(&|point| point[k]));
+        let spread =
+            Mat::from_fn(3, 3, |i, j| mean_of(&|point| (point[i] - centre[i]) * (point[j] - centre[j])));
+        let squares = spread.self_adjoint_eigenvalues(Side::Lower);
+        if !squares.is_ok_and(|squares| squares[0] > THIN * THIN) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Unknowns of the set-up that rows can share: those of a group, or all where distances join groups and anchors.

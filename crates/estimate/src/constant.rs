@@ -9,7 +9,7 @@ use faer::{Mat, Par};
 
 use truearm_kinematics::is_length;
 
-use crate::alike::check_poses;
+use crate::alike::leave_targets_open;
 use crate::dense::Cholesky;
 use crate::layout::{Layout, Problem, TARGET_PRECISION};
 use crate::measurements::Noise;
@@ -129,6 +129,8 @@ struct Balance {
     noise: Noise,
     scale: f64,
     weights: Vec<f64>,
+    /// Prior precision of the targets' coordinates, 1/m^2; zero where they have none.
+    targets: f64,
 }
 
 impl Fit<'_> {
@@ -144,7 +146,7 @@ impl Fit<'_> {
             packets: self.packets,
             weighting: Some((balance.noise, &balance.weights)),
             precision: &self.precision(balance.scale),
-            target_precision: self.options.prior.map_or(0.0, |_| TARGET_PRECISION),
+            target_precision: balance.targets,
             nominal: self.nominal,
             cancel: &self.options.cancel,
         };
@@ -154,9 +156,14 @@ impl Fit<'_> {
     fn run(&self, start: State) -> Result<ConstantFit, EstimateError> {
         let set = self.problem.measurements;
         let noise = self.options.noise.unwrap_or(Noise::GUESS);
-        let mut balance = Balance { noise, scale: 1.0, weights: set.weight.clone() };
+        let targets = self.options.prior.map_or(0.0, |_| TARGET_PRECISION);
+        let mut balance = Balance { noise, scale: 1.0, weights: set.weight.clone(), targets };
         let mut minimum = self.minimise(start, &balance)?;
-        check_poses(self.problem, &minimum.state, &minimum.normal)?;
+        let point = Point { parameters: &minimum.state.parameters, setup: &minimum.state.setup };
+        if leave_targets_open(self.problem, point, &minimum.normal)? && targets == 0.0 {
+            balance.targets = TARGET_PRECISION;
+            minimum = self.minimise(minimum.state, &balance)?;
+        }
         let mut covariance = self.covariance(&minimum, &balance)?;
         let mut residuals = self.residuals(&minimum.state)?;
         for _ in 0..ROUNDS {
@@ -203,7 +210,8 @@ impl Fit<'_> {
             matrix[(k, k)] += precision;
         }
         let (n, arm) = (matrix.nrows(), self.problem.columns.len());
-        for (k, known) in Layout::new(self.problem).setup_precision().into_iter().enumerate() {
+        for (k, known) in Layout::new(self.problem).setup_precision(TARGET_PRECISION).into_iter().enumerate()
+        {
             matrix[(arm + k, arm + k)] += known.max(ROUNDING * matrix[(arm + k, arm + k)]);
         }
         let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
@@ -231,7 +239,7 @@ impl Fit<'_> {
             Some(robust) => self.robust_weights(robust, noise, residuals),
             None => old.weights.clone(),
         };
-        Balance { noise, scale, weights }
+        Balance { noise, scale, weights, targets: old.targets }
     }
 
     fn prior_scale(&self, prior: &Prior, minimum: &Minimum, effective: f64) -> f64 {

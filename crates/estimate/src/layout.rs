@@ -86,6 +86,8 @@ impl Problem<'_> {
 const REACH: f64 = 0.1;
 /// The same as a precision, 1/m^2.
 pub const TARGET_PRECISION: f64 = 1.0 / (REACH * REACH);
+/// Precision of targets that stay where they are to a millimetre, 1/m^2.
+pub const HELD_PRECISION: f64 = 1e6;
 
 /// Positions of the unknowns in the vector of unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -145,10 +147,10 @@ impl Layout {
     }
 
     /// Prior precision of the set-up's unknowns (len - arm,): a frame is known to a metre and a radian, flat but never
-    /// singular; a target is within a tenth of one of the flange.
-    pub fn setup_precision(&self) -> Vec<f64> {
+    /// singular; a target's coordinates to the precision `targets`, 1/m^2.
+    pub fn setup_precision(&self, targets: f64) -> Vec<f64> {
         let mut precision = vec![1.0; self.len() - self.arm];
-        self.target_coordinates().for_each(|(_, _, at)| precision[at - self.arm] = TARGET_PRECISION);
+        self.target_coordinates().for_each(|(_, _, at)| precision[at - self.arm] = targets);
         precision
     }
 

@@ -40,6 +40,7 @@ mod common;
 #[cfg(test)]
 mod tests;
 
+pub use alike::setup_precision;
 pub use cancel::Cancel;
 pub use choice::{
     Choice, ChoiceOptions, Criterion, Observability, choose_poses, observability, observability_of,

@@ -184,7 +184,11 @@ impl<'a> Sample<'a> {
     }
 }
 
-fn flange_poses(
+/// Flange poses under link parameters, (5 L,) or one set a pose (n, 5 L).
+///
+/// # Errors
+/// [`EstimateError::Kinematics`].
+pub fn flange_poses(
     problem: &Problem,
     parameters: &[f64],
     poses: &[usize],

@@ -3,11 +3,14 @@
 
 mod common;
 
+use std::f64::consts::FRAC_PI_2;
+
 use common::arms::{ur10, ur10_columns, ur10_determined};
+use common::root_mean_square;
 use common::scene::{Plan, Scene};
 use truearm_estimate::{
-    Cancel, ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Prior,
-    fit_constant,
+    Cancel, ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Point, Prior,
+    fit_constant, residuals, setup_precision,
 };
 
 fn plan() -> Plan {
@@ -145,6 +148,36 @@ fn poses_that_move_too_little_of_the_arm() {
         let found = refusal(&scene, prior);
         assert!(matches!(found, EstimateError::Singular { .. }), "{found}");
     }
+}
+
+/// Joints of a UR10 whose tool keeps one orientation, pointing down.
+fn held_down(joints: &mut [f64]) {
+    joints[3] = -FRAC_PI_2 - joints[1] - joints[2];
+    joints[4] = -FRAC_PI_2;
+    joints[5] = joints[0];
+}
+
+#[test]
+fn poses_with_one_orientation_keep_the_target_near_the_flange_and_those_in_a_plane_are_refused() {
+    let spans = vec![2.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+    let space = Plan { bound: held_down, spans, columns: vec![], ..plan() };
+    for prior in [None, Some(Prior::default())] {
+        let scene = space.make();
+        let found = fit_constant(&scene.problem(), &ConstantOptions { prior, ..ConstantOptions::default() });
+        let found = found.unwrap();
+        let point = Point { parameters: &found.parameters, setup: &found.setup };
+        let left = root_mean_square(&residuals(&scene.problem(), point).unwrap());
+        assert!(left < 1.2e-4, "{left}");
+        assert!(root_mean_square(&found.setup.groups[0].targets[0]) < 0.2);
+        let precision = setup_precision(&scene.problem(), &found.setup).unwrap();
+        assert_eq!(precision, [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1e6, 1e6, 1e6]);
+    }
+    let elsewhere = plan().make();
+    let precision = setup_precision(&elsewhere.problem(), &elsewhere.setup).unwrap();
+    assert!(precision[6..].iter().all(|known| (known - 100.0).abs() < 1e-9), "{precision:?}");
+    let plane = Plan { spans: vec![0.0, 1.0, 1.0, 0.0, 0.0, 0.0], ..space };
+    let said = refusal(&plane.make(), None).to_string();
+    assert!(said.contains("too alike"), "{said}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! From measurements to rows that a field is inferred from.
 
-use truearm_estimate::{Layout, Linearised, Point, Problem, linearise};
+use truearm_estimate::{Layout, Linearised, Point, Problem, linearise, setup_precision};
 
 use crate::FieldError;
 use crate::cells::range;
@@ -35,7 +35,7 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
         jacobian: Vec::new(),
         setup: Vec::new(),
         setup_width: own,
-        setup_precision: layout.setup_precision(),
+        setup_precision: setup_precision(problem, point.setup)?,
         residual: Vec::new(),
         variance: Vec::new(),
         weight: Vec::new(),

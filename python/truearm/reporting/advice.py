@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import FEW_VALUES, SAME, STATED_TOO_LARGE, constants_do_better
+from truearm.doubts import FEW_VALUES, HELD_TOOL, HIDING, SAME, STATED_TOO_LARGE, constants_do_better
 from truearm.errors import count_of
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
@@ -99,7 +99,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     floor, mean = distance_at_floor_mm(facts), facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
-        if facts.grids or facts.noticed(FEW_VALUES):
+        if facts.grids or any(map(facts.noticed, HIDING)):
             return
         words = (
             f"The mean error is {left} mm, and noise alone would leave {noise} mm. More poses will hardly "
@@ -156,6 +156,11 @@ def _on_a_grid(facts: Facts) -> Iterator[Advice]:
 def _at_few_values(facts: Facts) -> Iterator[Advice]:
     if words := facts.noticed(FEW_VALUES):
         yield Advice("between_few_values", "Measure in between.", words, facts.mean_mm())
+
+
+def _held_one_way(facts: Facts) -> Iterator[Advice]:
+    if words := facts.noticed(HELD_TOOL):
+        yield Advice("turn_the_wrist", "Turn the wrist.", words, facts.mean_mm())
 
 
 def _in_order(facts: Facts) -> Iterator[Advice]:
@@ -275,6 +280,7 @@ RULES: Final = (
     _warm_up,
     _on_a_grid,
     _at_few_values,
+    _held_one_way,
     _in_order,
     _stated_sigma,
     _noise_or_poses,

@@ -24,6 +24,8 @@ pub struct Plan {
     pub noise: (f64, f64),
     /// Half ranges of the joints; empty for 2.5 rad and 0.3 m.
     pub spans: Vec<f64>,
+    /// What makes joints of a pose follow from others, once they are drawn.
+    pub bound: fn(&mut [f64]),
     /// Half a side of the cube that the targets lie in, m.
     pub tool: f64,
     pub seed: u64,
@@ -42,6 +44,7 @@ impl Plan {
             errors: 1e-3,
             noise: (0.0, 0.0),
             spans: vec![],
+            bound: |_| (),
             tool: 0.15,
             seed: 1,
         }
@@ -101,7 +104,9 @@ impl Plan {
             (None, Joint::Prismatic) => 0.3,
             (None, _) => 2.5,
         };
-        moving.map(|(k, link)| stream.within(half((k, link.joint)))).collect()
+        let mut joints: Vec<f64> = moving.map(|(k, link)| stream.within(half((k, link.joint)))).collect();
+        (self.bound)(&mut joints);
+        joints
     }
 
     fn measure(&self, set: &mut MeasurementSet, truth: &[f64], setup: &Setup, stream: &mut Stream) {
