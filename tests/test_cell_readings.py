@@ -93,6 +93,19 @@ def test_errors_of_the_system_name_the_device_that_let_them_through():
     assert raised.value.recoverable
 
 
+def test_errors_of_a_driver_itself_name_the_device_and_the_line_and_are_not_tried_again():
+    cell = Mock(arm=ta.Robot.load("ur10e"))
+    cell.robot.name, cell.robot.address = "own robot", "here"
+    cell.robot.move_joints.side_effect = lambda _: int("fast")
+    with pytest.raises(
+        DeviceError, match="own robot at here: its driver failed: ValueError: .*'fast'"
+    ) as raised:
+        Crew(cell, Mock(), threading.Event()).go([np.zeros(6)], Mock(), None)
+    assert "(test_cell_readings.py, line " in str(raised.value)
+    assert "truearm.cell.conformance" in str(raised.value)
+    assert not raised.value.recoverable
+
+
 def test_joints_may_be_a_list_of_as_many_numbers_as_the_arm_has():
     cell = Mock(arm=ta.Robot.load("ur10e"))
     cell.robot.name = "own robot"

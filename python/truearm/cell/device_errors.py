@@ -1,9 +1,13 @@
 """What goes wrong with devices, each with the device, its port and the time limit in the message."""
 
+import traceback
+from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import Final, Protocol
 
-from truearm.errors import WorkError
+from truearm.errors import TruearmError, WorkError
+
+MEND_THE_DRIVER: Final = "Mend the driver: truearm.cell.conformance tries it"
 
 
 class Addressed(Protocol):
@@ -74,8 +78,14 @@ class MalformedReadingError(DeviceError):
     recoverable = False
 
 
+class DriverError(DeviceError):
+    """The driver itself failed: connecting anew does not help."""
+
+    recoverable = False
+
+
 class Calls:
-    """Calls of a driver: errors of the system that it lets through, or of its readings, name the device.
+    """Calls of a driver: errors that it lets through, the system's, of readings or its own, name the device.
 
     Used by `with`, which raises DeviceError with the device and its port.
     """
@@ -98,9 +108,21 @@ class Calls:
             raise MalformedReadingError(
                 error.what, where=self._where(), rule=error.rule, way_out=error.way_out
             ) from None
+        if isinstance(error, Exception) and not isinstance(error, TruearmError):
+            raise DriverError(
+                f"its driver failed: {type(error).__name__}: {error} ({_last_line(trace)})",
+                where=self._where(),
+                way_out=MEND_THE_DRIVER,
+            ) from error
 
     def _where(self) -> str:
         return f"{self._device.name} at {self._device.address}"
+
+
+def _last_line(trace: TracebackType | None) -> str:
+    """File and line where an error came up."""
+    last = traceback.extract_tb(trace)[-1]
+    return f"{Path(last.filename).name}, line {last.lineno}"
 
 
 def silent(device: str, port: str, limit_s: float, *, doing: str = "") -> DeviceSilentError:

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.device_errors import MalformedReadingError
+from truearm.cell.device_errors import MEND_THE_DRIVER, MalformedReadingError
 from truearm.columns import PURPOSE, means_something
 
 Floats = NDArray[np.float64]
@@ -147,9 +147,7 @@ def _number(value: Any, what: str) -> float:  # noqa: ANN401 - whatever a driver
 
 
 def _wrong(what: str, rule: str) -> MalformedReadingError:
-    return MalformedReadingError(
-        what, rule=rule, way_out="Mend the driver: truearm.cell.conformance tries it"
-    )
+    return MalformedReadingError(what, rule=rule, way_out=MEND_THE_DRIVER)
 
 
 def _shown(value: object) -> str:
