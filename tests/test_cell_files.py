@@ -89,6 +89,16 @@ def test_a_driver_that_cannot_be_read_is_an_error_with_words(tmp_path):
             driver_and_settings({"driver": name}, ROBOTS, where="cell.toml, robot", folder=tmp_path)
 
 
+def test_a_driver_that_cannot_be_made_is_an_error_with_words(tmp_path, monkeypatch):
+    (tmp_path / "unmade_driver.py").write_text(
+        "from truearm.cell.rv_m2 import RvM2\n\nclass Own(RvM2):\n    def __init__(self, settings): ...\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    text = example("rv-m2").replace('driver = "rv-m2"', 'driver = "unmade_driver:Own"', 1)
+    with pytest.raises(InputError, match=r"cell.toml: Own cannot be made: TypeError: .*Settings and the arm"):
+        Cell.from_toml(text, where="cell.toml")
+
+
 def test_patterns_need_their_groups():
     text = example("tracker").replace("(?P<z>", "(?P<h>")
     with pytest.raises(InputError, match=r"no group \(\?P<z>"):

@@ -178,10 +178,7 @@ class Cell:
         target = arm.tool.copy()
         if file.target is not None:
             target[:3, 3] = to_si(np.array(file.target.in_flange_mm), "mm")
-        try:
-            built = robot(robot_settings, arm), sensor(sensor_settings, arm)
-        except InputError as error:
-            raise error.at(where) from None
+        built = _built(robot, robot_settings, arm, where), _built(sensor, sensor_settings, arm, where)
         return cls(file, arm, target, *built, robot_settings, sensor_settings)
 
     def targets_in_base(self, readings: Floats) -> Floats:
@@ -222,6 +219,19 @@ class Cell:
 
     def _flange(self, readings: Floats) -> Floats:
         return self.arm.flange_chain.pose(self.arm.joints_from_readings(readings))
+
+
+def _built(driver: Any, settings: BaseModel, arm: Arm, where: str) -> Any:  # noqa: ANN401 - of a user's own
+    try:
+        return driver(settings, arm)
+    except InputError as error:
+        raise error.at(where) from None
+    except Exception as error:
+        raise InputError(
+            f"{driver.__name__} cannot be made: {type(error).__name__}: {error}",
+            where=where,
+            rule="A driver is made of its Settings and the arm",
+        ) from error
 
 
 def _arm(file: CellFile, folder: Path) -> Arm:
