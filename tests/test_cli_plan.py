@@ -15,6 +15,8 @@ from truearm.cell.ordering import motion_seconds, paper_order, short_order, ther
 from truearm.cell.poses_file import Poses
 from truearm.cell.rehearsal import rehearse
 from truearm.cli import main
+from truearm.planning.accessibility import lowest
+from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 
 
@@ -38,6 +40,37 @@ def test_a_plan_for_a_cell_can_be_measured_there(tmp_path, capsys, monkeypatch):
     assert rehearse(cell, poses).refused == []
     table = pd.read_csv("poses.csv")
     assert_repeats(table, [f"q{j}" for j in range(1, 6)])
+
+
+def test_poses_stay_above_a_floor_and_in_a_box(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arm = Robot.load("ur10")
+    calibrated = VirtualArm(arm, seed=1)
+    ta.calibrate(arm, calibrated.measure(calibrated.poses(60)), model="constant").save(Path("a.calib"))
+    room = ["--floor-mm", "50", "--box-mm", "-900,-900,100,900,900,1200", "-o", "poses.csv", "--json"]
+    for words in (["plan", "ur10", "-n", "20"], ["plan", "--next", "5", "--from", "a.calib"]):
+        assert main([*words, *room]) == 0
+        told = json.loads(capsys.readouterr().out)
+        readings = Poses.read_csv("poses.csv", arm).readings
+        points = arm.position(readings)
+        assert (np.abs(points[:, :2]) <= 0.9).all()
+        assert ((points[:, 2] >= 0.1) & (points[:, 2] <= 1.2)).all()
+        assert told["lowest_mm"] >= 50.0
+        assert told["lowest_mm"] == pytest.approx(1e3 * lowest(arm, readings, tool=arm.tool))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--box-mm", "1,2,3"], '--box-mm: "1,2,3". Six numbers'),
+        (["--box-mm", "0,0,0,1,1,-1"], "the lowest x, y, z and then the highest"),
+        (["--floor-mm", "nan"], "--floor-mm: nan. It must be finite"),
+        (["--floor-mm", "9000"], "0 of 20000 random poses can be measured"),
+    ],
+)
+def test_a_room_that_is_none_is_told(words, message, tmp_path, capsys):
+    assert main(["plan", "ur10", "-n", "20", "-o", str(tmp_path / "poses.csv"), *words]) != 0
+    assert message in " ".join(capsys.readouterr().err.split())
 
 
 def assert_repeats(table, joints):

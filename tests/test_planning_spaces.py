@@ -5,6 +5,7 @@ import pytest
 
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.planning.accessibility import (
+    AboveFloor,
     InBox,
     InCone,
     InSphere,
@@ -13,6 +14,7 @@ from truearm.planning.accessibility import (
     LeastContactAngle,
     accessible,
     either,
+    lowest,
 )
 from truearm.planning.configurations import Configuration
 from truearm.planning.pool import PoolOptions, draw_pool, needed_pool
@@ -89,6 +91,17 @@ def test_a_configuration_is_kept(arm, elbow):
 def test_unknown_branch_is_refused():
     with pytest.raises(UsageError, match="front or back"):
         Configuration(arm="left")  # type: ignore[arg-type]
+
+
+def test_a_floor_holds_for_all_parts_that_move():
+    readings = np.random.default_rng(3).uniform(*RV_M2.limits.T, (400, RV_M2.joint_count))
+    tools = RV_M2.position(readings)[:, 2]
+    height = float(np.quantile(tools, 0.25))
+    allowed = accessible(RV_M2, readings, [AboveFloor(height)])
+    assert 0 < np.count_nonzero(allowed) < np.count_nonzero(tools >= height)
+    assert (tools[allowed] >= height).all()
+    assert lowest(RV_M2, readings[allowed], tool=RV_M2.tool) >= height
+    assert all(lowest(RV_M2, each[None], tool=RV_M2.tool) < height for each in readings[~allowed])
 
 
 def test_rules_of_the_volume():

@@ -1,6 +1,6 @@
 """Which poses to measure: those that determine most, others to judge by, and some again, in a good order."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,6 +17,7 @@ from truearm.columns import REPEAT, VALIDATE
 from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError, WorkError
 from truearm.identified import IdentifiedArm
+from truearm.planning.accessibility import Rule, accessible, lowest
 from truearm.planning.choosing import SETUP_KINDS, Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
 from truearm.planning.spreading import fill
 from truearm.robot import Robot
@@ -24,6 +25,7 @@ from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
+DRAWN_AT_ONCE: Final = 200
 POOL_PER_POSE: Final = 12
 POOL_PER_NUMBER: Final = 3
 LEAST_POOL: Final = 400
@@ -46,6 +48,7 @@ class PlanOptions:
         seed: Seed of the pool.
         order: "there-and-back", "short" or "paper".
         sigma_mm: Standard deviation of a measured coordinate, for the expected accuracy.
+        rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these.
     """
 
     count: int = 60
@@ -53,6 +56,7 @@ class PlanOptions:
     seed: int = 0
     order: str = THERE_AND_BACK
     sigma_mm: float = 0.1
+    rules: tuple[Rule, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.sigma_mm < np.inf:
@@ -69,6 +73,7 @@ class Plan:
         choice: What the choice did to the indices.
         seconds: Motion time in each order by name.
         expected: Expected standard deviation of the calibrated position over the pool, mm, by number.
+        lowest_m: The lowest place of the arm and its tool, in the base frame.
     """
 
     poses: Poses
@@ -76,6 +81,7 @@ class Plan:
     choice: Choice
     seconds: dict[str, float]
     expected: dict[int, float]
+    lowest_m: float
 
 
 def plan_poses(
@@ -86,15 +92,15 @@ def plan_poses(
     Args:
         arm: The nominal arm.
         options: How many, and what is best.
-        cell: Cell whose sensor has to reach the poses; joint limits alone without one.
+        cell: Cell whose sensor has to reach the poses; joint limits and rules alone without one.
         numbers: Numbers of poses of which the expected accuracy is asked for.
 
     Raises:
-        WorkError: If the sensor reaches too few poses.
+        WorkError: If the sensor reaches too few poses, or rules allow too few.
     """
     flange_from_target = arm.tool if cell is None else cell.flange_from_target
     size = max(LEAST_POOL, POOL_PER_POSE * options.count, POOL_PER_NUMBER * max(numbers, default=0))
-    pool = measurable_pool(arm, cell, size, options.seed)
+    pool = measurable_pool(arm, cell, size, options.seed, options.rules)
     wanted = ChoiceOptions(criterion=options.criterion, tool=flange_from_target)
     identified = IdentifiedArm(arm)
     choice = choose(identified, pool, options.count, wanted)
@@ -109,6 +115,7 @@ def plan_poses(
         choice,
         {name: motion_seconds(pool[rows], each, JOINT_SPEED_RAD_S) for name, each in orders.items()},
         {n: expected_mm(identified, pool, n, wanted, options.sigma_mm) for n in numbers},
+        lowest(arm, pool[rows], tool=flange_from_target),
     )
 
 
@@ -138,26 +145,43 @@ def expected_mm(
     return float(MM_PER_METRE * np.sqrt(np.square(spread).sum() / len(pool)))
 
 
-def measurable_pool(arm: Robot, cell: Cell | None, size: int, seed: int) -> Floats:
-    """Readings (size, N) drawn evenly within the limits, all of which can be measured."""
-    rng = np.random.default_rng(seed)
-    low, high = np.clip(arm.limits.T, -UNLIMITED_RAD, UNLIMITED_RAD)
+def measurable_pool(
+    arm: Robot, cell: Cell | None, size: int, seed: int, rules: Sequence[Rule] = ()
+) -> Floats:
+    """Readings (size, N) drawn evenly within the limits, all of which keep to the rules and can be measured.
+
+    Raises:
+        WorkError: If there are too few.
+    """
+    tool = arm.tool if cell is None else cell.flange_from_target
     prediction = None if cell is None else Prediction(cell)
     found: list[Floats] = []
-    for drawn in range(MOST_DRAWS):
-        readings = rng.uniform(low, high)
-        step = Step(0, "pose", 0, "", 0, readings)
-        if cell is None or prediction is None or not problem_of(cell, prediction, step):
-            found.append(readings)
-        if len(found) == size:
-            return np.array(found)
-        if drawn == MOST_DRAWS // 10 and len(found) < size // 100:
+    drawn = 0
+    for block in _drawn(arm, seed):
+        allowed = accessible(arm, block, rules, tool=tool)
+        for readings in block[allowed]:
+            step = Step(0, "pose", 0, "", 0, readings)
+            if cell is None or prediction is None or not problem_of(cell, prediction, step):
+                found.append(readings)
+            if len(found) == size:
+                return np.array(found)
+        drawn += len(block)
+        if drawn >= MOST_DRAWS // 10 and len(found) < size // 100:
             break
     raise WorkError(
-        f"{len(found)} of {MOST_DRAWS} random poses can be measured",
+        f"{len(found)} of {drawn} random poses can be measured",
         rule=f"A pool of {size} is needed",
-        way_out="Look at [world], [target] and the sensor's range in the cell file, or ask for fewer poses",
+        way_out="Look at [world], [target] and the sensor's range in the cell file and at --floor-mm and "
+        "--box-mm, or ask for fewer poses",
     )
+
+
+def _drawn(arm: Robot, seed: int) -> Iterator[Floats]:
+    """Readings (DRAWN_AT_ONCE, N) within the limits, MOST_DRAWS in all."""
+    rng = np.random.default_rng(seed)
+    low, high = np.clip(arm.limits.T, -UNLIMITED_RAD, UNLIMITED_RAD)
+    for _ in range(MOST_DRAWS // DRAWN_AT_ONCE):
+        yield rng.uniform(low, high, (DRAWN_AT_ONCE, arm.joint_count))
 
 
 def _with_others(pool: Floats, chosen: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:

@@ -21,8 +21,10 @@ from truearm.cell.plan import (
 from truearm.cell.poses_file import Poses
 from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError
+from truearm.planning.accessibility import Rule, lowest
 from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
 from truearm.robot import Robot
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
@@ -42,12 +44,14 @@ class ProposalOptions:
         seed: Seed of the candidates, and of the workspace.
         order: "there-and-back", "short" or "paper".
         group: Set-up in which they will be measured; the calibration's last one by default.
+        rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these.
     """
 
     count: int
     seed: int = 0
     order: str = THERE_AND_BACK
     group: str | None = None
+    rules: tuple[Rule, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,16 +63,22 @@ class Proposed:
         points: Targets in the base frame (n, 3), m.
         seconds: Motion time in each order by name.
         found: What was chosen, and what is expected of it.
+        lowest_m: The lowest place of the arm and its tool, in the base frame.
     """
 
     poses: Poses
     points: Floats
     seconds: dict[str, float]
     found: NextPoses | Acceptance
+    lowest_m: float
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values: motion times, and the expected deviations or what is noticed."""
-        told: dict[str, Any] = {"count": len(self.poses), "motion_s": self.seconds}
+        told: dict[str, Any] = {
+            "count": len(self.poses),
+            "motion_s": self.seconds,
+            "lowest_mm": MM_PER_METRE * self.lowest_m,
+        }
         if isinstance(self.found, NextPoses):
             expected = self.found.expected_mm
             return told | {
@@ -90,7 +100,7 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
         WorkError: If the sensor reaches too few poses, or the calibration has no standard deviations.
     """
     candidates = _candidates(calibration, options, cell)
-    workspace = measurable_pool(calibration.robot, cell, WORKSPACE, options.seed + 1)
+    workspace = measurable_pool(calibration.robot, cell, WORKSPACE, options.seed + 1, options.rules)
     found = next_poses(candidates, workspace, options.count)
     proposed = _ordered(candidates, found, found.rows, "train", options, cell)
     return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))
@@ -128,7 +138,7 @@ def _candidates(calibration: Calibration, options: ProposalOptions, cell: Cell |
             way_out="Measure some, calibrate and ask again, or plan afresh with truearm plan ROBOT -n N",
         )
     size = min(max(LEAST_POOL, POOL_PER_POSE * options.count), MOST_CANDIDATES)
-    pool = measurable_pool(calibration.robot, cell, size, options.seed)
+    pool = measurable_pool(calibration.robot, cell, size, options.seed, options.rules)
     return Candidates(calibration, pool, options.group)
 
 
@@ -142,8 +152,9 @@ def _ordered(
 ) -> Proposed:
     arm = candidates.calibration.robot
     readings = candidates.readings[rows]
-    points = targets_of(arm, readings, arm.tool if cell is None else cell.flange_from_target)
+    tool = arm.tool if cell is None else cell.flange_from_target
+    points = targets_of(arm, readings, tool)
     orders = orders_of(points, readings)
     poses, measured = in_order(readings, [purpose] * len(rows), orders[options.order], 0)
     seconds = {name: motion_seconds(readings, each, JOINT_SPEED_RAD_S) for name, each in orders.items()}
-    return Proposed(poses, points[measured], seconds, found)
+    return Proposed(poses, points[measured], seconds, found, lowest(arm, readings, tool=tool))

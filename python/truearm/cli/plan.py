@@ -1,5 +1,6 @@
 """`truearm plan`: choose measurement poses."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +14,14 @@ from truearm.cli.progress import told_stages
 from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError, count_of, list_names, typed
 from truearm.files import refuse_own_input, refuse_same
+from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import Plan
     from truearm.cell.proposed import Proposed
+    from truearm.planning.accessibility import Rule
     from truearm.robot import Robot
 
 NUMBERS: Final = (20, 40, 60, 100, 200)
@@ -38,6 +41,8 @@ def command(
     group: option.Group = None,
     order: option.Order = THERE_AND_BACK,
     sigma_mm: option.SigmaMm = 0.1,
+    floor_mm: option.FloorMm = None,
+    box_mm: option.BoxMm = None,
     seed: option.Seed = 0,
     picture: option.Picture = None,
     as_json: AsJson = False,
@@ -54,6 +59,7 @@ def command(
     Examples:
       truearm plan ur10 -n 100 -o poses.csv
       truearm plan rv-m2 -n 60 --cell cell.toml -o poses.csv
+      truearm plan ur10 --floor-mm 50 --box-mm -900,-900,100,900,900,1200
       truearm plan --next 20 --from arm/calibration.calib -o more.csv
       truearm plan --acceptance 10 --from arm/calibration.calib -o check.csv
     """
@@ -64,20 +70,25 @@ def command(
     _check_words(criterion, order)
     _check_counts({"--next": next_count, "--acceptance": acceptance, "--count": count})
     _check_outputs(output, picture, robot, known, cell)
+    rules = room(floor_mm, box_mm)
     if known is not None or next_count is not None or acceptance is not None:
         if count is not None:
             raise UsageError(
                 "--count is given where poses are proposed", rule="--next or --acceptance says how many"
             )
         _propose(
-            _Asked(robot, known, next_count, acceptance, group, cell, seed, order), output, picture, as_json
+            _Asked(robot, known, next_count, acceptance, group, cell, seed, order, rules),
+            output,
+            picture,
+            as_json,
         )
         return
     if robot is None:
         raise UsageError("no robot is named", rule="truearm plan ROBOT, or with --from CALIB")
     known_cell = None if cell is None else Cell.load(cell)
     arm = _arm_of(robot, known_cell)
-    options = PlanOptions(count or option.COUNT, criterion, seed, order, sigma_mm)  # type: ignore[arg-type]
+    number = count or option.COUNT
+    options = PlanOptions(number, criterion, seed, order, sigma_mm, rules)  # type: ignore[arg-type]
     with ends_promptly(), told_stages()("choosing poses"):
         plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
     write(plan, output)
@@ -88,6 +99,32 @@ def command(
         suggest(f"truearm measure {typed(cell)} {typed(output)} --dry-run")
     elif not as_json:
         suggest(f"truearm calibrate {typed(robot)} MEASUREMENTS.csv -o result", when=MEASURED)
+
+
+def room(floor_mm: float | None, box_mm: str | None) -> "tuple[Rule, ...]":
+    """What --floor-mm and --box-mm ask of every pose.
+
+    Raises:
+        UsageError: If the box is not made of six numbers, two corners.
+    """
+    from truearm.planning import AboveFloor, InBox
+
+    rules: list[Rule] = []
+    if floor_mm is not None:
+        if not math.isfinite(floor_mm):
+            raise UsageError(f"{floor_mm:g}", where="--floor-mm", rule="It must be finite")
+        rules.append(AboveFloor(floor_mm / MM_PER_METRE))
+    if box_mm is not None:
+        try:
+            numbers = [float(part) / MM_PER_METRE for part in box_mm.split(",")]
+        except ValueError:
+            numbers = []
+        low, high = numbers[:3], numbers[3:]
+        if len(numbers) != 6 or not all(a < b for a, b in zip(low, high, strict=True)):
+            rule = "Six numbers, the lowest x, y, z and then the highest, mm in the base frame"
+            raise UsageError(f'"{box_mm}"', where="--box-mm", rule=rule)
+        rules.append(InBox(low, high))
+    return tuple(rules)
 
 
 def _check_words(criterion: str, order: str) -> None:
@@ -143,6 +180,7 @@ class _Asked:
     cell: Path | None
     seed: int
     order: str
+    rules: "tuple[Rule, ...]"
 
 
 def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -> None:
@@ -169,7 +207,8 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
     if cell is not None:
         check_same_arm(calibration, cell.arm)
     choose = propose_next if asked.acceptance is None else propose_acceptance
-    options = ProposalOptions(asked.next_count or asked.acceptance or 0, asked.seed, asked.order, asked.group)
+    number = asked.next_count or asked.acceptance or 0
+    options = ProposalOptions(number, asked.seed, asked.order, asked.group, asked.rules)
     with ends_promptly():
         proposed = choose(calibration, options, cell=cell)
     write(proposed, output)
@@ -198,6 +237,7 @@ def _print_proposed(proposed: "Proposed", output: Path) -> None:
     told = proposed.to_dict()
     say(f"{count_of(told['count'], 'pose')}: {output}")
     say(_motion(proposed.seconds))
+    say_wrapped(_lowest(proposed.lowest_m))
     if "noticed" not in told:
         before, after = told["expected_before_mm"], told["expected_after_mm"][-1]
         say_wrapped(
@@ -222,6 +262,11 @@ def _motion(seconds: "dict[str, float]") -> str:
     return f"Motion: {back:.0f} s there and back, {short:.0f} s in short order, {paper:.0f} s in the paper's."
 
 
+def _lowest(height_m: float) -> str:
+    height = f"{MM_PER_METRE * height_m:.0f} mm"
+    return f"The lowest place of arm and tool is at z = {height} in the base frame (--floor-mm is a bound)."
+
+
 def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
     purposes = {name: plan.poses.purpose.count(name) for name in ("train", "validate", "repeat")}
     if as_json:
@@ -232,6 +277,7 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
                 "before": plan.choice.before,
                 "after": plan.choice.after,
                 "motion_s": plan.seconds,
+                "lowest_mm": MM_PER_METRE * plan.lowest_m,
                 "order": order,
                 "expected_mm": {str(n): value for n, value in plan.expected.items()},
             }
@@ -249,6 +295,7 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
         f"(index O1). Condition number {kappa} (columns at 300 mm)."
     )
     say(_motion(plan.seconds))
+    say_wrapped(_lowest(plan.lowest_m))
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]
     say("Expected standard deviation of the calibrated position:")
     print_table(("poses", "mm"), rows)

@@ -44,6 +44,16 @@ Order: TypeAlias = Annotated[
     str, typer.Option(metavar="there-and-back|short|paper", help="In which order they are measured.")
 ]
 SigmaMm: TypeAlias = Annotated[float, typer.Option(metavar="MM", help="Noise of a measured coordinate.")]
+FloorMm: TypeAlias = Annotated[
+    float | None,
+    typer.Option(metavar="MM", help="Height in the base frame that arm and tool stay above."),
+]
+BoxMm: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the target."
+    ),
+]
 Seed: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of the candidates.")]
 Picture: TypeAlias = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Draw the poses, as PNG or SVG.")

@@ -1,6 +1,7 @@
 """Measurement space analysis, section 4 of the paper: which poses to measure, and how to divide a space."""
 
 from truearm.planning.accessibility import (
+    AboveFloor,
     InBox,
     InCone,
     InSphere,
@@ -20,6 +21,7 @@ from truearm.planning.spaces import CartesianSpace, JointSpace, Space, Spherical
 from truearm.planning.workspace import Workspace
 
 __all__ = [
+    "AboveFloor",
     "CartesianSpace",
     "Choice",
     "ChoiceOptions",

@@ -44,6 +44,11 @@ class Places:
         """Tool points (n, 3), m."""
         return self.base_from_tool[:, :3, 3]
 
+    @property
+    def moving_points(self) -> Floats:
+        """Those of `arm_points` (n, k, 3) beyond the first link, which stands on the floor itself."""
+        return self.arm_points[:, STEPS_ALONG_LINK:]
+
     @cached_property
     def arm_points(self) -> Floats:
         """Points (n, k, 3) along the straight lines between the frames of the links and the tool."""
@@ -194,6 +199,32 @@ class KeepOut:
         low, high = np.asarray(self.low) - self.margin_m, np.asarray(self.high) + self.margin_m
         inside = ((places.arm_points >= low) & (places.arm_points <= high)).all(axis=2)
         return np.asarray(~np.logical_or.reduce(inside, axis=1))
+
+
+@dataclass(frozen=True)
+class AboveFloor:
+    """No part of the arm beyond its first link, nor its tool, is lower than `height_m` in the base frame.
+
+    The arm is taken as straight lines between the frames of its links: `height_m` has to leave room for half
+    its thickness.
+    """
+
+    height_m: float
+
+    def __call__(self, places: Places) -> Mask:
+        """Of each pose."""
+        return np.asarray((places.moving_points[:, :, 2] >= self.height_m).all(axis=1))
+
+
+def lowest(robot: Robot, readings: Floats, *, tool: Floats) -> float:
+    """The lowest place of the arm beyond its first link and of its tool, in the base frame, m.
+
+    Args:
+        robot: The nominal arm.
+        readings: Poses (n, N), one at the least.
+        tool: Transform (4, 4) from flange to tool.
+    """
+    return float(Places(robot, readings, tool).moving_points[:, :, 2].min())
 
 
 def either(*rules: Rule) -> Rule:
