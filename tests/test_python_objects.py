@@ -32,6 +32,18 @@ def calibration(robot, data):
     return ta.calibrate(robot, data)
 
 
+def test_standard_deviations_of_targets_are_along_the_axes_of_their_world(data, calibration):
+    q, name = data.readings[:5], calibration.groups[0]
+    target = calibration.model.setup.targets[0, 0]
+    in_base = calibration.position_std(q, tool=target)
+    in_world = calibration.position_std(q, group=name, target=1)
+    assert np.linalg.norm(in_world, axis=1) == pytest.approx(np.linalg.norm(in_base, axis=1))
+    assert not np.allclose(in_world, in_base, rtol=1e-3)
+    with pytest.raises(ta.WorkError, match="the orientation of the target on the tool is not known"):
+        calibration.pose_std(q, group=name, target=1)
+    assert calibration.pose_std(q, group=name, tool=target).shape == (5, 6)
+
+
 def sent(value):
     return pickle.loads(pickle.dumps(value))
 

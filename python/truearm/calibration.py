@@ -121,7 +121,7 @@ class Calibration:
     def __reduce__(self) -> tuple[object, ...]:
         content = self.to_bytes()
         file = content if self.file == content else self.file
-        return _restored, (content, self.notices, dict(self.seconds), file)
+        return _restored, (content, dict(self.seconds), file)
 
     def without_rows(self) -> "Calibration":
         """The same as a file without the measurements holds it, with the bounds of the standard deviation."""
@@ -226,13 +226,7 @@ class Calibration:
         Raises:
             WorkError: If the orientation of the target was not measured.
         """
-        end = self._endpoint(tool, group, target)
-        if not end.has_orientation:
-            raise WorkError(
-                "the orientation of the target on the tool is not known",
-                rule="It was not measured",
-                way_out="Ask for its position, or give a tool",
-            )
+        end = self._oriented(tool, group, target)
         rows, single = self._readings(q)
         poses = self._chain(end.flange_from_end).pose(*self._at(rows, features))
         if end.world_from_base is not None:
@@ -258,22 +252,39 @@ class Calibration:
         return found[0] if single else found
 
     def position_std(
-        self, q: ArrayLike, *, tool: ArrayLike | None = None, features: Features | None = None
+        self,
+        q: ArrayLike,
+        *,
+        tool: ArrayLike | None = None,
+        group: str | None = None,
+        target: int | None = None,
+        features: Features | None = None,
     ) -> Floats:
-        """Standard deviation of each coordinate along the axes of the base frame, (n, 3), m.
+        """Standard deviation of each coordinate that `position` gives for the same arguments, (n, 3), m.
 
-        It holds for base and tool as the device saw them in the set-up with most rows. Where the arm's own
-        base and flange are, no measurement of a target tells; work objects and tools found through the
-        calibrated arm take it over. Noise of a measurement is no part, but of a model with constants alone
-        all is that they leave beside the rows' own sigma: noise that is not stated, they cannot tell apart.
+        Along the axes of the base frame, or with a group or a target along those of its world. It holds for
+        base and tool as the device saw them in the set-up with most rows. Where the arm's own base and flange
+        are, no measurement of a target tells; work objects and tools found through the calibrated arm take it
+        over. Noise of a measurement is no part, but of a model with constants alone all is that they leave
+        beside the rows' own sigma: noise that is not stated, they cannot tell apart.
         """
-        return self._std(q, tool, features, pose=False)
+        return self._std(q, self._endpoint(tool, group, target), features, pose=False)
 
     def pose_std(
-        self, q: ArrayLike, *, tool: ArrayLike | None = None, features: Features | None = None
+        self,
+        q: ArrayLike,
+        *,
+        tool: ArrayLike | None = None,
+        group: str | None = None,
+        target: int | None = None,
+        features: Features | None = None,
     ) -> Floats:
-        """The same of position and rotation vector in the base frame, (n, 6), m and rad."""
-        return self._std(q, tool, features, pose=True)
+        """The same of position and rotation vector of `pose`, (n, 6), m and rad.
+
+        Raises:
+            WorkError: If the orientation of the target was not measured.
+        """
+        return self._std(q, self._oriented(tool, group, target), features, pose=True)
 
     def solve(
         self,
@@ -381,10 +392,13 @@ class Calibration:
         variances = np.einsum("kii->ik", centred - centred.mean(axis=2, keepdims=True))
         return np.asarray(np.sqrt(np.maximum(variances[:, : len(names)], 0.0)))
 
-    def _std(self, q: ArrayLike, tool: ArrayLike | None, features: Features | None, *, pose: bool) -> Floats:
+    def _std(self, q: ArrayLike, end: Endpoint, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)
-        jacobian = self._jacobian(rows, features, tool, pose=pose)
-        covariance = self._covariance(rows, features, tool, jacobian)
+        jacobian = self._jacobian(rows, features, end.flange_from_end, pose=pose)
+        covariance = self._covariance(rows, features, end.flange_from_end, jacobian)
+        if end.world_from_base is not None:
+            turn = np.kron(np.eye(jacobian.shape[1] // 3), end.world_from_base[:3, :3])
+            covariance = turn @ covariance @ turn.T
         found: Floats = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
         return found[0] if single else found
 
@@ -447,13 +461,22 @@ class Calibration:
             return Endpoint(at_tool(self.robot, tool))
         return at_target(self, tool, group, target)
 
+    def _oriented(self, tool: ArrayLike | None, group: str | None, target: int | None) -> Endpoint:
+        """The same where its orientation is asked for."""
+        end = self._endpoint(tool, group, target)
+        if end.has_orientation:
+            return end
+        raise WorkError(
+            "the orientation of the target on the tool is not known",
+            rule="It was not measured",
+            way_out="Ask for its position, or give a tool",
+        )
+
     def _chain(self, flange_from_end: Floats) -> Chain:
         return self.arm.chain(self.robot.flange @ flange_from_end)
 
 
-def _restored(
-    content: bytes, notices: tuple[Notice, ...], seconds: Mapping[str, float], file: bytes | None
-) -> Calibration:
-    """A calibration that was pickled: what its file holds, and what was said when it was made."""
+def _restored(content: bytes, seconds: Mapping[str, float], file: bytes | None) -> Calibration:
+    """A calibration that was pickled: what its file holds, and how long its fits took."""
     found = Calibration.from_bytes(content, where="a pickled calibration")
-    return replace(found, notices=notices, seconds=seconds, file=file)
+    return replace(found, seconds=seconds, file=file)
