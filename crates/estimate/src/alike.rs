@@ -13,6 +13,7 @@ use faer::{Mat, Side};
 
 use crate::EstimateError;
 use crate::MeasurementSet;
+use crate::Noise;
 use crate::layout::{HELD_PRECISION, Layout, Problem, TARGET_PRECISION};
 use crate::packets::Packets;
 use crate::pass::{Normal, normal_equations};
@@ -26,7 +27,7 @@ const OPEN: f64 = 3e-4;
 /// A column is closed at other poses when more than this share stands out.
 const CLOSED: f64 = 1e-2;
 
-/// Flanges that are no farther from a plane than this, m, are in it.
+/// Flanges that are no farther from a plane than this, m, root mean square, are in it.
 const THIN: f64 = 0.02;
 
 /// What poses leave open of the set-up that the arm's nature does not.
@@ -42,8 +43,8 @@ enum Open {
 ///
 /// # Errors
 /// [`EstimateError::Singular`] where they leave more of the set-up open, [`EstimateError::Kinematics`].
-pub fn leave_targets_open(problem: &Problem, point: Point, normal: &Normal) -> Result<bool, EstimateError> {
-    match open(problem, point, normal)? {
+pub fn leave_targets_open(problem: &Problem, setup: &Setup) -> Result<bool, EstimateError> {
+    match open(problem, setup)? {
         Open::Nothing => Ok(false),
         Open::Targets => Ok(true),
         Open::More => Err(EstimateError::Singular {
@@ -56,22 +57,28 @@ pub fn leave_targets_open(problem: &Problem, point: Point, normal: &Normal) -> R
 /// Prior precision of steps of the set-up (len - arm,) beside a field, from the constants' set-up.
 ///
 /// Where poses leave targets open these stay where the constants have them: what calibrated joints turn the tool is
-/// itself an estimate, and beside errors of the arm it would look like a tool of a metre. Asked of the nominal arm.
+/// itself an estimate, and beside errors of the arm it would look like a tool of a metre.
 ///
 /// # Errors
 /// [`EstimateError::Kinematics`].
 pub fn setup_precision(problem: &Problem, setup: &Setup) -> Result<Vec<f64>, EstimateError> {
-    let point = Point { parameters: &problem.chain.nominal(), setup };
-    let normal = normal_equations(problem, &Packets::new(problem.measurements), point, None)?;
-    let held = open(problem, point, &normal)? == Open::Targets;
+    let held = open(problem, setup)? == Open::Targets;
     Ok(Layout::new(problem).setup_precision(if held { HELD_PRECISION } else { TARGET_PRECISION }))
 }
 
-fn open(problem: &Problem, point: Point, normal: &Normal) -> Result<Open, EstimateError> {
+/// Asked of the nominal arm, whose joints turn the tool as the poses were chosen, and of the rows that take part.
+fn open(problem: &Problem, setup: &Setup) -> Result<Open, EstimateError> {
+    let nominal = problem.chain.nominal();
+    let (problem, point) = (&problem.with_columns(&[]), Point { parameters: &nominal, setup });
     let layout = Layout::new(problem);
+    let normal_of = |set: &MeasurementSet| {
+        let moved = Problem { measurements: set, ..*problem };
+        normal_equations(&moved, &Packets::new(set), point, Some((Noise::GUESS, &set.weight)))
+    };
+    let normal = normal_of(problem.measurements)?;
     let open: Vec<_> = blocks(problem, &layout)
         .into_iter()
-        .map(|block| (rank(normal, block.clone(), OPEN), block))
+        .map(|block| (rank(&normal, block.clone(), OPEN), block))
         .filter(|(rank, block)| *rank < block.len())
         .collect();
     if open.is_empty() {
@@ -79,22 +86,22 @@ fn open(problem: &Problem, point: Point, normal: &Normal) -> Result<Open, Estima
     }
     let elsewhere =
         MeasurementSet { joints: spread(&problem.measurements.joints), ..problem.measurements.clone() };
-    let moved = Problem { measurements: &elsewhere, ..*problem };
-    let other = normal_equations(&moved, &Packets::new(&elsewhere), point, None)?;
-    let lost: Vec<_> =
-        open.into_iter().filter(|(found, block)| *found < rank(&other, block.clone(), CLOSED)).collect();
+    let other = normal_of(&elsewhere)?;
+    let is_lost = |(found, block): &(usize, Range<usize>)| *found < rank(&other, block.clone(), CLOSED);
+    let lost: Vec<_> = open.into_iter().filter(is_lost).map(|(_, block)| block).collect();
     if lost.is_empty() {
         return Ok(Open::Nothing);
     }
-    let known = |block: &Range<usize>| rank(normal, block.start..block.start + 6, OPEN) == 6;
-    let frames = layout.frame == 6 && lost.iter().all(|(_, block)| known(block));
-    Ok(if frames && go_about_in_space(problem, point)? { Open::Targets } else { Open::More })
+    let known = |block: &Range<usize>| rank(&normal, block.start..block.start + 6, OPEN) == 6;
+    let frames = layout.frame == 6 && lost.iter().all(known);
+    let groups: Vec<usize> = lost.iter().map(|block| block.start / layout.group_width()).collect();
+    Ok(if frames && go_about_in_space(problem, point, &groups)? { Open::Targets } else { Open::More })
 }
 
-/// Whether the flanges of every group are in no plane.
-fn go_about_in_space(problem: &Problem, point: Point) -> Result<bool, EstimateError> {
+/// Whether the flanges of each of these groups are in no plane.
+fn go_about_in_space(problem: &Problem, point: Point, groups: &[usize]) -> Result<bool, EstimateError> {
     let set = problem.measurements;
-    for group in 0..set.group_count {
+    for &group in groups {
         let used = |&pose: &usize| set.group[pose] == group && set.weight[pose] > 0.0;
         let poses: Vec<usize> = (0..set.pose_count()).filter(used).collect();
         let flanges = flange_poses(problem, point.parameters, &poses)?;

@@ -159,8 +159,7 @@ impl Fit<'_> {
         let targets = self.options.prior.map_or(0.0, |_| TARGET_PRECISION);
         let mut balance = Balance { noise, scale: 1.0, weights: set.weight.clone(), targets };
         let mut minimum = self.minimise(start, &balance)?;
-        let point = Point { parameters: &minimum.state.parameters, setup: &minimum.state.setup };
-        if leave_targets_open(self.problem, point, &minimum.normal)? && targets == 0.0 {
+        if leave_targets_open(self.problem, &minimum.state.setup)? && targets == 0.0 {
             balance.targets = TARGET_PRECISION;
             minimum = self.minimise(minimum.state, &balance)?;
         }
@@ -169,7 +168,7 @@ impl Fit<'_> {
         for _ in 0..ROUNDS {
             let renewed = self.renewed(&balance, &minimum, &covariance, &residuals);
             if self.settled(&balance, &renewed) {
-                let ratio = if self.only_scales_the_cost() {
+                let ratio = if self.only_scales_the_cost(&balance) {
                     renewed.noise.position / balance.noise.position
                 } else {
                     1.0
@@ -270,10 +269,12 @@ impl Fit<'_> {
         let noise = Noise { position: of(&position), orientation: of(&orientation) };
         let tells = self.problem.measurements.measured_values() > Layout::new(self.problem).len();
         let floor = if tells { NOISE_FLOOR } else { Noise::GUESS };
-        Noise {
-            position: noise.position.max(floor.position),
-            orientation: noise.orientation.max(floor.orientation),
+        let (position, orientation) =
+            (noise.position.max(floor.position), noise.orientation.max(floor.orientation));
+        if !self.problem.measurements.has_rotations() {
+            return Noise { position, orientation };
         }
+        Noise { position: position.max(APART * orientation), orientation: orientation.max(APART * position) }
     }
 
     fn squares(&self, residuals: &[f64], weights: &[f64]) -> (Squares, Squares) {
@@ -354,13 +355,14 @@ impl Fit<'_> {
         let noise = same(old.noise.position, new.noise.position)
             && (!set.has_rotations() || same(old.noise.orientation, new.noise.orientation));
         let weights = old.weights.iter().zip(&new.weights).all(|(a, b)| (a - b).abs() < 1e-2);
-        weights && (self.only_scales_the_cost() || noise && same(old.scale, new.scale))
+        weights && (self.only_scales_the_cost(old) || noise && same(old.scale, new.scale))
     }
 
     /// Whether the noise weighs all rows alike, so that its value moves nothing.
-    fn only_scales_the_cost(&self) -> bool {
+    fn only_scales_the_cost(&self, balance: &Balance) -> bool {
         let set = self.problem.measurements;
         self.options.prior.is_none()
+            && balance.targets == 0.0
             && !set.has_rotations()
             && set.sigma.iter().all(|&sigma| sigma == 0.0)
             && self.options.robust.is_none_or(|robust| robust == Robust::None)
@@ -369,5 +371,8 @@ impl Fit<'_> {
 
 /// Share of a diagonal entry below which a pivot of the normal equations is nothing but rounding.
 const ROUNDING: f64 = 1e-12;
+/// Least ratio of the noises of positions and orientations, in m and rad: with more between them, rows of one kind drown those
+/// of the other in rounding.
+const APART: f64 = 1e-6;
 /// Below what any instrument resolves; keeps weights finite where data is exact.
 const NOISE_FLOOR: Noise = Noise { position: 1e-12, orientation: 1e-12 };

@@ -11,7 +11,7 @@
 //! with all five parameters of each row the rank is the same, but others take the place of some of them.
 
 use faer::linalg::solvers::{Qr, SolveLstsq};
-use faer::{Mat, MatRef};
+use faer::{Mat, MatRef, concat};
 
 use crate::EstimateError;
 use crate::distance;
@@ -24,7 +24,7 @@ use crate::setup::Setup;
 const INDEPENDENT_SHARE: f64 = 1e-6;
 /// A column shorter than this share of the longest one holds nothing but rounding.
 const ROUNDING: f64 = 1e-10;
-/// Poses that the question is answered on; more do not change the answer.
+/// Poses whose rows are looked at together: of more, triangular factors take the place of rows.
 const POSES: usize = 1000;
 /// Parts of a combination below this are left out.
 const NOTEWORTHY: f64 = 0.02;
@@ -67,7 +67,7 @@ pub fn identifiability(
     let columns = if problem.measurements.is_distances() {
         dense_distances(problem, &layout, point)?
     } else {
-        dense_rows(problem, &layout, &linearise(problem, point))
+        folded_rows(problem, &layout, &linearise(problem, point))
     };
     Ok(in_order(columns.as_ref(), layout.len() - layout.arm))
 }
@@ -82,11 +82,17 @@ fn scale(problem: &Problem, layout: &Layout, column: usize) -> f64 {
     if angle { ANGLE_ARM.recip() } else { 1.0 }
 }
 
-/// Scaled columns, set-up first: rows of at most [`POSES`] poses, in mm (orientation rows at 300 mm).
-fn dense_rows(problem: &Problem, layout: &Layout, rows: &Linearised) -> Mat<f64> {
+/// Scaled columns, set-up first, of all poses; of many the triangular factor, whose columns have the same products.
+fn folded_rows(problem: &Problem, layout: &Layout, rows: &Linearised) -> Mat<f64> {
+    let poses: Vec<usize> = (0..problem.measurements.pose_count()).collect();
+    let mut parts = poses.chunks(POSES).map(|some| dense_rows(problem, layout, rows, some));
+    let first = parts.next().unwrap_or_else(|| Mat::zeros(0, layout.len()));
+    parts.fold(first, |above, below| concat![[above], [below]].qr().thin_R().to_owned())
+}
+
+/// Scaled columns, set-up first: rows of some poses, in mm (orientation rows at 300 mm).
+fn dense_rows(problem: &Problem, layout: &Layout, rows: &Linearised, poses: &[usize]) -> Mat<f64> {
     let set = problem.measurements;
-    let stride = set.pose_count().div_ceil(POSES).max(1);
-    let poses: Vec<usize> = (0..set.pose_count()).step_by(stride).collect();
     let (width, own) = (layout.len(), layout.len() - layout.arm);
     let mut dense = Mat::zeros(poses.len() * rows.rows, width);
     for (index, &pose) in poses.iter().enumerate() {

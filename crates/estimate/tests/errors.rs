@@ -181,6 +181,46 @@ fn poses_with_one_orientation_keep_the_target_near_the_flange_and_those_in_a_pla
 }
 
 #[test]
+fn a_group_in_a_plane_with_its_wrist_turned_spoils_no_group_with_one_orientation() {
+    // The second group turns about the vertical axis and moves its wrist alone: flanges near one height.
+    fn by_turns(joints: &mut [f64]) {
+        if joints[5] > 0.0 {
+            held_down(joints);
+        } else {
+            (joints[1], joints[2], joints[3]) = (-1.2, 1.6, -0.4);
+            joints[4] *= 0.1;
+        }
+    }
+    let mut scene = Plan { bound: by_turns, columns: vec![], poses: vec![120], ..plan() }.make();
+    let in_space = |joints: &[f64]| (joints[4] + FRAC_PI_2).abs() < 1e-12;
+    let groups: Vec<usize> =
+        scene.set.joints.chunks_exact(6).map(|joints| usize::from(!in_space(joints))).collect();
+    scene.set.group = groups;
+    scene.set.group_count = 2;
+    scene.setup.groups.push(scene.setup.groups[0].clone());
+    assert!(fit_constant(&scene.problem(), &ConstantOptions::default()).is_ok());
+    let precision = setup_precision(&scene.problem(), &scene.setup).unwrap();
+    assert_eq!((precision[6], precision[15]), (1e6, 1e6));
+    // Rows that take no part do not turn the wrist either.
+    let mut alone = Plan { bound: held_down, columns: vec![], ..plan() }.make();
+    // One turn leaves its own axis open.
+    (alone.set.joints[4], alone.set.joints[9]) = (alone.set.joints[4] + 0.5, alone.set.joints[9] + 0.5);
+    assert!(setup_precision(&alone.problem(), &alone.setup).unwrap()[6] < 101.0);
+    alone.set.weight[..2].fill(0.0);
+    assert_eq!(setup_precision(&alone.problem(), &alone.setup).unwrap()[6], 1e6);
+}
+
+#[test]
+fn exact_orientations_beside_noisy_positions_are_no_poses_that_are_alike() {
+    let scene = Plan { rotations: true, noise: (4e-5, 0.0), ..plan() }.make();
+    for prior in [None, Some(Prior::default())] {
+        let options = ConstantOptions { prior, ..ConstantOptions::default() };
+        let found = fit_constant(&scene.problem(), &options).unwrap();
+        assert!(scene.error_of(&found.parameters) < 1e-3);
+    }
+}
+
+#[test]
 fn one_group_s_poses_all_alike() {
     let mut scene = Plan { poses: vec![30, 10], columns: ur10_columns(), ..plan() }.make();
     let first = scene.set.joints[180..186].to_vec();

@@ -34,6 +34,23 @@ fn beta_in_place_of_d_on_parallel_axes_makes_it_eighteen_and_twenty_seven_in_all
 }
 
 #[test]
+fn few_poses_among_many_count_wherever_they_stand() {
+    let mut still = Plan::new(ur10(), ur10_columns(), 2500);
+    still.spans = vec![2.5, 2.5, 2.5, 2.5, 0.0, 0.0];
+    let moved = ask(&Plan::new(ur10(), ur10_columns(), 20).make());
+    let mut scene = still.make();
+    assert!(ask(&scene).determined.len() < moved.determined.len());
+    let turned = Plan::new(ur10(), ur10_columns(), 20).make();
+    for (k, joints) in turned.set.joints.chunks_exact(6).enumerate() {
+        let pose = 1 + 2 * (60 * k + 1);
+        scene.set.joints[6 * pose..6 * (pose + 1)].copy_from_slice(joints);
+    }
+    let found = ask(&scene);
+    assert_eq!(found.determined, moved.determined);
+    assert_eq!(found.total_rank, moved.total_rank);
+}
+
+#[test]
 fn poses_tell_no_more_of_the_arm_than_positions_where_the_tool_s_orientation_is_unknown_too() {
     let plan = Plan::new(ur10(), ur10_columns(), 60);
     let (positions, _) = of(&plan);

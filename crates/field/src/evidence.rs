@@ -1,6 +1,6 @@
 //! The marginal likelihood of the measurements and its gradient by the hyper-parameters.
 //!
-//! Set-up unknowns have flat priors: the likelihood is the restricted one (REML, Patterson and Thompson 1971),
+//! Set-up unknowns have wide priors: the likelihood is the restricted one (REML, Patterson and Thompson 1971),
 //! `-1/2 (log|K| + log|S^T K^-1 S| + r^T P r)` with `P = K^-1 - K^-1 S (S^T K^-1 S)^-1 S^T K^-1`. Its
 //! gradient is `1/2 sum (alpha alpha^T - P) o dK` with `alpha = P r` (Rasmussen and Williams 2006, eq. 5.9). The
 //! log-normal priors of the hyper-parameters are added.

@@ -17,7 +17,7 @@ pub struct Judgement {
     pub distance: Vec<f64>,
     /// Factor that makes 95 % of the standardised components lie within [`QUANTILE_95`], at least one.
     pub inflation: f64,
-    /// Poses taken out of the fit.
+    /// Poses that are outliers.
     pub outliers: Vec<usize>,
 }
 

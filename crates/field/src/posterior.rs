@@ -338,8 +338,9 @@ impl LeaveOneOut {
         Ok(())
     }
 
-    /// The fit's own standardised residuals, which are no larger, of a pose that is far from any suspicion.
-    pub fn approximate(&mut self, rows: Range<usize>, standardised: &[f64]) {
+    /// The fit's own residuals, which are no larger, of a pose that is far from any suspicion.
+    pub fn approximate(&mut self, rows: Range<usize>, residual: &[f64], standardised: &[f64]) {
+        self.residual[rows.clone()].copy_from_slice(residual);
         self.standardised[rows.clone()].copy_from_slice(standardised);
         self.sampled[rows].fill(false);
     }

@@ -9,7 +9,7 @@ use crate::posterior::Posterior;
 /// arm, set-up, what joints do not repeat, instrument noise and the rows' own sigma.
 ///
 /// `problem` has the training's columns and groups, `point` the calibrated parameters of each pose and the fitted
-/// set-up, `inputs` (n, I) joints and features. Rows that were not measured have zeros.
+/// set-up, `inputs` (n, I) joints and features. Rows that were not measured have their noise alone.
 ///
 /// # Errors
 /// [`FieldError::Length`] where inputs or groups do not fit.

@@ -201,6 +201,7 @@ impl Training {
         };
         let mut nearest: Vec<f64> = (0..self.pose_count()).map(|pose| distance(pose, 0)).collect();
         let mut kept = vec![0];
+        nearest[0] = -1.0;
         while kept.len() < count.min(self.pose_count()) {
             let farthest = (0..nearest.len())
                 .fold(0, |best, pose| if nearest[pose] > nearest[best] { pose } else { best });

@@ -3,7 +3,7 @@
 //! Each axis's prior correlation is written as E E^T with the eigenvectors that matter, so that the unknowns v have unit
 //! priors and cells weigh `E v`. What a pose's joints do not repeat correlates its rows; they are whitened by
 //! the pose's own noise covariance. With A the whitened rows, `(I + A^T A) v = A^T r`; set-up unknowns stand beside
-//! with the precision of a metre and a radian.
+//! with the precision of their priors.
 
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::prelude::ReborrowMut;
@@ -244,7 +244,8 @@ impl WeightSpace {
             });
             for pose in clear {
                 let local: Vec<f64> = training.rows(pose).map(|row| left[(row - first, 0)]).collect();
-                out.approximate(training.rows(pose), &local);
+                let residual = times(self.model.noise_factor(pose)?.as_ref(), &local);
+                out.approximate(training.rows(pose), &residual, &local);
             }
             for &pose in exact.iter().filter(|&&pose| pose % stride != 0) {
                 out.suspect(training.rows(pose));

@@ -124,6 +124,7 @@ fn many_rows_go_to_weight_space_where_suspicious_poses_are_judged_exactly() {
     assert!(matches!(posterior, Posterior::Weight(_)));
     let judgement = crate::outliers::judge(&posterior).unwrap();
     assert_eq!(judgement.outliers, [101, 1503]);
+    assert!(judgement.distance.iter().all(|&distance| distance > 0.0), "all poses have residuals");
     let left_out = posterior.leave_one_out(&training.residual).unwrap();
     assert!(!left_out.sampled[3 * 101] && left_out.sampled[0] && !left_out.sampled[3 * 7]);
 }
@@ -146,4 +147,6 @@ fn poses_that_fill_the_space_are_far_apart() {
     assert_eq!((kept.len(), alike), (39, 1), "of two poses that are the same one is enough");
     assert!(kept.windows(2).all(|pair| pair[0] < pair[1]));
     assert_eq!(training.fill_space(100).len(), 40);
+    training.values = first.repeat(40);
+    assert!(training.fill_space(30).windows(2).all(|pair| pair[0] < pair[1]), "no pose stands twice");
 }
