@@ -47,7 +47,9 @@ def test_a_program_as_people_rewrite_it():
     command = [PROGRAM, "compensate", "arm.calib", "demo.mod", "-o", "out.mod", "--controller", "nominal"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "RAPID: 4 of 6 targets changed" in done.stdout
+    told = " ".join(done.stdout.split())
+    assert "RAPID: 4 of 6 targets changed, 0 kept as they were after a refusal, 2 left as they are" in told
+    assert "2 left as they are; listed besides: 1 place without numbers of its own." in told
     assert "Left as they are:" in done.stdout
     assert "MoveL pNowhere" in done.stdout
     assert "not declared in this module" in done.stdout
@@ -83,7 +85,9 @@ def test_json_is_all_that_is_printed(capsys):
     assert run("-o", "json.mod", "--json") == 0
     printed = capsys.readouterr()
     found = json.loads(printed.out)
-    assert found["counts"]["targets"] == 6
+    counts = found["counts"]
+    assert counts["targets"] == counts["changed"] + counts["kept"] + counts["left"] == 6
+    assert (counts["listed"], counts["beside"]) == (3, 1)
     assert found["outputs"] == ["json.mod"]
     assert {"line", "column", "name", "nominal", "corrected", "correction_mm"} <= found["targets"][0].keys()
 

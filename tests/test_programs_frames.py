@@ -8,7 +8,7 @@ import pytest
 import truearm as ta
 from tests.programs_rig import ABB, KUKA, models, read, rewritten
 from tests.test_programs_krl import pose_text
-from tests.test_programs_rapid import GO, SEEN, module, numbers
+from tests.test_programs_rapid import GO, SEEN, module, numbers, points
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.notices import frames_notices
@@ -167,11 +167,11 @@ def positions_alone():
     return ta.calibrate(ABB, arm.measure(arm.poses(60, seed=1)), ta.Options.of(model="constant"))
 
 
-def notices_of(path, calibration, frames=""):
+def notices_of(path, calibration, frames="", kinds=("frames", "tool")):
     compensator = ta.Compensator(calibration, limits=ta.Limits(largest_std_mm=None, largest_mm=20.0))
     given = Frames.parse(frames, where="cell.toml")
     done = ta.compensate_program(path, compensator, controller="nominal", frames=given)
-    return [notice for notice in done.notices if notice.kind in ("frames", "tool")]
+    return [notice for notice in done.notices if notice.kind in kinds]
 
 
 def test_tools_that_positions_alone_do_not_place_are_told(tmp_path, positions_alone):
@@ -188,6 +188,28 @@ def test_tools_that_positions_alone_do_not_place_are_told(tmp_path, positions_al
     arm = VirtualArm(ABB, seed=3)
     poses = arm.measure(arm.poses(60, seed=1), orientation=True)
     assert notices_of(path, ta.calibrate(ABB, poses, ta.Options.of(model="constant"))) == []
+
+
+TABLE = "[object.wT]\nxyz = [300, 0, 110]\n"
+
+
+def test_work_objects_that_were_not_taught_through_the_calibration_are_told(tmp_path, positions_alone):
+    path = tmp_path / "a.mod"
+    path.write_bytes(RAPID.encode("latin-1"))
+    for frames in ("", TABLE):
+        (found,) = notices_of(path, positions_alone, frames, ["object"])
+        assert 'work object "wT": not taught through the calibration' in found.message
+        assert found.message.endswith("truearm frame CALIB points.csv --object wT --with-tool tG")
+    elsewhere = TABLE.replace("300", "300.4")
+    for frames in (TABLE + "identified = {residual_mm = 0.03}\n", elsewhere):
+        assert notices_of(path, positions_alone, frames, ["object"]) == []
+
+
+@pytest.mark.parametrize("body", ["MoveJ pA,v100,fine,tG;", "MoveAbsJ jHome,v100,fine,tG\\WObj:=wT;"])
+def test_the_base_and_joint_targets_have_no_work_object_to_teach(body, tmp_path, positions_alone):
+    path = tmp_path / "a.mod"
+    path.write_bytes(module(body, points()).encode("latin-1"))
+    assert notices_of(path, positions_alone, "", ["object"]) == []
 
 
 def test_the_measured_point_is_known_by_positions_alone(tmp_path, positions_alone):

@@ -1,5 +1,7 @@
 """Tools and work objects that truly are elsewhere than the controller has them: what a program means then."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -12,6 +14,7 @@ from truearm.controller import Controller
 from truearm.errors import WorkError
 from truearm.inverse import Inverse
 from truearm.programs.densify import Spacing
+from truearm.programs.environment import Frame
 from truearm.programs.rewriting import Models
 from truearm.simulation import VirtualArm
 
@@ -148,6 +151,78 @@ def test_what_a_stretched_wrist_cannot_do_is_refused_with_the_reason(irb):
     wrist = module(f"MoveAbsJ {joints_text([10, 10, 20, 0, 0, 0])},v100,fine,tG;")
     with pytest.raises(WorkError, match="stays|would change|turns the tool"):
         rewritten(read("a.mod", wrist, ABB, RETAUGHT), given)
+
+
+def known_within(**variances):
+    """The part of an entry that tells a covariance: variances by their place, mm^2 and mrad^2."""
+    diagonal = np.diag([variances.get(name, 0.0) for name in ("x", "y", "z", "rx", "ry", "rz")])
+    return f"identified = {{covariance = {diagonal.tolist()}}}\n"
+
+
+TOOL_WITHIN = RETAUGHT + known_within(x=0.03**2, y=0.04**2, rz=9.0)
+TABLE_WITHIN = TABLE_ENTRY + known_within(x=0.01, rz=9.0)
+
+
+def test_what_tool_and_object_leave_open_is_in_the_standard_deviation(irb):
+    _, given = irb
+    plain = rewritten(both_ways(RETAUGHT + TABLE_ENTRY)[0], given)
+    assert (plain.std_mm > 0.0).all()
+    tool = rewritten(both_ways(TOOL_WITHIN + TABLE_ENTRY)[0], given)
+    np.testing.assert_allclose(tool.std_mm, np.hypot(plain.std_mm, 0.05), rtol=1e-9)
+    program, flange = both_ways(RETAUGHT + TABLE_WITHIN)
+    lever_mm = 1e3 * ((PLACED @ flange @ TOOL) - TRUE_TABLE)[:2, 3]
+    of_object = np.hypot(0.1, 3e-3 * np.linalg.norm(lever_mm))
+    assert of_object > 0.2
+    expected = np.hypot(plain.std_mm, [0.0, of_object, 0.0])
+    np.testing.assert_allclose(rewritten(program, given).std_mm, expected, rtol=1e-5)
+
+
+def test_what_tool_and_object_leave_open_counts_for_the_bound(irb):
+    _, given = irb
+    bounded = dataclasses.replace(given, largest_std_mm=0.2)
+    assert rewritten(both_ways(RETAUGHT + TABLE_ENTRY)[0], bounded).changed.all()
+    program, _ = both_ways(TOOL_WITHIN + TABLE_WITHIN)
+    with pytest.raises(WorkError, match="1 of 3 targets.*(?s:.)*tool and work object leave 0") as caught:
+        rewritten(program, bounded)
+    assert "more than 0.2" in str(caught.value)
+    assert "allow more with --largest-std-mm;" in str(caught.value)
+    assert "Touches further apart" in str(caught.value)
+    kept = rewritten(program, bounded, on_refusal="keep-nominal")
+    assert kept.changed.tolist() == [True, False, True]
+    assert np.isnan(kept.std_mm[1])
+    assert rewritten(program, given).changed.all(), "None is no bound"
+
+
+def test_what_a_frame_in_a_frame_leaves_open():
+    """Against differences: each moved by what its covariance is of."""
+    rng = np.random.default_rng(5)
+    poses = [MOVED @ TABLE, TRUE_TOOL]
+    roots = [1e-4 * rng.normal(size=(6, 6)) for _ in poses]
+    outer, inner = (
+        Frame(pose, pose, covariance=root @ root.T) for pose, root in zip(poses, roots, strict=True)
+    )
+    whole = outer.then(inner)
+    assert whole.covariance is not None
+
+    def moved(pose, by):
+        turned = np.eye(4)
+        turned[:3, :3] = Rotation.from_rotvec(by[3:]).as_matrix() @ pose[:3, :3]
+        turned[:3, 3] = pose[:3, 3] + by[:3]
+        return turned
+
+    def change(first, second):
+        now = moved(poses[0], first) @ moved(poses[1], second)
+        turn = Rotation.from_matrix(now[:3, :3] @ whole.true[:3, :3].T).as_rotvec()
+        return np.concatenate([(now - whole.true)[:3, 3], turn])
+
+    none = np.zeros(6)
+    columns = [change(column, none) for column in roots[0].T] + [
+        change(none, column) for column in roots[1].T
+    ]
+    np.testing.assert_allclose(
+        whole.covariance, np.array(columns).T @ np.array(columns), rtol=1e-2, atol=1e-11
+    )
+    assert Frame.of(TOOL).then(Frame.of(TABLE)).covariance is None
 
 
 def csv(q):

@@ -95,7 +95,12 @@ def test_a_controller_with_factory_kinematics_gets_what_it_computes_with():
 
 
 def test_controllers_that_may_differ_must_be_declared():
-    for name, language in (("kuka-kr-6-r900", "KRL"), ("abb-irb-120", "RAPID"), ("ur10e", "KRL")):
+    for name, language in (
+        ("kuka-kr-6-r900", "KRL"),
+        ("abb-irb-120", "RAPID"),
+        ("ur10e", "KRL"),
+        ("fanuc-lr-mate-200id", "FANUC TP"),
+    ):
         with pytest.raises(UsageError, match="not declared.*--controller"):
             declared_controller(None, language_of(Path("p"), language), Robot.load(name))
         assert may_differ(Robot.load(name))
@@ -198,6 +203,7 @@ def test_frames_files_say_what_is_wrong_in_them():
         "[tool.a]\nxyz = [1, 2, 3]\nquaternion_wxyz = [1, 0, 0, 0]\neuler_zyx_deg = [0, 0, 0]\n": "give one",
         "[tools.a]\nxyz = [1, 2, 3]\n": "tools",
         "tool = [": "not TOML",
+        "[tool.a]\nxyz = [1, 2, 3]\nidentified = {covariance = [[1.0], [2.0, 3.0]]}\n": "six rows",
     }.items():
         with pytest.raises(InputError, match=words):
             Frames.parse(text, where="f.toml")
@@ -207,7 +213,15 @@ def test_the_report_and_the_diff():
     done = rewritten(program_of(TWO), models(ABB))
     report = report_of(done.with_facts({"controller": {"kind": "nominal"}}, ()), [Path("out.mod")])
     assert (report["controller"], report["outputs"]) == ({"kind": "nominal"}, ["out.mod"])
-    assert report["counts"] == {"targets": 6, "moves": 2, "changed": 2, "kept": 0, "listed": 4}
+    assert report["counts"] == {
+        "targets": 6,
+        "moves": 2,
+        "changed": 2,
+        "kept": 0,
+        "left": 4,
+        "listed": 4,
+        "beside": 0,
+    }
     assert report["targets"][0]["name"] == "pa"
     assert (report["targets"][0]["line"], report["targets"][0]["column"]) == (11, 23)
     np.testing.assert_allclose(np.rad2deg(report["targets"][0]["nominal"]), SEEN["pA"], atol=0.01)

@@ -1,6 +1,7 @@
 """A compensated program as `truearm compensate` shows it."""
 
 from truearm.cli.console import print_table, say, say_wrapped
+from truearm.errors import count_of
 from truearm.programs.report import counts, table_rows, unified_diff
 from truearm.programs.rewriting import Rewritten, describe
 
@@ -14,9 +15,11 @@ def print_rewritten(done: Rewritten, *, dry_run: bool) -> None:
     if dry_run:
         _print_dry(done)
     verb = "would be changed" if dry_run else "changed"
+    beside = count_of(found["beside"], "place")
+    more = f"; listed besides: {beside} without numbers of its own" if found["beside"] else ""
     say_wrapped(
         f"{done.program.language.name}: {found['changed']} of {found['targets']} targets {verb}, "
-        f"{found['kept']} kept as they were after a refusal, {found['listed']} left as they are."
+        f"{found['kept']} kept as they were after a refusal, {found['left']} left as they are{more}."
     )
     if done.changed.any():
         moved = done.correction_mm[done.changed]

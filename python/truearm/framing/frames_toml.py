@@ -40,10 +40,7 @@ def former_entry(path: str | Path, kind: str, name: str) -> tuple[FrameEntry, fl
 
 def tip_covariance(entry: FrameEntry) -> Floats | None:
     """Covariance of a tool's tip along the flange's axes (3, 3), m^2, if the entry was identified."""
-    stated = (entry.identified or {}).get("covariance")
-    if stated is None or np.shape(stated) != (6, 6):
-        return None
-    return np.asarray(stated, dtype=np.float64)[:3, :3] * 1e-6
+    return None if entry.covariance is None else entry.covariance[:3, :3]
 
 
 def write_frame(path: str | Path, name: str, found: IdentifiedFrame, data_hash: str) -> list[Notice]:

@@ -14,6 +14,7 @@ from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
 from truearm.programs.notices import (
     frames_notices,
+    object_notices,
     payload_notices,
     still_notices,
     tool_notices,
@@ -64,7 +65,16 @@ def compensate_program(
     refuse_contradiction(program, declared, force=chosen.force)
     positions_only = not calibration.selection.orientation
     beyond = tuple(beyond_learnt(calibration, compensator.features))
-    models = Models(author, Inverse(author), declared, compensator, compensator.task, positions_only, beyond)
+    models = Models(
+        author,
+        Inverse(author),
+        declared,
+        compensator,
+        compensator.task,
+        positions_only,
+        beyond,
+        compensator.limits.largest_std_mm,
+    )
     mark = mark_text(version("truearm"), calibration.data_hash)
     done = rewrite(program, models, chosen, mark=mark, tell=tell)
     return done.with_facts(
@@ -79,6 +89,7 @@ def compensate_program(
             *update_notices(calibration),
             *still_notices(done, calibration),
             *tool_notices(done, calibration),
+            *object_notices(done),
             *(Notice("feature_range", f"{each}: corrections are guesses there.") for each in beyond),
         ],
     )

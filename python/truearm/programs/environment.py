@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.robot import Robot
-from truearm.rotations import rigid_inverse
+from truearm.rotations import rigid_inverse, rigid_motion
 
 Transform = NDArray[np.float64]
 
@@ -21,6 +21,8 @@ class Frame:
         name: As the program names it; empty for one that is written out.
         unknown: Why it is not known; the transforms mean nothing then.
         taught: Whether it was taught through a calibrated arm.
+        covariance: Of its translation and of a small rotation vector, both along the axes of the flange or of
+            the base (6, 6), SI; None where it is not known.
     """
 
     true: Transform
@@ -28,6 +30,7 @@ class Frame:
     name: str = ""
     unknown: str = ""
     taught: bool = False
+    covariance: NDArray[np.float64] | None = None
 
     @classmethod
     def of(cls, transform: Transform, name: str = "") -> "Frame":
@@ -39,10 +42,33 @@ class Frame:
         """One that is not known, and why: a sentence that ends the line of a listing."""
         return cls(np.eye(4), np.eye(4), name, reason)
 
+    def then(self, inner: "Frame") -> "Frame":
+        """A frame that is told in this one, told where this one is; with its own name."""
+        return Frame(
+            self.true @ inner.true,
+            self.controller @ inner.controller,
+            inner.name,
+            taught=self.taught or inner.taught,
+            covariance=self._covariance_with(inner),
+        )
+
+    def _covariance_with(self, inner: "Frame") -> NDArray[np.float64] | None:
+        """Covariance of a frame that is told in this one, as of `covariance`."""
+        if self.covariance is None and inner.covariance is None:
+            return None
+        turn = self.true[:3, :3]
+        moved = np.eye(6)
+        moved[:3] = rigid_motion((turn @ inner.true[:3, 3])[None])[0]
+        turned = np.kron(np.eye(2), turn)
+        outer, own = (np.zeros((6, 6)) if one.covariance is None else one.covariance for one in (self, inner))
+        covariance: NDArray[np.float64] = moved @ outer @ moved.T + turned @ own @ turned.T
+        return covariance
+
     @property
-    def key(self) -> tuple[bytes, bytes, str]:
+    def key(self) -> tuple[bytes, bytes, str, bytes]:
         """Equal for frames that are the same."""
-        return self.true.tobytes(), self.controller.tobytes(), self.unknown
+        known = b"" if self.covariance is None else self.covariance.tobytes()
+        return self.true.tobytes(), self.controller.tobytes(), self.unknown, known
 
 
 def author_of(robot: Robot, tool: Frame, displacement: Transform | None) -> Robot | None:

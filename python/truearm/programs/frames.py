@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
@@ -21,6 +22,8 @@ Kind = Literal["tool", "object"]
 Written = TypeVar("Written", bound=Hashable)
 Number = Annotated[float, Field(allow_inf_nan=False)]
 LENGTHS_M: Final = {"mm": 1e-3, "m": 1.0}
+MM_AND_MRAD: Final = 1e-3
+"""Unit of an entry's covariance, whatever the file's unit of lengths: mm and mrad."""
 ORIENTATIONS: Final = ("quaternion_wxyz", "euler_zyx_deg", "rotation_vector_rad")
 
 
@@ -67,6 +70,25 @@ class FrameEntry(Placement):
     controller: Placement | None = None
     payload_kg: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
     identified: Mapping[str, Any] | None = None
+
+    @field_validator("identified")
+    @classmethod
+    def _six_by_six(cls, value: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+        if value is None or "covariance" not in value:
+            return value
+        try:
+            covariance = np.array(value["covariance"], dtype=np.float64)
+        except (TypeError, ValueError):
+            covariance = np.empty(0)
+        if covariance.shape != (6, 6) or not np.isfinite(covariance).all() or (np.diag(covariance) < 0).any():
+            raise ValueError("a covariance has six rows of six numbers, and its diagonal no negative ones")
+        return value
+
+    @property
+    def covariance(self) -> NDArray[np.float64] | None:
+        """Of translation and rotation vector along the outer axes (6, 6), SI, where the entry tells it."""
+        stated = (self.identified or {}).get("covariance")
+        return None if stated is None else np.array(stated, dtype=np.float64) * MM_AND_MRAD**2
 
 
 class FramesFile(_Section):
@@ -198,4 +220,4 @@ def name_at_start(word: str, *, written: bool) -> str:
 def _frame(name: str, entry: FrameEntry, unit_m: float) -> Frame:
     true = entry.transform(unit_m)
     controller = true if entry.controller is None else entry.controller.transform(unit_m)
-    return Frame(true, controller, name, taught=entry.identified is not None)
+    return Frame(true, controller, name, taught=entry.identified is not None, covariance=entry.covariance)

@@ -216,11 +216,7 @@ class KrlFrames:
             frame = self.constant("tool", operand)
             if frame.unknown or result.unknown:
                 return frame if frame.unknown else result
-            result = Frame(
-                result.true @ frame.true,
-                result.controller @ frame.controller,
-                taught=result.taught or frame.taught,
-            )
+            result = replace(result.then(frame), name="")
         return result
 
     def constant(self, kind: str, operand: Structure | Named) -> Frame:
@@ -235,7 +231,4 @@ class KrlFrames:
         return self.named(kind, operand.key.upper())
 
     def _placed(self, kind: str, frame: Frame) -> Frame:
-        if kind == "tool" or frame.unknown:
-            return frame
-        true, controller = self._world.true @ frame.true, self._world.controller @ frame.controller
-        return replace(frame, true=true, controller=controller)
+        return frame if kind == "tool" or frame.unknown else self._world.then(frame)

@@ -6,8 +6,9 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.errors import Notice, list_names, typed
-from truearm.programs.environment import Frame
+from truearm.programs.environment import Environment, Frame
 from truearm.programs.frames import Frames, Kind
+from truearm.programs.layouts import of_joints as layout_of_joints
 from truearm.programs.program import Program
 from truearm.programs.rewriting import Rewritten
 from truearm.programs.tables import Motion
@@ -114,11 +115,50 @@ def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
     ]
 
 
+def object_notices(done: Rewritten) -> list[Notice]:
+    """Work objects of changed Cartesian targets that were not taught through a calibration.
+
+    One that was touched with the arm as the controller has it holds the errors that the arm has there, and
+    the uncorrected arm comes back to it with the same ones. The base itself is no work object, and one that
+    is elsewhere than the controller has it was told by whoever wrote the frames file.
+    """
+    places = {one.work_object.name: one for one in _environments_of(done, of_joints=False)}
+    doubtful = {name: one for name, one in places.items() if name and not _is_told(one.work_object)}
+    if not doubtful:
+        return []
+    names = list(doubtful)
+    tool = next(iter(doubtful.values())).tool.name
+    return [
+        Notice(
+            "object",
+            f"work object{'s' if len(names) > 1 else ''} {list_names(names)}: not taught through the "
+            "calibration. What was touched with the uncorrected arm holds its errors, and targets that are "
+            "corrected without teaching it again may miss by more than they do now, whatever std_mm says. "
+            f"Teach it again: truearm frame CALIB points.csv --object {typed(names[0])} "
+            f"--with-tool {typed(tool) if tool else 'NAME'}",
+        )
+    ]
+
+
+def _is_told(place: Frame) -> bool:
+    """Whether a work object is the base, was taught through a calibration, or is told to be elsewhere."""
+    is_base = np.array_equal(place.controller, np.eye(4))
+    return place.taught or is_base or not np.array_equal(place.true, place.controller)
+
+
 def _tools_of(done: Rewritten) -> list[Frame]:
     """Tools that motions to changed targets have."""
-    moves = done.program.moves
+    return [one.tool for one in _environments_of(done)]
+
+
+def _environments_of(done: Rewritten, *, of_joints: bool = True) -> list[Environment]:
+    """Environments that motions to changed targets have, those to joint targets among them or not."""
+    moves, targets = done.program.moves, done.program.targets
+    joints = np.array([layout_of_joints(layout) for layout in done.program.layouts], dtype=bool)
     used = (moves.motion != Motion.NONE) & done.changed[moves.target]
-    return [done.program.environments[int(number)].tool for number in np.unique(moves.environment[used])]
+    if not of_joints:
+        used &= ~joints[targets.layout[moves.target]]
+    return [done.program.environments[int(number)] for number in np.unique(moves.environment[used])]
 
 
 def _is_measured(tool: Frame, calibration: Calibration) -> bool:

@@ -1,7 +1,7 @@
 """Tools, work objects and loads of RAPID text: tooldata, wobjdata and loaddata."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -102,10 +102,7 @@ class RapidFrames:
         return Frame.missing(f'{what} "{name}" {why}', name)
 
     def _in_world(self, frame: Frame) -> Frame:
-        if frame.unknown:
-            return frame
-        true, controller = self._world.true @ frame.true, self._world.controller @ frame.controller
-        return replace(frame, true=true, controller=controller)
+        return frame if frame.unknown else self._world.then(frame)
 
 
 def _mass(value: Value) -> float | None:

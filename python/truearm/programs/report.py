@@ -36,13 +36,21 @@ def report_of(done: Rewritten, outputs: Sequence[Path] = ()) -> dict[str, Any]:
 
 
 def counts(done: Rewritten) -> dict[str, int]:
-    """How many targets were changed, kept and listed."""
+    """How many targets were changed, kept and left, which are all; and how much is listed.
+
+    "listed" counts the targets that are left and, alone in "beside", places without numbers of their own,
+    such as motions to what is known at run time only.
+    """
+    targets, changed = target_count(done.program), int(done.changed.sum())
+    left = targets - changed - len(done.kept)
     return {
-        "targets": target_count(done.program),
+        "targets": targets,
         "moves": int((done.program.moves.motion != Motion.NONE).sum()),
-        "changed": int(done.changed.sum()),
+        "changed": changed,
         "kept": len(done.kept),
+        "left": left,
         "listed": len(done.listed),
+        "beside": len(done.listed) - left,
     }
 
 

@@ -16,6 +16,7 @@ from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
 from truearm.programs.environment import Frame, Transform, author_of
 from truearm.programs.frames import Frames
+from truearm.programs.left_open import left_open_mm
 from truearm.programs.marks import refuse_marked
 from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.program import Language, Listed, Program, StepTexts
@@ -31,12 +32,15 @@ Bools = NDArray[np.bool_]
 
 UNSURE: Final = 8
 """Code of refusals where the calibration is less certain than allowed."""
+FRAMES_UNSURE: Final = 0
+"""Code of refusals where it is certain enough, but not together with tool and work object."""
 NOT_REACHED: Final = (2, 3)
 ALLOWING: Final = {
     5: "--largest-joint-deg",
     6: "--largest-mm",
     7: "--largest-deg",
     UNSURE: "--largest-std-mm",
+    FRAMES_UNSURE: "--largest-std-mm",
 }
 """The option that allows more, by the code of a refusal."""
 NAMED: Final = 10
@@ -94,6 +98,7 @@ class Models:
         task: What it meets; another than "pose" needs to know the tool for joint targets as well.
         positions_only: Whether the calibration was fitted to positions alone.
         beyond: In words, features that lie beyond what it was fitted to.
+        largest_std_mm: Standard deviation that is allowed, tool and work object included; None for any.
     """
 
     programming: Robot
@@ -103,6 +108,7 @@ class Models:
     task: str = "pose"
     positions_only: bool = False
     beyond: tuple[str, ...] = ()
+    largest_std_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -136,7 +142,8 @@ class Rewritten:
         correction_mm: How far the tool's target moved from where the program said it, for the controller's
             tool, (t,); NaN where it was not changed.
         correction_mrad: How far it turned, (t,).
-        std_mm: Standard deviation of the calibration there, (t,).
+        std_mm: Standard deviation of the tool's place there, (t,): of the calibration, of the tool and, for
+            Cartesian targets, of the work object, as far as the frames file tells theirs.
         kept: Targets that were refused and kept as they were, with the reason.
         listed: What was left as it was because it cannot be changed with certainty.
         inserted: How many waypoints were inserted.
@@ -284,21 +291,42 @@ class _State:
         self.corrected = placed(self.corrected, rows, found.q)
         self.correction_mm = placed(self.correction_mm, rows, found.correction_mm)
         self.correction_mrad = placed(self.correction_mrad, rows, found.correction_mrad)
-        if found.std_mm is not None:
-            self.std_mm = placed(self.std_mm, rows, found.std_mm)
         for refusal in found.refusals:
             self.refused[int(which[refusal.number - 1])] = refusal.reason
         self.codes |= {refusal.code for refusal in found.refusals}
-        refused = which[np.asarray(found.refused, dtype=bool)]
-        self.corrected[refused] = self.nominal[refused]
+        refused = np.array(found.refused, dtype=bool)
+        if found.std_mm is not None:
+            refused |= self._judge_std(which, found.std_mm, refused)
+        self.corrected[which[refused]] = self.nominal[which[refused]]
+
+    def _judge_std(self, which: Integers, std_mm: Floats, refused: Bools) -> Bools:
+        """Take over standard deviations of targets, with tool and work object; which are too large."""
+        rows, largest = run_of(which), self.models.largest_std_mm
+        added = left_open_mm(self.program, self.uses, which, self.nominal[rows], self.models.programming)
+        whole = np.hypot(std_mm, added)
+        self.std_mm = placed(self.std_mm, rows, whole)
+        if largest is None:
+            return np.zeros(len(which), dtype=bool)
+        beyond = (whole > largest) & (added > 0.0) & ~refused
+        for target, open_mm, std in zip(which[beyond].tolist(), added[beyond], whole[beyond], strict=True):
+            self.refused[target] = (
+                f"tool and work object leave {open_mm:.3f} mm open, which makes a standard deviation of "
+                f"{std:.3f} mm, more than {largest:g}"
+            )
+        if beyond.any():
+            self.codes.add(FRAMES_UNSURE)
+        return np.asarray(beyond)
 
     def _what_helps(self) -> str:
         """What can be done about the refusals there are: bounds that have an option may be allowed more."""
-        options = " or ".join(option for code, option in ALLOWING.items() if code in self.codes)
+        helping = dict.fromkeys(option for code, option in ALLOWING.items() if code in self.codes)
+        options = " or ".join(helping)
         allow = f", or allow more with {options}" if options else ""
         away = ". No option allows a tool to stay away" if self.codes.intersection(NOT_REACHED) else ""
         keep = "--on-refusal keep-nominal leaves such targets as they are where that makes no step"
-        return f"Change them{allow}; {keep}{away}{self._why_unsure()}"
+        again = ". Touches further apart, and more of them, tell tools and work objects better"
+        frames = again if FRAMES_UNSURE in self.codes else ""
+        return f"Change them{allow}; {keep}{away}{self._why_unsure()}{frames}"
 
     def _why_unsure(self) -> str:
         """What can be done where the calibration is unsure of features far off, or knows positions alone."""

@@ -28,7 +28,9 @@ class FanucTp:
 
     name = "FANUC TP"
     endings = (".ls",)
-    controller_differs = ""
+    controller_differs = (
+        "FANUC arms that were calibrated at the factory (a signature) compute with a model of their own"
+    )
 
     def companions(self, path: Path) -> tuple[Path, ...]:
         """None: a listing holds its positions."""

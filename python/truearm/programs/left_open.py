@@ -1,0 +1,50 @@
+"""What tools and work objects that were taught leave open of where a target is."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.programs.environment import Environment
+from truearm.programs.program import Program
+from truearm.programs.uses import Uses
+from truearm.robot import Robot
+from truearm.rotations import rigid_inverse, rigid_motion
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+def left_open_mm(program: Program, uses: Uses, which: Integers, q: Floats, robot: Robot) -> Floats:
+    """Standard deviation that tool and work object leave of targets `which`, (n,), mm.
+
+    The root of the sum of the variances of x, y and z, which counts the two as independent. A joint target
+    has no work object. Zero where no frames file tells a covariance.
+
+    Args:
+        program: The program.
+        uses: How its targets are used; each of `which` in an environment.
+        which: Numbers of targets (n,).
+        q: Readings that their author meant (n, N).
+        robot: The programming model.
+    """
+    numbers, of_joints = uses.environment[which], uses.of_joints[which]
+    variance = np.zeros(len(which))
+    for number in np.unique(numbers).tolist():
+        here = numbers == number
+        environment = program.environments[number]
+        if environment.tool.covariance is not None:
+            variance[here] += np.trace(environment.tool.covariance[:3, :3])
+        posed = here & ~of_joints
+        if environment.work_object.covariance is not None and posed.any():
+            variance[posed] += _of_object(environment, environment.work_object.covariance, robot, q[posed])
+    return MM_PER_METRE * np.sqrt(np.maximum(variance, 0.0))
+
+
+def _of_object(environment: Environment, covariance: Floats, robot: Robot, q: Floats) -> Floats:
+    """Variance of places on a work object, by its shift and by its turn about its origin, (n,), m^2."""
+    here = environment.work_object
+    flange = robot.flange_chain.pose(np.ascontiguousarray(robot.joints_from_readings(q)))
+    points = (rigid_inverse(here.controller) @ flange @ environment.tool.controller)[:, :3, 3]
+    motion = rigid_motion(points @ here.true[:3, :3].T)
+    variance: Floats = np.einsum("nij,jk,nik->n", motion, covariance, motion)
+    return variance
