@@ -1,6 +1,7 @@
 """Learning curves of the methods, one panel a set and split."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,6 +26,8 @@ PALE: Final = "#bbbbbb"
 PANEL_IN: Final = (2.6, 2.1)
 TICKS_MM: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 STEM: Final = "learning_curves"
+CROWDED: Final = 1.5
+"""Ratio of two numbers of poses below which their labels would touch."""
 
 
 def save_curves(summary: Mapping[str, Any], directory: Path) -> list[Path]:
@@ -46,6 +49,12 @@ def save_curves(summary: Mapping[str, Any], directory: Path) -> list[Path]:
             [lines[name] for name in lines], list(lines), loc="outside lower center", ncols=4, frameon=False
         )
         return save_figure(figure, directory / STEM)
+
+
+def _labels(sizes: Sequence[int]) -> list[str]:
+    """Labels of ascending numbers of poses; one that the next would touch stays empty."""
+    neighbours = zip(sizes, [*sizes[1:], math.inf], strict=True)
+    return [str(size) if following >= CROWDED * size else "" for size, following in neighbours]
 
 
 def _draw(axes: Axes, summary: Mapping[str, Any], name: str, kind: str, lines: dict[str, Any]) -> None:
@@ -71,7 +80,7 @@ def _draw(axes: Axes, summary: Mapping[str, Any], name: str, kind: str, lines: d
     axes.set_xscale("log")
     axes.set_yscale("log")
     sizes = [group["n_train"] for group in groups]
-    axes.set_xticks(sizes, [str(size) for size in sizes])
+    axes.set_xticks(sizes, _labels(sizes))
     axes.minorticks_off()
     low, high = axes.get_ylim()
     ticks = [tick for tick in TICKS_MM if low <= tick <= high]
