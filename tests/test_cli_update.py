@@ -54,6 +54,17 @@ def test_without_output_nothing_is_written(folder, capsys):
     assert sorted(folder.iterdir()) == before
 
 
+def test_coupled_joints_that_one_motor_changed_are_told(tmp_path, capsys):
+    arm = VirtualArm(ta.Robot.load("fanuc-lr-mate-200id"), seed=2)
+    data = arm.measure(arm.poses(60))
+    ta.calibrate(arm.robot, data, model="constant").save(tmp_path / "fanuc.calib")
+    moved = remastered_table(arm, arm.poses(15, seed=9), [0.0, 0.05, -0.05, 0.0, 0.0, 0.0], seed=9)
+    moved.to_csv(tmp_path / "later.csv", index=False)
+    assert main(["update", str(tmp_path / "fanuc.calib"), str(tmp_path / "later.csv")]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "one motor was re-mastered or slipped, that of joint 2." in told
+
+
 def test_what_is_kept_is_not_said_to_be_found(capsys):
     assert main(["update", "old.calib", "moved.csv", "--keep-frame", "--keep-tool"]) == 0
     told = capsys.readouterr().out

@@ -131,6 +131,74 @@ def test_readings_of_other_rows_are_named(lag, words):
     assert not notice_of(found, "fits_otherwise")
 
 
+def with_lost(data, places, *, points):
+    """Measurements that lost the points, or else the readings, of these rows: the next moved up."""
+    count = len(data) - len(places)
+    kept, others = np.delete(np.arange(len(data)), places), np.arange(count)
+    seen, read = (kept, others) if points else (others, kept)
+    return replace(data.select(others), targets=data.targets[seen], readings=data.readings[read])
+
+
+@pytest.mark.parametrize(
+    ("places", "points", "words"),
+    [
+        ([7], True, "From row 8 on .* the readings 1 row further on: 1 point was lost there, or 1 reading"),
+        ([50], True, "From row 51 on each point belongs to the readings 1 row further on"),
+        ([112], True, "From row 113 on each point belongs to the readings 1 row further on"),
+        ([50], False, "From row 51 on .* the readings 1 row before it: 1 reading was lost there, or 1 point"),
+        ([30, 80], True, "From row 31 on .* 1 row further on: 1 p.*; from row 80 on .* 2 rows further on"),
+    ],
+)
+def test_from_where_rows_were_lost_is_named(places, points, words):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    data = with_lost(arm.measure(arm.poses(120)), places, points=points)
+    found = ta.calibrate(arm.robot, data, model="constant", refit=False)
+    told = notice_of(found, "rows_shifted")
+    assert re.match(words, told), told
+    assert "Look at these rows first" not in notice_of(found, "no_help")
+    assert not notice_of(found, "single_rows")
+
+
+def test_few_shifted_rows_that_are_taken_for_outliers_are_named():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    data = with_lost(arm.measure(arm.poses(120)), [112], points=True)
+    told = notice_of(ta.calibrate(arm.robot, data, refit=False), "rows_shifted")
+    assert told.startswith("From row 113 on each point belongs to the readings 1 row further on")
+
+
+def test_a_lost_shot_is_named():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    data = with_lost(arm.measure(np.repeat(arm.poses(40), 3, axis=0)), [51], points=True)
+    told = notice_of(ta.calibrate(arm.robot, data, model="constant", refit=False), "rows_shifted")
+    assert re.match(r"From row 5[2-4] on each point belongs to the readings 1 row further on", told)
+
+
+def test_of_several_set_ups_the_one_that_lost_a_row_is_named():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    data = arm.measure(arm.poses(120))
+    rows = np.arange(120)
+    lost = with_lost(data.select(rows < 50), [20], points=True)
+    files = [("short.csv", lost), ("long.csv", data.select(rows >= 50))]
+    parts = [
+        replace(part, sources=np.full(len(part), name), group=np.full(len(part), name))
+        for name, part in files
+    ]
+    both = ta.Measurements.concatenate(parts)
+    told = notice_of(ta.calibrate(arm.robot, both, model="constant", refit=False), "rows_shifted")
+    assert told.startswith("From row 21 of short.csv on")
+    assert "long.csv" not in told
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_single_rows_that_are_far_off_are_not_taken_for_shifted_ones(seed):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    table = arm.measure_table(arm.poses(90, seed=seed), seed=seed)
+    off = np.random.default_rng(seed).choice(90, 20, replace=False)
+    table.loc[off, ["x", "y"]] += 0.5
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), refit=False)
+    assert notice_of(found, "rows_shifted") == ""
+
+
 @pytest.mark.parametrize(
     ("name", "otherwise", "words"),
     [

@@ -71,6 +71,7 @@ def test_columns_with_our_names_need_no_mapping(tmp_path: Path) -> None:
         ("Station 1\nsome words, and more\n" + PLAIN, {"skip_lines": 2}),
         (PLAIN.replace("\n", "\r\n"), {}),
         ("\ufeff" + PLAIN, {}),
+        ("// AT960; mm; deg\n" + PLAIN, {"comments": ("//",)}),
         (PLAIN.replace("\n", "\n# a remark, of two fields\n"), {"comments": ("#", "//")}),
         (PLAIN.replace(",", "   ").replace("\n", " \n  "), {"delimiter": " "}),
         (
@@ -192,6 +193,13 @@ def test_rows_of_one_target_each(tmp_path: Path) -> None:
 BAD: dict[str, tuple[str, dict[str, Any], str]] = {
     "semicolons": (PLAIN.replace(",", ";"), {}, 'separated by semicolons. If so, give --delimiter ";"'),
     "tabs": (PLAIN.replace(",", "\t"), {}, "separated by tabs. If so, give --delimiter tab"),
+    "remark with semicolons": ("// AT960; mm; deg\n" + PLAIN, {}, 'is a remark: .* FILE --comment "//"'),
+    "remark without marks": ("# of day 2\n" + PLAIN, {}, 'is a remark: "# of day 2".* FILE --comment "#"'),
+    "words above semicolons": (
+        "Hall 4, cell 2\n" + PLAIN.replace(",", ";"),
+        {},
+        "seem to be separated by semicolons",
+    ),
     "one field": (PLAIN.replace(",", " "), {}, 'the first line is one field: "J1 J2 px py pz".*--delimiter'),
     "decimal comma": (
         PLAIN.replace(",", ";").replace("90;", "90,5;"),

@@ -33,7 +33,8 @@ TABLES = {
         ["0,1,2,3,,", "0,1,2,3,4,5"],
         "columns 5 and 6 have no name.*--skip-lines",
     ),
-    "remark first": ("# made by a tool", ["q1,x,y,z", "0,1,2,3"], "is a remark.*--skip-lines 1"),
+    "remark first": ("# made by a tool", ["q1,x,y,z", "0,1,2,3"], 'is a remark.*--comment "#"'),
+    "remark with semicolons": ("// AT; mm; deg", ["q1,x,y,z", "0,1,2,3"], 'is a remark.*--comment "//"'),
     "separator first": ("sep=,", ["q1,x,y,z", "0,1,2,3"], "is a remark.*--skip-lines 1"),
     "no header": ("0,0,1,2,3", ["0,0,1,2,3"], "first line holds numbers only.*q1,q2"),
     "mixed angles": ("q1_deg,q2,x,y,z", ["0,0,1,2,3"], 'mixed units: column "q1_deg" is in deg, "q2" in SI'),
@@ -123,6 +124,10 @@ CONTENTS = {
     "semicolons": (
         b"q1;x;y;z\n0;1,5;2;3\n",
         'by semicolons.*truearm import .* --delimiter ";"',
+    ),
+    "semicolons under a remark": (
+        b"// AT960, 20 C, mm\nq1;x;y;z\n0;1,5;2;3\n",
+        'by semicolons.*truearm import .* --delimiter ";" --decimal "," --comment "//".$',
     ),
     "tabs": (b"q1\tx\ty\tz\n0\t1\t2\t3\n", "separated by tabs.*--delimiter tab"),
     "open quote": (b'q1,x,y,z\n0,1,2,"3\n', "not CSV"),

@@ -94,7 +94,8 @@ def test_unknown_branch_is_refused():
 
 
 def test_a_floor_holds_for_all_parts_that_move():
-    readings = np.random.default_rng(3).uniform(*RV_M2.limits.T, (400, RV_M2.joint_count))
+    low, high = RV_M2.limits.T
+    readings = np.random.default_rng(3).uniform(low, high, (400, RV_M2.joint_count))
     tools = RV_M2.position(readings)[:, 2]
     height = float(np.quantile(tools, 0.25))
     allowed = accessible(RV_M2, readings, [AboveFloor(height)])

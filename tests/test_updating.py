@@ -5,8 +5,10 @@ import pytest
 
 import truearm as ta
 from tests.remastered import remastered, remastered_table
+from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
 from truearm.programs.notices import update_notices
+from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.updating.squares import SquaresTest
 
@@ -57,6 +59,21 @@ def test_what_moved_is_found_and_the_error_comes_back(known, moved):
     assert error_mm(calibration, arm, SHIFT, TOOL_MM) > 10.0 * own
     assert error_mm(found.calibration, arm, SHIFT, TOOL_MM) < 1.4 * own
     assert found.after.position.mean < 0.1 * found.before.position.mean
+
+
+@pytest.mark.parametrize(
+    ("shift", "changed", "follows"),
+    [([0.05, -0.05], [2, 3], 2), ([0.05, 0.0], [2], None), ([0.05, 0.05], [2, 3], None)],
+)
+def test_one_motor_that_changes_two_coupled_joints_is_told(shift, changed, follows):
+    arm = VirtualArm(ta.Robot.load("fanuc-lr-mate-200id"), seed=2)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
+    shift_deg = np.array([0.0, *shift, 0.0, 0.0, 0.0])
+    found = ta.update(calibration, remastered(arm, arm.poses(15, seed=9), shift_deg, seed=9))
+    assert [offset.joint for offset in found.offsets if offset.moved] == changed
+    assert [offset.follows for offset in found.offsets] == [None, None, follows, None, None, None]
+    words = "Joint 3 is coupled to joint 2, and its change is what that of joint 2 makes of its reading"
+    assert (words in words_of(report(found.calibration).html)) == (follows is not None)
 
 
 def test_what_cannot_be_told_is_said(moved):

@@ -15,6 +15,7 @@ from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.doubts import (
     NO_HELP,
+    SINGLE_ROWS,
     Outliers,
     constant_is_better,
     doubts,
@@ -24,7 +25,7 @@ from truearm.doubts import (
     stood_still,
 )
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
-from truearm.errors import InputError, Notice, UsageError, list_outliers
+from truearm.errors import InputError, Notice, UsageError
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
     ENOUGH_FOR_HYPER,
@@ -48,7 +49,7 @@ from truearm.measurements import Measurements
 from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
-from truearm.row_lag import fits_shifted
+from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
 from truearm.splitting import Split, split_rows
 from truearm.turning_sense import check_turns
@@ -128,19 +129,34 @@ def _over_time(task: Task, data: Measurements, drift: Drift, judged: Validation)
 
 def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
     """What makes a calibration doubtful; where it does not help, with what would fit instead."""
-    rows = [] if found.rows is None else found.rows.outliers()
-    means = {} if found.held is None or found.selection.distances else found.held.means_without_mm(rows)
-    outliers = Outliers(list_outliers(rows, several=len(data.files) > 1), means)
+    doubted, shifted = _of_errors(task, found, data, Outliers.of(found)), list[Notice]()
+    if _many_are_off(found, doubted):
+        with stages("looking for lost rows"):
+            shifted = fits_shifted(task, data)
+    if shifted:
+        doubted = _of_errors(task, found, data, None)
+        doubted[1:1] = shifted
+    elif any(notice.kind == NO_HELP for notice in doubted):
+        with stages("trying other conventions"):
+            doubted[1:1] = fits_otherwise(task, data)
+    return doubted
+
+
+def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Outliers | None) -> list[Notice]:
+    """What the errors of a calibration say against it, and which outliers may be to blame."""
     judged, best = found.validation, found.model_name
-    doubted = [
+    return [
         *doubts(task.arm, found.models, judged, best, outliers),
         *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
         *constant_is_better(judged, best),
     ]
-    if any(notice.kind == NO_HELP for notice in doubted):
-        with stages("trying other conventions"):
-            doubted[1:1] = fits_shifted(task, data) or fits_otherwise(task, data)
-    return doubted
+
+
+def _many_are_off(found: Calibration, doubted: Sequence[Notice]) -> bool:
+    """Whether so many rows are off, or off from some row on, that they may belong to other points."""
+    drift, outliers = found.validation.drift, [] if found.rows is None else found.rows.outliers()
+    of_no_use = any(notice.kind in {NO_HELP, SINGLE_ROWS} for notice in doubted)
+    return of_no_use or len(outliers) > CHANGE or (drift is not None and bool(drift.jumps))
 
 
 def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:

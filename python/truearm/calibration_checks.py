@@ -50,6 +50,12 @@ class _Variable(_Part):
     feature_ranges: list[float]
 
 
+class _Notice(_Part):
+    kind: str
+    message: str
+    rows: list[Count]
+
+
 class _Content(_Part):
     version: str
     groups: list[str]
@@ -58,6 +64,7 @@ class _Content(_Part):
     identifiability: _Identifiability
     constant: _Constant
     variable: _Variable | None
+    notices: list[_Notice] = []
 
 
 def check_plain(content: Mapping[str, Any]) -> None:

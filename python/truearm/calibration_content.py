@@ -14,7 +14,7 @@ from truearm.calibration_file import AGAIN
 from truearm.core_set import Selection
 from truearm.defaults import NO_DRIFT
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.errors import InputError
+from truearm.errors import InputError, Notice
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
@@ -53,6 +53,7 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         "models": {name: _model(name, model, arrays) for name, model in calibration.models.items()},
         "validation": calibration.validation.to_dict(),
         "data_sha256": calibration.data_hash,
+        "notices": [{**asdict(notice), "rows": list(notice.rows)} for notice in calibration.notices],
         "rows": None,
         "held": None,
         "conservative": None,
@@ -123,9 +124,14 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "held": None if held is None else HeldRows.unpack(held, arrays),
         "data_hash": content["data_sha256"],
         "version": content["version"],
+        "notices": tuple(_notice(stored) for stored in content.get("notices", ())),
         "stored_conservative": None if bounds is None else conservative.unpack(bounds, arrays),
         "revision": revision.unpack(content["update"], arrays) if content.get("update") else None,
     }
+
+
+def _notice(content: Mapping[str, Any]) -> Notice:
+    return Notice(content["kind"], content["message"], tuple(content["rows"]))
 
 
 def _constant(details: ConstantDetails) -> dict[str, Any]:

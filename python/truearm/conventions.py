@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.doubts import FITS_OTHERWISE
 from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.measurements import Measurements
@@ -121,7 +122,7 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
         f"calibration, if {named.words(robot)}. Put that right in a robot file of the arm or "
         f"in the measurements, and calibrate again.{_words_of_others(robot, others)}"
     )
-    return [Notice("fits_otherwise", text)]
+    return [Notice(FITS_OTHERWISE, text)]
 
 
 def _words_of_others(robot: Robot, others: list[Convention]) -> str:

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.details import VariableDetails
-from truearm.errors import Notice
+from truearm.errors import Notice, list_outliers
 from truearm.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.grids import BETWEEN, grid_steps, grid_words
 from truearm.held_tool import TURN_MORE, held_tool, held_words
@@ -19,6 +19,9 @@ from truearm.robot import Robot
 from truearm.stillness import still_warning
 from truearm.units import MM_PER_METRE, to_si
 from truearm.validation import Validation, mean_distance
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
 
@@ -44,6 +47,10 @@ NO_HELP: Final = "no_help"
 NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
+ROWS_SHIFTED: Final = "rows_shifted"
+FITS_OTHERWISE: Final = "fits_otherwise"
+WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE)
+"""What the measurements would fit, where a calibration does not help."""
 ON_A_GRID: Final = "on_a_grid"
 FEW_VALUES: Final = "few_values"
 HELD_TOOL: Final = "held_tool"
@@ -64,10 +71,24 @@ class Outliers:
     Attributes:
         named: Which they are, in words.
         means_mm: Mean errors of the models on the judged rows without them; empty where none is judged.
+        judged: Which of them are judged, in words.
     """
 
     named: str
     means_mm: Mapping[str, float]
+    judged: str = ""
+
+    @classmethod
+    def of(cls, calibration: "Calibration") -> "Outliers":
+        """Those of the rows that a calibration was fitted to."""
+        rows = calibration.rows
+        if rows is None:
+            return cls("", {})
+        found, several = rows.outliers(), len(rows.data.files) > 1
+        held = None if calibration.selection.distances else calibration.held
+        means = {} if held is None else held.means_without_mm(found)
+        judged = held.among(found) if held is not None and means else []
+        return cls(list_outliers(found, several=several), means, list_outliers(judged, several=several))
 
 
 def doubts(
@@ -214,16 +235,16 @@ def no_help(before_mm: float, after_mm: float, what: str, outliers: Outliers | N
         return [Notice(NO_GAIN, text)]
     text = (
         f"The calibration does not help: its {what} is {after_mm:.4g} mm, that of the nominal model "
-        f"{before_mm:.4g} mm. Do not use it until the reason is found. {_first(outliers)}{CHECKS}."
+        f"{before_mm:.4g} mm. Do not use it until the reason is found. {to_check(outliers)}"
     )
     return [Notice(NO_HELP, text)]
 
 
-def _first(outliers: Outliers | None) -> str:
-    """Which rows to look at before all else."""
+def to_check(outliers: Outliers | None) -> str:
+    """What to look at where a calibration does not help: first rows that are far off, if any are."""
     if outliers is None or not outliers.named:
-        return ""
-    return f"Look at these rows first, which alone may spoil the fit: {outliers.named}. "
+        return f"{CHECKS}."
+    return f"Look at these rows first, which alone may spoil the fit: {outliers.named}. {CHECKS}."
 
 
 def nothing_to_gain(before_mm: float, after_mm: float) -> bool:

@@ -45,6 +45,11 @@ class HeldRows:
         own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
         return np.array([row not in named for row in own], dtype=bool)
 
+    def among(self, outliers: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+        """Those of the outliers, given with file and row, that are among these rows."""
+        own = set(zip(self.sources.tolist(), self.rows.tolist(), strict=True))
+        return [entry for entry in outliers if (entry["file"], entry["row"]) in own]
+
     def means_without_mm(self, outliers: Sequence[Mapping[str, Any]]) -> dict[str, float]:
         """Mean position error of each model at the other rows, mm; empty without an outlier here."""
         kept = self.without(outliers)

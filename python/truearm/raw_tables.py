@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
 from truearm.files import decode_text, read_bytes
-from truearm.reading import DELIMITERS, Table, Texts, check_is_table, quoted_delimiter, split_table
+from truearm.reading import (
+    DELIMITERS,
+    Table,
+    Texts,
+    check_is_table,
+    comment_of,
+    delimiter_of,
+    quoted_delimiter,
+    split_table,
+)
 from truearm.workbooks import DELIMITER, is_workbook, sheet_text
 
 Floats = NDArray[np.float64]
@@ -435,10 +444,10 @@ def _decoded(content: bytes, marks: Marks, where: str) -> str:
 
 
 def _plain_delimiter(text: str, where: str, options: str) -> str:
+    """A comma, where the lines are plainly made of them or the first is a comment that names no columns."""
     header = text.lstrip().splitlines()[0]
-    counts = {mark: header.count(mark) for mark in DELIMITERS}
-    best = max(counts, key=lambda mark: counts[mark])
-    if counts[best] == 0:
+    best = delimiter_of(text)
+    if best is None or (best == "," and "," not in header and not comment_of(header)):
         raise UsageError(
             f'the first line is one field: "{header[:SHOWN]}"',
             where=where,

@@ -3,8 +3,10 @@
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -26,7 +28,11 @@ NAMELESS: Final = (
 )
 LOOKED_AT: Final = 4096
 """Bytes of a file in another encoding, an even number, from which its marks are told."""
-REMARKS: Final = ("#", "sep=", "SEP=")
+COMMENTS: Final = ("#", "//")
+REMARKS: Final = (*COMMENTS, "sep=", "SEP=")
+"""What lines begin with that are not of the table; those of COMMENTS may be anywhere in a file."""
+LINES_ASKED: Final = 100
+"""Lines at the most that tell what is between the fields of all."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +153,7 @@ def read_csv_table(path: Path) -> Table:
         )
     text = decode_text(content, where=where, way_out=_way_out_of_encoding(path, content))
     check_is_table(text, where=where)
-    mark = _delimiter(text)
+    mark = delimiter_of(text) or ","
     if mark != ",":
         raise InputError(
             f"its fields are separated by {DELIMITERS[mark]}",
@@ -158,20 +164,39 @@ def read_csv_table(path: Path) -> Table:
     return split_table(text, ",", where=where)
 
 
-def _delimiter(text: str) -> str:
-    """The mark between the fields of the first line: a comma unless another one is there more often."""
-    header = "".join(text.lstrip().splitlines()[:1])
-    other = [mark for mark in DELIMITERS if mark != "," and mark in header]
-    return other[0] if other and header.count(",") < header.count(other[0]) else ","
+def delimiter_of(text: str) -> str | None:
+    """The mark between the fields of most lines, remarks apart; None where no line holds one.
+
+    A line with decimal commas may hold one more of them than of what is between its fields.
+    """
+    lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith(REMARKS))
+    said = Counter(mark for line in islice(lines, LINES_ASKED) if (mark := _mark_of(line)))
+    return max(said, key=lambda mark: said[mark], default=None)
+
+
+def _mark_of(line: str) -> str | None:
+    """The mark that a line seems to have between its fields."""
+    other = max((mark for mark in DELIMITERS if mark != ","), key=line.count)
+    commas = line.count(",")
+    if line.count(other) and line.count(other) + 1 >= commas:
+        return other
+    return "," if commas else None
+
+
+def comment_of(text: str) -> str | None:
+    """What the first line of a text begins with if it is a comment."""
+    start = text.lstrip()
+    return next((mark for mark in COMMENTS if start.startswith(mark)), None)
 
 
 def _import_command(path: Path, text: str, encoding: str = "") -> str:
     """The command that brings in a file with such a text, of an encoding other than UTF-8 if one is named."""
-    mark = _delimiter(text)
+    mark, comment = delimiter_of(text) or ",", comment_of(text)
     decimal = '","' if re.search(r"\d,\d", text) else '"."'
     marks = "" if mark == "," else f" --delimiter {quoted_delimiter(mark)} --decimal {decimal}"
     coded = f" --encoding {encoding}" if encoding else ""
-    return f"truearm import {typed(path)} -o measurements.csv{coded}{marks}"
+    said = f' --comment "{comment}"' if comment else ""
+    return f"truearm import {typed(path)} -o measurements.csv{coded}{marks}{said}"
 
 
 def _way_out_of_encoding(path: Path, content: bytes) -> str:
@@ -245,11 +270,13 @@ def quoted_delimiter(mark: str) -> str:
 
 def _check_header(header: Sequence[str], where: str) -> None:
     if header[0].startswith(REMARKS):
+        comment = comment_of(header[0])
+        option = f'--comment "{comment}"' if comment else "--skip-lines 1"
         raise InputError(
             f'the first line is a remark: "{header[0]}"',
             where=where,
             rule="The first line must name the columns",
-            way_out="Delete it, or bring the file in with: truearm import FILE --skip-lines 1 ...",
+            way_out=f"Delete it, or bring the file in with: truearm import FILE {option} ...",
         )
     if any(header) and all(_as_number(name) is not None for name in header if name):
         raise InputError(

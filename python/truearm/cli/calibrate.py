@@ -264,14 +264,14 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
 
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
+    from truearm.doubts import Outliers
+
     if not outliers:
         return
     several = calibration.rows is not None and len(calibration.rows.data.files) > 1
     fate = "taken out of the variable fit" if calibration.variable is not None else "not taken out of the fit"
     hint = "" if calibration.variable is not None else " --robust huber gives them less weight."
     say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, several=several)}.{hint}")
-    held = None if calibration.selection.distances else calibration.held
-    means = {} if held is None else held.means_without_mm(outliers)
-    if means:
+    if means := Outliers.of(calibration).means_mm:
         said = ", ".join(f"{name} {mean:.3f}" for name, mean in means.items())
         say_wrapped(f"Mean error without the held-out ones among them: {said} mm.")

@@ -50,9 +50,7 @@ FloorMm: TypeAlias = Annotated[
 ]
 BoxMm: TypeAlias = Annotated[
     str | None,
-    typer.Option(
-        metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the target."
-    ),
+    typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the target."),
 ]
 Seed: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of the candidates.")]
 Picture: TypeAlias = Annotated[

@@ -171,11 +171,15 @@ def _verdict(found: "Update") -> str:
 
 def _print(found: "Update") -> None:
     from truearm.reporting.numbers import listed, probability
+    from truearm.updating.moved import follows_words
 
     say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {_verdict(found)}")
     print_table(
         ("joint", "change of offset", "std error", "p", ""), [_offset(o) for o in found.offsets], left=(0, 4)
     )
+    for offset in found.offsets:
+        if offset.follows is not None:
+            say_wrapped(follows_words(offset.joint, offset.follows))
     for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
         for motion in motions:
             say(f"{name} of {motion.group}: {_motion(motion)}.")

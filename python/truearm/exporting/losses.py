@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from truearm.calibration import Calibration
+from truearm.doubts import Outliers
 from truearm.errors import list_rows
 from truearm.models import CONSTANT
 from truearm.parameters import BETA
@@ -47,8 +48,17 @@ def field_is_lost(calibration: Calibration, export_format: str) -> list[str]:
     return [
         f"The parameters of this calibration vary over the workspace; {FORMAT_WORDS[export_format]} holds "
         f"the constant part alone. On {validation.n_holdout} {validation.judged} rows the constant part "
-        f"left {constant:.3f} mm in the mean, the whole calibration {variable:.3f} mm. {whole}"
+        f"left {constant:.3f} mm in the mean, the whole calibration {variable:.3f} mm"
+        f"{_without_outliers(calibration)}. {whole}"
     ]
+
+
+def _without_outliers(calibration: Calibration) -> str:
+    outliers = Outliers.of(calibration)
+    if not outliers.means_mm:
+        return ""
+    constant, variable = (outliers.means_mm[name] for name in (CONSTANT, calibration.model_name))
+    return f"; without the outliers among them, {outliers.judged}, {constant:.3f} and {variable:.3f} mm"
 
 
 def beta_is_lost(robot: RobotData) -> list[str]:

@@ -1,12 +1,21 @@
 """What would help most next, decided by rules from the data."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from truearm.doubts import FEW_VALUES, HELD_TOOL, HIDING, SAME, STATED_TOO_LARGE, constants_do_better
+from truearm.doubts import (
+    FEW_VALUES,
+    HELD_TOOL,
+    HIDING,
+    SAME,
+    STATED_TOO_LARGE,
+    WOULD_FIT,
+    constants_do_better,
+    to_check,
+)
 from truearm.errors import count_of
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
@@ -45,11 +54,20 @@ class Advice:
 
 def advise(facts: Facts, known: Known | None) -> list[Advice]:
     """What would help most, the most first, four at most."""
-    rules = RULES if facts.update is None else RULES_OF_UPDATES
-    found = [advice for rule in rules for advice in rule(facts)]
-    if known is not None:
+    found = [advice for rule in _rules(facts) for advice in rule(facts)]
+    if known is not None and not facts.is_of_no_help:
         found += _where(facts, known)
     return sorted(found, key=lambda advice: -advice.weight_mm)[:MOST]
+
+
+def _would_fit(facts: Facts) -> Iterator[Advice]:
+    for words in filter(None, map(facts.noticed, WOULD_FIT)):
+        yield Advice("would_fit", "Correct what does not fit.", words, np.inf)
+
+
+def _checks(facts: Facts) -> Iterator[Advice]:
+    words = to_check(None if any(_would_fit(facts)) else facts.outliers)
+    yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())
 
 
 def _outliers(facts: Facts) -> Iterator[Advice]:
@@ -102,15 +120,15 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         if facts.grids or any(map(facts.noticed, HIDING)):
             return
         words = (
-            f"The mean error is {left} mm, and noise alone would leave {noise} mm. More poses will hardly "
-            "help: what is left is noise of the measuring device and what the arm does not repeat."
+            f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm. More poses will "
+            "hardly help: what is left is noise of the measuring device and what the arm does not repeat."
         )
         yield Advice("noise_floor", "The noise floor is reached.", words, floor)
         return
     trained = facts.calibration.validation.poses_trained
     words = (
-        f"The mean error is {left} mm, and noise alone would leave {noise} mm. The rest is what {trained} "
-        "leave undetermined. Poses like those of the task help most."
+        f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm. The rest is what "
+        f"{trained} leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
@@ -175,8 +193,9 @@ def _tail(facts: Facts) -> Iterator[Advice]:
     if p99 > LONG_TAIL * mean:
         far, near = short(p99, mean)
         words = (
-            f"One pose in a hundred has an error above {far} mm; the mean is {near} mm. See where the worst "
-            "poses lie, in their table and along the joints: measure more poses there, or these again."
+            f"One pose in a hundred has an error above {far} mm; the {facts.mean_error} is {near} mm. See "
+            "where the worst poses lie, in their table and along the joints: measure more poses there, or "
+            "these again."
         )
         yield Advice("long_tail", "Look at the worst poses.", words, 0.5 * p99)
 
@@ -260,21 +279,22 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
     elif facts.best == VARIABLE and constants_do_better(mean, constant):
         left, before = short(mean, constant)
         words = (
-            f"The mean error is {left} mm with the variable model and {before} mm with constant parameters: "
-            "what it learnt does not hold where it was judged. Measure poses there, or stay with --model "
-            "constant."
+            f"The {facts.mean_error} is {left} mm with the variable model and {before} mm with constant "
+            "parameters: what it learnt does not hold where it was judged. Measure poses there, or stay with "
+            "--model constant."
         )
         yield Advice("constant_better", "Constant parameters do better.", words, mean)
     elif facts.best == VARIABLE and mean > SAME * constant:
         left, before = short(mean, constant)
         words = (
-            f"The variable model gains little: a mean error of {left} mm against {before} mm with constant "
-            "parameters. They hardly vary, or the poses are too few to show it."
+            f"The variable model gains little: a {facts.mean_error} of {left} mm against {before} mm with "
+            "constant parameters. They hardly vary, or the poses are too few to show it."
         )
         yield Advice("constant_suffices", "Constant parameters do as well.", words, 0.2 * mean)
 
 
 RULES: Final = (
+    _would_fit,
     _outliers,
     _stood_still,
     _warm_up,
@@ -291,3 +311,11 @@ RULES: Final = (
     _what_varies,
 )
 RULES_OF_UPDATES: Final = (_no_longer_fits, _left_out, _unseen, _few_held)
+RULES_WITHOUT_HELP: Final = (_would_fit, _checks, _stood_still)
+
+
+def _rules(facts: Facts) -> tuple[Callable[[Facts], Iterator[Advice]], ...]:
+    """The rules that hold for a calibration: one that does not help tells nothing of noise or of the arm."""
+    if facts.update is not None:
+        return RULES_OF_UPDATES
+    return RULES_WITHOUT_HELP if facts.is_of_no_help else RULES

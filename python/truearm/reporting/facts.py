@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from truearm._core import Field
 from truearm.calibration import Calibration
-from truearm.doubts import ON_A_GRID
+from truearm.doubts import ON_A_GRID, SINGLE_ROWS, Outliers, helps, nothing_to_gain
 from truearm.evaluation import Evaluation
 from truearm.grids import grid_steps, grid_words
 from truearm.held_rows import HeldRows
-from truearm.models import ArmModel
+from truearm.models import NOMINAL, ArmModel
 from truearm.reporting.numbers import shown_readings, unit_of
 from truearm.stillness import still_warning
 from truearm.summary import WAVE
@@ -109,6 +109,33 @@ class Facts:
         if self.held is None:
             return {}
         return {name: MM_PER_METRE * found.distance_m for name, found in self.held.errors.items()}
+
+    @cached_property
+    def outliers(self) -> Outliers:
+        """Rows that are far off; none after an update, which leaves its own out."""
+        return Outliers("", {}) if self.update is not None else Outliers.of(self.calibration)
+
+    @property
+    def is_spoilt_by_rows(self) -> bool:
+        """Whether the calibration helps but for single rows that are far off."""
+        return bool(self.noticed(SINGLE_ROWS))
+
+    @property
+    def is_of_no_help(self) -> bool:
+        """Whether the calibration is wrong, so that nothing it says of noise or of the arm holds."""
+        errors = self.calibration.validation.holdout
+        before, after = (errors[name].position.mean for name in (NOMINAL, self.best))
+        return not (helps(before, after) or nothing_to_gain(before, after) or self.is_spoilt_by_rows)
+
+    @property
+    def leaves_outliers_out(self) -> bool:
+        """Whether errors are told without outliers too: some judged poses are, and the others tell so."""
+        return bool(self.outliers.means_mm) and not self.is_of_no_help
+
+    @property
+    def mean_error(self) -> str:
+        """What `mean_mm` is called."""
+        return "mean error without the outliers" if self.leaves_outliers_out else "mean error"
 
     def mean_mm(self, model: str | None = None) -> float:
         """Mean held-out position error of a model, the best by default, mm; outliers are no part of it."""

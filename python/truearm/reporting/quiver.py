@@ -106,8 +106,9 @@ def _arrows(
 def _says(facts: Facts, held: HeldRows) -> str:
     """Whether the errors point one way, before and after."""
     common = []
+    kept = held.without(facts.summary["outliers"] if facts.leaves_outliers_out else [])
     for model in (NOMINAL, facts.best):
-        vectors = vectors_mm(held, model)
+        vectors = vectors_mm(held, model)[kept]
         vectors = vectors[np.isfinite(vectors).all(axis=1)]
         mean = float(np.linalg.norm(vectors.mean(axis=0)))
         common.append((mean, float(np.linalg.norm(vectors, axis=1).mean())))
@@ -115,7 +116,7 @@ def _says(facts: Facts, held: HeldRows) -> str:
     texts = short(before, after, mean)
     shared = "share no direction" if mean < SHARED * after else "share a direction"
     return (
-        f"The mean error is {texts[0]} mm with the nominal model and {texts[1]} mm with the {facts.best} "
-        f"one; the mean of its error vectors is {texts[2]} mm long: they {shared}. The arm is drawn in a "
-        "pose near the middle of the measured ones."
+        f"The {facts.mean_error} is {texts[0]} mm with the nominal model and {texts[1]} mm with the "
+        f"{facts.best} one; the mean of its error vectors is {texts[2]} mm long: they {shared}. The arm is "
+        "drawn in a pose near the middle of the measured ones."
     )

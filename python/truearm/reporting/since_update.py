@@ -8,6 +8,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
+from truearm.updating.moved import follows_words
 from truearm.validation import Validation
 
 VERDICTS: Final = {
@@ -59,7 +60,9 @@ def _offsets(told: Mapping[str, Any]) -> Table:
             ]
         )
     columns = ["", "change of offset", "standard error", "p", ""]
-    return Table("Joint offsets", columns, rows, left=(0, 4))
+    follow = [entry for entry in told["offsets"] if entry.get("follows") is not None]
+    says = " ".join(follows_words(entry["joint"], entry["follows"]) for entry in follow)
+    return Table("Joint offsets", columns, rows, says=says, left=(0, 4))
 
 
 def _motions(told: Mapping[str, Any]) -> list[Table]:

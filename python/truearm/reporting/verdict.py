@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import SINGLE_ROWS, helps, nothing_to_gain
+from truearm.doubts import helps, nothing_to_gain
 from truearm.errors import count_of
 from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
@@ -64,17 +64,29 @@ def verdict(facts: Facts) -> str:
     poses = facts.poses_judged + (", each predicted from the others," if validation.left_out else "")
     said = (
         f"On {poses} the mean {facts.error} is {numbers[0]} mm and the largest {numbers[1]} mm; "
-        f"{_former(facts)} they are {numbers[2]} mm and {numbers[3]} mm."
+        f"{_former(facts)} they are {numbers[2]} mm and {numbers[3]} mm.{_without_outliers(facts)}"
     )
-    if any(notice.kind == SINGLE_ROWS for notice in facts.calibration.notices):
+    if facts.is_spoilt_by_rows:
         return f"{said} Single rows are far off: correct them or leave them out, and calibrate again."
     if nothing_to_gain(nominal.mean, after.mean):
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
-    if not helps(nominal.mean, after.mean):
+    if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
     if facts.update is not None and facts.update["verdict"] == "field":
         return f"{said} The calibration no longer fits the arm: measure again and calibrate."
     return said
+
+
+def _without_outliers(facts: Facts) -> str:
+    """The errors without outliers among the judged poses; empty where none is, or nobody knows which are."""
+    if not facts.leaves_outliers_out:
+        return ""
+    kept = [facts.kept_errors_mm(name) for name in (facts.best, NOMINAL)]
+    numbers = short(*(float(found(errors)) for errors in kept for found in (np.nanmean, np.nanmax)))
+    return (
+        f" Without the outliers among them, {facts.outliers.judged}, they are {numbers[0]} mm and "
+        f"{numbers[1]} mm; {_former(facts)} {numbers[2]} mm and {numbers[3]} mm."
+    )
 
 
 def _former(facts: Facts) -> str:
@@ -101,16 +113,27 @@ def cards(facts: Facts) -> list[Card]:
     mean, p95, former = short(after.mean, after.p95, was)
     found = [
         Card(mean, "mm", f"mean error on {facts.judged} poses; {_former(facts)} {former}", tone(facts)),
+        *_card_without_outliers(facts),
         Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"),
-        Card(*_short_mm(distance_at_floor_mm(facts)), "mean error that noise alone would leave"),
     ]
+    if not facts.is_of_no_help:
+        floor = distance_at_floor_mm(facts)
+        found.append(Card(*_short_mm(floor), "mean error that noise alone would leave"))
     ratios = summary["error_to_repeatability"]
     if ratios is not None:
         found.append(Card(f"{ratios[facts.best]:.1f}", "times", "the stated repeatability: the mean error"))
-    if validation.coverage_95 is not None:
+    if validation.coverage_95 is not None and not facts.is_of_no_help:
         share = f"{100 * validation.coverage_95:.1f}"
         found.append(Card(share, "%", "of the held-out coordinates lie within their 95 % intervals"))
     return found
+
+
+def _card_without_outliers(facts: Facts) -> list[Card]:
+    if not facts.leaves_outliers_out:
+        return []
+    mean, former = short(facts.mean_mm(), facts.mean_mm(NOMINAL))
+    words = f"mean error without the outliers among them; {_former(facts)} {former}"
+    return [Card(mean, "mm", words)]
 
 
 def _short_mm(value: float) -> tuple[str, str]:

@@ -1,7 +1,7 @@
 """What moved, in numbers for people: offsets of joints, frames and tools."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +18,8 @@ Mask = NDArray[np.bool_]
 
 TOLD: Final = 0.5
 """An offset is told when its standard error is below this share of the prior's deviation."""
+NO_CHANGE: Final = 0.5
+"""A joint value that changed by less than this share of its reading's change may not have changed."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class Offset:
         moved: Whether that is too rare.
         told: Whether the poses tell it; where they do not, the offset is held as it was.
         confounded: What it cannot be told from: "frame", "tool", "frame and tool", or "" for the others.
+        follows: The coupled joint, from 1, whose change alone makes this one; None where there is none.
     """
 
     joint: int
@@ -56,10 +59,19 @@ class Offset:
     moved: bool
     told: bool
     confounded: str = ""
+    follows: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
         return asdict(self)
+
+
+def follows_words(joint: int, followed: int) -> str:
+    """That one motor explains the changes of two coupled joints, counted from 1, in a sentence."""
+    return (
+        f"Joint {joint} is coupled to joint {followed}, and its change is what that of joint {followed} "
+        f"makes of its reading: one motor was re-mastered or slipped, that of joint {followed}."
+    )
 
 
 @dataclass(frozen=True)
@@ -143,7 +155,35 @@ def offsets(scene: Scene, found: Estimate, held: dict[int, str], judge: Judge) -
         result.append(
             Offset(joint + 1, unit, scale * change, scale * error, p, p < judge.level / len(kinds), told=True)
         )
-    return tuple(result)
+    coupled = _Coupled(scene.task.arm.robot.coupling, found, judge)
+    return tuple(replace(offset, follows=coupled.followed(result, offset)) for offset in result)
+
+
+@dataclass(frozen=True, eq=False)
+class _Coupled:
+    """Joint values (N,) as C (N, N) makes them of readings, and how certain their changes are."""
+
+    coupling: Floats
+    found: Estimate
+    judge: Judge
+
+    def followed(self, offsets: Sequence[Offset], offset: Offset) -> int | None:
+        """The joint, from 1, whose change alone makes that of a reading; None where there is none.
+
+        It follows where the joint value changed by no more than chance, and far less than the reading.
+        """
+        row, joint = self.coupling[offset.joint - 1], offset.joint - 1
+        others = [
+            other.joint for other in offsets if other.moved and other is not offset and row[other.joint - 1]
+        ]
+        if not offset.moved or len(others) != 1:
+            return None
+        count = len(row)
+        changes, covariance = self.found.state.arm[:count], self.found.covariance[:count, :count]
+        left, error = float(row @ changes), float(np.sqrt(row @ covariance @ row))
+        is_chance = student_p(left / error, self.judge.known) >= self.judge.level / count
+        is_small = abs(left) < NO_CHANGE * abs(row[joint] * changes[joint])
+        return others[0] if is_chance and is_small else None
 
 
 def motions(scene: Scene, found: Estimate, judge: Judge) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
