@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, exp};
 
+use crate::columns::Columns;
 use crate::hyper::{Hyper, Product};
 use crate::kernel::{Input, InputKind, Shape};
 use crate::own::OwnKernel;
@@ -25,28 +26,28 @@ pub struct Pairing {
 
 /// Kernels of one pose with the poses from it on, under given hyper-parameters.
 pub struct PoseKernels {
-    /// Of each input, (I, count).
-    pub own: Vec<OwnSlopes>,
-    /// Summed over the inputs.
-    pub smooth: SmoothSlopes,
-    /// For each product, (count,).
-    pub products: Vec<Vec<f64>>,
+    /// Three of each input.
+    own: Columns,
+    /// Three, each summed over the inputs.
+    smooth: Columns,
+    /// Of each product.
+    pub products: Columns,
 }
 
 /// Kernels and their derivatives by the logarithms of the length scales, (count,).
-pub struct SmoothSlopes {
-    pub kernel: Vec<f64>,
+pub struct SmoothSlopes<'a> {
+    pub kernel: &'a [f64],
     /// By that of angles.
-    pub by_log_length: Vec<f64>,
-    /// By that of lines; empty without such inputs.
-    pub by_log_line_length: Vec<f64>,
+    pub by_log_length: &'a [f64],
+    /// By that of lines.
+    pub by_log_line_length: &'a [f64],
 }
 
-/// The same of an `own` block.
-pub struct OwnSlopes {
-    pub kernel: Vec<f64>,
-    pub by_log_length: Vec<f64>,
-    pub by_log_cycles: Vec<f64>,
+/// The same of an `own` block, (count,).
+pub struct OwnSlopes<'a> {
+    pub kernel: &'a [f64],
+    pub by_log_length: &'a [f64],
+    pub by_log_cycles: &'a [f64],
 }
 
 /// The kernels of all poses.
@@ -99,14 +100,15 @@ impl PairKernels for Continuous<'_> {
     fn fill(&self, j: usize, table: &mut PairTable) {
         let (pairing, kernels) = (&self.pairings[j], &self.poses[j]);
         let waves = &self.hyper.waves;
-        table.clear(kernels.own.len(), kernels.products.len(), waves.len(), pairing.count);
-        let copy = |column: &mut Vec<f64>, values: &Vec<f64>| {
+        table.clear(pairing.distances.len(), kernels.products.iter().len(), waves.len(), pairing.count);
+        let copy = |column: &mut Vec<f64>, values: &[f64]| {
             column.copy_from_slice(&values[..pairing.count]);
         };
-        table.own.iter_mut().zip(&kernels.own).for_each(|(column, own)| copy(column, &own.kernel));
+        table.own.iter_mut().zip(kernels.own()).for_each(|(column, own)| copy(column, own.kernel));
         table.sag.iter_mut().zip(&pairing.loads).for_each(|(column, loads)| copy(column, loads));
-        table.products.iter_mut().zip(&kernels.products).for_each(|(column, values)| copy(column, values));
-        copy(&mut table.smooth, &kernels.smooth.kernel);
+        let products = table.products.iter_mut().zip(kernels.products.iter());
+        products.for_each(|(column, values)| copy(column, values));
+        copy(&mut table.smooth, kernels.smooth().kernel);
         for (column, wave) in table.waves.iter_mut().zip(waves) {
             let value = |pose: usize| self.training.values_of(pose)[wave.joint];
             for (i, out) in column.iter_mut().enumerate() {
@@ -128,74 +130,84 @@ impl Kernel for Fill<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) -> PoseKernels {
         let Self { pairing: Pairing { distances, count, .. }, inputs, hyper } = self;
-        let mut own = Vec::with_capacity(distances.len());
-        let mut smooth = SmoothSlopes::zeros(*count, inputs);
-        for (input, distances) in inputs.iter().zip(distances) {
-            own.push(OwnSlopes::new::<I>(OwnKernel::of(hyper, input.kind), distances));
-            smooth.add::<I>(input, distances, hyper);
+        let length = padded(*count);
+        let mut own = Columns::zeros(PER_INPUT * inputs.len(), length);
+        let mut smooth = Columns::zeros(PER_INPUT, length);
+        for ((input, distances), slopes) in inputs.iter().zip(distances).zip(own.iter_mut_by()) {
+            write_own::<I>(OwnKernel::of(hyper, input.kind), distances, slopes);
+            for sums in smooth.iter_mut_by() {
+                add_smooth::<I>(input, distances, hyper, sums);
+            }
         }
-        let mut products = Vec::with_capacity(hyper.products.len());
-        for product in &hyper.products {
-            products.push(product_kernels::<I>(product, distances, *count));
+        let mut products = Columns::zeros(hyper.products.len(), length);
+        for (product, kernels) in hyper.products.iter().zip(products.iter_mut()) {
+            write_product::<I>(product, distances, kernels);
         }
         PoseKernels { own, smooth, products }
     }
 }
 
-impl OwnSlopes {
-    #[inline(always)]
-    fn new<I: Isa>(kernel: OwnKernel, distances: &[f64]) -> Self {
-        let zeros = || vec![0.0; distances.len()];
-        let mut slopes = Self { kernel: zeros(), by_log_length: zeros(), by_log_cycles: zeros() };
-        let (kernels, lengths) = (runs_mut(&mut slopes.kernel), runs_mut(&mut slopes.by_log_length));
-        let outputs = kernels.iter_mut().zip(lengths).zip(runs_mut(&mut slopes.by_log_cycles));
-        for (distance, ((value, by_length), by_cycles)) in runs(distances).iter().zip(outputs) {
-            let found = kernel.of_lane::<I>(Lane(*distance));
-            *value = found.kernel.0;
-            *by_length = found.by_log_length.0;
-            *by_cycles = found.by_log_cycles.0;
-        }
-        slopes
-    }
-}
+/// A kernel, and its derivatives by two logarithms.
+const PER_INPUT: usize = 3;
 
-impl SmoothSlopes {
-    fn zeros(count: usize, inputs: &[Input]) -> Self {
-        let zeros = || vec![0.0; padded(count)];
-        let lines = inputs.iter().any(|input| input.kind == InputKind::Line);
-        let by_log_line_length = if lines { zeros() } else { Vec::new() };
-        Self { kernel: zeros(), by_log_length: zeros(), by_log_line_length }
+impl PoseKernels {
+    /// Of each input.
+    pub fn own(&self) -> impl Iterator<Item = OwnSlopes<'_>> {
+        (0..self.own.iter().len()).step_by(PER_INPUT).map(|k| OwnSlopes {
+            kernel: self.own.get(k),
+            by_log_length: self.own.get(k + 1),
+            by_log_cycles: self.own.get(k + 2),
+        })
     }
 
-    #[inline(always)]
-    fn add<I: Isa>(&mut self, input: &Input, distances: &[f64], hyper: &Hyper) {
-        let length = hyper.smooth_length_of(input);
-        let slopes = match input.kind {
-            InputKind::Angle => &mut self.by_log_length,
-            InputKind::Line => &mut self.by_log_line_length,
-        };
-        let kernels = runs_mut(&mut self.kernel);
-        for ((distance, kernel), slope) in runs(distances).iter().zip(kernels).zip(runs_mut(slopes)) {
-            let value = Shape::SquaredExponential.of::<I>(Lane(*distance), length);
-            *kernel = (Lane(*kernel) + value.kernel).0;
-            *slope = (Lane(*slope) + value.by_log_length).0;
+    /// Of all inputs.
+    pub fn smooth(&self) -> SmoothSlopes<'_> {
+        SmoothSlopes {
+            kernel: self.smooth.get(0),
+            by_log_length: self.smooth.get(1),
+            by_log_line_length: self.smooth.get(2),
         }
     }
 }
 
-/// Kernels of a product, (count,): one exponential of the sum of its exponents.
 #[inline(always)]
-fn product_kernels<I: Isa>(product: &Product, distances: &[Vec<f64>], count: usize) -> Vec<f64> {
-    let mut kernels = vec![0.0; padded(count)];
+fn write_own<I: Isa>(kernel: OwnKernel, distances: &[f64], slopes: [&mut [f64]; PER_INPUT]) {
+    let [kernels, by_length, by_cycles] = slopes.map(runs_mut);
+    let outputs = kernels.iter_mut().zip(by_length).zip(by_cycles);
+    for (distance, ((value, by_length), by_cycles)) in runs(distances).iter().zip(outputs) {
+        let found = kernel.of_lane::<I>(Lane(*distance));
+        *value = found.kernel.0;
+        *by_length = found.by_log_length.0;
+        *by_cycles = found.by_log_cycles.0;
+    }
+}
+
+#[inline(always)]
+fn add_smooth<I: Isa>(input: &Input, distances: &[f64], hyper: &Hyper, sums: [&mut [f64]; PER_INPUT]) {
+    let length = hyper.smooth_length_of(input);
+    let [kernels, by_length, by_line_length] = sums.map(runs_mut);
+    let slopes = match input.kind {
+        InputKind::Angle => by_length,
+        InputKind::Line => by_line_length,
+    };
+    for ((distance, kernel), slope) in runs(distances).iter().zip(kernels).zip(slopes) {
+        let value = Shape::SquaredExponential.of::<I>(Lane(*distance), length);
+        *kernel = (Lane(*kernel) + value.kernel).0;
+        *slope = (Lane(*slope) + value.by_log_length).0;
+    }
+}
+
+/// Kernels of a product, (count,), in place of zeros: one exponential of the sum of its exponents.
+#[inline(always)]
+fn write_product<I: Isa>(product: &Product, distances: &[Vec<f64>], kernels: &mut [f64]) {
     for (k, factor) in exponent_factors(product) {
-        for (sum, distance) in runs_mut(&mut kernels).iter_mut().zip(runs(&distances[k])) {
+        for (sum, distance) in runs_mut(kernels).iter_mut().zip(runs(&distances[k])) {
             *sum = I::mul_add(Lane(*distance), Lane::splat(-factor), Lane(*sum)).0;
         }
     }
-    for kernel in runs_mut(&mut kernels) {
+    for kernel in runs_mut(kernels) {
         *kernel = exp::<I>(Lane(*kernel)).0;
     }
-    kernels
 }
 
 /// Inputs of a product, and what their distances are multiplied with in its exponent.

@@ -15,12 +15,13 @@ use truearm_estimate::dense::{Cholesky, parallelism};
 use truearm_kinematics::{Isa, Kernel, dispatch};
 
 use crate::FieldError;
+use crate::columns::Columns;
 use crate::continuous::{Continuous, Pairing, PoseKernels, dot, exponent_factors, padded, pairings};
 use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
     AT_SMOOTH_LENGTH, AT_SMOOTH_LINE_LENGTH, Hyper, Product,
 };
-use crate::pairs::{ByColumn, ClassSums, add_products, write_covariance};
+use crate::pairs::{ByColumn, STEP, Step, add_products, step_at, write_covariance, write_step};
 use crate::product::times;
 use crate::projection::Projection;
 use crate::training::Training;
@@ -185,6 +186,14 @@ fn pulled(factor: &Cholesky, root: &Mat<f64>, residual: &[f64]) -> Vec<f64> {
     alpha
 }
 
+/// `out += scale a b` for a step of its numbers.
+#[inline(always)]
+fn add_to<I: Isa>(out: &mut [f64], start: usize, scale: f64, a: &Step, b: &Step) {
+    let mut sum = step_at(out, start);
+    add_products::<I>(&mut sum, scale, a, b);
+    write_step(out, start, &sum);
+}
+
 /// The columns of one pose's share of the gradient.
 struct PoseGradient<'a> {
     evidence: &'a Evidence<'a>,
@@ -207,39 +216,27 @@ impl Kernel for PoseGradient<'_> {
     }
 }
 
-/// `(alpha alpha^T - P)[r, c] J[r, p] J[c, p]` summed over the pose's rows c and the columns p of a kind; by row r
-/// while it is gathered, by pose in the end.
+/// `(alpha alpha^T - P)[r, c] J[r, p] J[c, p]` summed over the rows c of a pose, the rows r of one from it on, and the columns p
+/// of a kind: constants of each class, what blocks drive of each class, `own` of each input.
 struct Shares {
-    constants: [Vec<f64>; 3],
-    classes: [Vec<f64>; 3],
-    own: Vec<Vec<f64>>,
+    sums: Columns,
     noise: [f64; 2],
 }
 
 impl Shares {
-    fn zeros(rows: usize, inputs: usize) -> Self {
-        let zeros = || vec![0.0; rows];
-        Self {
-            constants: [zeros(), zeros(), zeros()],
-            classes: [zeros(), zeros(), zeros()],
-            own: vec![zeros(); inputs],
-            noise: [0.0; 2],
-        }
+    const CLASSES: usize = 3;
+    const OWN: usize = 6;
+
+    fn constants(&self) -> impl Iterator<Item = &[f64]> {
+        self.sums.iter().take(Self::CLASSES)
     }
 
-    /// Sums the rows of each of so many poses, in runs of eight.
-    fn by_pose(self, poses: &[usize], count: usize) -> Self {
-        let sum = |rows: Vec<f64>| {
-            let mut sums = vec![0.0; padded(count)];
-            poses.iter().zip(&rows).for_each(|(pose, value)| sums[pose - poses[0]] += value);
-            sums
-        };
-        Self {
-            constants: self.constants.map(sum),
-            classes: self.classes.map(sum),
-            own: self.own.into_iter().map(sum).collect(),
-            noise: self.noise,
-        }
+    fn classes(&self) -> impl Iterator<Item = &[f64]> {
+        self.sums.iter().take(Self::OWN).skip(Self::CLASSES)
+    }
+
+    fn own(&self) -> impl Iterator<Item = &[f64]> {
+        self.sums.iter().skip(Self::OWN)
     }
 }
 
@@ -250,25 +247,56 @@ impl PoseGradient<'_> {
         let by_column = &self.evidence.by_column;
         let rows = training.rows(self.pose);
         let first = rows.start;
-        let mut shares = Shares::zeros(by_column.rows - first, by_column.own.len());
-        let mut sums = ClassSums::default();
-        let mut weights = vec![0.0; by_column.rows - first];
-        for row in rows {
-            sums.fill::<I>(by_column, row, first);
-            self.weights(row, first, &mut weights);
-            let noise = training.noise_slope(row, self.hyper.noise);
-            shares.noise[usize::from(training.is_orientation[row])] += weights[row - first] * noise;
-            let kinds = shares.constants.iter_mut().chain(&mut shares.classes);
-            for (share, sums) in kinds.zip(sums.constants.iter().chain(&sums.classes)) {
-                add_products(share, sums, &weights, 1.0);
-            }
-            for (own, share) in by_column.own.iter().zip(&mut shares.own) {
-                let Some((p, lever)) = own else { continue };
-                let factor = lever * lever * by_column.entry(*p, row);
-                add_products(share, by_column.column(*p, first), &weights, factor);
+        let room = (by_column.rows - first).next_multiple_of(STEP);
+        let (mut weights, mut noise) = (Columns::zeros(rows.len(), room), [0.0; 2]);
+        for (row, weights) in rows.clone().zip(weights.iter_mut()) {
+            self.weights(row, first, &mut weights[..by_column.rows - first]);
+            let slope = training.noise_slope(row, self.hyper.noise);
+            noise[usize::from(training.is_orientation[row])] += weights[row - first] * slope;
+        }
+        let mut by_row = Columns::zeros(Shares::OWN + by_column.own.len(), room);
+        for start in (0..room).step_by(STEP) {
+            for (row, weights) in rows.clone().zip(weights.iter()) {
+                self.add_row::<I>(row, (first, start), &step_at(weights, start), &mut by_row);
             }
         }
-        shares.by_pose(&by_column.pose[first..], training.pose_count() - self.pose)
+        Shares { sums: self.by_pose(first, &by_row), noise }
+    }
+
+    /// Adds what one row has with a step of rows, from that many behind the pose's first one on.
+    #[inline(always)]
+    fn add_row<I: Isa>(
+        &self,
+        row: usize,
+        (first, start): (usize, usize),
+        weights: &Step,
+        by_row: &mut Columns,
+    ) {
+        let by_column = &self.evidence.by_column;
+        let sums = by_column.class_sums::<I>(row, first + start);
+        for (k, sums) in sums.constants.iter().chain(&sums.classes).enumerate() {
+            add_to::<I>(by_row.get_mut(k), start, 1.0, sums, weights);
+        }
+        for (k, own) in by_column.own.iter().enumerate() {
+            let Some((p, lever)) = own else { continue };
+            let factor = lever * lever * by_column.entry(*p, row);
+            let entries = by_column.step(*p, first + start);
+            add_to::<I>(by_row.get_mut(Shares::OWN + k), start, factor, &entries, weights);
+        }
+    }
+
+    /// Sums over the rows of each pose from this one on, in runs of eight; columns of rows from `first` on.
+    fn by_pose(&self, first: usize, by_row: &Columns) -> Columns {
+        let training = self.evidence.training;
+        let poses = self.pose..training.pose_count();
+        let mut by_pose = Columns::zeros(by_row.iter().len(), padded(poses.len()));
+        for (sums, values) in by_pose.iter_mut().zip(by_row.iter()) {
+            for (sum, pose) in sums.iter_mut().zip(poses.clone()) {
+                let rows = training.rows(pose);
+                *sum = values[rows.start - first..rows.end - first].iter().sum();
+            }
+        }
+        by_pose
     }
 
     /// `(alpha alpha^T - P)[r, row]` for rows r from `first` on, doubled for the poses after this one.
@@ -293,16 +321,16 @@ impl PoseGradient<'_> {
         let hyper = self.hyper;
         let mut gradient = vec![0.0; hyper.to_logs().len()];
         let noise = gradient.len() - 2;
-        for (class, (factor, share)) in hyper.constant.iter().zip(&shares.constants).enumerate() {
+        for (class, (factor, share)) in hyper.constant.iter().zip(shares.constants()).enumerate() {
             gradient[AT_CONSTANT + class] = factor.powi(2) * share.iter().sum::<f64>();
         }
-        let anew: f64 = shares.own.iter().map(|share| share[0]).sum();
+        let anew: f64 = shares.own().map(|share| share[0]).sum();
         gradient[AT_REPEATABILITY] = hyper.repeatability.powi(2) * anew;
         gradient[noise] = shares.noise[0];
         gradient[noise + 1] = shares.noise[1];
         self.contract_single(shares, &mut gradient);
         let mut first = AT_PRODUCTS;
-        for (product, kernels) in hyper.products.iter().zip(&self.kernels.products) {
+        for (product, kernels) in hyper.products.iter().zip(self.kernels.products.iter()) {
             self.contract_product(product, kernels, shares, &mut gradient[first..first + product.len()]);
             first += product.len();
         }
@@ -314,20 +342,20 @@ impl PoseGradient<'_> {
     fn contract_single(&self, shares: &Shares, gradient: &mut [f64]) {
         let hyper = self.hyper;
         let (own, sag) = (hyper.own.powi(2), hyper.sag.powi(2));
-        for (kernels, share) in self.kernels.own.iter().zip(&shares.own) {
-            gradient[AT_OWN] += own * dot(share, &kernels.kernel);
-            gradient[AT_OWN_LENGTH] += 0.5 * own * dot(share, &kernels.by_log_length);
-            gradient[AT_OWN_CYCLES] += 0.5 * own * dot(share, &kernels.by_log_cycles);
+        for (kernels, share) in self.kernels.own().zip(shares.own()) {
+            gradient[AT_OWN] += own * dot(share, kernels.kernel);
+            gradient[AT_OWN_LENGTH] += 0.5 * own * dot(share, kernels.by_log_length);
+            gradient[AT_OWN_CYCLES] += 0.5 * own * dot(share, kernels.by_log_cycles);
         }
-        for (loads, share) in self.evidence.pairings[self.pose].loads.iter().zip(&shares.own) {
+        for (loads, share) in self.evidence.pairings[self.pose].loads.iter().zip(shares.own()) {
             gradient[AT_SAG] += sag * dot(share, loads);
         }
-        let smooth = &self.kernels.smooth;
-        for (class, shares) in shares.classes.iter().enumerate() {
+        let smooth = self.kernels.smooth();
+        for (class, shares) in shares.classes().enumerate() {
             let variance = hyper.smooth[class].powi(2);
-            gradient[AT_SMOOTH + class] += variance * dot(shares, &smooth.kernel);
-            gradient[AT_SMOOTH_LENGTH] += 0.5 * variance * dot(shares, &smooth.by_log_length);
-            gradient[AT_SMOOTH_LINE_LENGTH] += 0.5 * variance * dot(shares, &smooth.by_log_line_length);
+            gradient[AT_SMOOTH + class] += variance * dot(shares, smooth.kernel);
+            gradient[AT_SMOOTH_LENGTH] += 0.5 * variance * dot(shares, smooth.by_log_length);
+            gradient[AT_SMOOTH_LINE_LENGTH] += 0.5 * variance * dot(shares, smooth.by_log_line_length);
         }
     }
 
@@ -336,11 +364,13 @@ impl PoseGradient<'_> {
     fn contract_product(&self, product: &Product, kernels: &[f64], shares: &Shares, gradient: &mut [f64]) {
         let mut total = vec![0.0; kernels.len()];
         for (slope, (amplitude, shares)) in
-            gradient.iter_mut().zip(product.amplitudes.iter().zip(&shares.classes))
+            gradient.iter_mut().zip(product.amplitudes.iter().zip(shares.classes()))
         {
             let variance = amplitude.powi(2);
             *slope += variance * dot(shares, kernels);
-            add_products(&mut total, shares, kernels, variance);
+            for (sum, (share, kernel)) in total.iter_mut().zip(shares.iter().zip(kernels)) {
+                *sum += variance * share * kernel;
+            }
         }
         for (slope, (k, factor)) in gradient[3..].iter_mut().zip(exponent_factors(product)) {
             *slope += factor * dot(&total, &self.evidence.pairings[self.pose].distances[k]);

@@ -17,6 +17,7 @@ extern crate self as truearm_field;
 mod bank;
 mod cells;
 pub mod cmac;
+mod columns;
 mod compass;
 mod compiled;
 mod compiled_axis;

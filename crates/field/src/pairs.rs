@@ -3,8 +3,8 @@
 //! For rows r of pose i and c of pose j,
 //! `K[r, c] = sum_p J[r, p] J[c, p] (constant^2 constant_p^2 + own^2 k_own + sag^2 k_sag + sum wave^2 k_wave + (smooth^2 k_smooth + sum product^2 k_product) of p's class)`,
 //! and within one pose what its joints do not repeat.
-//! The sums over the parameters of a class are formed first, for all rows at once, so that the inner loops run over
-//! contiguous rows; nothing of the size of the matrix is kept but the matrix.
+//! The sums over the parameters of a class are formed first, for a step of rows r at once and in registers; nothing of the size
+//! of the matrix is kept but the matrix.
 
 use faer::prelude::ReborrowMut;
 use faer::{ColRef, MatMut};
@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
+use crate::columns::Columns;
 use crate::hyper::Hyper;
 use crate::kernel::InputKind;
 use crate::training::{Class, Training};
@@ -78,7 +79,11 @@ struct Group {
 }
 
 /// Rows that are summed at a time: sums stay in registers.
-const STEP: usize = 4 * LANES;
+pub const STEP: usize = 4 * LANES;
+/// A number for each of a step's rows.
+pub type Step = [Lane; STEP / LANES];
+
+const NOTHING: Step = [Lane::ZERO; STEP / LANES];
 
 impl ByColumn {
     /// The columns of a training set's Jacobian.
@@ -128,76 +133,76 @@ impl ByColumn {
         }
     }
 
-    /// Column `p` from row `first` on.
-    #[inline(always)]
-    pub fn column(&self, p: usize, first: usize) -> &[f64] {
-        &self.from(p, first)[..self.rows - first]
-    }
-
     /// Entry of a row.
     #[inline(always)]
     pub fn entry(&self, p: usize, row: usize) -> f64 {
         self.jacobian[p * (self.rows + STEP) + row]
     }
 
-    /// Column `p` from row `first` on, with zeros behind it for a whole step.
+    /// A step of column `p` from row `first` on, which is none behind the last; zeros behind the rows.
     #[inline(always)]
-    fn from(&self, p: usize, first: usize) -> &[f64] {
-        let width = self.rows + STEP;
-        &self.jacobian[p * width + first..(p + 1) * width]
+    pub fn step(&self, p: usize, first: usize) -> Step {
+        let start = p * (self.rows + STEP) + first;
+        step_at(&self.jacobian[start..start + STEP], 0)
     }
-}
 
-/// Sums over the parameters of each class for one row c, over rows r from the pose's first on.
-#[derive(Default)]
-pub struct ClassSums {
-    /// Weighed with the prior variances of the constants.
-    pub constants: [Vec<f64>; 3],
-    /// Of what blocks drive.
-    pub classes: [Vec<f64>; 3],
-}
-
-impl ClassSums {
-    /// Sums for a row, with the rows from `first` on.
+    /// Sums over the parameters of each class of the entries of a row times those of a step of rows from `first` on.
     #[inline(always)]
-    pub fn fill<I: Isa>(&mut self, by_column: &ByColumn, row: usize, first: usize) {
-        let count = by_column.rows - first;
-        let room = count.next_multiple_of(STEP);
-        self.constants.iter_mut().chain(&mut self.classes).for_each(|sums| sums.resize(room, 0.0));
-        for start in (0..room).step_by(STEP) {
-            let mut constants = [[Lane::ZERO; STEP / LANES]; 3];
-            let mut classes = constants;
-            for group in &by_column.groups {
-                let mut sum = [Lane::ZERO; STEP / LANES];
-                for &p in &group.columns {
-                    let factor = Lane::splat(by_column.entry(p, row));
-                    let values = by_column.from(p, first + start)[..STEP].as_chunks().0;
-                    for (sum, values) in sum.iter_mut().zip(values) {
-                        *sum = I::mul_add(factor, Lane(*values), *sum);
-                    }
-                }
-                let variance = Lane::splat(group.constant);
-                for (total, sum) in constants[group.class].iter_mut().zip(&sum) {
-                    *total = I::mul_add(variance, *sum, *total);
-                }
-                if group.driven {
-                    for (total, sum) in classes[group.class].iter_mut().zip(&sum) {
-                        *total += *sum;
-                    }
-                }
+    pub fn class_sums<I: Isa>(&self, row: usize, first: usize) -> ClassSums {
+        let mut sums = ClassSums { constants: [NOTHING; 3], classes: [NOTHING; 3] };
+        for group in &self.groups {
+            let mut sum = NOTHING;
+            for &p in &group.columns {
+                add_scaled::<I>(&mut sum, self.entry(p, row), &self.step(p, first));
             }
-            let all = self.constants.iter_mut().chain(&mut self.classes);
-            for (sums, found) in all.zip(constants.iter().chain(&classes)) {
-                write(&mut sums[start..start + STEP], found);
+            add_scaled::<I>(&mut sums.constants[group.class], group.constant, &sum);
+            if group.driven {
+                add_scaled::<I>(&mut sums.classes[group.class], 1.0, &sum);
             }
         }
+        sums
     }
 }
 
+/// Sums over the parameters of each class for one row c and a step of rows r.
+pub struct ClassSums {
+    /// Weighed with the prior variances of the constants.
+    pub constants: [Step; 3],
+    /// Of what blocks drive.
+    pub classes: [Step; 3],
+}
+
+/// A step of numbers of whole steps.
 #[inline(always)]
-fn write(out: &mut [f64], lanes: &[Lane; STEP / LANES]) {
-    for (out, lane) in out.as_chunks_mut().0.iter_mut().zip(lanes) {
+pub fn step_at(values: &[f64], start: usize) -> Step {
+    let mut step = NOTHING;
+    for (lane, values) in step.iter_mut().zip(values[start..start + STEP].as_chunks().0) {
+        *lane = Lane(*values);
+    }
+    step
+}
+
+/// Writes a step of numbers of whole steps.
+#[inline(always)]
+pub fn write_step(out: &mut [f64], start: usize, step: &Step) {
+    for (out, lane) in out[start..start + STEP].as_chunks_mut().0.iter_mut().zip(step) {
         *out = lane.0;
+    }
+}
+
+/// `sum += factor values`.
+#[inline(always)]
+pub fn add_scaled<I: Isa>(sum: &mut Step, factor: f64, values: &Step) {
+    for (sum, value) in sum.iter_mut().zip(values) {
+        *sum = I::mul_add(Lane::splat(factor), *value, *sum);
+    }
+}
+
+/// `sum += scale a b`.
+#[inline(always)]
+pub fn add_products<I: Isa>(sum: &mut Step, scale: f64, a: &Step, b: &Step) {
+    for ((sum, a), b) in sum.iter_mut().zip(a).zip(b) {
+        *sum = I::mul_add(*a * scale, *b, *sum);
     }
 }
 
@@ -249,10 +254,11 @@ impl RowFactors {
     }
 }
 
-/// Values of poses from `first` on, for each row the one of its pose.
+/// Values of poses from `first` on, for each row the one of its pose; in whole steps.
 fn repeat(values: &[f64], poses: &[usize], first: usize, out: &mut Vec<f64>) {
     out.clear();
     out.extend(poses.iter().map(|pose| values[pose - first]));
+    out.resize(poses.len().next_multiple_of(STEP), 0.0);
 }
 
 struct PoseColumns<'a> {
@@ -269,37 +275,42 @@ impl Kernel for PoseColumns<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        let Self { training, by_column, hyper, factors, pose, mut out } = self;
-        let rows = training.rows(pose);
-        let first = rows.start;
-        let mut column = Vec::new();
-        let mut sums = ClassSums::default();
-        for (k, row) in rows.enumerate() {
-            sums.fill::<I>(by_column, row, first);
-            column.clear();
-            column.resize(by_column.rows - first, 0.0);
-            for (sums, factor) in sums.constants.iter().zip(&hyper.constant) {
-                let variance = factor * factor;
-                column.iter_mut().zip(sums).for_each(|(value, sum)| *value += variance * sum);
+        let rows = self.training.rows(self.pose);
+        let (first, count) = (rows.start, self.by_column.rows - rows.start);
+        let room = count.next_multiple_of(STEP);
+        let mut columns = Columns::zeros(rows.len(), room);
+        for start in (0..room).step_by(STEP) {
+            for (row, column) in rows.clone().zip(columns.iter_mut()) {
+                write_step(column, start, &self.step::<I>(row, (first, start)));
             }
-            for (sums, factors) in sums.classes.iter().zip(&factors.classes) {
-                add_products(&mut column, sums, factors, 1.0);
-            }
-            for (own, factors) in by_column.own.iter().zip(&factors.own) {
-                let Some((p, _)) = own else { continue };
-                add_products(&mut column, by_column.column(*p, first), factors, by_column.entry(*p, row));
-            }
-            let mut out = out.rb_mut().col_mut(k).subrows_mut(first, column.len());
-            out.copy_from(ColRef::from_slice(&column));
+        }
+        let mut out = self.out;
+        for (k, column) in columns.iter().enumerate() {
+            let mut out = out.rb_mut().col_mut(k).subrows_mut(first, count);
+            out.copy_from(ColRef::from_slice(&column[..count]));
         }
     }
 }
 
-/// `out += scale a b`, element by element.
-#[inline(always)]
-pub fn add_products(out: &mut [f64], a: &[f64], b: &[f64], scale: f64) {
-    for ((value, x), y) in out.iter_mut().zip(a).zip(b) {
-        *value += scale * x * y;
+impl PoseColumns<'_> {
+    /// Covariances of a row with a step of rows, from that many behind the pose's first one on.
+    #[inline(always)]
+    fn step<I: Isa>(&self, row: usize, (first, start): (usize, usize)) -> Step {
+        let Self { by_column, hyper, factors, .. } = self;
+        let sums = by_column.class_sums::<I>(row, first + start);
+        let mut total = NOTHING;
+        for (sums, factor) in sums.constants.iter().zip(&hyper.constant) {
+            add_scaled::<I>(&mut total, factor * factor, sums);
+        }
+        for (sums, factors) in sums.classes.iter().zip(&factors.classes) {
+            add_products::<I>(&mut total, 1.0, sums, &step_at(factors, start));
+        }
+        for (own, factors) in by_column.own.iter().zip(&factors.own) {
+            let Some((p, _)) = own else { continue };
+            let entries = by_column.step(*p, first + start);
+            add_products::<I>(&mut total, by_column.entry(*p, row), &entries, &step_at(factors, start));
+        }
+        total
     }
 }
 
