@@ -1,5 +1,7 @@
 """Calibrating virtual arms whose errors are known."""
 
+from importlib.metadata import version
+
 import numpy as np
 import pytest
 
@@ -453,7 +455,9 @@ def test_tools_that_are_none(variable):
 def test_public_names_are_found_on_the_package():
     for name in ta.__all__:
         assert getattr(ta, name).__name__ == name
-    assert set(ta.__all__) <= set(dir(ta))
+    assert {name for name in dir(ta) if not name.startswith("_")} == set(ta.__all__)
+    assert ta.__version__ == version("truearm")
+    assert "__version__" in dir(ta)
     with pytest.raises(AttributeError, match="nonsense"):
         _ = ta.nonsense
 

@@ -13,7 +13,7 @@ from truearm.cell.examples import EXAMPLES, example
 from truearm.cell.opening import open_session
 from truearm.cell.poses_file import Poses
 from truearm.cell.sequence import steps_of
-from truearm.cell.session import Session
+from truearm.cell.session import Session, Step
 from truearm.errors import InputError, WorkError
 from truearm.robot import Robot
 from truearm.rotations import transform_from_parts
@@ -173,6 +173,21 @@ def test_one_process_writes_and_any_reads(cell, poses, tmp_path):
             assert step is not None
             assert step.step == 0
     open_session(path, cell, poses).close()
+
+
+def test_of_two_processes_that_begin_a_session_one_has_it(tmp_path):
+    path = tmp_path / "session.db"
+    steps = [Step(0, "pose", 0, "", 0, np.zeros(5))]
+    with Session.create(path, steps, {"who": "first"}) as first:
+        with pytest.raises(WorkError, match="another process is measuring into this session"):
+            Session.create(path, steps, {"who": "second"})
+        first.add_event("remark", "still here")
+    with pytest.raises(WorkError, match="another process has made this session meanwhile"):
+        Session.create(path, steps, {"who": "third"})
+    with Session(path, writing=True) as known:
+        assert known.meta("who") == "first"
+        assert known.rows("SELECT message FROM events") == [("still here",)]
+    assert {place.name for place in tmp_path.iterdir()} <= {"session.db", "session.db.lock"}
 
 
 def test_a_link_to_a_session_is_that_session(cell, poses, tmp_path):

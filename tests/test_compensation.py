@@ -1,11 +1,16 @@
 """Compensation as a user calls it: the real tool goes where the program means it, and bounds are kept."""
 
+import time
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.compensation import TOOLS_KEPT
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.solving import beyond_learnt
 
@@ -74,6 +79,39 @@ def test_one_waypoint_is_that_of_the_path(calibration):
     for row, corrected in zip(PATH, together.q, strict=True):
         assert np.array_equal(compensator.correct(row), corrected)
     assert np.array_equal(compensator.joints(PATH[3]).q, together.q[3:4])
+
+
+def test_what_was_corrected_stays_what_it_was(constant):
+    given = PATH.copy()
+    found = ta.Compensator(constant).joints(given)
+    given += 1.0
+    assert np.array_equal(found.nominal, PATH)
+
+
+class Dawdling(OrderedDict[Any, Any]):
+    """Other threads have their turn between what it finds and what is done with that."""
+
+    def get(self, key: Any, default: Any = None) -> Any:
+        found = super().get(key, default)
+        time.sleep(1e-4)
+        return found
+
+    def __contains__(self, key: object) -> bool:
+        return self.get(key) is not None
+
+
+def test_threads_share_a_compensator(constant):
+    compensator = ta.Compensator(constant, limits=OPEN)
+    compensator._correctors = Dawdling()
+    tools = [np.array([0.0, 0.0, 0.001 * k]) for k in range(3 * TOOLS_KEPT)]
+    alone = [ta.Compensator(constant, limits=OPEN).correct(PATH[0], tool=tool) for tool in tools]
+
+    def all_right(seed):
+        drawn = np.random.default_rng(seed).integers(len(tools), size=100)
+        return all(np.array_equal(compensator.correct(PATH[0], tool=tools[k]), alone[k]) for k in drawn)
+
+    with ThreadPoolExecutor(6) as pool:
+        assert all(pool.map(all_right, range(6)))
 
 
 def test_inverse_kinematics_of_the_calibrated_arm(calibration):
@@ -216,7 +254,7 @@ def test_standard_deviations_of_constants_are_the_calibrations(constant):
         (lambda c: ta.Compensator(c, features={"t": 1.0}), "The calibration needs none"),
         (lambda c: ta.Compensator(c).joints(np.zeros((2, 5))), "must be \\(n, 6\\)"),
         (lambda c: ta.Compensator(c).joints([[np.nan] * 6]), "NaN or infinite"),
-        (lambda c: ta.Compensator(c).joints(PATH, tool=2 * np.eye(4)), "its last row 0 0 0 1"),
+        (lambda c: ta.Compensator(c).joints(PATH, tool=2 * np.eye(4)), "the last row is 0 0 0 2"),
         (lambda c: ta.Compensator(c).joints(PATH, tool=np.diag([2.0, 1, 1, 1])), "the tool"),
         (lambda c: ta.Compensator(c).correct([0.0] * 5), "5 readings"),
         (lambda c: ta.Compensator(c).correct("home"), "could not convert"),

@@ -186,3 +186,20 @@ def test_registration_finds_a_known_frame():
     np.testing.assert_allclose(register(points, in_world, none, none, 0.0), truth, atol=1e-12)
     one = register(points[:1], in_world[:1], turned[:3], truth[:3, :3] @ turned[:3], 0.5)
     np.testing.assert_allclose(one, truth, atol=1e-12)
+
+
+def test_a_set_up_without_the_judged_target_is_named():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
+    table = arm.measure_table(arm.poses(80)).assign(group=["a"] * 40 + ["b"] * 40)
+    table[["x2", "y2", "z2"]] = table[["x", "y", "z"]]
+    data = ta.Measurements.from_dataframe(table)
+    calibration = ta.calibrate(arm.robot, data, model="constant", judge_target=2)
+    table.loc[40:, ["x2", "y2", "z2"]] = np.nan
+    lacking = ta.Measurements.from_dataframe(table)
+    for call in (
+        lambda: ta.calibrate(arm.robot, lacking, model="constant", judge_target=2),
+        lambda: ta.evaluate(calibration, lacking, judge_target=2),
+    ):
+        with pytest.raises(ta.InputError, match=r'target 2 was measured in none of the rows .*"b"'):
+            call()
+    assert ta.calibrate(arm.robot, lacking, model="constant").validation.n_holdout == 24

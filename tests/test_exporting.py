@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import re
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -383,6 +384,15 @@ def test_samples_say_at_which_features(tmp_path):
     calibration = ta.calibrate(robot, ta.Measurements.from_dataframe(table), features=("warmth",))
     made = export(calibration, "field-csv", options=Options(grid="q1=3", features={"warmth": 21.5}))
     assert "# Features: warmth 21.5." in made.text
+    number: Any = np.float32(21.5)
+    again = export(calibration, "field-csv", options=Options(grid="q1=3", features={"warmth": number}))
+    assert again.text == made.text
+
+
+def test_samples_are_of_one_number_of_each_feature():
+    several: Any = {"warmth": [20.0, 21.0, 22.0]}
+    with pytest.raises(UsageError, match='the feature "warmth" is .*It must be a number'):
+        Options(features=several)
 
 
 def test_without_a_grid_samples_cover_the_measured_readings(variable):

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from truearm.errors import InputError
-from truearm.files import write_all, write_whole
+from truearm.files import make_directory, read_bytes, write_all, write_whole
 
 
 def test_a_link_stays_one_and_what_it_leads_to_is_written(tmp_path):
@@ -78,3 +78,35 @@ def test_threads_leave_the_mask_of_new_files_alone(tmp_path):
 def _write_many(folder, name):
     for number in range(50):
         write_whole(folder / f"{name}{number}", "text")
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o600, 0o444, 0o666])
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path, mode):
+    path = tmp_path / "private.txt"
+    path.write_text("old")
+    path.chmod(mode)
+    write_whole(path, "new")
+    assert path.read_text() == "new"
+    assert path.stat().st_mode & 0o777 == mode
+
+
+@pytest.mark.parametrize("name", ["file/below", "n" * 300])
+def test_what_no_file_can_be_is_told(tmp_path, name):
+    (tmp_path / "file").write_text("a file")
+    path = tmp_path / name
+    with pytest.raises(InputError, match="this cannot be read: "):
+        read_bytes(path)
+    with pytest.raises(InputError, match="this cannot be written: "):
+        write_whole(path, "text")
+    with pytest.raises(InputError, match=r"a file is in the way|this directory cannot be made: "):
+        make_directory(path)
+    assert [place.name for place in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_directory_is_made_with_those_above_it_and_no_file_is_one(tmp_path):
+    for _ in range(2):
+        make_directory(tmp_path / "above" / "below")
+    assert (tmp_path / "above" / "below").is_dir()
+    (tmp_path / "file").write_text("a file")
+    with pytest.raises(InputError, match=r"file: a file is in the way\. A directory is needed"):
+        make_directory(tmp_path / "file")

@@ -284,6 +284,11 @@ def test_unsure_drift_beyond_a_limit_asks_for_more_poses():
     assert "measure more poses" in found.words
 
 
+def test_results_cannot_go_where_a_file_is(plant):
+    with pytest.raises(InputError, match=r"R1\.csv: a file is in the way"):
+        run_fleet(Fleet.from_toml(FIRST, folder=plant), plant / "R1.csv")
+
+
 def test_both_a_scheduler_and_workers_are_refused(plant, tmp_path):
     with pytest.raises(UsageError, match="both"):
         run_fleet(Fleet.from_toml(HEAD + arms("R1"), folder=plant), tmp_path, scheduler="a:1", workers=1)

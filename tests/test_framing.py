@@ -233,6 +233,16 @@ def test_touches_that_are_turned_about_one_axis_are_refused(exact, tmp_path):
         find_tool(model, as_data(readings(q), tmp_path / "spun.csv"), orientation=np.eye(3))
 
 
+def test_lists_of_measurements_are_put_together(exact, tmp_path):
+    model, robot = exact
+    data = touched(robot, 0, tmp_path, count=8)
+    parts = [data.select(range(4)), data.select(range(4, 8))]
+    whole, parted = (find_tool(model, given, orientation=TOOL[:3, :3]) for given in (data, parts))
+    np.testing.assert_array_equal(parted.transform, whole.transform)
+    with pytest.raises(InputError, match="no place x, y, z of every touched point"):
+        find_object(model, parts, TOOL)
+
+
 def test_too_little_is_refused(exact, tmp_path):
     model, robot = exact
     data = touched(robot, 0, tmp_path, count=8)
@@ -242,7 +252,11 @@ def test_too_little_is_refused(exact, tmp_path):
         find_tool(model, data)
     with pytest.raises(InputError, match="no rotation matrix"):
         find_tool(model, data, orientation=np.ones((3, 3)))
-    with pytest.raises(InputError, match="no rotation matrix"):
+    with pytest.raises(InputError, match="the orientation is no rotation matrix: R mirrors"):
+        find_tool(model, data, orientation=-np.eye(3))
+    with pytest.raises(InputError, match=r"the orientation has shape \(4, 4\)"):
+        find_tool(model, data, orientation=np.eye(4))
+    with pytest.raises(InputError, match="the entries of the orientation hold NaN"):
         find_tool(model, data, orientation=np.full((3, 3), np.nan))
     with pytest.raises(InputError, match="no place x, y, z of every touched point"):
         find_object(model, data, TOOL)

@@ -179,6 +179,12 @@ def test_branches_of_many_poses_are_those_of_each():
     assert solver.branches(np.empty((0, 4, 4))).shape == (0, 0, 6)
 
 
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_solutions_are_those_of_one_pose(count):
+    with pytest.raises(InputError, match=rf"shape \({count}, 4, 4\).*branches\(\) and near\(\)"):
+        SOLVERS["ur5"].solutions(np.tile(np.eye(4), (count, 1, 1)))
+
+
 def test_a_wrist_in_line_keeps_the_seed():
     for name in ("kuka-kr-6-r900", "ur10"):
         solver = SOLVERS[name]
@@ -229,7 +235,7 @@ def test_what_is_out_of_reach_is_said_by_number():
         (np.eye(3), np.zeros(6), r"shape \(3, 3\)"),
         (2.0 * np.eye(4), np.zeros(6), "not rigid in row 0"),
         (np.full((4, 4), np.nan), np.zeros(6), "NaN"),
-        (np.diag([1.0, 1.0, -1.0, 1.0]), np.zeros(6), "no mirror"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), np.zeros(6), "R mirrors"),
         (np.eye(4), np.zeros(5), r"\(n, 6\)"),
         (np.eye(4), np.full(6, np.nan), "seeds hold NaN"),
         (np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 6)), "3 seeds for 2 poses"),

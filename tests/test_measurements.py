@@ -1,5 +1,6 @@
 """Measurements: what is in the file is what is fitted, in SI."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -286,3 +287,57 @@ def test_public_data(shared_data: Path, name: str, count: int, joints: int, targ
     table = np.genfromtxt(shared_data / f"{name}.csv", delimiter=",", names=True)
     np.testing.assert_array_equal(data.readings[:, 0], table["q1"])
     np.testing.assert_array_equal(data.targets[:, 0], np.column_stack([table[axis] for axis in "xyz"]))
+
+
+def test_tables_of_one_name_are_set_ups_of_their_own(tmp_path: Path) -> None:
+    tables = [Measurements.from_dataframe(frame().assign(x=float(k))) for k in range(3)]
+    together = Measurements.of(tables)
+    assert together.groups == together.files == ["data", "data 2", "data 3"]
+    again = Measurements.concatenate([Measurements.of(tables[:2]), tables[1], tables[2]])
+    assert again.groups == ["data", "data 2", "data 3"]
+    assert again.deduplicated().hash() == together.hash()
+    for folder in ("monday", "tuesday"):
+        (tmp_path / folder).mkdir()
+    paths = [write(tmp_path / "monday"), write(tmp_path / "tuesday")]
+    listed = Measurements.of([Measurements.read_csv(path) for path in paths])
+    files = Measurements.read_files(paths)
+    assert listed.groups == files.groups == [str(path) for path in paths]
+    assert listed.hash() == files.hash()
+    assert Measurements.of([files, Measurements.read_csv(paths[0])]).groups == files.groups
+
+
+def test_names_that_are_stated_and_parts_of_one_table_stay_together() -> None:
+    named = [Measurements.from_dataframe(frame().assign(group="lab", x=float(k))) for k in range(2)]
+    assert Measurements.of(named).groups == ["lab"]
+    data = Measurements.from_dataframe(frame())
+    parts = [data.select([0, 1]), data.select([1, 2, 3])]
+    assert Measurements.of(parts).groups == ["data"]
+    renamed = [
+        replace(part, group=np.full(len(part), "lab"))
+        for part in (data, Measurements.from_dataframe(frame().assign(x=9.0), name="b"))
+    ]
+    assert Measurements.of(renamed).groups == ["lab"]
+
+
+def test_arrays_of_the_caller_stay_the_callers() -> None:
+    data = Measurements.from_dataframe(frame().assign(load=1.0))
+    arrays: dict[str, Any] = {
+        name: np.array(getattr(data, name)) for name in ("readings", "targets", "group", "sources", "rows")
+    }
+    features = pd.DataFrame({"load": np.ones(len(data))})
+    made = replace(data, **arrays, features=features)
+    assert all(array.flags.writeable for array in arrays.values())
+    arrays["readings"][:], features["new"], features["load"] = 9.0, 1.0, 2.0
+    assert made.hash() == data.hash()
+    other = replace(made, group=np.full(len(data), "b"))
+    other.features["new"] = 1.0
+    assert list(made.features) == ["load"]
+    with pytest.raises(InputError, match="features: 2 rows. There are 6 readings"):
+        replace(data, features=pd.DataFrame({"load": [1.0, 2.0]}))
+
+
+def test_the_name_of_a_set_up_counts_in_the_hash() -> None:
+    one, two = (Measurements.from_dataframe(frame(), name=name) for name in ("one", "two"))
+    assert one.hash() != two.hash()
+    named = [Measurements.from_dataframe(frame().assign(group="a"), name=name) for name in ("one", "two")]
+    assert named[0].hash() == named[1].hash()

@@ -52,6 +52,22 @@ def test_refused_targets_stop_with_their_lines():
     assert "keep-nominal" in str(caught.value)
 
 
+@pytest.mark.parametrize("word", ["abort", "STOP", "keep_nominal", None])
+def test_what_becomes_of_refused_targets_is_one_of_two_words(word):
+    with pytest.raises(UsageError, match='on_refusal.*It is "stop" or "keep-nominal"'):
+        Choices(on_refusal=word)
+    other = Choices()
+    object.__setattr__(other, "on_refusal", word)
+    with pytest.raises(WorkError, match="cannot be corrected"):
+        rewrite(program_of(TWO), models(ABB, refuse=(1,)), other)
+
+
+def test_a_file_is_no_directory_for_what_was_rewritten(tmp_path):
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(InputError, match="a file is in the way"):
+        rewritten(program_of(TWO), models(ABB)).save(f"{tmp_path}/taken/")
+
+
 def test_refused_targets_are_kept_where_that_makes_no_step():
     program = program_of(TWO)
     done = rewritten(program, models(ABB, refuse=(1,)), on_refusal="keep-nominal")

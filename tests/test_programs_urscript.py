@@ -134,7 +134,7 @@ def test_motions_are_told_apart(robot, sample):
     moves = read(UR, sample, robot).moves
     kinds = [Motion(int(kind)).name for kind in moves.motion]
     assert kinds == [
-        "JOINT", "NONE", "JOINT", "JOINT", "LINEAR", "LINEAR", "LINEAR", "VIA", "CIRCULAR", "JOINT",
+        "JOINT", "SEED", "JOINT", "JOINT", "LINEAR", "LINEAR", "LINEAR", "VIA", "CIRCULAR", "JOINT",
     ]  # fmt: skip
     assert moves.blended.tolist() == [False, False, False, True, False, False, True, True, True, True]
 

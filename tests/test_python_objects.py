@@ -187,6 +187,8 @@ def test_an_evaluation_prints_without_its_rows(calibration, data):
     found = ta.evaluate(calibration, data)
     assert found.rows is not None
     assert len(repr(found)) < 1000
+    assert found in {found}
+    assert copy.copy(found) != found
 
 
 def test_types_that_are_needed_are_called_by_their_package(robot):

@@ -1,6 +1,7 @@
 """The robot: what its file says is what its kinematics do."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from truearm.errors import InputError
 from truearm.library import library_names
 from truearm.robot import Robot
 from truearm.robot_data import Payload
+from truearm.urdf_names import UrdfNames
 
 LINK = """
 [[link]]
@@ -121,6 +123,23 @@ def test_out_is_written_to() -> None:
 
 
 @pytest.mark.parametrize(
+    ("out", "message"),
+    [
+        (np.zeros(3), r"has shape \(3,\)\. .*with shape \(2, 3\)"),
+        (np.zeros((2, 3), dtype=np.float32), "is an array of float32"),
+        (np.zeros((2, 3), order="F"), "is not C-contiguous"),
+        (np.broadcast_to(0.0, (2, 3)), "is read-only"),
+        ([[0.0] * 3] * 2, "is of type list"),
+    ],
+)
+def test_what_results_cannot_be_written_to_is_told(out: Any, message: str) -> None:
+    with pytest.raises(InputError, match=f"out {message}"):
+        Robot.load("ur5").position(np.zeros((2, 6)), out=out)
+    with pytest.raises(InputError, match=r"writable array of float64 with shape \(6, 30\)"):
+        Robot.load("ur5").parameter_jacobian(np.zeros(6), pose=True, out=out)
+
+
+@pytest.mark.parametrize(
     ("q", "message"),
     [
         (np.zeros(5), r"shape \(5,\).*must be \(n, 6\), or \(6,\)"),
@@ -147,6 +166,22 @@ def test_a_dictionary_with_a_flange_that_is_not_rigid_is_refused() -> None:
         Robot.from_dict({**Robot.load("ur10").to_dict(), "flange": np.diag([1.0, 1.5, 1.0, 1.0]).tolist()})
 
 
+def test_transforms_that_are_not_rigid_are_refused_and_last_rows_made_exact() -> None:
+    robot = Robot.load("ur10")
+    with pytest.raises(InputError, match="tool: no rigid motion: R mirrors"):
+        replace(robot, tool=np.diag([1.0, 1.0, -1.0, 1.0]))
+    nearly = robot.pose(np.ones(6))
+    nearly[3, 0] = 1e-17
+    np.testing.assert_array_equal(replace(robot, tool=nearly).tool[3], [0.0, 0.0, 0.0, 1.0])
+
+
+def test_robots_that_are_equal_have_one_hash() -> None:
+    robot = Robot.load("ur10")
+    other = replace(robot, table=np.where(robot.table == 0.0, -0.0, robot.table))
+    assert other == robot
+    assert hash(other) == hash(robot)
+
+
 @pytest.mark.parametrize("name", library_names())
 def test_dictionary_and_toml_bring_back_the_same_robot(name: str) -> None:
     robot = Robot.load(name)
@@ -161,10 +196,9 @@ numbers = st.floats(-3.0, 3.0)
     table=st.lists(st.tuples(*[numbers] * 5), min_size=2, max_size=2),
     coupling=st.sampled_from([np.eye(2), np.diag([1.0, -1.0]), np.array([[1.0, 0.0], [0.7, -1.0]])]),
     text=st.text(min_size=1).filter(lambda t: "\r" not in t),
-    lower=st.sampled_from([-np.inf, -1.0]),
+    limits=st.sampled_from([(-np.inf, np.inf), (-1.0, 2.0), (-1.0, np.inf), (-np.inf, 2.0)]),
 )
-def test_any_robot_comes_back_bit_for_bit(table: Any, coupling: Any, text: str, lower: float) -> None:
-    upper = np.inf if np.isinf(lower) else 2.0
+def test_any_robot_comes_back_bit_for_bit(table: Any, coupling: Any, text: str, limits: Any) -> None:
     robot = Robot(
         name=text,
         source=text,
@@ -176,8 +210,9 @@ def test_any_robot_comes_back_bit_for_bit(table: Any, coupling: Any, text: str, 
         tool=np.eye(4),
         base_row=None,
         coupling=coupling,
-        limits=np.array([[lower, upper], [-0.1, 0.2]]),
+        limits=np.array([limits, [-0.1, 0.2]]),
         payload=Payload(2.5, (1.0, 2.0, 3.0)),
+        urdf_names=UrdfNames(text, ("j1", text), (text, "l2"), "tip"),
     )
     assert Robot.from_dict(json.loads(json.dumps(robot.to_dict()))) == robot
     assert Robot.from_toml(robot.to_toml()) == robot

@@ -63,7 +63,13 @@ BAD = {
         "alpha = nan",
         "link 2, alpha: nan cannot be used. Must be a finite number",
     ),
-    "infinite limit": ("[-90.0, 90.0]", "[-inf, 90.0]", "link 1, limits.*Must be a finite number"),
+    "limit that is no number": ("[-90.0, 90.0]", "[nan, 90.0]", "link 1, limits: nan to 90; the lower limit"),
+    "infinite limits swapped": ("[-90.0, 90.0]", "[inf, 90.0]", "link 1, limits: inf to 90; the lower limit"),
+    "names of another chain": (
+        "[payload]",
+        '[urdf]\nbase_link = "b"\ntip_link = "t"\njoints = ["j1"]\nlinks = ["l1", "l2"]\n[payload]',
+        r"urdf\.joints has 1 names, it must have 2",
+    ),
     "limits swapped": (
         "[-90.0, 90.0]",
         "[90.0, -90.0]",
@@ -150,3 +156,5 @@ def test_missing_file_and_directory(tmp_path: Path) -> None:
         Robot.load(tmp_path / "none.toml")
     with pytest.raises(InputError, match="this is a directory"):
         Robot.load(tmp_path)
+    with pytest.raises(InputError, match="no file of that name"):
+        Robot.load("a" * 300)

@@ -173,6 +173,10 @@ def test_the_tip_is_chosen_behind_a_hash(tmp_path: Path) -> None:
         Robot.load(f"{path}#a,camera")
     with pytest.raises(InputError, match='"base" is not behind link "a"'):
         Robot.load(f"{path}#a,base")
+    with pytest.raises(InputError, match='"base,a,camera" names 3 links.*its base link and its tip link'):
+        Robot.load(f"{path}#base,a,camera")
+    robot = Robot.load(f"{path}#base,camera")
+    assert Robot.from_toml(robot.to_toml()) == robot
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError
+from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.simulation import PAPER_PARAMETERS, Imperfections, VirtualArm
 
@@ -146,3 +147,23 @@ def _matrices(quaternions):
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows), -1, 0)
+
+
+@pytest.mark.parametrize("held", [[0], [7], [1.5], "1", 3])
+def test_joints_that_cannot_be_held_are_refused(held):
+    arm = VirtualArm(Robot.load("ur10"), seed=1)
+    with pytest.raises(InputError, match="joint|held"):
+        arm.poses(2, held=held)
+
+
+def test_held_joints_stay_at_zero():
+    arm = VirtualArm(Robot.load("ur10"), seed=1)
+    readings = arm.poses(3, held=[1, 6])
+    assert (readings[:, [0, 5]] == 0.0).all()
+    assert (readings[:, 1:5] != 0.0).all()
+
+
+def test_what_an_arm_measures_is_of_one_set_up():
+    arm = VirtualArm(Robot.load("ur10"), seed=1)
+    parts = [arm.measure(arm.poses(3, seed=k)) for k in range(2)]
+    assert Measurements.of(parts).groups == ["data"]

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from truearm.core_set import distance_count
 from truearm.errors import InputError, UsageError
 from truearm.measurements import Measurements
 from truearm.options import Options
@@ -240,3 +241,61 @@ def test_of_many_set_ups_without_training_rows_few_are_named():
     data = measured(40, group=[f"g{k}" for k in range(40)])
     with pytest.raises(InputError, match=r'"g\d+" and 7 others trains'):
         split_rows(data, SplitRule())
+
+
+def in_pairs(count, name="data"):
+    frame = table(count, pair=[f"p{k // 2}" for k in range(count)], distance=1.0)
+    return Measurements.from_dataframe(frame.drop(columns=["x", "y", "z"]), name=name)
+
+
+@pytest.mark.parametrize(("size", "taken"), [(20, 20), (21, 20), (2, 2)])
+def test_a_train_size_takes_whole_pairs(size, taken):
+    data = in_pairs(60)
+    split, whole = split_rows(data, SplitRule(train_size=size)), split_rows(data, SplitRule())
+    assert len(split.train) == taken == 2 * distance_count(data.select(split.train))
+    assert split.train.tolist() == [row for row in whole.train if row in split.train]
+    np.testing.assert_array_equal(split.holdout, whole.holdout)
+    places = [min(whole.train.tolist().index(row) for row in (k - k % 2, k - k % 2 + 1)) for k in whole.train]
+    first = sorted(set(places))[: taken // 2]
+    assert set(split.train // 2) == {whole.train[place] // 2 for place in first}
+
+
+def test_a_train_size_without_room_for_a_pair_is_refused():
+    with pytest.raises(UsageError, match="a train size of 1 holds no whole pair"):
+        split_rows(in_pairs(60), SplitRule(train_size=1))
+
+
+def test_a_train_size_is_filled_with_rows_beside_pairs():
+    frame = table(60, pair=["p"] * 2 + [""] * 58, anchor=[""] * 2 + ["ball"] * 58, distance=1.0)
+    data = Measurements.from_dataframe(frame.drop(columns=["x", "y", "z"]))
+    whole = split_rows(data, SplitRule()).train
+    for size in range(1, 41):
+        train = split_rows(data, SplitRule(train_size=size)).train
+        assert len(train) == size
+        assert len({0, 1} & set(train.tolist())) != 1
+        if not {0, 1} & set(whole[: size + 1].tolist()):
+            np.testing.assert_array_equal(train, whole[:size])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ((0, True, 0.3), "joint 0 .*counted from 1"),
+        ((1, True, 0.0), r"share in \"q1:high:0.0\" is 0.*between 0 and 1"),
+        ((1, True, 2.0), "between 0 and 1"),
+        ((1.5, True, 0.3), "joint is 1.5. It must be a whole number"),
+        ((1, "high", 0.3), "high is 'high'. It must be True or False"),
+        ((1, True, "0.3"), "share is '0.3'. It must be a number"),
+    ],
+)
+def test_ranges_that_cannot_be_made(wrong, words):
+    with pytest.raises(UsageError, match=words):
+        HoldoutRange(*wrong)
+
+
+def test_every_digit_of_a_range_is_kept():
+    tail = HoldoutRange(2, True, 1 / 3)
+    assert HoldoutRange.parse(str(tail)) == tail
+    options = Options.of(holdout_range=tail)
+    assert Options.of(**options.to_dict()) == options
+    assert SplitRule(holdout_range=str(tail)).holdout_range == tail  # type: ignore[arg-type]

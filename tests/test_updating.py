@@ -8,8 +8,10 @@ from tests.remastered import remastered, remastered_table
 from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
 from truearm.programs.notices import update_notices
+from truearm.reporting.facts import Facts
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
+from truearm.solving import beyond_learnt
 from truearm.updating.squares import SquaresTest
 
 SHIFT = np.array([0.0, 0.6, -0.2, 0.9, 0.0])
@@ -171,6 +173,20 @@ def test_heights_that_only_frame_and_tool_share_stay_together(model):
         assert checked.position.mean < 2.0 * own
     kept = ta.evaluate(found.calibration, new, keep_frames=True)
     assert kept.errors[model].position.mean < 2.0 * own
+    again = ta.update(calibration, remastered(arm, arm.poses(15, seed=9), [0.0, 0.2, 0.0, 0.0], seed=9))
+    assert again.verdict == "moved"
+    check_offset(again.offsets[1], 0.2)
+    assert again.offsets[1].std < 1.1 * found.offsets[1].std  # a moved joint spoils no place to linearise at
+
+
+def test_another_target_on_a_scara_hides_no_offset():
+    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=1)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(80)), model="constant")
+    shift = np.array([0.0, 0.5, 0.0, 0.0])
+    data = remastered(arm, arm.poses(15, seed=9), shift, seed=9, tool_mm=(30.0, -20.0, 40.0))
+    found = ta.update(calibration, data, new_tool=True)
+    assert found.verdict == "moved"
+    check_offset(found.offsets[1], shift[1])
 
 
 def test_positions_are_compared_with_a_target_whose_orientation_was_measured_too():
@@ -194,6 +210,15 @@ def test_orientations_that_the_calibration_did_not_use_are_left_out(known):
     assert found.after.orientation is None
     with pytest.raises(ta.UsageError, match="took no part in the calibration"):
         ta.update(calibration, data, use="pose")
+
+
+def test_without_rows_an_updated_calibration_holds_none_of_the_one_before(moved):
+    found = moved[1].calibration
+    stripped = found.without_rows()
+    assert stripped.to_bytes() == found.to_bytes(with_rows=False)
+    assert stripped.learned_from is None
+    with pytest.raises(ta.WorkError, match="left out when the file was stripped"):
+        _ = stripped.predecessor
 
 
 def test_every_model_is_judged_at_poses_left_out_in_turn(known, moved):
@@ -271,6 +296,21 @@ def test_an_update_is_saved_with_what_was_before(known, moved, tmp_path):
     ta.roll_back(tmp_path / "new.calib", tmp_path / "again.calib")
     with pytest.raises(ta.UsageError, match="something else already"):
         ta.roll_back(tmp_path / "new.calib", tmp_path / "new.calib")
+
+
+def test_features_were_learnt_where_the_first_calibration_was():
+    arm = VirtualArm.paper(seed=2)
+    data, later = (
+        ta.Measurements.from_dataframe(
+            arm.measure_table(arm.poses(count, seed=seed), seed=seed).assign(warmth=np.linspace(*span, count))
+        )
+        for count, seed, span in ((80, 0, (15.0, 30.0)), (20, 5, (21.0, 22.0)))
+    )
+    calibration = ta.calibrate(arm.robot, data, features=("warmth",))
+    updated = ta.update(calibration, later).calibration
+    assert beyond_learnt(updated, [28.0]) == []
+    assert beyond_learnt(updated, [31.0]) == beyond_learnt(calibration, [31.0]) != []
+    assert Facts(updated).features == {"warmth": 22.5}
 
 
 def test_an_updated_calibration_is_updated_and_rolled_back_again(known, moved, tmp_path):
@@ -359,7 +399,7 @@ def test_set_up_derivatives_are_those_of_finite_differences(known):
     task = Task(calibration.arm, select(data, None), data.groups, calibration.options)
     unknowns = Unknowns.of(calibration, task, UpdateOptions())
     scene = Scene(task, data, calibration, unknowns)
-    state = scene.start()
+    state = scene.first()
     linear = scene.linear(state)
     size = 1e-6
     for k in range(len(unknowns.std)):

@@ -28,8 +28,10 @@ class VirtualController:
         for target, environment, motion in zip(
             program.moves.target, program.moves.environment, program.moves.motion, strict=True
         ):
+            if motion == Motion.BESIDE:
+                continue
             now = self._goal(program, int(target), program.environments[int(environment)], inverse, now)
-            if motion != Motion.NONE:
+            if motion != Motion.SEED:
                 stops.append(now)
         return np.array(stops)
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from truearm.programs.compensating import compensate_program
     from truearm.programs.frames import Frames
     from truearm.programs.rewriting import Choices, Rewritten
+    from truearm.release import __version__ as __version__
     from truearm.robot import Robot
     from truearm.splitting import HoldoutRange, SplitRule
     from truearm.updating import Update, UpdateOptions, roll_back, update
@@ -61,6 +62,7 @@ __all__ = [
 ]
 
 _HOME: Final = {
+    "__version__": "release",
     "calibrate": "calibrating",
     "Calibration": "calibration",
     "Compensated": "compensation",
@@ -99,4 +101,4 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public name
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted([*__all__, "__version__", *(name for name in globals() if name.startswith("__"))])

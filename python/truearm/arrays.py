@@ -1,6 +1,6 @@
 """Arrays that come in from outside, checked once at the door: numbers, shape, finite."""
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -8,7 +8,25 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.errors import InputError, list_rows
 
 RIGID_WITHIN: Final = 1e-8
-"""How far R^T R of a rotation may be from the identity, as in the core."""
+"""How far R^T R of a rotation may be from the identity, as in the core; a last row may be as far off."""
+_IDENTITY: Final = np.eye(3)
+_LAST_ROW: Final = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class Fault(NamedTuple):
+    """What is wrong with some of n matrices.
+
+    Attributes:
+        rows: Which these are, counted from 0.
+        why: What is wrong with them.
+        rule: What they should be.
+        way_out: What the user can do about it.
+    """
+
+    rows: list[int]
+    why: str
+    rule: str
+    way_out: str
 
 
 def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
@@ -63,6 +81,27 @@ def check_finite(rows: NDArray[np.float64], *, what: str) -> None:
         )
 
 
+def check_out(out: object, *shape: int) -> None:
+    """Raise InputError unless `out` is None, or an array of `shape` that results can be written to."""
+    if out is None:
+        return
+    if not isinstance(out, np.ndarray):
+        found = f"is of type {type(out).__name__}"
+    elif out.dtype != np.float64:
+        found = f"is an array of {out.dtype}"
+    elif out.shape != shape:
+        found = f"has shape {out.shape}"
+    elif not out.flags.carray:
+        found = "is read-only" if not out.flags.writeable else "is not C-contiguous"
+    else:
+        return
+    raise InputError(
+        f"out {found}",
+        rule=f"It must be a writable array of float64 with shape {shape}, its rows one after another",
+        way_out=f"Make it with np.empty({shape})",
+    )
+
+
 def frozen(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
     """A read-only copy of `values` in the given shape."""
     array = np.array(values, dtype=np.float64).reshape(shape)
@@ -81,27 +120,61 @@ def as_transforms(values: ArrayLike, *, what: str) -> tuple[NDArray[np.float64],
         The array, and whether it was given as one transform.
 
     Raises:
-        InputError: If these are no numbers, the shape is another, a value is not finite, a last row is not
-            0 0 0 1, or a rotation is not orthonormal to eight digits.
+        InputError: If these are no numbers, the shape is another, a value is not finite, or one is not rigid
+            to eight digits.
     """
     given = as_numbers(values, what=what)
     if given.ndim not in {2, 3} or given.shape[-2:] != (4, 4):
         raise InputError(f"{what} have shape {given.shape}", rule="The shape must be (4, 4) or (n, 4, 4)")
     rows = given.reshape(-1, 4, 4)
     check_finite(rows, what=what)
-    turned = rows[:, :3, :3]
-    square = np.abs(turned.transpose(0, 2, 1) @ turned - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    whole = (rows[:, 3] == [0.0, 0.0, 0.0, 1.0]).all(axis=1) & (np.linalg.det(turned) > 0.0)
-    bad = np.flatnonzero((square > RIGID_WITHIN) | ~whole)
-    if len(bad):
+    rows, fault = rigid(rows)
+    if fault is not None:
         raise InputError(
-            f"{what} are not rigid in {list_rows(bad.tolist())} (counted from 0): R^T R differs from "
-            f"the identity by up to {square[bad].max():.1e}",
-            rule=f"A rotation R is orthonormal within {RIGID_WITHIN:g} and no mirror, the last row 0 0 0 1",
-            way_out="Give them in double precision (float64), with the nearest rotations: u @ vt of "
-            "u, s, vt = np.linalg.svd(R)",
+            f"{what} are not rigid in {list_rows(fault.rows)} (counted from 0): {fault.why}",
+            rule=fault.rule,
+            way_out=fault.way_out,
         )
     return rows, given.ndim == 2
+
+
+def rigid(transforms: NDArray[np.float64]) -> tuple[NDArray[np.float64], Fault | None]:
+    """Transforms (n, 4, 4) with exact last rows, and what keeps some from being rigid; None if nothing."""
+    apart = np.abs(transforms[:, 3] - _LAST_ROW).max(axis=1, initial=0.0)
+    if not apart.any():
+        return transforms, rotation_fault(transforms[:, :3, :3])
+    bad = np.flatnonzero(~(apart <= RIGID_WITHIN))
+    if len(bad):
+        numbers = " ".join(f"{value:.6g}" for value in transforms[bad[0], 3])
+        way_out = "Where the translation stands there, give the transposed matrix"
+        return transforms, Fault(bad.tolist(), f"the last row is {numbers}", "It must be 0 0 0 1", way_out)
+    exact = transforms.copy()
+    exact[:, 3] = _LAST_ROW
+    return exact, rotation_fault(exact[:, :3, :3])
+
+
+def rotation_fault(matrices: NDArray[np.float64], within: float = RIGID_WITHIN) -> Fault | None:
+    """What keeps some of matrices (n, 3, 3) from being rotations; None if nothing does.
+
+    Args:
+        matrices: They.
+        within: How far R^T R may be from the identity.
+    """
+    apart = np.abs(matrices.transpose(0, 2, 1) @ matrices - _IDENTITY).max(axis=(1, 2), initial=0.0)
+    bad = np.flatnonzero(~(apart <= within))
+    if len(bad):
+        return Fault(
+            bad.tolist(),
+            f"R^T R differs from the identity by up to {apart[bad].max():.1e}",
+            f"A rotation R is orthonormal within {within:g}",
+            "Give it in double precision (float64), the nearest rotation if need be: u @ vt of "
+            "u, s, vt = np.linalg.svd(R)",
+        )
+    bad = np.flatnonzero(np.linalg.det(matrices) < 0.0)
+    if len(bad):
+        why = "R mirrors, its determinant is -1"
+        return Fault(bad.tolist(), why, "A rotation is right-handed", "Check order and signs of its axes")
+    return None
 
 
 def as_row_numbers(index: ArrayLike, count: int) -> NDArray[np.int64]:

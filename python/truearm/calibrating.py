@@ -44,7 +44,7 @@ from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
-from truearm.judging import judge
+from truearm.judging import check_judged, judge
 from truearm.measurements import Measurements
 from truearm.options import Options
 from truearm.plausibility import check_against
@@ -90,6 +90,7 @@ def calibrate(
     notices += stood_still(robot, given.readings) + seen_at_values(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
+    check_judged(given.select(split.train), task.selection)
     task = replace(task, sizes=() if split.planned else given.sizes)
     trained, drift = fit_settled(task, given, split.train)
     with stages("judging on held-out rows"):

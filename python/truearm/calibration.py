@@ -126,7 +126,16 @@ class Calibration:
     def without_rows(self) -> "Calibration":
         """The same as a file without the measurements holds it, with the bounds of the standard deviation."""
         bounds = self.conservative if self.has_conservative else None
-        return replace(self, rows=None, held=None, fitted_spread=None, stored_conservative=bounds)
+        revision = None if self.revision is None else replace(self.revision, file=None)
+        return replace(
+            self,
+            rows=None,
+            held=None,
+            file=None,
+            fitted_spread=None,
+            stored_conservative=bounds,
+            revision=revision,
+        )
 
     def save(self, path: str | Path, *, with_rows: bool = True) -> None:
         """Write a calibration file, completely or not at all.

@@ -4,6 +4,7 @@ from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Final
 
 import numpy as np
@@ -49,7 +50,8 @@ class Compensated:
 
     Attributes:
         q: Corrected readings (n, N), rad and m; NaN where the waypoint is refused.
-        nominal: Readings (n, N) that were corrected: the program's, or the programming model's for its poses.
+        nominal: Readings (n, N) that were corrected: a copy of the program's, or the programming model's for
+            its poses.
         residual_mm: How far from its target the calibrated model puts the tool, (n,).
         residual_mrad: How far turned from it, (n,).
         correction_mm: How far the correction shifts the tool, (n,), as the programming model sees it.
@@ -76,7 +78,7 @@ class Compensated:
 
 
 class Compensator:
-    """Corrects what a program says for the arm that will run it.
+    """Corrects what a program says for the arm that will run it; several threads may share one.
 
     The corrected readings q^c put the tool of the calibrated arm where the programming model puts it for the
     program's readings q^n: equation (3) of the paper, q^c = q^n - dq, carried to convergence.
@@ -125,6 +127,7 @@ class Compensator:
         self._programming = plain_model(self.programming)
         self._calibrated = calibrated_model(calibration)
         self._correctors: OrderedDict[tuple[bytes, ...], Corrector] = OrderedDict()
+        self._keeping = Lock()
 
     def __reduce__(self) -> tuple[object, ...]:
         names = self.calibration.options.features[: len(self._features)]
@@ -148,7 +151,7 @@ class Compensator:
             InputError: If the readings or the tool are none, or the author's arm has other joints.
         """
         rows, _ = as_rows(q, self.programming.joint_count, what="joint readings")
-        return self._corrected(rows, self._tool(tool), {}, author)
+        return self._corrected(np.array(rows), self._tool(tool), {}, author)
 
     def poses(
         self, base_from_tool: ArrayLike, seed: ArrayLike, *, tool: ArrayLike | None = None
@@ -214,20 +217,23 @@ class Compensator:
             )
 
     def _corrector(self, flange_from_tool: Floats, author: Robot | None = None) -> Corrector:
-        """The corrector of a tool, for an author's arm; the last TOOLS_KEPT of them are kept."""
+        """The corrector of a tool, for an author's arm; all threads keep the same last TOOLS_KEPT."""
         shape = () if author is None else (author.base, author.flange, author.table, author.coupling)
         key = tuple(part.tobytes() for part in (flange_from_tool, *shape))
-        if key in self._correctors:
-            self._correctors.move_to_end(key)
-            return self._correctors[key]
+        with self._keeping:
+            kept = self._correctors.get(key)
+            if kept is not None:
+                self._correctors.move_to_end(key)
+                return kept
         if author is not None:
             self._check_joints(author)
         programming = self._programming if author is None else plain_model(author)
         tool = np.ascontiguousarray(flange_from_tool)
         made = Corrector(self._calibrated, programming, tool, self._options)
-        self._correctors[key] = made
-        if len(self._correctors) > TOOLS_KEPT:
-            self._correctors.popitem(last=False)
+        with self._keeping:
+            self._correctors[key] = made
+            if len(self._correctors) > TOOLS_KEPT:
+                self._correctors.popitem(last=False)
         return made
 
     def _corrected(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import MeasurementSet, Setup
+from truearm.defaults import FIRST_TARGET
 from truearm.errors import InputError, UsageError, count_of
 from truearm.measurements import Measurements
 from truearm.robot import Robot
@@ -18,7 +19,6 @@ Rows = NDArray[np.int64]
 Use = Literal["position", "pose", "targets"]
 
 USES: Final = ("position", "pose", "targets")
-FIRST_TARGET: Final = 1
 
 
 @dataclass(frozen=True)

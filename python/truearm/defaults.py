@@ -34,5 +34,42 @@ HOLD_S: Final = 0.1
 
 DEADLINE_S: Final = 0.05
 """Longest time between two set-points."""
+
+FIRST_TARGET: Final = 1
+"""Measured target at which errors are judged."""
+
+MODEL: Final = "variable"
+"""Model that predicts."""
+
+ROBUST: Final = "none"
+"""Loss of the constant fit."""
+
+DRIFT: Final = "auto"
+"""Whether drift of the set-ups is taken out."""
+
 NO_DRIFT: Final = "none"
 """What the option `drift` says where set-ups are taken to stand still."""
+
+FRAME: Final = "free"
+"""Whether the frames of set-ups are unknown."""
+
+DEGREE: Final = 2
+"""Degree of the memberships."""
+
+OFFSET_DEG: Final = 1.0
+"""Standard deviation of the change of a revolute joint's offset before an update."""
+
+TOOL_MM: Final = 5.0
+"""The same of each coordinate of the target on the tool."""
+
+LEVEL: Final = 0.01
+"""Share of the unchanged arms of which an update may say that something changed."""
+
+PAPER_REGIONS: Final = 85
+"""Into how many regions the experiment of the paper divides the space."""
+
+PAPER_POSES: Final = 20
+"""Poses that the paper measures in each region to identify it."""
+
+EXPERIMENT_SPEED: Final = 1000.0
+"""How fast the virtual clock of that experiment runs."""

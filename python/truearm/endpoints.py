@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import RIGID_WITHIN, check_finite
+from truearm.arrays import check_finite, rigid
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.robot import Robot
 
@@ -53,16 +53,11 @@ def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
             f"the tool has shape {given.shape}",
             rule="A transform (4, 4) from flange to tool, or a point (3,) in the flange frame, m",
         )
-    turn = given[:3, :3]
-    off = float(np.abs(turn.T @ turn - np.eye(3)).max())
-    last = float(np.abs(given[3] - [0.0, 0.0, 0.0, 1.0]).max())
-    if max(off, last) > RIGID_WITHIN or np.linalg.det(turn) < 0.0:
-        raise InputError(
-            "the tool is no rigid motion",
-            rule=f"Its rotation is orthonormal within {RIGID_WITHIN:g} and right-handed, "
-            "its last row 0 0 0 1",
-        )
-    return given
+    exact, fault = rigid(given[None])
+    if fault is not None:
+        raise InputError(f"the tool is no rigid motion: {fault.why}", rule=fault.rule, way_out=fault.way_out)
+    found: Floats = exact[0]
+    return found
 
 
 def at_target(

@@ -11,14 +11,14 @@ from truearm import kinds
 from truearm._core import Setup, fit_constant
 from truearm.calibration import Calibration
 from truearm.core_set import Use, core_set, rotations, select
-from truearm.defaults import SEED
+from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts import no_help
 from truearm.errors import InputError, Notice, UsageError, count_of, list_names
 from truearm.fitted_rows import known_rows
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.gross_rows import Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
-from truearm.judging import judge, model_inputs
+from truearm.judging import check_judged, judge, model_inputs
 from truearm.measurements import Measurements
 from truearm.models import NOMINAL, ArmModel
 from truearm.plausibility import check_against
@@ -53,9 +53,10 @@ class EvaluationOptions:
     frame_rows: int | None = None
     keep_tool: bool = False
     keep_frames: bool = False
-    judge_target: int = 1
+    judge_target: int = FIRST_TARGET
 
     def __post_init__(self) -> None:
+        kinds.settle(self, whole=("seed", "frame_rows", "judge_target"), flags=("keep_tool", "keep_frames"))
         if self.keep_frames and self.frame_rows is not None:
             raise UsageError("frame rows find frames", rule="With --keep-frames there are none to find")
         if self.frame_rows is not None and self.frame_rows < FEWEST_FRAME_ROWS:
@@ -64,7 +65,7 @@ class EvaluationOptions:
             raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """Errors on other measurements.
 
@@ -128,6 +129,8 @@ def evaluate(
         check_turns(data, calibration.robot)
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
     frame, judged = _divide(data, chosen)
+    found_by = data.select(frame if len(frame) else judged)
+    check_judged(found_by, selection)
     with stages("finding frame and tool"):
         models = {
             name: ArmModel(
@@ -140,7 +143,6 @@ def evaluate(
         }
     with stages("judging"):
         chosen_rows = data.select(judged)
-        found_by = data.select(frame if len(frame) else judged)
         errors = judge(task, models, chosen_rows, found_by)
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held

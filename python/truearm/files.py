@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import stat
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -39,7 +40,7 @@ def read_bytes(path: Path) -> bytes:
     """The content of a file.
 
     Raises:
-        InputError: If there is no such file, it is a directory, or it may not be read.
+        InputError: If there is no such file, it is a directory, or it cannot or may not be read.
     """
     try:
         return path.read_bytes()
@@ -49,6 +50,16 @@ def read_bytes(path: Path) -> bytes:
         raise InputError("this is a directory", where=str(path), rule="A file is needed") from None
     except PermissionError:
         raise InputError("no permission to read this file", where=str(path)) from None
+    except OSError as error:
+        raise InputError(f"this cannot be read: {_reason(error)}", where=str(path)) from None
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file at `path`; none has a name that is too long for one."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def read_text(path: Path) -> str:
@@ -102,15 +113,16 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
     """Write files, each completely or not at all: neighbours of all are written, then renamed in this order.
 
-    A link is followed. What is no file, such as a pipe or /dev/stdout, is written to at the end and not
-    replaced.
+    A link is followed, and a file that is replaced keeps its permissions. What is no file, such as a pipe or
+    /dev/stdout, is written to at the end and not replaced.
 
     Raises:
-        InputError: If a directory does not exist or may not be written to, or is what a path names; nothing
-            is written then.
+        InputError: If a directory does not exist or may not be written to, or is what a path names, or a
+            file cannot be written; nothing is written then.
     """
     streams: list[tuple[Path, bytes]] = []
     neighbours: list[tuple[Path, Path]] = []
+    path = Path()
     try:
         for path, content in contents:
             data = content.encode() if isinstance(content, str) else content
@@ -119,15 +131,31 @@ def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
             else:
                 place = followed(path) if path.is_symlink() else path
                 neighbours.append((_beside(place, data), place))
-        for neighbour, place in neighbours:
-            neighbour.replace(place)
-    except BaseException:
+        for neighbour, path in neighbours:
+            neighbour.replace(path)
+    except BaseException as error:
         for neighbour, _ in neighbours:
             neighbour.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise InputError(f"this cannot be written: {_reason(error)}", where=str(path)) from None
         raise
     for path, data in streams:
         with path.open("ab") as stream:
             stream.write(data)
+
+
+def make_directory(path: Path) -> None:
+    """Make a directory, and those above it, where there is none.
+
+    Raises:
+        InputError: If a file is in its place or above it, or it cannot or may not be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError("a file is in the way", where=str(path), rule="A directory is needed") from None
+    except OSError as error:
+        raise InputError(f"this directory cannot be made: {_reason(error)}", where=str(path)) from None
 
 
 def followed(path: Path) -> Path:
@@ -153,14 +181,17 @@ def _beside(path: Path, data: bytes) -> Path:
     if path.is_dir():
         raise InputError("this is a directory", where=str(path), rule="A file is to be written")
     neighbour = path.with_name(f".{secrets.token_hex(8)}")
+    mode = stat.S_IMODE(path.stat().st_mode) if path.exists() else None
     try:
-        handle = os.open(neighbour, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        handle = os.open(neighbour, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666 if mode is None else 0o600)
     except FileNotFoundError:
         raise InputError("there is no such directory", where=str(path.parent)) from None
     except PermissionError:
         raise InputError("no permission to write here", where=str(path.parent)) from None
     try:
         with os.fdopen(handle, "wb") as file:
+            if mode is not None:
+                os.fchmod(file.fileno(), mode)
             file.write(data)
     except BaseException:
         neighbour.unlink(missing_ok=True)
@@ -191,14 +222,11 @@ def refuse_own_input(output: Path, *inputs: Path | str | None) -> None:
 def _files_of(given: Path | str) -> list[Path]:
     """The files that an argument may mean."""
     named = [Path(given), *([Path(given.partition("#")[0])] if isinstance(given, str) else [])]
-    return [path for path in named if _is_file(path)]
+    return [path for path in named if is_file(path)]
 
 
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # no file has a name as long as that
-        return False
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)
 
 
 def refuse_same(output: Path, other: Path | None, *, option: str) -> None:

@@ -24,6 +24,7 @@ from truearm.errors import InputError, UsageError, WorkError, count_of, list_nam
 from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
 from truearm.inputs import is_payload
+from truearm.kinds import settle
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.options import Options
@@ -92,6 +93,7 @@ class Task:
 
     def __post_init__(self) -> None:
         """Check what the core takes as it is."""
+        settle(self, whole=("threads",))
         if self.threads is not None and self.threads < 1:
             raise UsageError(f"{self.threads} threads", rule="At least 1, or None for all there are")
 

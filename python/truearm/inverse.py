@@ -53,9 +53,16 @@ class Inverse:
                 limits; of a joint without limits those within one turn of zero.
 
         Raises:
-            InputError: If the pose is not a rigid transform.
+            InputError: If the pose is not a rigid transform, or they are several.
         """
-        return self._solver.solutions(as_transforms(base_from_flange, what="the pose")[0][0], turns)
+        poses, single = as_transforms(base_from_flange, what="the pose")
+        if not single:
+            raise InputError(
+                f"the pose has shape {poses.shape}",
+                rule="The shape must be (4, 4)",
+                way_out="branches() and near() take many poses",
+            )
+        return self._solver.solutions(poses[0], turns)
 
     def branches(self, base_from_flange: ArrayLike) -> Floats:
         """The solutions of many poses (n, 4, 4) without turns: (n, K, N), filled up with NaN to the most, K.

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Setup
 from truearm.core_set import Selection
+from truearm.errors import InputError, list_names
 from truearm.fitting import Task, feature_values
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
@@ -20,6 +21,32 @@ def model_inputs(arm: IdentifiedArm, data: Measurements, features: tuple[str, ..
     """Inputs (n, I) of a field at measured rows: joint values, then features."""
     values = arm.robot.joints_from_readings(data.readings)
     return np.hstack([values, feature_values(data, features)])
+
+
+def check_judged(data: Measurements, selection: Selection) -> None:
+    """Check that rows of each set-up show where a judged target sits that takes no part in the fit.
+
+    Args:
+        data: The rows that are to find its point.
+        selection: What is used of them.
+
+    Raises:
+        InputError: If a set-up has no row with it; names the set-ups.
+    """
+    if not selection.judges_another:
+        return
+    held = np.isfinite(data.targets[:, selection.judge]).all(axis=1)
+    seen = set(data.group[held].tolist())
+    missing = [group for group in data.groups if group not in seen]
+    if missing:
+        raise InputError(
+            f"target {selection.judge + 1} was measured in none of the rows of the set-up "
+            f"{list_names(missing)} that would find it",
+            where=", ".join(data.files),
+            rule="Where errors are judged at a target that takes no part in the fit, each set-up needs rows "
+            "with it",
+            way_out="Measure it there, leave the set-up out, or judge at another target",
+        )
 
 
 def judge(
@@ -54,7 +81,11 @@ def setup_of_judged(task: Task, data: Measurements, parameters: Floats, setup: S
         data: Rows, n of them.
         parameters: The model's parameters there (n, L, 5).
         setup: Frames of the fit.
+
+    Raises:
+        InputError: If a set-up has no row with the judged target.
     """
+    check_judged(data, task.selection)
     joints = task.arm.robot.joints_from_readings(data.readings)
     base_from_flange = task.arm.flange_chain.pose(joints, np.ascontiguousarray(parameters))
     frames = setup.frames

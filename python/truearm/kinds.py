@@ -1,6 +1,6 @@
 """Arguments of the public calls: whether they are what is needed, and options given in two ways."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any, Final, TypeVar
@@ -30,6 +30,80 @@ def required(value: object, kind: type[T], noun: str) -> T:
         rule=f"A {kind.__module__.partition('.')[0]}.{kind.__name__} is needed",
         way_out=WAYS.get(kind.__name__, ""),
     )
+
+
+def settle(
+    options: object, *, whole: Sequence[str] = (), numbers: Sequence[str] = (), flags: Sequence[str] = ()
+) -> None:
+    """Check fields of a frozen dataclass and make them int, float and bool, which JSON can hold.
+
+    A field that is None by default may be None.
+
+    Args:
+        options: The dataclass, in its __post_init__.
+        whole: Names of the fields that are whole numbers.
+        numbers: Names of those that are numbers.
+        flags: Names of those that are true or false.
+
+    Raises:
+        UsageError: If a field holds anything else.
+    """
+    kinds: list[tuple[Sequence[str], Callable[[object, str], object]]] = [
+        (whole, _whole),
+        (numbers, _real),
+        (flags, _flag),
+    ]
+    optional = [field.name for field in fields(options) if field.default is None]  # type: ignore[arg-type]
+    for names, made in kinds:
+        for name in names:
+            value = getattr(options, name)
+            if value is not None or name not in optional:
+                object.__setattr__(options, name, made(value, name))
+
+
+def whole_numbers(values: object, name: str) -> tuple[int, ...]:
+    """Whole numbers that the option `name` holds, one or several.
+
+    Raises:
+        UsageError: If they are none.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise UsageError(f"{name} is {values!r}", rule="It must be a list of whole numbers")
+    return tuple(_whole(value, f"a number of {name}") for value in values)
+
+
+def words(value: object, name: str) -> tuple[str, ...]:
+    """Names that the option `name` holds, as one text with commas or one by one.
+
+    Raises:
+        UsageError: If they are none.
+    """
+    if isinstance(value, str):
+        return tuple(part.strip() for part in value.split(","))
+    if not isinstance(value, Iterable) or isinstance(value, bytes):
+        raise UsageError(f"{name} is {value!r}", rule="It must be a list of names")
+    found = tuple(value)
+    for part in found:
+        if not isinstance(part, str):
+            raise UsageError(f"a name of {name} is {part!r}", rule="It must be a text")
+    return tuple(str(part) for part in found)
+
+
+def _whole(value: object, name: str) -> int:
+    check_number(value, name, Integral)
+    return int(value)  # type: ignore[call-overload, no-any-return]
+
+
+def _real(value: object, name: str) -> float:
+    check_number(value, name)
+    return float(value)  # type: ignore[arg-type]
+
+
+def _flag(value: object, name: str) -> bool:
+    """True or False, also as NumPy has them: the command line's help comes without NumPy."""
+    if not isinstance(value, bool) and str(getattr(value, "dtype", "")) != "bool":
+        raise UsageError(f"{name} is {value!r}", rule="It must be True or False")
+    return bool(value)
 
 
 def check_number(value: object, name: str, kind: type = Real) -> None:

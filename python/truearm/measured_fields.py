@@ -55,6 +55,7 @@ def read_fields(
         **_ends(table, layout, distance),
         "purpose": purpose,
         "notices": tuple(notices),
+        "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
 
 

@@ -1,10 +1,11 @@
 """Measurements: joint readings and what was measured at them."""
 
 import hashlib
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -31,7 +32,7 @@ CONTENT: Final = (
     "anchor",
     "pair",
 )
-PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows")
+PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group")
 GROUPS_SHOWN: Final = 3
 
 
@@ -46,7 +47,7 @@ class Measurements:
             measured; None where no orientation was measured at all.
         sigma_m: Standard deviation of the position (n,), NaN where not stated; None where never.
         group: Name of the set-up (n,), hence which world_from_base and which tool.
-        features: All other numeric columns (n, ...), indexed from 0.
+        features: All other numeric columns (n, ...), indexed from 0; a copy of the table that was given.
         sources: File of each row (n,).
         rows: Number of each row in its file (n,), the first data row being 1.
         joint_units: Unit of each joint column in the file: "rad", "deg", "m", "mm", or "" where
@@ -57,6 +58,8 @@ class Measurements:
         pair: Name of the pair of rows (n,), "" where there is none.
         purpose: What each pose was planned for (n,), such as "train" or "validate"; None where nothing says.
         notices: What was noticed on reading.
+        default_group: What the set-up is called after its file (n,), "" where a column names it; None where
+            nothing is called so.
     """
 
     readings: Floats
@@ -73,6 +76,7 @@ class Measurements:
     pair: Texts | None = None
     purpose: Texts | None = None
     notices: tuple[Notice, ...] = ()
+    default_group: Texts | None = None
 
     def __post_init__(self) -> None:
         if not self.joint_units:
@@ -80,9 +84,10 @@ class Measurements:
         for name in PER_ROW:
             value = getattr(self, name)
             if value is not None:
-                if len(value) != len(self):
-                    raise InputError(f"{len(value)} rows", where=name, rule=f"There are {len(self)} readings")
-                value.flags.writeable = False
+                self._check_length(name, value)
+                object.__setattr__(self, name, _frozen(value))
+        self._check_length("features", required(self.features, pd.DataFrame, "the table of features"))
+        object.__setattr__(self, "features", self.features.reset_index(drop=True))
 
     def __len__(self) -> int:
         return len(self.readings)
@@ -94,6 +99,10 @@ class Measurements:
 
     def __reduce__(self) -> tuple[object, ...]:
         return Measurements, tuple(getattr(self, field.name) for field in fields(self))
+
+    def _check_length(self, name: str, value: Texts | Floats | pd.DataFrame) -> None:
+        if len(value) != len(self):
+            raise InputError(f"{len(value)} rows", where=name, rule=f"There are {len(self)} readings")
 
     @property
     def joint_count(self) -> int:
@@ -242,8 +251,11 @@ class Measurements:
     def concatenate(parts: Sequence["Measurements"]) -> "Measurements":
         """All rows of several measurements, in order.
 
-        Points, orientations and features that a part lacks become NaN. Groups keep their names: equal
-        names mean the same set-up. Pairs never reach from one part to another.
+        Points, orientations and features that a part lacks become NaN. Pairs never reach from one part to
+        another. Groups that a column names keep their names: equal names mean the same set-up. Those that
+        are called after their file are set-ups of their own, as with `read_files`: files of one name are
+        called by their folders as well, and tables of one name are numbered, "data" and "data 2". Rows that
+        were selected from the same file belong to the same set-up.
 
         Raises:
             InputError: If there are no parts or the numbers of joints differ.
@@ -252,7 +264,7 @@ class Measurements:
 
     @staticmethod
     def of(given: object) -> "Measurements":
-        """`given`, which has to be measurements, or a list of them that are put together.
+        """`given`, which has to be measurements, or a list of them that are put together by `concatenate`.
 
         Raises:
             UsageError: If it is anything else.
@@ -281,7 +293,10 @@ class Measurements:
         return self.select(~repeated) if repeated.any() else self
 
     def hash(self) -> str:
-        """SHA-256 (hexadecimal) of what was measured; file names, row numbers and purposes do not count."""
+        """SHA-256 (hexadecimal) of what was measured.
+
+        Row numbers and purposes do not count, and file names only where set-ups are called after them.
+        """
         digest = hashlib.sha256()
         for name in CONTENT:
             value = getattr(self, name)
@@ -332,7 +347,7 @@ class Measurements:
 def _concatenate(parts: Sequence[Measurements]) -> Measurements:
     if not parts:
         raise InputError("there are no measurements to put together")
-    first = parts[0]
+    first, parts = parts[0], _told_apart(parts)
     for part in parts[1:]:
         if part.joint_count != first.joint_count:
             raise InputError(
@@ -354,7 +369,75 @@ def _concatenate(parts: Sequence[Measurements]) -> Measurements:
         purpose=_joined_words([(part.purpose, len(part)) for part in parts]),
         pair=_joined_words([(_own_pairs(part, k), len(part)) for k, part in enumerate(parts)]),
         notices=tuple(notice for part in parts for notice in part.notices),
+        default_group=_joined_words([(part.default_group, len(part)) for part in parts]),
     )
+
+
+def _frozen(values: NDArray[Any]) -> NDArray[Any]:
+    """An array that nothing changes: itself where it is read-only, else a copy."""
+    if not values.flags.writeable:
+        return values
+    copied = values.copy()
+    copied.flags.writeable = False
+    return copied
+
+
+def _told_apart(parts: Sequence[Measurements]) -> list[Measurements]:
+    """The parts with different names for the set-ups of different files, where no column names them."""
+    known: dict[str, list[Measurements]] = {}
+    parts = [_own_table(part, known) for part in parts]
+    called = set[tuple[str, str]]()
+    for part in parts:
+        rows = _called_after_file(part)
+        called |= set(zip(part.group[rows].tolist(), part.sources[rows].tolist(), strict=True))
+    groups, sources = Counter(group for group, _ in called), Counter(source for _, source in called)
+    unclear = [source for group, source in called if groups[group] > 1 or sources[source] > 1]
+    return [
+        _renamed(part, _called_after_file(part) & np.isin(part.sources, unclear), group=part.sources)
+        for part in parts
+    ]
+
+
+def _own_table(part: Measurements, known: dict[str, list[Measurements]]) -> Measurements:
+    """The part with a name of its own for each table that is called as another one; adds to `known`."""
+    unnamed = _called_after_file(part)
+    for source in list(dict.fromkeys(part.sources[unnamed].tolist())):
+        mask = unnamed & (part.sources == source)
+        table, name, number = part.select(mask), source, 1
+        while any(_are_different(table, other) for other in known.get(name, [])):
+            number += 1
+            name = f"{source} {number}"
+        known.setdefault(name, []).append(table)
+        if name != source:
+            part = _renamed(part, mask, sources=np.full(len(part), name))
+    return part
+
+
+def _are_different(table: Measurements, other: Measurements) -> bool:
+    """Whether two tables of one name hold different things in a row of the same number."""
+    common, mine, others = np.intersect1d(table.rows, other.rows, return_indices=True)
+    if len(common) == 0:
+        return False
+    pair = table.select(mine), other.select(others)
+    nameless = [replace(rows, group=np.full(len(rows), "")) for rows in pair]
+    return nameless[0].hash() != nameless[1].hash()
+
+
+def _called_after_file(part: Measurements) -> NDArray[np.bool_]:
+    """Mask (n,) of the rows whose set-up is called after its file."""
+    if part.default_group is None:
+        return np.zeros(len(part), dtype=np.bool_)
+    return np.asarray((part.default_group == part.group) & (part.default_group != ""))
+
+
+def _renamed(part: Measurements, mask: NDArray[np.bool_], **names: Texts) -> Measurements:
+    """The part with other texts (n,) in the rows of a mask, `group` or `sources`."""
+    if not mask.any():
+        return part
+    if "group" in names:
+        names["default_group"] = names["group"]
+    changes: dict[str, Any] = {key: np.where(mask, text, getattr(part, key)) for key, text in names.items()}
+    return replace(part, **changes)
 
 
 def _padded_targets(parts: Sequence[Measurements]) -> Floats:

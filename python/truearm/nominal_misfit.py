@@ -23,9 +23,9 @@ FEWEST_ROWS: Final = 12
 """Rows, at the most and at the least, that such a fit is asked of."""
 
 
-def some_rows(rows: Rows) -> Rows:
-    """At most MOST_ROWS of row indices, spread evenly."""
-    return rows[np.unique(np.linspace(0, len(rows) - 1, MOST_ROWS).astype(np.int64))]
+def some_rows(rows: Rows, most: int = MOST_ROWS) -> Rows:
+    """At most so many of row indices, spread evenly."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, most).astype(np.int64))]
 
 
 def nominal_setup(

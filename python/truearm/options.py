@@ -1,19 +1,19 @@
 """What a calibration may be told: the options of the command line, with the same defaults."""
 
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from numbers import Integral
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final, Literal
 
-from truearm.core_set import FIRST_TARGET, USES, Use
-from truearm.defaults import NO_DRIFT
-from truearm.errors import UsageError
+from truearm import kinds
+from truearm.core_set import USES, Use
+from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, MODEL, NO_DRIFT, ROBUST
+from truearm.errors import UsageError, list_names
 from truearm.identified import Frame
-from truearm.kinds import check_name, check_number
 from truearm.parameters import PARALLEL_WITHIN_DEG
 from truearm.scheme_options import SchemeOptions
 from truearm.schemes import SCHEMES
-from truearm.splitting import HoldoutRange, SplitRule
+from truearm.splitting import SplitRule
 
 ModelName = Literal["variable", "constant", "regions", "cmac", "fcmac"]
 Robust = Literal["none", "huber", "cauchy"]
@@ -27,8 +27,7 @@ CHOICES: Final[Mapping[str, tuple[object, ...]]] = {
     "frame": ("free", "world"),
     "degree": (2, 3),
 }
-WHOLE: Final = ("train_size", "seed", "judge_target")
-NUMBERS: Final = ("holdout", "prior_mm", "prior_mrad", "parallel_within_deg")
+POSITIVE: Final = ("prior_mm", "prior_mrad", "parallel_within_deg", "repeatability_mm")
 
 
 @dataclass(frozen=True)
@@ -58,14 +57,14 @@ class Options:
 
     split: SplitRule = field(default_factory=SplitRule)
     use: Use | None = None
-    model: ModelName = "variable"
-    robust: Robust = "none"
-    drift: Drifting = "auto"
+    model: ModelName = MODEL
+    robust: Robust = ROBUST
+    drift: Drifting = DRIFT
     refit: bool = True
     features: tuple[str, ...] = ()
-    frame: Frame = "free"
+    frame: Frame = FRAME
     judge_target: int = FIRST_TARGET
-    degree: int = 2
+    degree: int = DEGREE
     prior_mm: float = 2.0
     prior_mrad: float = 2.0
     parallel_within_deg: float = PARALLEL_WITHIN_DEG
@@ -73,17 +72,19 @@ class Options:
     repeatability_mm: float | None = None
 
     def __post_init__(self) -> None:
+        kinds.required(self.split, SplitRule, "the split")
+        kinds.required(self.scheme, SchemeOptions, "the scheme")
+        kinds.settle(self, whole=("judge_target", "degree"), numbers=POSITIVE, flags=("refit",))
+        object.__setattr__(self, "features", kinds.words(self.features, "features"))
         for name, known in CHOICES.items():
             value = getattr(self, name)
             if value not in known:
                 words = " or ".join(str(choice) for choice in known if choice is not None)
                 raise UsageError(f'"{value}" is not known', where=name, rule=f"Either {words}")
-        for name in ("prior_mm", "prior_mrad", "parallel_within_deg"):
-            if not getattr(self, name) > 0.0:
-                raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
-
-        if self.repeatability_mm is not None and not self.repeatability_mm > 0.0:
-            raise UsageError(f"{self.repeatability_mm}", where="repeatability_mm", rule="It must be positive")
+        for name in POSITIVE:
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                raise UsageError(f"{value}", where=name, rule="It must be positive and finite")
         if len(set(self.features)) < len(self.features):
             raise UsageError("a feature is named twice", where="features", rule="Each is named once")
         if self.features and self.model != "variable":
@@ -102,30 +103,29 @@ class Options:
     def of(cls, **given: Any) -> "Options":
         """Options from keywords: those of this class, of SplitRule and of SchemeOptions, side by side.
 
+        A stated `holdout` comes before what poses were planned for, unless `by_purpose` is stated as well.
+
         Raises:
-            UsageError: If there is no such option or a value breaks a rule.
+            UsageError: If there is no such option, a value breaks a rule, or a split or scheme is given as an
+                object and by keywords.
         """
-        parts = {"split": SplitRule.__dataclass_fields__, "scheme": SchemeOptions.__dataclass_fields__}
-        known = {*cls.__dataclass_fields__, *parts["split"], *parts["scheme"]}
+        parts: dict[str, type] = {"split": SplitRule, "scheme": SchemeOptions}
+        names = {part: [each.name for each in fields(kind)] for part, kind in parts.items()}
+        known = {*(each.name for each in fields(cls)), *names["split"], *names["scheme"]}
         for name in given:
             if name not in parts:
-                check_name(name, list(known - set(parts)))
-        _check_numbers(given)
-        splitting = {name: given.pop(name) for name in SplitRule.__dataclass_fields__ if name in given}
-        if isinstance(splitting.get("holdout_range"), str):
-            splitting["holdout_range"] = HoldoutRange.parse(splitting["holdout_range"])
-        for part, names in ((splitting, ("split_by",)), (given, ("features",))):
-            part |= {name: _words(part[name]) for name in names if name in part}
-        if "holdout" in splitting:
-            splitting.setdefault("by_purpose", False)
-        if splitting:
-            given["split"] = SplitRule(**splitting)
-        scheme = {name: given.pop(name) for name in parts["scheme"] if name in given}
-        if scheme:
-            given["scheme"] = SchemeOptions(
-                **scheme
-                | {name: tuple(scheme[name]) for name in ("scheme_joints", "cells") if name in scheme}
-            )
+                kinds.check_name(name, list(known - set(parts)))
+        for part, kind in parts.items():
+            own = {name: given.pop(name) for name in names[part] if name in given}
+            if own and part in given:
+                raise UsageError(
+                    f"{part} is given as an object, and {list_names(own)} by keyword",
+                    rule=f"Give an object of {kind.__name__}, or keywords",
+                )
+            if "holdout" in own:
+                own.setdefault("by_purpose", False)
+            if own:
+                given[part] = kind(**own)
         return cls(**given)
 
     def to_dict(self) -> dict[str, Any]:
@@ -137,17 +137,3 @@ class Options:
         scheme: dict[str, Any] = content.pop("scheme")
         lists = {name: list(scheme[name]) for name in ("scheme_joints", "cells")}
         return split | content | scheme | lists | {"features": list(self.features)}
-
-
-def _check_numbers(given: Mapping[str, Any]) -> None:
-    for name in WHOLE:
-        if given.get(name) is not None:
-            check_number(given[name], name, Integral)
-    for name in NUMBERS:
-        if name in given:
-            check_number(given[name], name)
-
-
-def _words(value: Any) -> tuple[str, ...]:  # noqa: ANN401
-    """Names given as one text with commas, or one by one."""
-    return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else tuple(value)

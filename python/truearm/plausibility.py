@@ -11,7 +11,7 @@ from truearm.measurements import Measurements
 from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
 from truearm.robot import Robot
 from truearm.turning_sense import FIT, MISFIT
-from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.units import MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,7 +25,6 @@ SPREAD_FACTOR: Final = 30.0
 TOOL_ALLOWANCE_M: Final = 0.1
 FAR_FACTOR: Final = 8.0
 """Spreads that differ by more are worth a fit that asks whether points are in inches."""
-MM_PER_INCH: Final = 25.4
 INCHES: Final = (
     (
         MM_PER_INCH,
@@ -55,8 +54,9 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
         What the user should know: joints outside their limits, rows identical in everything.
 
     Raises:
-        InputError: If the number or kind of joints differs, degrees were read as radians or the other
-            way round, millimetres as metres or the other way round, inches as either, or all poses are alike.
+        InputError: If there are no rows, the number or kind of joints differs, degrees were read as radians
+            or the other way round, millimetres as metres or the other way round, inches as either, or all
+            poses are alike.
     """
     outside = check_readings(measurements, robot)
     _check_alike(measurements)
@@ -71,9 +71,11 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
         What the user should know: joints outside their limits.
 
     Raises:
-        InputError: If the number or kind of joints differs, degrees were read as radians, or millimetres of a
-            prismatic joint as metres.
+        InputError: If there are no rows, the number or kind of joints differs, degrees were read as radians,
+            or millimetres of a prismatic joint as metres.
     """
+    if len(measurements) == 0:
+        raise InputError("the measurements have no rows", rule="What is measured is at least one pose")
     measurements.require_joint_count(robot.joint_count)
     _check_kinds(measurements, robot)
     _check_degrees(measurements, robot)

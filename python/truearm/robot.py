@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from truearm import robot_dict, robot_toml
 from truearm._core import Chain
-from truearm.arrays import as_rows
+from truearm.arrays import as_rows, check_out
 from truearm.errors import InputError
-from truearm.files import read_text
+from truearm.files import is_file, read_text
 from truearm.library import library_text
 from truearm.robot_checks import check_sizes
 from truearm.robot_data import Floats, RobotData
@@ -36,13 +36,20 @@ class Robot(RobotData):
         A URDF's chain is given behind its path: "arm.urdf#tool0" or "arm.urdf#base_link,tool0".
 
         Raises:
-            InputError: If there is no such robot or file, or the file breaks a rule.
+            InputError: If there is no such robot or file, or the file breaks a rule, or more than two links
+                are named.
         """
         given = str(name_or_path)
         path = Path(given)
         urdf, _, chain = given.partition("#")
         if Path(urdf).suffix.lower() in URDF_ENDINGS:
             *base, tip = [part.strip() or None for part in chain.split(",")]
+            if len(base) > 1:
+                raise InputError(
+                    f'"{chain}" names {len(base) + 1} links',
+                    where=given,
+                    rule="A chain is named by its tip link, or by its base link and its tip link",
+                )
             return cls.from_urdf(urdf, base_link=base[0] if base else None, tip_link=tip)
         if path.suffix.lower() == ".xacro":
             raise InputError(
@@ -51,7 +58,7 @@ class Robot(RobotData):
                 way_out=f"Expand it first: xacro {path.name} > {path.stem}.urdf",
             )
         is_path = "/" in given or "\\" in given or given in {".", ".."}
-        if path.suffix.lower() == ".toml" or path.is_file() or is_path:
+        if path.suffix.lower() == ".toml" or is_file(path) or is_path:
             return cls.from_toml(read_text(path), where=given)
         name, text = library_text(given)
         return cls.from_toml(text, where=f"{name}.toml")
@@ -125,7 +132,7 @@ class Robot(RobotData):
         return isinstance(other, Robot) and self.to_dict() == other.to_dict()
 
     def __hash__(self) -> int:
-        return hash((self.name, self.convention, self.joints, self.table.tobytes()))
+        return hash((self.name, self.convention, self.joints))
 
     @cached_property
     def chain(self) -> Chain:
@@ -152,13 +159,15 @@ class Robot(RobotData):
     def position(self, q: ArrayLike, out: Floats | None = None) -> Floats:
         """Tool points in the base frame, m: (n, 3) for readings `q` (n, N), (3,) for (N,)."""
         rows, single = self._readings(q)
-        result = self.chain.position(self.values_of(rows), out=_batched(out, single=single))
+        target = _target(out, len(rows), 3, single=single)
+        result = self.chain.position(self.values_of(rows), out=target)
         return result[0] if single else result
 
     def pose(self, q: ArrayLike, out: Floats | None = None) -> Floats:
         """base_from_tool: (n, 4, 4) for readings `q` (n, N), (4, 4) for (N,)."""
         rows, single = self._readings(q)
-        result = self.chain.pose(self.values_of(rows), out=_batched(out, single=single))
+        target = _target(out, len(rows), 4, 4, single=single)
+        result = self.chain.pose(self.values_of(rows), out=target)
         return result[0] if single else result
 
     def parameter_jacobian(self, q: ArrayLike, pose: bool = False, out: Floats | None = None) -> Floats:
@@ -173,8 +182,8 @@ class Robot(RobotData):
             (n, 3, 5 N), or (n, 6, 5 N) with translation first; without n for one reading.
         """
         rows, single = self._readings(q)
-        values, target = self.values_of(rows), _batched(out, single=single)
-        result = self.chain.parameter_jacobian(values, pose=pose, out=target)
+        target = _target(out, len(rows), 6 if pose else 3, 5 * self.joint_count, single=single)
+        result = self.chain.parameter_jacobian(self.values_of(rows), pose=pose, out=target)
         return result[0] if single else result
 
     def joint_jacobian(self, q: ArrayLike, pose: bool = False) -> Floats:
@@ -197,7 +206,10 @@ class Robot(RobotData):
         return cls(**robot_dict.fields_of(content))
 
     def to_toml(self) -> str:
-        """The text of a robot file in m and rad that from_toml reads back to this robot."""
+        """The text of a robot file in m and rad that from_toml reads back to this robot.
+
+        Rotations of base, flange and tool are written as quaternions, so that they come back to rounding.
+        """
         return robot_toml.write(self)
 
     def _chain(self, end: Floats) -> Chain:
@@ -215,5 +227,7 @@ class Robot(RobotData):
         return bool(np.array_equal(self.coupling, np.eye(self.joint_count)))
 
 
-def _batched(out: Floats | None, *, single: bool) -> Floats | None:
+def _target(out: Floats | None, *shape: int, single: bool) -> Floats | None:
+    """What results of `shape` are written to, where `out` is given; without the first dimension for one."""
+    check_out(out, *(shape[1:] if single else shape))
     return out[None] if single and out is not None else out

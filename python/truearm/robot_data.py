@@ -7,7 +7,7 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import frozen
+from truearm.arrays import frozen, rigid
 from truearm.errors import InputError
 from truearm.urdf_names import UrdfNames
 
@@ -75,7 +75,8 @@ class RobotData:
         shapes = {"table": (n, 5), "base": (4, 4), "flange": (4, 4), "tool": (4, 4)}
         shapes |= {"coupling": (n, n), "limits": (n, 2)}
         for field, shape in shapes.items():
-            object.__setattr__(self, field, _checked(field, getattr(self, field), shape))
+            value = _checked(field, getattr(self, field), shape)
+            object.__setattr__(self, field, _rigid(field, value) if shape == (4, 4) else value)
         if self.base_row is not None:
             object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
         unordered = np.flatnonzero(~(self.limits[:, 0] < self.limits[:, 1]))
@@ -111,3 +112,10 @@ def _checked(field: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:
     if field != "limits" and not np.isfinite(array).all():
         raise InputError("NaN or infinite value", where=field, rule="All values must be finite")
     return frozen(array, *shape)
+
+
+def _rigid(field: str, transform: Floats) -> Floats:
+    exact, fault = rigid(transform[None])
+    if fault is not None:
+        raise InputError(f"no rigid motion: {fault.why}", where=field, rule=fault.rule, way_out=fault.way_out)
+    return frozen(exact[0], 4, 4)

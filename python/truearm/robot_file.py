@@ -16,6 +16,8 @@ from truearm.rotations import UNIT_TOLERANCE
 from truearm.units import AngleUnit, LengthUnit
 
 Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Limit = Annotated[float, Field(strict=True)]
+Name = Annotated[str, Field(min_length=1)]
 Vector3 = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Number], Field(min_length=4, max_length=4)]
 ROW_KEYS: Final = ("theta", "d", "a", "alpha", "beta")
@@ -71,12 +73,12 @@ class Link(Row):
 
     joint: Literal["revolute", "prismatic"]
     direction: Literal[1, -1] = 1
-    limits: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    limits: Annotated[list[Limit], Field(min_length=2, max_length=2)] | None = None
 
     @field_validator("limits")
     @classmethod
     def _ordered(cls, value: list[float] | None) -> list[float] | None:
-        if value is not None and value[0] >= value[1]:
+        if value is not None and not value[0] < value[1]:
             raise ValueError(
                 f"{value[0]:g} to {value[1]:g}; the lower limit comes first, and a joint that never moves "
                 "needs some room too, such as -1 to 1"
@@ -97,10 +99,19 @@ class PayloadSection(_Section):
     centre_of_gravity_mm: Vector3 | None = None
 
 
+class UrdfSection(_Section):
+    """The names that links and joints have in a URDF."""
+
+    base_link: Name
+    joints: list[Name]
+    links: list[Name]
+    tip_link: Name
+
+
 class RobotFile(_Section):
     """A robot file as written, in its own units."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     source: str = ""
     convention: Literal["standard", "modified"]
     length_unit: LengthUnit
@@ -111,6 +122,15 @@ class RobotFile(_Section):
     tool: Placement = Placement()
     coupling: Coupling | None = None
     payload: PayloadSection | None = None
+    urdf: UrdfSection | None = None
+
+    @model_validator(mode="after")
+    def _named(self) -> "RobotFile":
+        for key in ("joints", "links"):
+            count = len(self.link) if self.urdf is None else len(getattr(self.urdf, key))
+            if count != len(self.link):
+                raise ValueError(f"urdf.{key} has {count} names, it must have {len(self.link)}, one per link")
+        return self
 
     @model_validator(mode="after")
     def _square(self) -> "RobotFile":
@@ -175,6 +195,7 @@ def _known_keys(location: Iterable[int | str]) -> list[str]:
         "link": Link,
         "coupling": Coupling,
         "payload": PayloadSection,
+        "urdf": UrdfSection,
     }
     names = [part for part in location if isinstance(part, str)]
     return list((sections[names[0]] if names else RobotFile).model_fields)

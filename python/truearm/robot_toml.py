@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from truearm.dh_row import row_transform
 from truearm.robot_data import Payload, RobotData
-from truearm.robot_file import Link, PayloadSection, Placement, RobotFile, Row
+from truearm.robot_file import Link, PayloadSection, Placement, RobotFile, Row, UrdfSection
 from truearm.rotations import quaternion_from_matrix, transform_from_parts
 from truearm.units import to_si
+from truearm.urdf_names import UrdfNames
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +35,7 @@ def fields_of(file: RobotFile) -> dict[str, Any]:
         "coupling": matrix * np.array([link.direction for link in file.link], dtype=np.float64),
         "limits": np.array([_limits(link, file) for link in file.link]),
         "payload": None if file.payload is None else _payload_of(file.payload),
+        "urdf_names": None if file.urdf is None else _names_of(file.urdf),
     }
 
 
@@ -57,6 +59,8 @@ def write(robot: RobotData) -> str:
         lines += ["", "[coupling]", f"matrix = [\n{rows},\n]"]
     if robot.payload is not None:
         lines += _payload(robot.payload)
+    if robot.urdf_names is not None:
+        lines += _names(robot.urdf_names)
     return "\n".join(lines) + "\n"
 
 
@@ -65,6 +69,10 @@ def _payload_of(section: PayloadSection) -> Payload:
         return Payload(section.mass_kg)
     x, y, z = section.centre_of_gravity_mm
     return Payload(section.mass_kg, (x, y, z))
+
+
+def _names_of(section: UrdfSection) -> UrdfNames:
+    return UrdfNames(section.base_link, tuple(section.joints), tuple(section.links), section.tip_link)
 
 
 def _row(row: Row, file: RobotFile) -> Floats:
@@ -101,7 +109,7 @@ def _link(robot: RobotData, index: int, direction: int) -> list[str]:
     lines += [f"theta = {theta!r}", f"d = {d!r}", f"a = {a!r}", f"alpha = {alpha!r}"]
     lines += [f"beta = {beta!r}"] if beta else []
     lines += [f"direction = {direction}"] if direction != 1 else []
-    if np.isfinite(robot.limits[index]).all():
+    if np.isfinite(robot.limits[index]).any():
         lines.append(f"limits = {_list(robot.limits[index])}")
     return lines
 
@@ -123,6 +131,13 @@ def _payload(payload: Payload) -> list[str]:
     if payload.centre_of_gravity_mm is not None:
         lines.append(f"centre_of_gravity_mm = {_list(payload.centre_of_gravity_mm)}")
     return lines
+
+
+def _names(names: UrdfNames) -> list[str]:
+    joints, links = (", ".join(map(_quoted, each)) for each in (names.joints, names.links))
+    lists = [f"joints = [{joints}]", f"links = [{links}]"]
+    ends = [f"base_link = {_quoted(names.base_link)}", f"tip_link = {_quoted(names.tip_link)}"]
+    return ["", "[urdf]", *ends, *lists]
 
 
 def _list(values: Iterable[float]) -> str:

@@ -6,6 +6,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.arrays import rotation_fault
 from truearm.errors import InputError, UsageError, list_rows
 from truearm.rotations import (
     check_euler_sequence,
@@ -102,11 +103,11 @@ def _check_angles(angles: Floats, unit: str) -> None:
 def _rotations(values: Floats, rows: NDArray[np.int64]) -> Floats:
     """Rotations (n, 3, 3) of numbers (n, 9) that are found to be some; `rows` (n,) are their places."""
     matrices = values.reshape(-1, 3, 3)
-    apart = np.abs(matrices.transpose(0, 2, 1) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
-    bad = (apart > ROUNDED) | (np.linalg.det(matrices) < 0.0)
-    if bad.any():
+    fault = rotation_fault(matrices, ROUNDED)
+    if fault is not None:
         raise InputError(
-            f"the nine numbers of {list_rows((rows[bad] + 1).tolist())} are no rotation matrix",
+            f"the nine numbers of {list_rows((rows[fault.rows] + 1).tolist())} are no rotation matrix: "
+            f"{fault.why}",
             where="--rotation",
             rule="Its columns have length one, stand at right angles and form a right-handed frame",
             way_out="Name the columns row by row: matrix=R11,R12,R13,R21,...",

@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from truearm import kinds
 from truearm.errors import UsageError
-from truearm.kinds import check_number
 from truearm.units import MM_PER_METRE
 
 MAJOR_JOINTS: Final = (1, 2, 3)
+WHOLE: Final = ("most_regions", "region_rows", "active", "epochs", "table")
+POSITIVE: Final = (*WHOLE, "sigma_cells", "rate", "tolerance_mm")
 KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
     "region_ceps": ("shrunk", "least_squares"),
     "train_on": ("ceps", "measurements"),
@@ -68,19 +70,13 @@ class SchemeOptions:
                 raise UsageError(
                     f'"{getattr(self, name)}" is not known', where=name, rule=f"Either {' or '.join(known)}"
                 )
-        for name in (
-            "most_regions",
-            "region_rows",
-            "sigma_cells",
-            "active",
-            "rate",
-            "tolerance_mm",
-            "epochs",
-        ):
-            check_number(getattr(self, name), name)
-            if not getattr(self, name) > 0:
-                raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
-        check_number(self.demanded_mm, "demanded_mm")
+        kinds.settle(self, whole=WHOLE, numbers=("sigma_cells", "rate", "tolerance_mm", "demanded_mm"))
+        for name in ("scheme_joints", "cells"):
+            object.__setattr__(self, name, kinds.whole_numbers(getattr(self, name), name))
+        for name in POSITIVE:
+            value = getattr(self, name)
+            if value is not None and not 0 < value < math.inf:
+                raise UsageError(f"{value}", where=name, rule="It must be positive and finite")
         if not 0.0 <= self.demanded_mm < math.inf:
             raise UsageError(f"{self.demanded_mm}", where="demanded_mm", rule="Zero or more, and finite")
         if not self.scheme_joints or len(set(self.scheme_joints)) < len(self.scheme_joints):

@@ -86,12 +86,13 @@ def feature_values(calibration: "Calibration", given: Mapping[str, float] | None
 
 
 def beyond_learnt(calibration: "Calibration", values: Sequence[float]) -> list[str]:
-    """In words, which features (F,) lie beyond those of the rows that a calibration knows, and theirs."""
-    if calibration.rows is None:
+    """In words, which features (F,) lie beyond those that a calibration learned from, and these."""
+    rows = calibration.learned_from if values else None
+    if rows is None:
         return []
     found = []
     for name, value in zip(calibration.options.features, values, strict=False):
-        learnt = calibration.rows.data.features[name]
+        learnt = rows.data.features[name]
         low, high = float(learnt.min()), float(learnt.max())
         if not low <= value <= high:
             found.append(f"{name} = {value:.10g} lies beyond {low:.10g} to {high:.10g}, where it was learnt")

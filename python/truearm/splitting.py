@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from truearm import kinds
 from truearm.columns import VALIDATE
 from truearm.defaults import HOLDOUT, SEED
 from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
@@ -38,6 +39,12 @@ class HoldoutRange:
     high: bool
     share: float
 
+    def __post_init__(self) -> None:
+        kinds.settle(self, whole=("joint",), numbers=("share",), flags=("high",))
+        if self.joint < 1:
+            raise UsageError(f"joint {self.joint} of a range to hold out", rule="Joints are counted from 1")
+        _check_share(self.share, f'the share in "{self}"')
+
     @classmethod
     def parse(cls, text: str) -> "HoldoutRange":
         """The range that "q2:high:0.3" stands for.
@@ -52,11 +59,10 @@ class HoldoutRange:
                 f'"{text}" is no range to hold out',
                 rule="Write qJ:low:SHARE or qJ:high:SHARE, such as q2:high:0.3",
             )
-        _check_share(share, f'the share in "{text}"')
         return cls(int(found[1]), found[2] == "high", share)
 
     def __str__(self) -> str:
-        return f"q{self.joint}:{'high' if self.high else 'low'}:{self.share:g}"
+        return f"q{self.joint}:{'high' if self.high else 'low'}:{self.share!r}"
 
 
 @dataclass(frozen=True)
@@ -73,14 +79,16 @@ class SplitRule:
     and `holdout_range` come first.
 
     Rows with the same joint vector, rows after one another that were read within 0.3 mrad or mm of one
-    pose, and the two rows of a pair, stay together, on the side of the first.
+    pose, and the two rows of a pair, stay together, on the side of the first. `train_size` takes no half of
+    a pair: one that does not fit is passed over, for what comes next in the permutation.
 
     Attributes:
         holdout: Part of the rows that is held out, between 0 and 1.
         seed: Seed of the permutations.
-        train_size: Training rows of each file; all that are not held out by default.
-        split_by: Columns.
-        holdout_range: Tail of one joint.
+        train_size: Training rows of each file, one less where only pairs are left to fill it; all that are
+            not held out by default.
+        split_by: Columns: features, joints ("q1") or "group".
+        holdout_range: Tail of one joint, also as text, such as "q2:high:0.3".
         by_purpose: Whether rows that were planned to validate are held out, where there are some; only with
             the default share.
     """
@@ -93,6 +101,13 @@ class SplitRule:
     by_purpose: bool = True
 
     def __post_init__(self) -> None:
+        kinds.settle(self, whole=("seed", "train_size"), numbers=("holdout",), flags=("by_purpose",))
+        object.__setattr__(self, "split_by", kinds.words(self.split_by, "split_by"))
+        tail: object = self.holdout_range
+        if tail is not None:
+            read = HoldoutRange.parse(tail) if isinstance(tail, str) else tail
+            kinds.required(read, HoldoutRange, "the range to hold out")
+            object.__setattr__(self, "holdout_range", read)
         _check_share(self.holdout, "the share to hold out")
         if self.seed < 0:
             raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
@@ -191,7 +206,33 @@ def _split_file(data: Measurements, rows: Rows, first_of: Rows, rule: SplitRule)
     where = str(data.sources[rows[0]])
     _check_sizes(len(train), len(holdout), rule, where)
     count = len(holdout) if planned.any() else 0
-    return Split(train=rows[train[: rule.train_size]], holdout=rows[holdout], planned=count)
+    return Split(train=_first(data, rows[train], rule), holdout=rows[holdout], planned=count)
+
+
+def _first(data: Measurements, train: Rows, rule: SplitRule) -> Rows:
+    """The first `train_size` of the training rows (t,) of a file, without half a pair.
+
+    A distance between two rows says nothing where one of them is missing.
+    """
+    if rule.train_size is None or data.pair is None:
+        return train[: rule.train_size]
+    alone = data.pair[train] == ""
+    labels = np.where(
+        alone, np.char.add("row ", train.astype(np.str_)), np.char.add("pair ", data.pair[train])
+    )
+    _, first, index, sizes = np.unique(labels, return_index=True, return_inverse=True, return_counts=True)
+    taken, free = np.zeros(len(sizes), dtype=np.bool_), rule.train_size
+    for kin in np.argsort(first):
+        if sizes[kin] <= free:
+            taken[kin], free = True, free - sizes[kin]
+    if not taken.any():
+        raise UsageError(
+            f"a train size of {rule.train_size} holds no whole pair",
+            where=str(data.sources[train[0]]),
+            rule="The two rows of a pair stay together",
+            way_out="Give a larger --train-size",
+        )
+    return train[taken[index.reshape(-1)]]
 
 
 def _planned(data: Measurements, rows: Rows, rule: SplitRule) -> Mask:
@@ -229,7 +270,7 @@ def _drawn_keys(data: Measurements, rows: Rows, rule: SplitRule, rng: np.random.
 
 
 def _key_columns(data: Measurements, names: Sequence[str]) -> NDArray[np.float64]:
-    """Columns (n, k) to split by: features, or what was read as group, joints or positions."""
+    """Columns (n, k) to split by: features, or what was read as group or joints."""
     known = {f"q{j + 1}": data.readings[:, j] for j in range(data.joint_count)}
     known["group"] = np.unique(data.group, return_inverse=True)[1].astype(np.float64)
     known |= {str(name): data.features[name].to_numpy(np.float64) for name in data.features.columns}

@@ -36,8 +36,6 @@ def open_session(path: Path, cell: Cell, poses: Poses) -> Session:
         GROUP: poses.group,
     }
     if not path.exists():
-        if not path.parent.is_dir():
-            raise InputError("there is no such directory", where=str(path.parent))
         head = {"cell": cell.file.name, DRIFT_MM: drift_mm, **identity}
         return Session.create(path, steps_of(poses, cell.file.process), head)
     session = Session(path, writing=True)

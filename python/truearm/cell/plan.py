@@ -15,10 +15,19 @@ from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
 from truearm.columns import REPEAT, VALIDATE
 from truearm.defaults import THERE_AND_BACK
-from truearm.errors import UsageError, WorkError
+from truearm.errors import UsageError, WorkError, count_of
 from truearm.identified import IdentifiedArm
+from truearm.kinds import settle
 from truearm.planning.accessibility import Rule, accessible, lowest
-from truearm.planning.choosing import SETUP_KINDS, Choice, ChoiceOptions, Criterion, choose, unknowns_jacobian
+from truearm.planning.choosing import (
+    CRITERIA,
+    SETUP_KINDS,
+    Choice,
+    ChoiceOptions,
+    Criterion,
+    choose,
+    unknowns_jacobian,
+)
 from truearm.planning.spreading import fill
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
@@ -59,8 +68,18 @@ class PlanOptions:
     rules: tuple[Rule, ...] = ()
 
     def __post_init__(self) -> None:
+        settle(self, whole=("count", "seed"), numbers=("sigma_mm",))
         if not 0.0 < self.sigma_mm < np.inf:
             raise UsageError(f"{self.sigma_mm:g}", where="--sigma-mm", rule="It must be positive and finite")
+        if self.count < 1:
+            raise UsageError(count_of(self.count, "pose"), rule="At least one is planned")
+        if self.seed < 0:
+            raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
+        for name, known in (("order", ORDERS), ("criterion", CRITERIA)):
+            if getattr(self, name) not in known:
+                raise UsageError(
+                    f'"{getattr(self, name)}" is not known', where=name, rule=f"Either {' or '.join(known)}"
+                )
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.arrays import rotation_fault
 from truearm.cell.device_errors import MEND_THE_DRIVER, MalformedReadingError
 from truearm.columns import PURPOSE, means_something
 
@@ -119,9 +120,7 @@ def _features(features: object) -> dict[str, float]:
 
 def _pose(pose: object) -> Floats:
     found = _array(pose, (4, 4), "pose_in_world")
-    turn = found[:3, :3]
-    off = np.abs(turn.T @ turn - np.eye(3)).max()
-    if not off < TOLERANCE or np.linalg.det(turn) < 0.0:
+    if rotation_fault(found[None, :3, :3], TOLERANCE) is not None:
         raise _wrong("pose_in_world is no turn and place", "It is world_from_target (4, 4), a rotation in it")
     return found
 

@@ -4,6 +4,7 @@ SQLite in write-ahead mode with full synchronisation: what was committed outlive
 """
 
 import json
+import secrets
 import sqlite3
 import time
 from collections.abc import Iterator, Sequence
@@ -74,8 +75,13 @@ class Stored(NamedTuple):
 class Session:
     """A session file, open for writing by one process at a time, or for reading by any."""
 
-    def __init__(self, path: Path, *, writing: bool) -> None:
+    def __init__(self, path: Path, *, writing: bool, lock: FileLock | None = None) -> None:
         """Open a file that exists.
+
+        Args:
+            path: The file.
+            writing: Whether it is written to.
+            lock: Its lock, where this process holds it already; given back when the session is closed.
 
         Raises:
             InputError: If there is none, or it is no session of this layout.
@@ -91,12 +97,10 @@ class Session:
                 )
         self.path = path
         self._keeps = writing
-        place = path.resolve()
-        self._lock = FileLock(f"{place}.lock") if writing else None
-        self._acquire()
+        self._lock = (lock or _locked(path)) if writing else None
         mode = "rwc" if writing else "ro"
         self._db = sqlite3.connect(
-            f"{place.as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
+            f"{path.resolve().as_uri()}?mode={mode}", uri=True, isolation_level=None, check_same_thread=False
         )
         try:
             self._check_version()
@@ -113,24 +117,31 @@ class Session:
 
         Raises:
             InputError: If it cannot be written.
+            WorkError: If another process has made it, or is about to.
         """
+        if not path.parent.is_dir():
+            raise InputError("there is no such directory", where=str(path.parent))
         file = path.resolve()
-        neighbour = file.with_name(f".{file.name}.new")
-        neighbour.unlink(missing_ok=True)
-        values = {"version": VERSION, "created_s": time.time(), **meta}
+        neighbour = file.with_name(f".{file.name}.{secrets.token_hex(8)}")
+        lock = None
         try:
-            with closing(sqlite3.connect(neighbour, isolation_level=None)) as database:
-                database.executescript(SCHEMA)
-                database.execute("BEGIN")
-                rows = [(key, json.dumps(value)) for key, value in values.items()]
-                database.executemany("INSERT INTO meta VALUES (?, ?)", rows)
-                database.executemany(ADD_STEP, map(_step_row, steps))
-                database.execute("COMMIT")
+            _write_new(neighbour, steps, {"version": VERSION, "created_s": time.time(), **meta})
+            lock = _locked(path)
+            if path.exists():
+                raise WorkError(
+                    "another process has made this session meanwhile",
+                    where=str(path),
+                    way_out="Give the same command again to go on with it",
+                )
             neighbour.replace(file)
-        except (sqlite3.OperationalError, OSError) as error:
+            return cls(path, writing=True, lock=lock)
+        except BaseException as error:
             neighbour.unlink(missing_ok=True)
-            raise InputError(f"cannot be written: {error}", where=str(path)) from None
-        return cls(path, writing=True)
+            if lock is not None:
+                lock.release()
+            if isinstance(error, sqlite3.OperationalError | OSError):
+                raise InputError(f"cannot be written: {error}", where=str(path)) from None
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -290,16 +301,6 @@ class Session:
                 way_out="What it says is stored is there. Make room, then the same command goes on",
             ) from None
 
-    def _acquire(self) -> None:
-        if self._lock is None:
-            return
-        try:
-            self._lock.acquire(timeout=0.0)
-        except Timeout:
-            raise WorkError(
-                "another process is measuring into this session", where=str(self.path), way_out="Wait for it"
-            ) from None
-
     def _check_version(self) -> None:
         try:
             version = self.meta("version")
@@ -311,6 +312,29 @@ class Session:
                 where=str(self.path),
                 rule=f"This version of truearm knows layout {VERSION}",
             )
+
+
+def _locked(path: Path) -> FileLock:
+    """The lock of a session file, held by this process."""
+    lock = FileLock(f"{path.resolve()}.lock")
+    try:
+        lock.acquire(timeout=0.0)
+    except Timeout:
+        raise WorkError(
+            "another process is measuring into this session", where=str(path), way_out="Wait for it"
+        ) from None
+    return lock
+
+
+def _write_new(file: Path, steps: Sequence[Step], values: dict[str, Any]) -> None:
+    """Write a session with steps and a head, to a file that is not there yet."""
+    with closing(sqlite3.connect(file, isolation_level=None)) as database:
+        database.executescript(SCHEMA)
+        database.execute("BEGIN")
+        rows = [(key, json.dumps(value)) for key, value in values.items()]
+        database.executemany("INSERT INTO meta VALUES (?, ?)", rows)
+        database.executemany(ADD_STEP, map(_step_row, steps))
+        database.execute("COMMIT")
 
 
 def _point(values: tuple[Any, ...]) -> Point | None:

@@ -20,9 +20,9 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
-from truearm.defaults import HOLDOUT, SEED
+from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, HOLDOUT, MODEL, ROBUST, SEED
 from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
-from truearm.files import write_whole
+from truearm.files import make_directory, write_whole
 from truearm.scheme_options import SchemeOptions
 
 if TYPE_CHECKING:
@@ -45,12 +45,12 @@ def command(
     split_by: option.SplitBy = None,
     holdout_range: option.HoldoutRange = None,
     use: Use = None,
-    judge_target: option.JudgeTarget = 1,
-    model: option.Model = "variable",
-    robust: option.Robust = "none",
-    drift: option.Drift = "auto",
+    judge_target: option.JudgeTarget = FIRST_TARGET,
+    model: option.Model = MODEL,
+    robust: option.Robust = ROBUST,
+    drift: option.Drift = DRIFT,
     features: option.Features = None,
-    frame: option.Frame = "free",
+    frame: option.Frame = FRAME,
     no_refit: option.NoRefit = False,
     strip: option.Strip = False,
     length_unit: LengthUnit = None,
@@ -65,7 +65,7 @@ def command(
     composition: option.Composition = SCHEME.composition,
     repeatability_mm: option.RepeatabilityMm = None,
     as_json: AsJson = False,
-    degree: option.Degree = 2,
+    degree: option.Degree = DEGREE,
     threads: option.Threads = None,
 ) -> None:
     """Calibrate an arm and judge the calibration on poses that took no part in it.
@@ -181,7 +181,7 @@ def bound_std(calibration: "Calibration", stages: Stages) -> None:
 def write_results(calibration: "Calibration", output: Path, *, with_rows: bool = True) -> dict[str, Any]:
     """Write all three files to a directory, which is made if needed; the content of summary.json."""
     summary = calibration.summary
-    output.mkdir(parents=True, exist_ok=True)
+    make_directory(output)
     calibration.save(output / CALIBRATION_NAME, with_rows=with_rows)
     write_whole(output / SUMMARY_NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
     make_report(calibration if with_rows else calibration.without_rows(), output / REPORT_NAME)

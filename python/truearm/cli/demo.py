@@ -18,7 +18,7 @@ from truearm.cli.measure_progress import Teller
 from truearm.cli.progress import told_stages
 from truearm.cli.report import CALIBRATION_NAME
 from truearm.errors import typed
-from truearm.files import write_whole
+from truearm.files import make_directory, write_whole
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -56,7 +56,7 @@ def command(
     from truearm.studies.demonstration import demonstration_cell
 
     check_directory(output)
-    output.mkdir(parents=True, exist_ok=True)
+    make_directory(output)
     text = demonstration_cell(speed)
     write_whole(output / CELL, text)
     plan = _planned(text, count, output, quiet=as_json)

@@ -9,7 +9,7 @@ from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import told_stages
-from truearm.defaults import SEED
+from truearm.defaults import FIRST_TARGET, SEED
 from truearm.errors import count_of, typed
 
 
@@ -18,7 +18,7 @@ def command(
     measurements: MeasurementFiles,
     seed: Annotated[int, typer.Option(help="Seed of the draw of frame rows.")] = SEED,
     use: Use = None,
-    judge_target: Annotated[int, typer.Option(metavar="K", help="Judge at this target.")] = 1,
+    judge_target: Annotated[int, typer.Option(metavar="K", help="Judge at this target.")] = FIRST_TARGET,
     frame_rows: Annotated[
         int | None,
         typer.Option(metavar="N", help="Rows that find the frame and tool.  [default: a third, 400 at most]"),

@@ -12,7 +12,7 @@ from truearm.cli.console import print_json, print_table, say, suggest, tell, war
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.files import write_whole
+from truearm.files import make_directory, write_whole
 
 if TYPE_CHECKING:
     from truearm.studies.accuracy.running import Outcome, Study
@@ -90,7 +90,7 @@ def command(
     check_directory(output)
     with ends_promptly(f"Results so far are in {output}; the same command goes on with the others."):
         _warn_of(study)
-        output.mkdir(parents=True, exist_ok=True)
+        make_directory(output)
         outcome = gather(study, output) if so_far else conduct(study, output, where, told_progress())
         if so_far and not outcome.records:
             raise InputError(

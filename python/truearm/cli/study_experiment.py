@@ -11,23 +11,22 @@ from truearm.cli.console import print_json, print_table, say, suggest
 from truearm.cli.interrupt import end_at_once, ends_promptly
 from truearm.cli.measure_progress import Teller
 from truearm.cli.progress import told_stages
+from truearm.defaults import EXPERIMENT_SPEED, PAPER_POSES, PAPER_REGIONS
 from truearm.errors import typed
-from truearm.files import write_whole
+from truearm.files import make_directory, write_whole
 
 JSON_NAME: Final = "experiment.json"
 PAGE_NAME: Final = "experiment.md"
 CELL_NAME: Final = "cell.toml"
-REGIONS: Final = 85
-SPEED: Final = 1000.0
 
 
 def command(
     output: OutputDirectory,
-    regions: Annotated[int, typer.Option(min=2, help="Into how many the space is divided.")] = REGIONS,
-    poses: Annotated[int, typer.Option(min=5, help="Measured in each region to identify it.")] = 20,
+    regions: Annotated[int, typer.Option(min=2, help="Into how many the space is divided.")] = PAPER_REGIONS,
+    poses: Annotated[int, typer.Option(min=5, help="Measured in each region to identify it.")] = PAPER_POSES,
     speed: Annotated[
         float, typer.Option(min=1.0, metavar="X", help="How fast the virtual clock runs.")
-    ] = SPEED,
+    ] = EXPERIMENT_SPEED,
     as_json: AsJson = False,
 ) -> None:
     """Repeat the paper's experiment (section 7) on its virtual cell and say where they agree.
@@ -50,7 +49,7 @@ def command(
     from truearm.studies.process.setting import Setting, cell_text
 
     check_directory(output)
-    output.mkdir(parents=True, exist_ok=True)
+    make_directory(output)
     setting = Setting(regions=regions, poses=poses, speed=speed)
     write_whole(output / CELL_NAME, cell_text(setting))
     kept = f"The session is in {output}; the same command goes on with it."

@@ -11,7 +11,7 @@ from truearm.cli.console import print_json, print_table, say, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.errors import UsageError, typed
-from truearm.files import write_whole
+from truearm.files import make_directory, write_whole
 
 FIGURES: Final = ("6", "7", "8", "paths", "noise", "cmac")
 JSON_NAME: Final = "paper.json"
@@ -53,7 +53,7 @@ def command(
 
     with ends_promptly():
         study = conduct_study(range(seeds), chosen, told_stages(), scheduler=scheduler, workers=workers)
-    output.mkdir(parents=True, exist_ok=True)
+    make_directory(output)
     files = save_pictures(study, output)
     write_whole(output / JSON_NAME, json.dumps(study.result, indent=1, allow_nan=False) + "\n")
     write_whole(output / PAGE_NAME, study.page)

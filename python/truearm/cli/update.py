@@ -10,6 +10,7 @@ from truearm.cli.console import print_json, print_table, say, say_wrapped, sugge
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.cli.report import CALIBRATION_NAME
+from truearm.defaults import LEVEL, OFFSET_DEG, TOOL_MM
 from truearm.errors import UsageError, typed
 
 if TYPE_CHECKING:
@@ -29,9 +30,9 @@ def command(
     keep_frame: option.KeepFrame = False,
     keep_tool: option.KeepTool = False,
     new_tool: option.NewTool = False,
-    offset_deg: option.OffsetDeg = 1.0,
-    tool_mm: option.ToolMm = 5.0,
-    level: option.Level = 0.01,
+    offset_deg: option.OffsetDeg = OFFSET_DEG,
+    tool_mm: option.ToolMm = TOOL_MM,
+    level: option.Level = LEVEL,
     use: Use = None,
     roll_back: option.RollBack = False,
     length_unit: LengthUnit = None,
@@ -127,12 +128,12 @@ def _free_place(output: Path) -> Path:
 
 
 def _write(found: "Update", place: Path) -> None:
-    from truearm.files import write_whole
+    from truearm.files import make_directory, write_whole
 
     if found.calibration.has_conservative:
         with told_stages()("bounding the standard deviation"):
             _ = found.calibration.conservative
-    place.parent.mkdir(parents=True, exist_ok=True)
+    make_directory(place.parent)
     found.calibration.save(place)
     if place.name == CALIBRATION_NAME:
         text = json.dumps(found.to_dict(), indent=2, allow_nan=False)

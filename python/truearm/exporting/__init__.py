@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal, cast, get_args
 
-from numpy.typing import ArrayLike
-
 from truearm.calibration import Calibration
 from truearm.errors import UsageError, did_you_mean, list_names
 from truearm.exporting.constant_part import constant_robot
@@ -20,7 +18,7 @@ from truearm.exporting.tables import csv_text, json_text, toml_text
 from truearm.exporting.ur_yaml import yaml_text
 from truearm.exporting.urdf_file import urdf_text
 from truearm.files import write_whole
-from truearm.kinds import required
+from truearm.kinds import check_number, required
 
 Format = Literal["urdf", "ur-yaml", "dh-toml", "dh-json", "dh-csv", "field-csv"]
 FORMATS: Final = get_args(Format)
@@ -36,15 +34,22 @@ class Options:
         urdf: For "urdf": the URDF to correct, "FILE.urdf#TIP"; None writes a new one.
         kinematics_hash: For "ur-yaml": the hash that the driver compares with the arm's; None makes one.
         grid: For "field-csv": "q1=-90:90:7,q4=30", deg and mm; None for five readings a joint.
-        features: For "field-csv": features of the calibration by name.
+        features: For "field-csv": features of the calibration by name, one number each for all samples.
         with_std: For "field-csv": whether to add standard deviations.
+
+    Raises:
+        UsageError: If a feature is not one number.
     """
 
     urdf: str | None = None
     kinematics_hash: str | None = None
     grid: str | None = None
-    features: Mapping[str, ArrayLike] | None = None
+    features: Mapping[str, float] | None = None
     with_std: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in (self.features or {}).items():
+            check_number(value, f'the feature "{name}"')
 
 
 @dataclass(frozen=True)

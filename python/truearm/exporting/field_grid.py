@@ -135,10 +135,10 @@ def grid_text(
     table: pd.DataFrame,
     calibration: Calibration,
     axes: Sequence[Axis],
-    features: Mapping[str, ArrayLike] | None = None,
+    features: Mapping[str, float] | None = None,
 ) -> str:
     """The table as CSV with comments on what it is, where it was sampled, and what each column is."""
-    stated = [f"{name} {np.asarray(value):{SHOWN}}" for name, value in (features or {}).items()]
+    stated = [f"{name} {value:{SHOWN}}" for name, value in (features or {}).items()]
     notes = [
         f"{calibration.robot.name}, calibrated by truearm {calibration.version}: samples of what varies",
         f"Sampled at {'; '.join(_in_words(calibration, axes))}, the last one running fastest",

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-from truearm.files import write_whole
+from truearm.files import make_directory, write_whole
 from truearm.fleet.inputs import Inputs
 from truearm.fleet.rows import Row, row_of_made
 from truearm.fleet.task import ArmMade
@@ -39,7 +39,7 @@ def keep(inputs: Inputs, made: ArmMade, output: Path) -> Row:
         InputError: If the directory may not be written to.
     """
     folder = output / inputs.entry.name
-    folder.mkdir(parents=True, exist_ok=True)
+    make_directory(folder)
     for name in (ROW_NAME, REPORT_NAME):
         (folder / name).unlink(missing_ok=True)
     write_whole(folder / CALIBRATION_NAME, made.calibration)

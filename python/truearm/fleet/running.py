@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from truearm.errors import TruearmError
-from truearm.files import write_whole
+from truearm.files import make_directory, write_whole
 from truearm.fitting import Stages, no_stages
 from truearm.fleet.attention import FAILED
 from truearm.fleet.fleet_file import Entry, Fleet
@@ -75,7 +75,7 @@ def run_fleet(
     """
     check_workers(scheduler, workers)
     folder = Path(output)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_directory(folder)
     rows: dict[str, Row] = {}
     traces: dict[str, str] = {}
     with stages("looking for what is done"):

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import RIGID_WITHIN, as_numbers
+from truearm.arrays import as_numbers, check_finite, rotation_fault
 from truearm.calibration import Calibration
 from truearm.endpoints import at_tool
 from truearm.errors import InputError, Notice, UsageError
@@ -32,7 +32,7 @@ __all__ = ["IdentifiedFrame", "find_object", "find_tool", "former_entry", "tip_c
 
 def find_tool(
     calibration: Calibration,
-    data: Measurements,
+    data: Measurements | Sequence[Measurements],
     *,
     orientation: ArrayLike | None = None,
     points: Sequence[str] | None = None,
@@ -52,8 +52,8 @@ def find_tool(
         InputError: If the data is of another arm.
         WorkError: If the data determines too little.
     """
-    calibration = required(calibration, Calibration, "the calibration")
-    notices = check_readings(Measurements.of(data), calibration.robot)
+    calibration, data = required(calibration, Calibration, "the calibration"), Measurements.of(data)
+    notices = check_readings(data, calibration.robot)
     turned = None if orientation is None else _rotation(orientation)
     if data.target_count and np.isfinite(data.targets).any():
         if data.orientations is not None and turned is not None:
@@ -70,7 +70,7 @@ def find_tool(
 
 def find_object(
     calibration: Calibration,
-    data: Measurements,
+    data: Measurements | Sequence[Measurements],
     flange_from_tool: ArrayLike,
     covariance: ArrayLike | None = None,
 ) -> IdentifiedFrame:
@@ -86,8 +86,8 @@ def find_object(
         InputError: If the data is of another arm, or has no positions.
         WorkError: If the points do not tell where the object is.
     """
-    calibration = required(calibration, Calibration, "the calibration")
-    notices = check_readings(Measurements.of(data), calibration.robot)
+    calibration, data = required(calibration, Calibration, "the calibration"), Measurements.of(data)
+    notices = check_readings(data, calibration.robot)
     if not data.target_count or not np.isfinite(data.targets[:, 0]).all():
         raise InputError(
             "there is no place x, y, z of every touched point",
@@ -114,8 +114,12 @@ def _covariance(given: ArrayLike) -> Floats:
 
 def _rotation(orientation: ArrayLike) -> Floats:
     given = as_numbers(orientation, what="the entries of the orientation")
-    square = given.shape == (3, 3)
-    off = np.abs(given.T @ given - np.eye(3)).max() if square else np.nan
-    if not off <= RIGID_WITHIN or np.linalg.det(given) < 0:
-        raise InputError("the orientation is no rotation matrix (3, 3)")
+    if given.shape != (3, 3):
+        raise InputError(f"the orientation has shape {given.shape}", rule="A rotation matrix is (3, 3)")
+    check_finite(given, what="the entries of the orientation")
+    fault = rotation_fault(given[None])
+    if fault is not None:
+        raise InputError(
+            f"the orientation is no rotation matrix: {fault.why}", rule=fault.rule, way_out=fault.way_out
+        )
     return given

@@ -123,7 +123,7 @@ class _Reader:
             targets.extend(0, at[first:last], int(layout[first]), numbers)
         both = len(self._parts) == 2
         motion = np.where(
-            (layout == 0) & both, int(Motion.NONE), np.where(layout == 0, Motion.JOINT, Motion.LINEAR)
+            (layout == 0) & both, int(Motion.SEED), np.where(layout == 0, Motion.JOINT, Motion.LINEAR)
         )
         count = len(order)
         zeros = np.zeros(count, dtype=np.int64)
@@ -228,6 +228,7 @@ class _Reader:
         points = {m[1]: (c, m[3] or "m") for c, n in names.items() if (m := TARGET.fullmatch(n)) and not m[2]}
         turns = {m[1]: (c, m[2] or "rad") for c, n in names.items() if (m := ROTATION.fullmatch(n))}
         wanted = range(1, len(self._joints) + 1)
+        self._check_once()
         self._check_joints(joints)
         has_pose = set(points) == set("xyz") and (quaternion or set(turns) == set("xyz"))
         has_joints = set(joints) == set(wanted)
@@ -251,12 +252,23 @@ class _Reader:
             parts.append(self._pose_part(points, turns, quaternion=quaternion))
         return parts
 
+    def _check_once(self) -> None:
+        """No two columns say the same: one of them would stay as it was."""
+        said: dict[str, str] = {}
+        for name in self._names:
+            coordinate = _coordinate(name)
+            if coordinate and coordinate in said:
+                self._fail_header(f'"{said[coordinate]}" and "{name}" say the same')
+            said[coordinate] = name
+        vector = [said[turn] for turn in ("rx", "ry", "rz") if turn in said]
+        quaternion = [said[part] for part in QUATERNION if part in said]
+        if vector and quaternion:
+            self._fail_header(
+                f"{', '.join(quaternion)} and {', '.join(vector)} both say how the tool is turned"
+            )
+
     def _check_joints(self, joints: Mapping[int, tuple[int, str]]) -> None:
-        """Each joint has one column, in a unit of its kind."""
-        named = [m[1] for name in self._names if (m := JOINT.fullmatch(name))]
-        twice = [joint for joint in joints if named.count(str(joint)) > 1]
-        if twice:
-            self._fail_header(f"joint {twice[0]} has more than one column")
+        """Each joint is in a unit of its kind."""
         for joint, (column, unit) in joints.items():
             kind = self._joints[joint - 1] if joint <= len(self._joints) else ""
             if kind and unit and (unit in ("m", "mm")) != (kind == "prismatic"):
@@ -283,6 +295,17 @@ class _Reader:
             rule="Columns are q1 ... qN, or x, y, z with qw, qx, qy, qz or rx, ry, rz, or both",
             way_out="docs/reference/programs.md has the units that names may carry",
         )
+
+
+def _coordinate(name: str) -> str:
+    """What a column says of a waypoint, its unit left out; empty for another column."""
+    if joint := JOINT.fullmatch(name):
+        return f"q{int(joint[1])}"
+    if (point := TARGET.fullmatch(name)) and not point[2]:
+        return str(point[1])
+    if turn := ROTATION.fullmatch(name):
+        return f"r{turn[1]}"
+    return name if name in QUATERNION else ""
 
 
 def _si(unit: str) -> float:

@@ -13,12 +13,13 @@ from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
 from truearm.programs.layouts import of_joints, of_pose
 from truearm.programs.program import LinearStep, Program, StepTexts
-from truearm.programs.tables import Motion
+from truearm.programs.tables import NOWHERE, Motion
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 MOST_SAMPLES: Final = 4000
@@ -79,24 +80,29 @@ class Densifier:
     def insert(self, nominal: Floats, changed: Bools) -> Inserted:
         """Waypoints for every linear move between two changed targets, (t, N) readings and (t,)."""
         moves = self._program.moves
+        ends = np.stack([moves.before, moves.target], axis=1)
+        lines = (moves.motion == Motion.LINEAR) & (moves.before != NOWHERE) & changed[ends].all(axis=1)
         stepped: list[list[LinearStep]] = []
         impossible: list[int] = []
-        for move in np.flatnonzero((moves.motion == Motion.LINEAR) & moves.follows):
-            ends = moves.target[move - 1 : move + 1]
-            if move == 0 or not changed[ends].all():
-                continue
-            found = self._between(int(move), nominal[ends])
+        for move in np.flatnonzero(lines).tolist():
+            found = self._between(move, ends[move], nominal[ends[move]])
             if found is None:
-                impossible.append(int(move))
+                impossible.append(move)
             elif found:
                 stepped.append(found)
         texts = self._program.language.linear_steps(self._program, stepped) if stepped else StepTexts()
         return Inserted(texts, tuple(sorted([*impossible, *texts.impossible])))
 
-    def _between(self, move: int, ends: Floats) -> list[LinearStep] | None:
-        """Waypoints before a move; None where it deviates by more and that cannot be helped."""
+    def _between(self, move: int, targets: Integers, ends: Floats) -> list[LinearStep] | None:
+        """Waypoints before a move; None where it deviates by more and that cannot be helped.
+
+        Args:
+            move: Its number.
+            targets: Where the arm stands before it, and where it leads, (2,).
+            ends: Readings of these, (2, N).
+        """
         environment = self._program.environments[int(self._program.moves.environment[move])]
-        uses, targets = self._encoder.uses, self._program.moves.target[move - 1 : move + 1]
+        uses = self._encoder.uses
         start, end = uses.displaced[targets].tolist()
         displacement = uses.displacements[end]
         tool = environment.tool.controller

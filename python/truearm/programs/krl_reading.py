@@ -84,6 +84,8 @@ OWN: Final = {
 """Settings of a motion's own that name the frame data of an inline form."""
 RELATIVE: Final = frozenset(f"{word}_rel" for word in MOTIONS)
 BLENDING: Final = frozenset({"c_dis", "c_ptp", "c_ori", "c_vel", "c_spl"})
+ANGLE: Final = "ca"
+"""Tells how far an arc goes, which then ends elsewhere than at its target."""
 OPENING: Final = {"if": False, "switch": False, "for": True, "while": True, "loop": True, "repeat": True}
 CLOSING: Final = frozenset({"endif", "endswitch", "endfor", "endwhile", "endloop", "until"})
 OTHERWISE: Final = frozenset({"else", "case", "default"})
@@ -335,6 +337,8 @@ class KrlReading:
                 self._storage.read |= names_in([token for part in _parts(whole)[number:] for token in part])
         if "with" in words:
             self._storage.read |= names_in(found[words.index("with") :])
+        if ANGLE in words:
+            self._flow.jump()
         self._flow.state = before
         self._after_interrupts()
 

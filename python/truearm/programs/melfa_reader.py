@@ -35,14 +35,17 @@ Transform = NDArray[np.float64]
 Kind = Literal["tool", "base"]
 
 _KINDS: Final = {
-    "mov": (Motion.JOINT,),
-    "mvs": (Motion.LINEAR,),
-    "mva": (Motion.JOINT,),
-    "mvr": (Motion.LINEAR, Motion.VIA, Motion.CIRCULAR),
-    "mvr2": (Motion.LINEAR, Motion.CIRCULAR, Motion.NONE),
-    "mvr3": (Motion.LINEAR, Motion.CIRCULAR, Motion.NONE),
-    "mvc": (Motion.LINEAR, Motion.VIA, Motion.VIA),
+    "mov": ((0, Motion.JOINT),),
+    "mvs": ((0, Motion.LINEAR),),
+    "mva": ((0, Motion.JOINT),),
+    "mvr": ((0, Motion.LINEAR), (1, Motion.VIA), (2, Motion.CIRCULAR)),
+    "mvr2": ((0, Motion.LINEAR), (2, Motion.BESIDE), (1, Motion.CIRCULAR)),
+    "mvr3": ((0, Motion.LINEAR), (2, Motion.BESIDE), (1, Motion.CIRCULAR)),
+    "mvc": ((0, Motion.LINEAR), (1, Motion.VIA), (2, Motion.VIA), (0, Motion.CIRCULAR)),
 }
+"""What a motion does with its arguments, by their place, in the order in which the arm passes them. The third
+one of Mvr2 is a point of the rest of the circle, that of Mvr3 its centre; Mvc ends where it begins.
+"""
 _VARIABLE: Final = re.compile(rf"\s*\(?\s*({NAME})\s*\)?\s*\Z")
 _DISTANCE: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*\Z")
 _TOOL_SET: Final = re.compile(r"\bM_Tool\b[^=]*=", re.IGNORECASE)
@@ -222,16 +225,22 @@ class Reader:
                 move.at, f"{move.word} is not followed: the tool stands still, or it is a relative move"
             )
             self._keep(move.pieces, f"it is also used in line {line} by {move.word}, which is not followed")
+            self._follows = False
             return
         kinds = _KINDS[word]
-        pieces, behind = move.pieces[: len(kinds)], move.pieces[len(kinds) :]
+        count = 1 + max(piece for piece, _ in kinds)
+        pieces, behind = move.pieces[:count], move.pieces[count:]
         self._keep(behind, f"a distance is computed from it in line {line} when the program runs")
         offset, problem = _close_distance(behind) if word in {"mov", "mvs"} else (np.eye(4), "")
-        for piece, kind in zip(pieces, kinds, strict=False):
-            found = self._place(piece)
+        places = [self._place(piece) for piece in pieces]
+        for piece, found in zip(pieces, places, strict=True):
             if isinstance(found, str):
                 self._list(move.at, found)
                 self._keep([piece], f"a target is computed from it in line {line} when the program runs")
+        for number, kind in kinds:
+            found = places[number] if number < len(places) else COMPUTED
+            if isinstance(found, str):
+                self._follows = False
                 continue
             target, before, after = found
             environment = self._environment(place, before, after @ offset, problem)
@@ -296,7 +305,6 @@ class Reader:
         line, column = self._source.place(at)
         shown = " ".join(self._source.line_text(line).split())[:LONGEST_NAME]
         self.listed.append(Listed(0, line, column, shown, reason))
-        self._follows = False
 
 
 def _close_distance(pieces: Sequence[str]) -> tuple[Transform, str]:

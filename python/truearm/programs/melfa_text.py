@@ -23,7 +23,7 @@ _ASSIGNMENT: Final = re.compile(
     re.IGNORECASE,
 )
 _MOTION: Final = re.compile(
-    r"(?<![\w.*])(Mov|Mvs|Mvc|Mvr[23]?|Mva|E?Mv(?!Tune\b)[A-Za-z]+|Jrc)(?=[\s(,])", re.IGNORECASE
+    r"(?<![\w.*])(Mov|Mvs|Mvc|Mvr[23]?|Mva|E?Mv(?!Tune\b)[A-Za-z]+|Jrc|Mxt)(?=[\s(,])", re.IGNORECASE
 )
 _WHOLE: Final = re.compile(NAME)
 _END_OF_TARGETS: Final = re.compile(r"(?<![\w.])(Type|Wth|WthIf)\b", re.IGNORECASE)

@@ -11,7 +11,6 @@ from truearm.programs.frames import Frames, Kind
 from truearm.programs.layouts import of_joints as layout_of_joints
 from truearm.programs.program import Program
 from truearm.programs.rewriting import Rewritten
-from truearm.programs.tables import Motion
 from truearm.robot import Robot
 from truearm.stillness import moved_joints, still_words
 
@@ -155,7 +154,7 @@ def _environments_of(done: Rewritten, *, of_joints: bool = True) -> list[Environ
     """Environments that motions to changed targets have, those to joint targets among them or not."""
     moves, targets = done.program.moves, done.program.targets
     joints = np.array([layout_of_joints(layout) for layout in done.program.layouts], dtype=bool)
-    used = (moves.motion != Motion.NONE) & done.changed[moves.target]
+    used = moves.moving & done.changed[moves.target]
     if not of_joints:
         used &= ~joints[targets.layout[moves.target]]
     return [done.program.environments[int(number)] for number in np.unique(moves.environment[used])]

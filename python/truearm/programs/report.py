@@ -9,7 +9,6 @@ import numpy as np
 
 from truearm.programs.program import Listed, Program
 from truearm.programs.rewriting import Rewritten, listed_target
-from truearm.programs.tables import Motion
 from truearm.programs.uses import target_count
 
 FORMAT = 1
@@ -45,7 +44,7 @@ def counts(done: Rewritten) -> dict[str, int]:
     left = targets - changed - len(done.kept)
     return {
         "targets": targets,
-        "moves": int((done.program.moves.motion != Motion.NONE).sum()),
+        "moves": int(done.program.moves.moving.sum()),
         "changed": changed,
         "kept": len(done.kept),
         "left": left,

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.controller import Controller
-from truearm.errors import Notice, WorkError
+from truearm.errors import Notice, UsageError, WorkError, did_you_mean, list_names
+from truearm.files import make_directory
 from truearm.inverse import Inverse
+from truearm.kinds import required
 from truearm.programs.densify import Densifier, Inserted, Spacing
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
@@ -22,7 +24,7 @@ from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.program import Language, Listed, Program, StepTexts
 from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, placed, run_of
+from truearm.programs.tables import placed, run_of
 from truearm.programs.uses import Uses, target_count
 from truearm.robot import Robot
 
@@ -44,6 +46,8 @@ ALLOWING: Final = {
 }
 """The option that allows more, by the code of a refusal."""
 NAMED: Final = 10
+KEEP_NOMINAL: Final = "keep-nominal"
+ON_REFUSAL: Final = ("stop", KEEP_NOMINAL)
 Tell = Callable[[str, int, int], None]
 
 
@@ -120,12 +124,26 @@ class Choices:
         force: Rewrite a program that bears a mark.
         spacing: How waypoints are inserted on long lines; None inserts none.
         language: Name of the program's language; by the ending without.
+
+    Raises:
+        UsageError: If `on_refusal` is another word, or the spacing none.
     """
 
     on_refusal: Literal["stop", "keep-nominal"] = "stop"
     force: bool = False
     spacing: Spacing | None = None
     language: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.on_refusal not in ON_REFUSAL:
+            raise UsageError(
+                f"{self.on_refusal!r}",
+                where="on_refusal",
+                rule=f"It is {list_names(ON_REFUSAL, last='or')}",
+                way_out=did_you_mean(str(self.on_refusal), ON_REFUSAL),
+            )
+        if self.spacing is not None:
+            required(self.spacing, Spacing, "the spacing")
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +214,7 @@ class Rewritten:
         """
         self.refuse_unchanged()
         if str(output).endswith("/"):
-            Path(output).mkdir(parents=True, exist_ok=True)
+            make_directory(Path(output))
         paths = output_paths(self.program, Path(output))
         write_outputs(paths, self.contents)
         return paths
@@ -267,7 +285,7 @@ class _State:
     def compensate(self) -> None:
         """Corrected readings of all known targets, tool by tool, in the order of the moves."""
         for number, example in enumerate(self.uses.tools):
-            along = self.program.moves.target[self.program.moves.motion != Motion.NONE]
+            along = self.program.moves.target[self.program.moves.moving]
             which = along[self.known[along] & (self.uses.tool[along] == number)]
             if len(which) == 0:
                 continue
@@ -323,7 +341,7 @@ class _State:
         options = " or ".join(helping)
         allow = f", or allow more with {options}" if options else ""
         away = ". No option allows a tool to stay away" if self.codes.intersection(NOT_REACHED) else ""
-        keep = "--on-refusal keep-nominal leaves such targets as they are where that makes no step"
+        keep = f"--on-refusal {KEEP_NOMINAL} leaves such targets as they are where that makes no step"
         again = ". Touches further apart, and more of them, tell tools and work objects better"
         frames = again if FRAMES_UNSURE in self.codes else ""
         return f"Change them{allow}; {keep}{away}{self._why_unsure()}{frames}"
@@ -345,7 +363,7 @@ class _State:
         if not self.refused:
             return ()
         listed = [self._listed(target, reason) for target, reason in sorted(self.refused.items())]
-        if choices.on_refusal == "stop":
+        if choices.on_refusal != KEEP_NOMINAL:
             raise WorkError(
                 f"{len(listed)} of {target_count(self.program)} targets cannot be corrected:\n"
                 + describe(self.program, listed),

@@ -15,7 +15,7 @@ from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, meant, nearest_turns, with_turns
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight
-from truearm.programs.tables import all_ones, placed, run_of
+from truearm.programs.tables import NOWHERE, all_ones, placed, run_of
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
 
@@ -122,21 +122,22 @@ class _Solver:
                 self.reasons.setdefault(int(target), reason)
 
     def take_poses(self, tell: Callable[[int, int], None]) -> None:
-        """Cartesian targets, in the order of the moves, each with the one before for a seed."""
+        """Cartesian targets, in the order of the moves, each near its seed or where the arm stands."""
         possible = self._possible(tell)
         if not possible:
             return
         self.q = np.require(self.q, requirements="W")
-        before: Floats | None = None
         moves = self.program.moves
-        columns = (moves.target.tolist(), moves.follows.tolist(), moves.motion.tolist())
-        for target, follows, motion in zip(*columns, strict=True):
-            if not follows:
-                before = None
+        moved = moves.moving
+        columns = (moves.target[moved].tolist(), moves.near[moved].tolist(), moves.motion[moved].tolist())
+        for target, near, motion in zip(*columns, strict=True):
             if target in possible:
-                self._take(target, possible[target], before, straight=motion_is_straight(motion))
-            known = not np.isnan(self.q[target, 0])
-            before = self.q[target] if known else None
+                self._take(target, possible[target], self._known(near), straight=motion_is_straight(motion))
+
+    def _known(self, target: int) -> Floats | None:
+        """The readings of a target; None where they are not known."""
+        unknown = target == NOWHERE or target in self.program.fixed or np.isnan(self.q[target, 0])
+        return None if unknown else self.q[target]
 
     def _possible(self, tell: Callable[[int, int], None]) -> dict[int, _Possible]:
         """What the readings of each Cartesian target can be."""

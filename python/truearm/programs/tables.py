@@ -7,6 +7,7 @@ from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ Whole = NDArray[np.integer[Any]]
 Floats = NDArray[np.float64]
 
 ABSENT_AT: Final = -1
+NOWHERE: Final = -1
+"""Stands for a target where it is not known at which one the arm is."""
 
 
 def run_of(rows: Integers) -> slice | Integers:
@@ -44,13 +47,23 @@ def all_ones(factors: Floats) -> bool:
 
 
 class Motion(IntEnum):
-    """How a move reaches its target."""
+    """How a move reaches its target; the last two do not move there.
+
+    Attributes:
+        JOINT: Joint by joint.
+        LINEAR: On a straight line.
+        VIA: On an arc that goes on behind it.
+        CIRCULAR: At the end of an arc.
+        SEED: A solution near these readings is taken for the target of the next move.
+        BESIDE: It only shapes a path that ends elsewhere, as the centre of an arc does.
+    """
 
     JOINT = 0
     LINEAR = 1
     VIA = 2
     CIRCULAR = 3
-    NONE = 4
+    SEED = 4
+    BESIDE = 5
 
 
 class Number(NamedTuple):
@@ -137,7 +150,7 @@ class Moves:
         target: Number of the target.
         source: Number of the file of the statement.
         at: Offset of the statement.
-        motion: A Motion; NONE for a use that does not move, such as a home position that is compared.
+        motion: A Motion.
         blended: Whether the arm does not stop at the target.
         environment: Number of the environment.
         follows: Whether the move before, in this table, is the one executed before: False behind labels,
@@ -154,6 +167,33 @@ class Moves:
 
     def __len__(self) -> int:
         return len(self.target)
+
+    @cached_property
+    def moving(self) -> NDArray[np.bool_]:
+        """Which of them move the arm to their target, (m,)."""
+        return self.motion < Motion.SEED
+
+    @cached_property
+    def before(self) -> Integers:
+        """Target that the arm stands at before each, (m,): that of the last move; NOWHERE if not known."""
+        moved = np.flatnonzero(self.moving)
+        places = np.searchsorted(moved, np.arange(len(self))) - 1
+        known = places >= 0
+        last = moved[places[known]]
+        breaks = np.cumsum(~self.follows)
+        found = np.full(len(self), NOWHERE, dtype=np.int64)
+        found[known] = np.where(breaks[last] == breaks[known], self.target[last], NOWHERE)
+        return found
+
+    @cached_property
+    def near(self) -> Integers:
+        """Target whose readings the solution for each is looked for near, (m,): a seed right before it in
+        the same statement, otherwise where the arm stands; NOWHERE if that is not known.
+        """
+        found = np.array(self.before)
+        seeded = np.flatnonzero(self.motion[:-1] == Motion.SEED) + 1
+        found[seeded] = self.target[seeded - 1]
+        return found
 
 
 class TargetTable:

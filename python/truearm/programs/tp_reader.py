@@ -157,7 +157,7 @@ class Reader:
         found = [one for one in _TARGET.finditer(text) if one.start() < _options_at(text)]
         bare = _COMMENT.sub("", text)
         problem = self._moved.get(at) or next((why for option, why in _OPTIONS if option.search(bare)), "")
-        blended, known = _is_blended(bare), bool(found)
+        blended, known = _is_blended(bare), len(found) > (kind == "C")
         if not found:
             self._choose(at, text.strip(), problem)
         for place, target in enumerate(found[:2]):

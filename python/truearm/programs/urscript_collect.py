@@ -25,12 +25,16 @@ from truearm.programs.urscript_syntax import (
     statements,
 )
 
+NOT_FOLLOWED: Final = "it is a motion that is not followed"
 UNTRACKED: Final = {
     "speedj": "it is a speed, not a target",
     "speedl": "it is a speed, not a target",
     "force_mode": "the arm is moved by forces",
     "freedrive_mode": "the arm is moved by hand",
     "teach_mode": "the arm is moved by hand",
+    "optimovej": NOT_FOLLOWED,
+    "optimovel": NOT_FOLLOWED,
+    "mc_run_motion": NOT_FOLLOWED,
 }
 SHIFTING: Final = frozenset(
     {"path_offset_enable", "path_offset_set", "track_conveyor_linear", "track_conveyor_circular"}
@@ -103,7 +107,7 @@ class Collected:
         line, column = self._source.place(at)
         shown = name or " ".join(self._source.line_text(line).split())[:LONGEST_NAME]
         self.listed.append(Listed(0, line, column, shown, reason))
-        self.breaks.append(at)
+        self.breaks.extend((at, at + 1))
 
     def compute(self, node: Node, at: int) -> None:
         """The program computes a motion's target, or its numbers, from the variables in `node`."""

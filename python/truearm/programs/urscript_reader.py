@@ -202,7 +202,7 @@ class Reader:
         if seed is not None and place.seed is not None:
             environment = self._environment(state, None, self._problem(place.seed, frames))
             number = self.environments.number(environment)
-            self._rows.add(seed, motion.at, int(Motion.NONE), 0, number, int(alone))
+            self._rows.add(seed, motion.at, int(Motion.SEED), 0, number, int(alone))
         number = self.environments.number(self._environment(state, place, self._problem(place, frames)))
         row = (target, motion.at, int(motion.motion), int(motion.blended), number)
         self._rows.add(*row, int(alone and seed is None))

@@ -56,7 +56,7 @@ class Uses:
         targets, moves = program.targets, program.moves
         joints = np.array([of_joints(layout) for layout in program.layouts], dtype=bool)
         joint_targets = joints[targets.layout] if len(targets) else np.zeros(0, dtype=bool)
-        real = _all_or(moves.motion != Motion.NONE)
+        real = _all_or(moves.moving)
         target = run_of(moves.target[real])
         moved = np.zeros(len(targets), dtype=bool)
         moved[target] = True
@@ -84,7 +84,7 @@ class Uses:
 
 def target_count(program: Program) -> int:
     """How many targets a program has; readings that a pose is only looked for next to are none."""
-    real = program.moves.motion != Motion.NONE
+    real = program.moves.moving
     seeds = np.setdiff1d(program.moves.target[~real], program.moves.target[real])
     return len(program.targets) - len(seeds)
 

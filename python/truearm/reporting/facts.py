@@ -191,7 +191,8 @@ class Facts:
     @cached_property
     def features(self) -> dict[str, float]:
         """A usual value of each feature: the median of the rows, zero where they are not known."""
-        names, rows = self.calibration.options.features, self.calibration.rows
+        names = self.calibration.options.features
+        rows = self.calibration.learned_from if names else None
         if rows is None:
             return dict.fromkeys(names, 0.0)
         return {name: float(rows.data.features[name].median()) for name in names}

@@ -1,6 +1,7 @@
 """A virtual arm with known errors, and what an instrument says about it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -9,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import Chain
 from truearm.arrays import as_rows
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 from truearm.files import parsed
+from truearm.kinds import whole_numbers
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.simulation import arm_file
@@ -143,10 +145,19 @@ class VirtualArm:
             n: How many.
             seed: Seed of the draw, apart from the arm's own.
             held: Joints, counted from 1, that stay at reading zero.
+
+        Raises:
+            UsageError: If the arm has no such joint.
         """
+        joints = whole_numbers(held, "held")
+        for joint in joints:
+            if not 1 <= joint <= self.robot.joint_count:
+                raise UsageError(
+                    f"there is no joint {joint} to hold", rule=f"Joints are 1 to {self.robot.joint_count}"
+                )
         low, high = joint_ranges(self.robot)
         readings = np.random.default_rng([self.seed, 1, seed]).uniform(low, high, (n, len(low)))
-        readings[:, [joint - 1 for joint in held]] = 0.0
+        readings[:, [joint - 1 for joint in joints]] = 0.0
         return readings
 
     def true_position(self, q: ArrayLike, *, conditions: Conditions | None = None) -> Floats:
@@ -189,6 +200,8 @@ class VirtualArm:
     ) -> Measurements:
         """What the instrument says about readings `q` (n, N): the target, in the frame of the instrument.
 
+        All that it measures is of one set-up, also where several are put together.
+
         Args:
             q: Readings.
             seed: Seed of the noise, apart from the arm's own.
@@ -196,7 +209,7 @@ class VirtualArm:
             conditions: What the poses are reached under; without them one after another, unloaded.
         """
         table = self.measure_table(q, seed=seed, orientation=orientation, conditions=conditions)
-        return Measurements.from_dataframe(table)
+        return replace(Measurements.from_dataframe(table), default_group=None)
 
     def measure_table(
         self,

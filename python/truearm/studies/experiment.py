@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Problem, Regions, Setup
 from truearm.core_set import known_setup, measured_points
+from truearm.defaults import PAPER_POSES
 from truearm.identified import IdentifiedArm
 from truearm.planning.dividing import DivisionOptions, divide_space, named_columns
 from truearm.planning.pool import PoolOptions, needed_pool
@@ -23,7 +24,6 @@ from truearm.studies.setting import (
     MAIN_READING,
     MEMBERSHIPS,
     NOISE_MM,
-    POSES_A_REGION,
     TEST_POINTS,
     WORKSPACE_POSES,
     Kind,
@@ -157,7 +157,7 @@ def conduct(seed: int, plan: Plan) -> Experiment:
     options = DivisionOptions(
         accuracy_m=0.0 if forced else DEMANDED_M,
         most_regions=plan.regions if plan.regions is not None else FREE_TO_STOP,
-        poses=POSES_A_REGION,
+        poses=PAPER_POSES,
         candidates=CANDIDATES,
         tests=TEST_POINTS,
         seed=seed,

@@ -1,7 +1,9 @@
 """paper.md: what the paper states beside what comes out, and the readings chosen."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
+
+from truearm.studies.markdown import table
 
 Result = Mapping[str, Any]
 
@@ -145,9 +147,3 @@ def _readings(found: Result) -> str:
                 rows.append((name, noise, scheme, *_numbers(judged["path"])[:2], *_workspace(judged)))
     head = ("reading", "noise", "scheme", "path mean mm", "max mm", "workspace mean mm", "max mm")
     return table(head, rows)
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])

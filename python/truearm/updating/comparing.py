@@ -17,10 +17,10 @@ from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.turning_sense import check_turns
-from truearm.updating.estimating import MOST_PARTS, Estimate, estimate, surprise
+from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
-from truearm.updating.scene import Scene
+from truearm.updating.scene import Scene, State
 from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
 from truearm.updating.unknowns import Unknowns
 from truearm.updating.updated import updated
@@ -145,33 +145,33 @@ def update(
     with stages("asking what the calibration expects"):
         _ = calibration.spread
     with stages("finding what moved"):
-        held = _held(calibration, Scene(task, data, calibration, unknowns))
+        held = _held(Scene(task, data, calibration, unknowns))
         unknowns = unknowns.holding(held)
         kept, outliers = _without_outliers(calibration, task, data, unknowns)
         _check_groups(data.select(kept), task)
-        scene = Scene(task, data.select(kept), calibration, unknowns)
-        found = _Found(calibration, scene, chosen, held)
+        scene, start = begun(Scene(task, data.select(kept), calibration, unknowns))
+        found = _Found(calibration, scene, start, chosen, held)
         return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """A calibration, the measurements that count, and the joints whose offsets they do not tell."""
+    """A calibration, the measurements that count, where the search begins, and joints that are not told."""
 
     calibration: Calibration
     scene: Scene
+    start: State
     options: UpdateOptions
     held: dict[int, str]
 
     def told(self, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
         """What the measurements say."""
         scene, unknowns, level = self.scene, self.scene.unknowns, self.options.level
-        start = scene.start()
-        spread = scene.covariance(self.calibration, start)
-        found = estimate(scene, spread, start, unknowns.free)
+        spread = scene.covariance(self.start)
+        found = estimate(scene, spread, self.start, unknowns.free)
         _check_plausible(scene, found)
         anew = unknowns.free & unknowns.nuisance
-        still = estimate(scene, spread, scene.unchanged(start), anew)
+        still = estimate(scene, spread, scene.unchanged(self.start), anew)
         judge = Judge(level, scale_freedom(self.calibration))
         changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
         verdict = _verdict(changed, rest, level)
@@ -206,10 +206,10 @@ def _verdict(changed: SquaresTest, rest: SquaresTest, level: float) -> Verdict:
     return "moved" if changed.p < level / 2.0 else "holds"
 
 
-def _held(calibration: Calibration, scene: Scene) -> dict[int, str]:
+def _held(whole: Scene) -> dict[int, str]:
     """Joints, from 0, whose offsets the poses do not tell, and what from."""
-    start = scene.start()
-    return untold(scene, scene.covariance(calibration, start), start)
+    scene, start = begun(whole)
+    return untold(scene, scene.covariance(start), start)
 
 
 def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, stages: Stages) -> Task:
@@ -298,9 +298,8 @@ def _without_outliers(
     """
     kept, out = np.arange(len(data)), list[int]()
     while len(out) <= MOST_OUTLIERS * len(data):
-        scene = Scene(task, data.select(kept), calibration, unknowns)
-        start = scene.start()
-        spread = scene.covariance(calibration, start)
+        scene, start = begun(Scene(task, data.select(kept), calibration, unknowns))
+        spread = scene.covariance(start)
         found = estimate(scene, spread, start, unknowns.free)
         squares, freedom = surprise(found.linear, spread, unknowns.std, unknowns.free)
         score = squares / (2.0 * gammainccinv(freedom / 2.0, OVERWHELMING))

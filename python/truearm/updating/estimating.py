@@ -17,6 +17,8 @@ Mask = NDArray[np.bool_]
 MOST_STEPS: Final = 30
 STANDS_STILL: Final = 1e-6
 """In prior standard deviations."""
+NEAR: Final = 1e-3
+"""The same, for a state to linearise at."""
 MOST_PARTS: Final = 30
 """Values are left out in so many parts at the most."""
 
@@ -38,6 +40,24 @@ class Estimate:
     factor: Floats
 
 
+def begun(scene: Scene) -> tuple[Scene, State]:
+    """Where the search of what moved begins: what rows say of all unknowns if only noise scatters them.
+
+    What an unchanged arm may scatter by is linearised there. The set-ups of the unchanged arm are no place for
+    that: they make up for the offsets that moved.
+
+    Returns:
+        The same rows with what is found anew held there, ever so gently; and the state.
+    """
+    state = scene.first()
+    factor = factored(scene.scatter(state))
+    for _ in range(MOST_STEPS):
+        state, step = _stepped(scene, factor, state, scene.unknowns.free)
+        if step < NEAR:
+            break
+    return scene.about(state.setup), state
+
+
 def estimate(scene: Scene, spread: Floats, state: State, free: Mask) -> Estimate:
     """The most likely values of the unknowns that are `free` (u,), from a state on.
 
@@ -48,12 +68,9 @@ def estimate(scene: Scene, spread: Floats, state: State, free: Mask) -> Estimate
         WorkError: If V is not positive definite, or the steps do not come to a standstill.
     """
     factor = factored(spread)
-    std = scene.unknowns.std
     for _ in range(MOST_STEPS):
-        linear = scene.linear(state)
-        step = solved(linear, factor, std, free)
-        state = scene.moved(state, step)
-        if np.abs(step[free] / std[free]).max(initial=0.0) < STANDS_STILL:
+        state, step = _stepped(scene, factor, state, free)
+        if step < STANDS_STILL:
             break
     else:
         raise WorkError(
@@ -62,7 +79,14 @@ def estimate(scene: Scene, spread: Floats, state: State, free: Mask) -> Estimate
             way_out="Check that the measurements are of this arm, and their units",
         )
     linear = scene.linear(state)
-    return Estimate(state, linear, posterior(linear, factor, std, free), factor)
+    return Estimate(state, linear, posterior(linear, factor, scene.unknowns.std, free), factor)
+
+
+def _stepped(scene: Scene, factor: Floats, state: State, free: Mask) -> tuple[State, float]:
+    """A state after one more step, and how long that was, in prior standard deviations."""
+    std = scene.unknowns.std
+    step = solved(scene.linear(state), factor, std, free)
+    return scene.moved(state, step), float(np.abs(step[free] / std[free]).max(initial=0.0))
 
 
 def posterior(linear: Linear, factor: Floats, std: Floats, free: Mask) -> Floats:

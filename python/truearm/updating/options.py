@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 from truearm.core_set import Use
+from truearm.defaults import LEVEL, OFFSET_DEG, TOOL_MM
 from truearm.errors import UsageError
-from truearm.kinds import check_number
+from truearm.kinds import settle
 
 
 @dataclass(frozen=True)
@@ -23,22 +24,22 @@ class UpdateOptions:
         use: What of the measurements to use, as in calibrate.
     """
 
-    offset_deg: float = 1.0
+    offset_deg: float = OFFSET_DEG
     offset_mm: float = 2.0
-    tool_mm: float = 5.0
+    tool_mm: float = TOOL_MM
     tool_deg: float = 1.0
     keep_frame: bool = False
     keep_tool: bool = False
     new_tool: bool = False
-    level: float = 0.01
+    level: float = LEVEL
     use: Use | None = None
 
     def __post_init__(self) -> None:
-        for name in ("offset_deg", "offset_mm", "tool_mm", "tool_deg"):
-            check_number(getattr(self, name), name)
+        sizes = ("offset_deg", "offset_mm", "tool_mm", "tool_deg")
+        settle(self, numbers=(*sizes, "level"), flags=("keep_frame", "keep_tool", "new_tool"))
+        for name in sizes:
             if not getattr(self, name) > 0.0:
                 raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
-        check_number(self.level, "level")
         if not 0.0 < self.level < 1.0:
             raise UsageError(f"{self.level}", where="level", rule="Between 0 and 1, such as 0.01")
         if self.keep_tool and self.new_tool:

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
 from truearm.core_set import Selection, core_set, rotations
-from truearm.fitting import Task, core_errors, fit_options
+from truearm.fitting import FRAME_UNKNOWNS, Task, core_errors, fit_options
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse
-from truearm.updating.unknowns import FRAME_UNKNOWNS, OPEN, Unknowns, is_part_of
+from truearm.updating.unknowns import OPEN, Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -51,10 +51,26 @@ class Linear:
 
 
 class Scene:
-    """The rows of an update under one model of a calibration."""
+    """The rows of an update under one model of a calibration.
 
-    def __init__(self, task: Task, data: Measurements, calibration: Calibration, unknowns: Unknowns) -> None:
+    Args:
+        task: What is measured.
+        data: The rows.
+        calibration: As it was.
+        unknowns: What may have moved.
+        about: Set-ups that what is found anew is held at, ever so gently; without them those of `found_free`.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        data: Measurements,
+        calibration: Calibration,
+        unknowns: Unknowns,
+        about: Setup | None = None,
+    ) -> None:
         model = calibration.model
+        self._calibration, self._about = calibration, about
         self.task, self.data, self.unknowns = task, data, unknowns
         self._known = _part(model.setup, calibration.selection, task.selection)
         self.inputs = model_inputs(task.arm, data, task.options.features)
@@ -65,13 +81,22 @@ class Scene:
         self.orientation = np.array([False] * (3 * len(task.selection.targets)) + [True] * self._turns)
         self.seen = self._seen()
 
-    def start(self) -> State:
-        """Nothing moved but set-ups; parts of them that are kept are as they were."""
-        return State(np.zeros(len(self.unknowns.arm_names)), self._with_known(self.anew, self.unknowns.free))
+    def first(self) -> State:
+        """Nothing moved but what is found anew; all else is where the calibration has it."""
+        return State(
+            np.zeros(len(self.unknowns.arm_names)), self._with_known(self.found_free, self.unknowns.std >= OPEN)
+        )
+
+    def about(self, setup: Setup) -> "Scene":
+        """The same rows, with what is found anew held at other set-ups."""
+        return Scene(self.task, self.data, self._calibration, self.unknowns, setup)
 
     @cached_property
-    def anew(self) -> Setup:
-        """Set-ups that the unchanged arm finds in the rows: what is found anew starts from them."""
+    def found_free(self) -> Setup:
+        """Set-ups that the unchanged arm finds in the rows, whatever is known of them.
+
+        Where rows hardly tell a part, as the height of a SCARA's target, a changed offset takes it metres off.
+        """
         with core_errors(self.data):
             options = fit_options(self.task, parameters=self.parameters)
             return fit_constant(self.task.problem(self.measured, []), options).setup
@@ -89,8 +114,7 @@ class Scene:
     def linear(self, state: State) -> Linear:
         """Residuals and derivatives at a state."""
         unknowns = self.unknowns
-        change = (unknowns.directions @ state.arm).reshape(-1, 5)
-        parameters = np.ascontiguousarray(self.parameters + change)
+        parameters = self._moved_parameters(state)
         arm, residual = linearise(self.problem, parameters, state.setup)
         own = setup_jacobian(self.problem, parameters, state.setup)
         jacobian = np.zeros((*residual.shape, len(unknowns.std)))
@@ -105,14 +129,15 @@ class Scene:
     def departure(self, state: State) -> Floats:
         """How far the unknowns (u,) of a state are from where their priors have them.
 
-        Those found anew are held, ever so gently, where the unchanged arm finds them: rows of few directions
-        do not tell all of them, such as the height of a SCARA's device from that of its target.
+        Those found anew are held, ever so gently, where the search began: rows of few directions do not tell
+        all of them, such as the height of a SCARA's device from that of its target.
         """
+        about = self.found_free if self._about is None else self._about
         found = np.zeros(len(self.unknowns.std))
         found[: len(state.arm)] = state.arm
         for k, number in enumerate(self.unknowns.known):
             place = self.unknowns.group(k)
-            gentle = self._between(self.anew, k, state.setup, k)
+            gentle = self._between(about, k, state.setup, k)
             known = gentle if number is None else self._between(self._known, number, state.setup, k)
             found[place] = np.where(self.unknowns.std[place] >= OPEN, gentle, known)
         return found
@@ -126,22 +151,30 @@ class Scene:
         frame = 0 if self.task.arm.world_is_known else 6
         return (moved[:frame] if frame else None), moved[frame:]
 
-    def covariance(self, calibration: Calibration, state: State) -> Floats:
+    def covariance(self, state: State) -> Floats:
         """Covariance (R, R) of the residuals of an unchanged arm, without what is found anew.
 
         What a frame or tool found anew can make up for is its own: along these directions an arm's parameters
         and the old set-up may be unknown by metres, each known with the other alone (the height of a SCARA
         and of its tool).
         """
-        jacobian, _ = linearise(self.problem, self.parameters, state.setup)
-        spread, seen = calibration.spread, self.seen.reshape(-1)
-        whole = spread.joint(self.inputs, jacobian, self._known_setup_jacobian(calibration, state))
-        anew = self.linear(state).jacobian[:, self.unknowns.std >= OPEN]
-        expected = _without(whole[np.ix_(seen, seen)], anew)
-        noise = spread.noise(jacobian, self.orientation)
+        jacobian, _ = linearise(self.problem, self._moved_parameters(state), state.setup)
+        whole = self._calibration.spread.joint(self.inputs, jacobian, self._known_setup_jacobian(state))
+        anew, seen = self.linear(state).jacobian[:, self.unknowns.std >= OPEN], self.seen.reshape(-1)
+        return _without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
+
+    def scatter(self, state: State) -> Floats:
+        """Covariance (R, R) of what rows show anew: noise, and what the device says of itself."""
+        jacobian, _ = linearise(self.problem, self._moved_parameters(state), state.setup)
+        noise, seen = self._calibration.spread.noise(jacobian, self.orientation), self.seen.reshape(-1)
         own = np.zeros(len(self.data)) if self.data.sigma_m is None else np.nan_to_num(self.data.sigma_m)
-        scatter = block_diag(*(noise + (own[:, None, None] ** 2) * np.diag(~self.orientation)))
-        return np.asarray(expected + scatter[np.ix_(seen, seen)])
+        whole = block_diag(*(noise + (own[:, None, None] ** 2) * np.diag(~self.orientation)))
+        return np.asarray(whole[np.ix_(seen, seen)])
+
+    def _moved_parameters(self, state: State) -> Floats:
+        """Parameters (n, L, 5) of the arm in a state."""
+        change = (self.unknowns.directions @ state.arm).reshape(-1, 5)
+        return np.ascontiguousarray(self.parameters + change)
 
     @property
     def _turns(self) -> int:
@@ -181,13 +214,13 @@ class Scene:
             parts.append(Rotation.from_matrix(turn).as_rotvec())
         return np.concatenate(parts)
 
-    def _known_setup_jacobian(self, calibration: Calibration, state: State) -> Floats | None:
+    def _known_setup_jacobian(self, state: State) -> Floats | None:
         """Derivatives (n, m, S) by the calibration's own set-ups, as far as they are not found anew."""
         if all(number is None for number in self.unknowns.known):
             return None
-        own = setup_jacobian(self.problem, self.parameters, state.setup)
-        places, width = self._places(calibration.selection)
-        found = np.zeros((*own.shape[:2], len(calibration.groups) * width))
+        own = setup_jacobian(self.problem, self._moved_parameters(state), state.setup)
+        places, width = self._places(self._calibration.selection)
+        found = np.zeros((*own.shape[:2], len(self._calibration.groups) * width))
         for k, number in enumerate(self.unknowns.known):
             if number is not None:
                 rows = np.flatnonzero(self.number == k)

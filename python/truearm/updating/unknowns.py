@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.core_set import Selection
-from truearm.fitting import Task
+from truearm.fitting import FRAME_UNKNOWNS, Task
 from truearm.identified import IdentifiedArm
 from truearm.parameters import KIND_COUNT, KINDS, THETA, D
 from truearm.units import to_si
@@ -18,7 +18,6 @@ from truearm.updating.options import UpdateOptions
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FRAME_UNKNOWNS: Final = 6
 OPEN: Final = 1.0
 """What is found anew is known to a metre and a radian, as in the fits."""
 

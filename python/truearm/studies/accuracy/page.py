@@ -9,6 +9,7 @@ from truearm.studies.accuracy.methods import FAMILIES, OURS, TITLES
 from truearm.studies.accuracy.methods.ours import OWN, OWN_SMOOTH
 from truearm.studies.accuracy.splits import TITLES as SPLITS
 from truearm.studies.accuracy.summary import LEVEL
+from truearm.studies.markdown import table
 
 Summary = Mapping[str, Any]
 
@@ -210,9 +211,3 @@ def _by_set_and_split(summary: Summary) -> dict[tuple[str, str], dict[str, Mappi
     for group in summary["groups"]:
         found.setdefault((group["set"], group["split"]), {})[group["size"]] = group
     return found
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
-    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])

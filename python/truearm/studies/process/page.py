@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
+from truearm.studies.markdown import table
 from truearm.studies.panels import TITLES
-from truearm.studies.paper_page import table
 from truearm.studies.process.setting import ANGLE_DEG, LENGTH_MM, SHARE
 
 Result = Mapping[str, Any]

@@ -8,17 +8,17 @@ import tomli_w
 from numpy.typing import NDArray
 
 from truearm.cell.examples import example
+from truearm.defaults import EXPERIMENT_SPEED, PAPER_POSES, PAPER_REGIONS
 from truearm.files import parsed
 from truearm.planning.configurations import Configuration
 from truearm.planning.spaces import CartesianSpace
 from truearm.robot import Robot
 from truearm.simulation import PAPER_PARAMETERS
-from truearm.studies.setting import POSES_A_REGION, ROBOT, TEST_POINTS, straight
+from truearm.studies.setting import ROBOT, TEST_POINTS, straight
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 
-REGIONS: Final = 85
 DEMANDED_MM: Final = 0.5
 SECONDS_A_MEASUREMENT: Final = 5.0
 ORIGIN_MM: Final = (0.0, -80.0, 0.0)
@@ -54,10 +54,10 @@ class Setting:
     """
 
     seed: int = SEED
-    regions: int = REGIONS
-    poses: int = POSES_A_REGION
+    regions: int = PAPER_REGIONS
+    poses: int = PAPER_POSES
     tests: int = TEST_POINTS
-    speed: float = 1000.0
+    speed: float = EXPERIMENT_SPEED
 
 
 def cell_text(setting: Setting) -> str:
