@@ -37,3 +37,23 @@ def test_outliers_leave_nothing_behind_of_what_was_found_with_them():
     clean, cleaned = found
     assert {entry["row"] - 1 for entry in calibration.summary["outliers"]} >= set(off.tolist())
     assert np.max(np.divide(cleaned, clean)) < 1.5
+
+
+def test_one_row_far_out_spoils_no_model():
+    """A wrong decimal point, and readings of the row before: neither constants nor what varies remember it."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
+    table = arm.measure_table(arm.poses(100))
+    trained = int(np.random.default_rng(7).permutation(100)[3])
+    far, stale = table.copy(), table.copy()
+    far.loc[trained, "x"] += 1.0
+    readings = [name for name in table.columns if name.startswith("q")]
+    stale.loc[trained, readings] = table.loc[(trained + 1) % 100, readings]
+    found = []
+    for each in (table.drop(index=trained), far, stale):
+        calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(each))
+        holdout = calibration.validation.holdout
+        means = [holdout[model].position.mean for model in ("nominal", "constant", "variable")]
+        found.append([*means, calibration.summary["noise_mm"]])
+        rows = [entry["row"] - 1 for entry in calibration.summary["outliers"]]
+        assert rows == [trained] * (len(each) == len(table))
+    assert np.max(np.divide(found[1:], found[0])) < 1.3, found

@@ -42,6 +42,8 @@ ANY_TARGET_M: Final = 0.3
 """How many poses are drawn for each row, and how far from the flange targets lie, to count unknowns."""
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
+SPOILING: Final = 0.1
+"""Share of all squares that constants leave from which rows that are taken out have bent them."""
 
 
 def no_stages(_: str) -> AbstractContextManager[None]:
@@ -157,9 +159,37 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
         WorkError: If the rows are too few or too alike.
     """
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
-    began = time.perf_counter()
     _check_enough(task, data, setup_unknowns(task))
     _check_set_ups(task, data)
+    began = time.perf_counter()
+    constants = _fit_constants(task, measured, data)
+    seconds, variable = {CONSTANT: time.perf_counter() - began}, None
+    if task.options.model == VARIABLE:
+        began = time.perf_counter()
+        variable = _fit_field(task, measured, constants, data, known)
+        if _spoilt(constants.constant, variable):
+            constants, variable = _without_outliers(task, data, variable, known)
+        seconds[VARIABLE] = time.perf_counter() - began
+    nominal, found, constant = constants.nominal, constants.identifiability, constants.constant
+    scheme = None
+    if task.options.model in SCHEMES:
+        began = time.perf_counter()
+        with task.stages("dividing the workspace, and learning"), core_errors(data):
+            scheme = _fit_scheme(task, measured, constant, found, data)
+        seconds[task.options.model] = time.perf_counter() - began
+    return Fits(data, nominal, found, constant, variable, seconds, scheme, task.options.model)
+
+
+@dataclass(frozen=True, eq=False)
+class _Constants:
+    """What rows say of the arm without anything that varies."""
+
+    nominal: ConstantFit
+    identifiability: Identifiability
+    constant: ConstantFit
+
+
+def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> _Constants:
     with task.stages("finding frame and tool"), core_errors(data):
         nominal = fit_constant(task.problem(measured, []), fit_options(task))
     with task.stages("asking what the poses determine"):
@@ -170,23 +200,23 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
         constant = fit_constant(
             chosen, fit_options(task, prior=task.options.prior, robust=task.options.robust)
         )
-    seconds = {CONSTANT: time.perf_counter() - began}
-    variable = None
-    if task.options.model == VARIABLE:
-        began = time.perf_counter()
-        with (
-            task.stages("searching what varies" if known.rough else "fitting what varies"),
-            core_errors(data),
-        ):
-            variable = _fit_field(task, measured, constant, found, data, known)
-        seconds[VARIABLE] = time.perf_counter() - began
-    scheme = None
-    if task.options.model in SCHEMES:
-        began = time.perf_counter()
-        with task.stages("dividing the workspace, and learning"), core_errors(data):
-            scheme = _fit_scheme(task, measured, constant, found, data)
-        seconds[task.options.model] = time.perf_counter() - began
-    return Fits(data, nominal, found, constant, variable, seconds, scheme, task.options.model)
+    return _Constants(nominal, found, constant)
+
+
+def _spoilt(constant: ConstantFit, variable: FieldFit) -> bool:
+    """Whether rows that the variable model takes out have bent the constants that it begins with."""
+    squares = np.square(constant.residuals.reshape(len(variable.weights), -1)).sum(axis=1)
+    return float(squares[variable.weights < 1.0].sum()) > SPOILING * float(squares.sum())
+
+
+def _without_outliers(
+    task: Task, data: Measurements, variable: FieldFit, known: KnownHyper
+) -> tuple[_Constants, FieldFit]:
+    """All models anew, where the rows that a variable model takes out begin without weight."""
+    measured = core_set(task.arm.robot, data, task.selection, task.groups, variable.weights)
+    constants = _fit_constants(task, measured, data)
+    known = replace(known, near=variable, contested=not known.rough)
+    return constants, _fit_field(task, measured, constants, data, known)
 
 
 def _fit_scheme(
@@ -253,16 +283,13 @@ def field_options(
 
 
 def _fit_field(
-    task: Task,
-    measured: MeasurementSet,
-    constant: ConstantFit,
-    found: Identifiability,
-    data: Measurements,
-    known: KnownHyper,
+    task: Task, measured: MeasurementSet, constants: _Constants, data: Measurements, known: KnownHyper
 ) -> FieldFit:
     values = feature_values(data, task.options.features)
-    options = field_options(task, found.determined, values, feature_ranges(values), known)
-    return fit_field(task.problem(measured, task.arm.candidates.columns), constant, options)
+    names = constants.identifiability.determined
+    options = field_options(task, names, values, feature_ranges(values), known)
+    with task.stages("searching what varies" if known.rough else "fitting what varies"), core_errors(data):
+        return fit_field(task.problem(measured, task.arm.candidates.columns), constants.constant, options)
 
 
 def feature_values(data: Measurements, names: Sequence[str]) -> Floats:

@@ -11,7 +11,7 @@ use crate::joined::{Joined, join};
 use crate::kernel::Input;
 use crate::linear::{input_values, training};
 use crate::optimise::{Curvature, Limits};
-use crate::outliers::{self, Judgement};
+use crate::outliers::{self, Judgement, News};
 use crate::posterior::{Posterior, Solution};
 use crate::refine::relinearised;
 use crate::select::{Found, contest_major, prune_major, refine, select_major};
@@ -139,13 +139,12 @@ pub fn fit_field(
     training = judged.posterior.training().clone();
     let large = training.row_count() > ROWS_FOR_POLISH;
     for round in 0..REWEIGHTINGS_OF_SPOILED {
-        let changed = judged.judgement.reweigh(&mut training);
-        let spoilt = judged.judgement.spoils(&changed);
-        if changed.is_empty() || (!spoilt && round >= if large { 1 } else { REWEIGHTINGS }) {
+        let News { poses, spoils } = judged.judgement.reweigh(&mut training);
+        if !spoils && (!poses || round >= if large { 1 } else { REWEIGHTINGS }) {
             break;
         }
         let Judged { posterior, .. } = judged;
-        let posterior = if spoilt && options.hyper.is_none() {
+        let posterior = if spoils && options.hyper.is_none() {
             drop(posterior);
             hyper = search.contested(&training, hyper, noise)?;
             search.posterior(&training, &hyper)?

@@ -20,6 +20,8 @@ const ALIKE: f64 = 3e-3;
 const FAR: f64 = 10.0;
 /// Least deviation that is taken for typical, m or rad: that of an instrument's last digit.
 const LAST_DIGIT: f64 = 1e-5;
+/// Degrees of freedom from which on shots tell their noise: three poses of two.
+const ENOUGH: f64 = 9.0;
 /// Rows of a position, and of an orientation.
 const COORDINATES: f64 = 3.0;
 
@@ -152,8 +154,10 @@ impl Shots<'_> {
                 all.iter_mut().zip(squares[shot]).for_each(|(all, square)| all.push(square));
             }
         }
-        let typical = all
-            .map(|mut all| (median(&mut all) / chi_squared(COORDINATES, 0.0)).max(LAST_DIGIT * LAST_DIGIT));
+        let left = self.left();
+        let typical =
+            [0, 1].map(|kind| median(&mut all[kind]).min(left[kind]) / chi_squared(COORDINATES, 0.0));
+        let typical = typical.map(|typical| typical.max(LAST_DIGIT * LAST_DIGIT));
         let limit = typical.map(|typical| FAR * FAR * COORDINATES * typical);
         let is_far = |shot: &usize| squares[*shot].iter().zip(limit).any(|(square, limit)| *square > limit);
         let (mut kept, mut doubted) = (Vec::new(), Vec::new());
@@ -167,6 +171,18 @@ impl Shots<'_> {
         }
         *poses = kept;
         doubted
+    }
+
+    /// Typical square of what the constants leave of positions and of orientations: shots of a pose do not differ by more, and
+    /// where there are few of them, those that do are all there is.
+    fn left(&self) -> [f64; 2] {
+        let mut all: [Vec<f64>; 2] = Default::default();
+        for shot in 0..self.training.pose_count() {
+            let squares = self.squares(shot, &vec![0.0; self.training.rows(shot).len()]);
+            let present = all.iter_mut().zip(squares).filter(|(_, square)| *square > 0.0);
+            present.for_each(|(all, square)| all.push(square));
+        }
+        all.map(|mut all| median(&mut all))
     }
 
     /// Variance of a shot beside its own, of positions and of orientations: what it is at least, in all likelihood, so that
@@ -188,7 +204,7 @@ impl Shots<'_> {
         }
         let least = |kind: usize| {
             let most: f64 = freedom[kind] + 2.0 * f64::sqrt(2.0 * freedom[kind]);
-            ((sums[kind] - own[kind]) / most.max(1.0)).max(0.0)
+            if freedom[kind] < ENOUGH { 0.0 } else { ((sums[kind] - own[kind]) / most).max(0.0) }
         };
         [least(0), least(1)]
     }

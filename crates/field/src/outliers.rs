@@ -107,19 +107,31 @@ impl Training {
     }
 }
 
+/// What a judgement changed.
+#[derive(Debug, Clone, Copy)]
+pub struct News {
+    /// Whether poses became outliers, or are none any more.
+    pub poses: bool,
+    /// Whether hyper-parameters that were found with the former weights cannot stay.
+    pub spoils: bool,
+}
+
 impl Judgement {
-    /// Takes the weight of the outliers away and gives it back to poses judged innocent; the poses of which this is news.
-    pub fn reweigh(&self, training: &mut Training) -> Vec<usize> {
-        let mut changed = Vec::new();
+    /// Takes the weight of the outliers away and gives it back to poses judged innocent.
+    ///
+    /// A model that an outlier has bent finds it less far out than it is: it may leave it too much.
+    pub fn reweigh(&self, training: &mut Training) -> News {
+        let (mut poses, mut changed, mut kept) = (false, 0.0, 0.0);
         for pose in 0..training.pose_count() {
             let weight = if self.score[pose] > 1.0 { NEGLIGIBLE / self.score[pose] } else { 1.0 };
             let rows = training.rows(pose);
-            if rows.clone().any(|row| (training.weight[row] < 1.0) != (weight < 1.0)) {
-                changed.push(pose);
-            }
+            let Some(before) = rows.clone().next().map(|row| training.weight[row]) else { continue };
+            poses |= (before < 1.0) != (weight < 1.0);
+            changed += (before - weight).abs() * self.distance[pose].powi(2);
+            kept += weight * self.distance[pose].powi(2);
             training.weight[rows].fill(weight);
         }
-        changed
+        News { poses, spoils: changed > SPOILING * (changed + kept) }
     }
 
     /// The same for shots, each of the pose that `pose_of` (n,) says.
@@ -128,15 +140,6 @@ impl Judgement {
         let score = of(&self.score);
         let outliers = (0..score.len()).filter(|&shot| score[shot] > 1.0).collect();
         Judgement { distance: of(&self.distance), outliers, score, inflation: self.inflation }
-    }
-
-    /// Whether hyper-parameters that were found with these poses judged otherwise cannot stay.
-    pub fn spoils(&self, changed: &[usize]) -> bool {
-        let square = |pose: usize| self.distance[pose].powi(2);
-        let of_changed: f64 = changed.iter().map(|&pose| square(pose)).sum();
-        let innocent =
-            (0..self.distance.len()).filter(|pose| self.score[*pose] <= 1.0 && !changed.contains(pose));
-        of_changed > SPOILING * (of_changed + innocent.map(square).sum::<f64>())
     }
 }
 

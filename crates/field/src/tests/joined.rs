@@ -76,6 +76,31 @@ fn a_shot_that_its_others_contradict_stands_apart() {
 }
 
 #[test]
+fn two_rows_that_cannot_be_shots_of_one_pose_are_none() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = Measure::poses(60).of(&arm);
+    let joints = arm.chain.joint_count();
+    // The readings of the pose before were noted once more: nothing else tells what shots differ by.
+    set.joints.copy_within(30 * joints..31 * joints, 31 * joints);
+    let Joined { pose_of, training, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
+    assert_eq!(pose_of, (0..60).collect::<Vec<usize>>());
+    assert_eq!(training.shot, [0.0; 2]);
+    assert_eq!(fit(&arm, &set).unwrap().field.judgement.outliers, [31]);
+}
+
+#[test]
+fn few_shots_do_not_tell_the_noise_of_all() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = Measure::poses(40).of(&arm);
+    let joints = arm.chain.joint_count();
+    set.joints.copy_within(10 * joints..11 * joints, 11 * joints);
+    set.targets.copy_within(30..33, 33);
+    set.targets[33] += 5e-5;
+    let Joined { training, pose_of, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
+    assert_eq!((&pose_of[9..13], training.shot), (&[9, 10, 10, 11][..], [0.0; 2]));
+}
+
+#[test]
 fn shots_do_not_pass_what_poses_scatter_off_as_the_fields() {
     let arm = six_axes(Truth { own: 2e-5, ..Truth::BENDING });
     let scatter = 4e-5;
