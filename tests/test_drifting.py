@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import truearm as ta
 from tests.report_support import words_of
@@ -266,6 +267,24 @@ def test_what_was_bumped_is_told_with_its_rows(measured, tmp_path, after):
     assert jump.words in says
     calibration.save(tmp_path / "a.calib")
     assert ta.Calibration.load(tmp_path / "a.calib").validation.drift == drift_of(calibration)
+
+
+def test_an_instrument_that_stood_elsewhere_is_no_slip(measured):
+    arm, steady, _ = measured
+    turn = Rotation.from_rotvec([0.02, -0.01, 0.5]).as_matrix()
+    elsewhere = np.arange(ROWS)[:, None, None] >= 90
+    data = replace(
+        steady, targets=np.where(elsewhere, steady.targets @ turn.T + [2.0, -1.0, 0.1], steady.targets)
+    )
+    calibration = ta.calibrate(arm.robot, data)
+    ((jump,),) = drift_of(calibration).other_places.values()
+    (notice,) = [notice for notice in calibration.notices if notice.kind == "another_place"]
+    assert jump.between in str(notice)
+    assert "column `group`" in str(notice)
+    assert "row 91" in jump.between
+    advice = report(calibration).advice
+    assert jump.between in advice[0].words
+    assert "gave_way" not in {each.kind for each in advice}
 
 
 def test_a_file_of_before_does_not_claim_it(settled):

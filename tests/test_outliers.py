@@ -45,9 +45,9 @@ def test_one_row_far_out_spoils_no_model():
     table = arm.measure_table(arm.poses(100))
     trained = int(np.random.default_rng(7).permutation(100)[3])
     far, stale = table.copy(), table.copy()
-    far.loc[trained, "x"] += 1.0
+    far.loc[[trained], "x"] += 1.0
     readings = [name for name in table.columns if name.startswith("q")]
-    stale.loc[trained, readings] = table.loc[(trained + 1) % 100, readings]
+    stale.loc[[trained], readings] = table.loc[[(trained + 1) % 100], readings].to_numpy()
     found = []
     for each in (table.drop(index=trained), far, stale):
         calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(each))

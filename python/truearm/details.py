@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,11 @@ class VariableDetails:
     feature_ranges: tuple[float, ...]
 
 
+ANOTHER_PLACE: Final = "another_place"
+FARTHEST_SLIP_MM: Final = 20.0
+"""What gives way when it is touched moves by less; what moves farther stands elsewhere and is turned, too."""
+
+
 @dataclass(frozen=True)
 class Jump:
     """A displacement of a set-up at once.
@@ -79,6 +84,11 @@ class Jump:
     between: str
     mm: float
     poses_change: bool = False
+
+    @property
+    def is_another_place(self) -> bool:
+        """Whether it is farther than anything slips: instrument or target was put elsewhere."""
+        return self.mm > FARTHEST_SLIP_MM
 
     @property
     def words(self) -> str:
@@ -113,6 +123,12 @@ class DriftDetails:
     def slips(self) -> dict[str, list[Jump]]:
         """Of each set-up the jumps that no change of the poses explains; set-ups without any are left out."""
         found = {group: [jump for jump in own if not jump.poses_change] for group, own in self.jumps.items()}
+        return {group: own for group, own in found.items() if own}
+
+    @property
+    def other_places(self) -> dict[str, list[Jump]]:
+        """Of each set-up the jumps to another place of instrument or target; only set-ups with some."""
+        found = {group: [jump for jump in own if jump.is_another_place] for group, own in self.jumps.items()}
         return {group: own for group, own in found.items() if own}
 
     def way(self, group: str) -> str:

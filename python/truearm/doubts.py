@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.details import VariableDetails
+from truearm.details import ANOTHER_PLACE, VariableDetails
 from truearm.errors import Notice, list_outliers
 from truearm.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.grids import BETWEEN, grid_steps, grid_words
@@ -49,7 +49,7 @@ SINGLE_ROWS: Final = "single_rows"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 ROWS_SHIFTED: Final = "rows_shifted"
 FITS_OTHERWISE: Final = "fits_otherwise"
-WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE)
+WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE)
 """What the measurements would fit, where a calibration does not help."""
 ON_A_GRID: Final = "on_a_grid"
 FEW_VALUES: Final = "few_values"

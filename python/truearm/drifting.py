@@ -15,7 +15,7 @@ from scipy.spatial.distance import pdist
 
 from truearm._core import FieldFit, Setup, find_drift
 from truearm.defaults import NO_DRIFT
-from truearm.details import DriftDetails, Jump
+from truearm.details import ANOTHER_PLACE, DriftDetails, Jump
 from truearm.errors import Notice
 from truearm.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
 from truearm.measurements import Measurements
@@ -267,11 +267,23 @@ def _jump(task: Task, data: Measurements, drift: Drift, group: str, rows: tuple[
     return Jump(" and ".join(names), float(MM_PER_METRE * far_m), changed)
 
 
+def _another_place(details: DriftDetails, ways: Sequence[str]) -> str:
+    where = "; ".join(jump.between for own in details.other_places.values() for jump in own)
+    return (
+        f"The set-up moved while it was measured: {'; '.join(ways)}. No target or tripod that is touched "
+        f"moves that far: instrument or target stood elsewhere from there on ({where}), and turned as well, "
+        "which is not taken out. Give the rows before and after names of their own in a column `group`, or files of "
+        "their own, and calibrate again: each then has a frame and a tool of its own."
+    )
+
+
 def drift_notices(details: DriftDetails | None) -> list[Notice]:
     """A notice where set-ups moved."""
     if details is None:
         return []
     ways = [f"{group} by {details.way(group)}" for group in details.moved_mm]
+    if details.other_places:
+        return [Notice(ANOTHER_PLACE, _another_place(details, ways))]
     slowly = "Arms and instruments that warm up do so."
     at_once = "Something gave way there: a target or a tripod that was touched, play in a joint."
     with_poses = "As the poses change there too, this may be what varies with them, and nothing gave way."

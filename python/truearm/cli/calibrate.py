@@ -22,7 +22,7 @@ from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
 from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, HOLDOUT, MODEL, ROBUST, SEED
 from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
-from truearm.files import make_directory, write_whole
+from truearm.files import make_directory, refuse_own_input, write_whole
 from truearm.scheme_options import SchemeOptions
 
 if TYPE_CHECKING:
@@ -108,11 +108,13 @@ def command(
         composition=composition,
         repeatability_mm=repeatability_mm,
     )
+    check_directory(output)
+    for name in (CALIBRATION_NAME, SUMMARY_NAME, REPORT_NAME):
+        refuse_own_input(output / name, robot, *measurements)
     arm = Robot.load(robot)
     data = Measurements.read_files(
         measurements, length_unit=length_unit, angle_unit=angle_unit, joints=arm.joints
     )
-    check_directory(output)
     with ends_promptly():
         calibration = _calibrated(arm, data, options, threads)
         summary = write_results(calibration, output, with_rows=not strip)
@@ -269,8 +271,11 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
     if not outliers:
         return
     several = calibration.rows is not None and len(calibration.rows.data.files) > 1
-    fate = "taken out of the variable fit" if calibration.variable is not None else "not taken out of the fit"
-    hint = "" if calibration.variable is not None else " --robust huber gives them less weight."
+    robust = calibration.options.robust != ROBUST
+    fate = "given less weight in the fit" if robust else "not taken out of the fit"
+    hint = "" if robust else " --robust huber gives them less weight."
+    if calibration.variable is not None:
+        fate, hint = "taken out of the variable fit", ""
     say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, several=several)}.{hint}")
     if means := Outliers.of(calibration).means_mm:
         said = ", ".join(f"{name} {mean:.3f}" for name, mean in means.items())

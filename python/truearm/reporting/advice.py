@@ -22,6 +22,7 @@ from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.known import Known, Stretch, weakest
+from truearm.reporting.levers import of_last_link, target_lever_mm
 from truearm.reporting.numbers import listed, percent, short, shown_readings
 from truearm.row_order import ORDER_OF_POSES
 
@@ -32,6 +33,8 @@ LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
 ROWS_NAMED: Final = 5
+ON_THE_AXIS_MM: Final = 5.0
+"""Targets nearer to the last joint's axis than this hardly show how it turns."""
 SETUP_WORDS: Final = "the place of device or target"
 
 
@@ -135,7 +138,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
 
 def _warm_up(facts: Facts) -> Iterator[Advice]:
     drift = facts.calibration.validation.drift
-    if drift is None:
+    if drift is None or drift.other_places:
         return
     steady = facts.calibration.validation.holdout[facts.best].position.mean
     span, left_in = max(drift.moved_mm.values()), drift.left_in_mean_mm[facts.best]
@@ -231,11 +234,15 @@ def _range(facts: Facts, weak: Stretch) -> str:
 def _unseen(facts: Facts) -> Iterator[Advice]:
     found, selection = facts.calibration.identifiability, facts.calibration.selection
     pairs = zip(found.undetermined, found.words, strict=True)
-    hidden = [name for name, words in pairs if SETUP_WORDS not in words]
+    lever = target_lever_mm(facts)
+    of_target = set() if lever is None or lever < ON_THE_AXIS_MM else of_last_link(facts)
+    hidden = [name for name, words in pairs if SETUP_WORDS not in words and name not in of_target]
     if hidden:
+        is_on = lever is not None and lever < ON_THE_AXIS_MM
+        more = ", and a target mounted off the last axis," if is_on else ""
         words = (
             f"The poses do not determine {listed(hidden)}: the nominal values stay. Larger motions of the "
-            "joints, and a target mounted off the last axis, would determine more."
+            f"joints{more} would determine more."
         )
         yield Advice("unseen_parameters", "Determine all parameters.", words, 0.1 * facts.mean_mm())
     if selection.distances or selection.orientation or len(selection.targets) > 2:
