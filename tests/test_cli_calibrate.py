@@ -293,3 +293,12 @@ def test_ctrl_c_ends_within_a_second_and_leaves_nothing(after_s, tmp_path):
     assert took < 1.5
     assert told.endswith("Interrupted.\n")
     assert files(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["summary.json", "report.html", "calibration.calib"])
+def test_measurements_are_not_written_over(name, folder, capsys):
+    (folder / "arm.csv").rename(folder / name)
+    before = (folder / name).read_bytes()
+    assert main(["calibrate", "rv-m2", name, "-o", "."]) == 2
+    assert "never written over" in capsys.readouterr().err
+    assert (folder / name).read_bytes() == before

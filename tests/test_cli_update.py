@@ -50,7 +50,9 @@ def test_an_update_is_told_written_and_rolled_back(folder, capsys):
 def test_without_output_nothing_is_written(folder, capsys):
     before = sorted(folder.iterdir())
     assert main(["update", "old.calib", "same.csv"]) == 0
-    assert "The calibration still holds" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "The calibration still holds" in told
+    assert "truearm compensate old.calib PROGRAM --dry-run" in told
     assert sorted(folder.iterdir()) == before
 
 
@@ -72,6 +74,38 @@ def test_what_is_kept_is_not_said_to_be_found(capsys):
     assert "Tool of moved: kept as it was." in told
     assert "Offsets changed." in told
     assert "anew" not in told
+
+
+def test_joints_that_were_not_tested_are_named_with_the_options_that_tell_them(capsys):
+    assert main(["update", "old.calib", "same.csv"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "no significant change was found. Joints 1 and 5 were not tested." in told
+    assert "if the device stands where it stood, --keep-frame tells it." in told
+    assert "if the target sits where it sat, --keep-tool tells it." in told
+    assert main(["update", "old.calib", "same.csv", "--new-tool"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "--keep-tool" not in told
+    assert main(["update", "old.calib", "same.csv", "--keep-frame", "--keep-tool"]) == 0
+    assert "not tested" not in capsys.readouterr().out
+
+
+def test_what_was_not_written_is_proposed_with_the_same_options(folder, capsys):
+    assert main(["update", "old.calib", "moved.csv", "--keep-frame", "--level", "0.02"]) == 0
+    line = next(line for line in capsys.readouterr().out.splitlines() if "-o NEW.calib" in line)
+    assert line.split()[2:-2] == ["old.calib", "moved.csv", "--keep-frame", "--level", "0.02"]
+    assert main([*line.split()[1:-1], "again.calib"]) == 0
+    assert (folder / "again.calib").exists()
+
+
+def test_nothing_is_written_over_or_into_a_file(folder, capsys):
+    before = (folder / "same.csv").read_bytes()
+    assert main(["update", "old.calib", "same.csv", "-o", "same.csv"]) == 2
+    assert "this is a file. -o names a .calib file or a directory." in capsys.readouterr().err
+    assert (folder / "same.csv").read_bytes() == before
+    (folder / "kept").mkdir()
+    (folder / "kept" / "update.json").write_text("mine")
+    assert main(["update", "old.calib", "same.csv", "-o", "kept"]) == 2
+    assert "update.json: there is a file already" in capsys.readouterr().err
 
 
 def test_json_says_it_to_programs(folder, capsys):

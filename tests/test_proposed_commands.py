@@ -8,8 +8,10 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm.cli import main, session_export
+from truearm.cli import calibrate, main, session_export
+from truearm.cli.again import option_words
 from truearm.errors import typed
+from truearm.options import Options
 from truearm.simulation import VirtualArm
 
 
@@ -68,16 +70,53 @@ def test_next_poses_measured_and_calibrated_from_as_proposed_share_the_set_up(fo
     capsys.readouterr()
     assert main(["plan", "--next", "4", "--from", "out/calibration.calib", "-o", "more.csv"]) == 0
     words = proposed(capsys.readouterr().out, "calibrate")
-    assert words[2:] == ["ROBOT", "my data.csv", "MEASUREMENTS.csv", "-o", "result"]
+    model = ["--model", "constant"]
+    assert words[2:] == ["ROBOT", "my data.csv", "MEASUREMENTS.csv", *model, "-o", "result"]
     poses = pd.read_csv("more.csv")
     readings = poses[[f"q{j}" for j in range(1, 6)]].to_numpy()
     found = folder.measure_table(readings, seed=5).join(poses[["approach", "purpose", "group"]])
     found.to_csv("MEASUREMENTS.csv", index=False)
     words[words.index("ROBOT")] = "my arm.toml"
-    assert main([*words[1:], "--model", "constant"]) == 0
+    assert main(words[1:]) == 0
     calibration = ta.Calibration.load("result/calibration.calib")
     assert calibration.groups == ("my data",)
     assert calibration.validation.holdout["constant"].position.max < 2.0
+
+
+def test_features_that_a_calibration_varies_with_are_asked_for_again(folder, capsys):
+    table = pd.read_csv("my data.csv").assign(warmth=[20.0 + k / 10 for k in range(40)])
+    table.to_csv("warmth.csv", index=False)
+    words = ["calibrate", "my arm.toml", "warmth.csv", "-o", "felt", "--features", "warmth", "--seed", "3"]
+    assert main([*words, "--no-refit"]) == 0
+    capsys.readouterr()
+    assert main(["plan", "--next", "1", "--from", "felt/calibration.calib", "-o", "felt.csv"]) == 0
+    told = capsys.readouterr().out
+    assert 'Note "warmth" at each pose' in told
+    options = ["--seed", "3", "--features", "warmth", "--no-refit"]
+    assert proposed(told, "calibrate")[4:] == ["MEASUREMENTS.csv", *options, "-o", "result"]
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"holdout": 0.3},
+        {"holdout_range": "q2:high:0.25", "train_size": 20},
+        {"model": "fcmac", "scheme_joints": (2, 3), "most_regions": 20, "composition": "product"},
+        {"features": ("a", "b"), "split_by": ("group",), "refit": False, "drift": "none", "use": "position"},
+    ],
+)
+def test_options_that_are_named_again_calibrate_alike(given, monkeypatch):
+    options, made = Options.of(**given), []
+
+    def calibrated(_arm, _data, chosen, _threads):
+        made.append(chosen)
+        raise ta.WorkError("enough")
+
+    monkeypatch.setattr(calibrate, "_calibrated", calibrated)
+    monkeypatch.setattr(ta.Measurements, "read_files", lambda *_, **__: None)
+    assert main(["calibrate", "rv-m2", "m.csv", "-o", "never", *option_words(options)]) == 1
+    assert made == [options]
 
 
 @pytest.mark.parametrize(("name", "word"), [("abb-irb-120", "abb-irb-120"), ("my arm.toml", "ROBOT")])

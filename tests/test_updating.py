@@ -99,6 +99,33 @@ def test_a_device_and_a_target_that_stayed_tell_the_first_and_last_joint(known):
     assert found.frames[0].largest_mm < 1e-9
 
 
+@pytest.mark.parametrize("kept", ["frame", "tool"])
+def test_what_is_kept_and_moved_is_named_where_nothing_fits(kept, known):
+    arm, calibration = known
+    other = VirtualArm.paper(seed=2)
+    if kept == "frame":
+        other.world_from_base = VirtualArm.paper(seed=99).world_from_base
+    else:
+        other.target_in_flange = other.target_in_flange + np.array([0.03, -0.02, 0.05])
+    with pytest.raises(ta.WorkError, match=f"Leave --keep-{kept} out unless"):
+        ta.update(
+            calibration,
+            other.measure(arm.poses(15, seed=9), seed=9),
+            keep_frame=kept == "frame",
+            keep_tool=kept == "tool",
+        )
+
+
+def test_a_field_that_does_not_fit_names_what_was_kept(known):
+    from truearm.cli.update import _verdict
+
+    arm, calibration = known
+    data = remastered(arm, arm.poses(15, seed=9), np.zeros(5), seed=9, tool_mm=(2.0, 0.0, 0.0))
+    found = ta.update(calibration, data, keep_tool=True)
+    assert found.verdict == "field"
+    assert "Leave --keep-tool out unless the target sits where it sat" in _verdict(found)
+
+
 def test_unchanged_arms_are_said_to_hold_at_the_stated_rate(known):
     arm, calibration = known
     verdicts = [
@@ -176,7 +203,8 @@ def test_heights_that_only_frame_and_tool_share_stay_together(model):
     again = ta.update(calibration, remastered(arm, arm.poses(15, seed=9), [0.0, 0.2, 0.0, 0.0], seed=9))
     assert again.verdict == "moved"
     check_offset(again.offsets[1], 0.2)
-    assert again.offsets[1].std < 1.1 * found.offsets[1].std  # a moved joint spoils no place to linearise at
+    stds = [each.offsets[1].std or np.inf for each in (again, found)]
+    assert stds[0] < 1.1 * stds[1]  # a moved joint spoils no place to linearise at
 
 
 def test_another_target_on_a_scara_hides_no_offset():

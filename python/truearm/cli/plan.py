@@ -1,12 +1,13 @@
 """`truearm plan`: choose measurement poses."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from truearm.cli import plan_options as option
+from truearm.cli.again import calibrate_again
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
@@ -17,7 +18,6 @@ from truearm.files import refuse_own_input, refuse_same
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
-    from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import Plan
     from truearm.cell.proposed import Proposed
@@ -218,19 +218,12 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
         print_json({"poses": str(output), "order": asked.order, **proposed.to_dict()})
         return
     _print_proposed(proposed, output)
+    _print_features(calibration.options.features)
     if asked.acceptance is not None:
         suggest(f"truearm update {typed(asked.calibration)} MEASUREMENTS.csv", when=MEASURED)
     else:
-        suggest(f"truearm calibrate {_again(asked, calibration)} -o result", when="Then calibrate from all:")
-
-
-def _again(asked: _Asked, calibration: "Calibration") -> str:
-    """The arm and the files that are calibrated from once more, with the new measurements."""
-    from truearm.cli.naming import name_of
-
-    robot = asked.robot or name_of(calibration.robot)
-    files = ["OLD.csv"] if calibration.rows is None else calibration.rows.data.files
-    return " ".join(typed(word) for word in (robot, *files, "MEASUREMENTS.csv"))
+        again = calibrate_again(calibration, asked.robot, "MEASUREMENTS.csv")
+        suggest(again, when="Then calibrate from all:")
 
 
 def _print_proposed(proposed: "Proposed", output: Path) -> None:
@@ -255,6 +248,13 @@ def _print_proposed(proposed: "Proposed", output: Path) -> None:
     say("Smallest change that is noticed in 95 of 100 cases:")
     rows = [[name, f"{value:.4f}"] for name, value in told["noticed"].items()]
     print_table(("offset of joint in deg (mm), tool in mm (worst direction)", ""), rows)
+
+
+def _print_features(features: Sequence[str]) -> None:
+    """Say what has to be noted at each pose."""
+    if features:
+        where = f"{'each ' * (len(features) > 1)}in a column of its name"
+        say_wrapped(f"Note {list_names(features)} at each pose, {where}: the calibration varies with that.")
 
 
 def _motion(seconds: "dict[str, float]") -> str:

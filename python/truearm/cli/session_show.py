@@ -6,7 +6,7 @@ import typer
 
 from truearm.cli.arguments import AsJson, SessionFile
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
-from truearm.errors import UsageError, typed
+from truearm.errors import UsageError, count_of, typed
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def command(
 
 
 def _show(session: "Session", *, as_json: bool) -> None:
+    from truearm.cell.checks import told_unchecked
     from truearm.cell.summary import summary_of
 
     found = summary_of(session)
@@ -52,6 +53,11 @@ def _show(session: "Session", *, as_json: bool) -> None:
     frame = found["registration"]
     if frame is not None:
         say(f"Frame from {frame['contacts']} contacts, {frame['residual_mm']:.2f} mm RMS.")
+    checks = found["checks"]
+    if any(checks.values()):
+        say(f"{count_of(checks['measured'], 'check')} of the first contacts, {checks['skipped']} skipped.")
+    for notice in told_unchecked(found["unchecked"]):
+        say_wrapped(str(notice))
     if found["stretches"]:
         print_table(
             ("poses", "model", "held out mm", "95 % mm", "expected mm"),
@@ -73,6 +79,11 @@ def _stretch(row: dict[str, Any]) -> list[str]:
 
 
 def _show_pose(session: "Session", pose: int, *, as_json: bool) -> None:
+    count = int(session.rows("SELECT coalesce(max(pose), -1) + 1 FROM steps")[0][0])
+    if not 1 <= pose <= count:
+        raise UsageError(
+            f"there is no pose {pose}", where=str(session.path), rule=f"Its poses are 1 to {count}"
+        )
     rows = session.rows(
         "SELECT s.kind, r.attempt, r.x_m, r.y_m, r.z_m, r.valid, r.reason, o.attempts, o.outcome, r.raw "
         "FROM readings r JOIN steps s USING (step) LEFT JOIN outcomes o USING (step) "
@@ -80,7 +91,7 @@ def _show_pose(session: "Session", pose: int, *, as_json: bool) -> None:
         (pose - 1,),
     )
     if not rows:
-        raise UsageError(f"there are no readings of pose {pose}", where=str(session.path))
+        raise UsageError(f"there are no readings of pose {pose} yet", where=str(session.path))
     names = ("kind", "attempt", "x_m", "y_m", "z_m", "valid", "reason", "attempts", "outcome", "raw")
     readings = [dict(zip(names, row, strict=True)) for row in rows]
     if as_json:

@@ -4,10 +4,14 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+import typer
+
 from truearm.cli import update_options as option
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, Use
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
+from truearm.cli.given import given_options
 from truearm.cli.interrupt import ends_promptly
+from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import told_stages
 from truearm.cli.report import CALIBRATION_NAME
 from truearm.defaults import LEVEL, OFFSET_DEG, TOOL_MM
@@ -24,6 +28,7 @@ SUFFIX: Final = ".calib"
 
 
 def command(
+    context: typer.Context,
     calibration: CalibFile,
     measurements: option.FilesOrNone = None,
     output: option.Output = None,
@@ -84,7 +89,8 @@ def command(
     _print(found)
     if place is not None:
         say(f"Updated calibration: {place}")
-    _suggest(found, calibration, place)
+    given = " ".join(map(typed, files)) + given_options(context, "output", "as_json")
+    _suggest(found, known, calibration, place, given)
 
 
 def _updated(
@@ -117,12 +123,18 @@ def _roll_back(updated: Path, files: list[Path], output: Path | None, *, as_json
 def _free_place(output: Path) -> Path:
     """The file to write; nothing may be there, since nothing is overwritten."""
     place = output if output.suffix == SUFFIX else output / CALIBRATION_NAME
-    if place.exists():
+    written = [place, place.parent / UPDATE_NAME] if place.name == CALIBRATION_NAME else [place]
+    for file in written:
+        if file.exists():
+            raise UsageError(
+                "there is a file already",
+                where=str(file),
+                rule="An update overwrites nothing",
+                way_out="Name another file with -o",
+            )
+    if place.parent.exists() and not place.parent.is_dir():
         raise UsageError(
-            "there is a file already",
-            where=str(place),
-            rule="An update overwrites nothing",
-            way_out="Name another file with -o",
+            "this is a file", where=str(place.parent), rule=f"-o names a {SUFFIX} file or a directory"
         )
     return place
 
@@ -140,39 +152,51 @@ def _write(found: "Update", place: Path) -> None:
         write_whole(place.parent / UPDATE_NAME, text + "\n")
 
 
-def _suggest(found: "Update", old: Path, place: Path | None) -> None:
-    """What to do next."""
+def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | None, given: str) -> None:
+    """What to do next.
+
+    Args:
+        found: What the update says.
+        known: The calibration as it was.
+        old: Its file.
+        place: The file that was written, if any.
+        given: The measurements, and the options that the command was given, as they were typed.
+    """
     if found.verdict == "field":
         suggest(f"truearm plan --next 20 --from {typed(old)} -o poses.csv", when="Poses that teach most:")
     elif place is not None:
         suggest(f"truearm update --roll-back {typed(place)} -o OLD.calib", when="Back to the old one:")
     elif found.verdict == "moved":
-        suggest(
-            f"truearm update {typed(old)} MEASUREMENTS -o NEW.calib", when="Nothing was written. To do so:"
-        )
+        suggest(f"truearm update {typed(old)} {given} -o NEW.calib", when="Nothing was written. To do so:")
+    else:
+        suggest(*(compensate_commands(known, old) or [f"truearm report {typed(old)}"]))
 
 
 def _verdict(found: "Update") -> str:
     """What was found, in a sentence or two."""
     from truearm.reporting.numbers import listed
+    from truearm.updating.untested import untested_joints, way_out_of_keeping
 
+    untested = untested_joints(found.to_dict())
     if found.verdict == "holds":
-        return "The calibration still holds: no significant change was found."
+        return f"The calibration still holds: no significant change was found. {untested}".strip()
     if found.verdict == "moved":
         return (
             f"{' or '.join(found.tested).capitalize()} changed. All else still fits, so the updated "
-            "calibration replaces the old one."
-        )
+            f"calibration replaces the old one. {untested}"
+        ).strip()
+    kept = way_out_of_keeping(found.kept)
     return (
         f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "
-        "Measure again and calibrate. If the measuring device scatters more than when the arm was "
-        "calibrated, say so in a column sigma_mm and update again."
+        f"{kept and f'{kept}. '}Measure again and calibrate. If the measuring device scatters more than when "
+        "the arm was calibrated, say so in a column sigma_mm and update again."
     )
 
 
 def _print(found: "Update") -> None:
     from truearm.reporting.numbers import listed, probability
     from truearm.updating.moved import follows_words
+    from truearm.updating.untested import untested_words
 
     say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {_verdict(found)}")
     print_table(
@@ -181,6 +205,8 @@ def _print(found: "Update") -> None:
     for offset in found.offsets:
         if offset.follows is not None:
             say_wrapped(follows_words(offset.joint, offset.follows))
+    if untested := untested_words(found.to_dict()):
+        say_wrapped(untested)
     for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
         for motion in motions:
             say(f"{name} of {motion.group}: {_motion(motion)}.")

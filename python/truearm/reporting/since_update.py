@@ -9,6 +9,7 @@ from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
 from truearm.updating.moved import follows_words
+from truearm.updating.untested import untested_joints, untested_words
 from truearm.validation import Validation
 
 VERDICTS: Final = {
@@ -32,6 +33,8 @@ def _overall(told: Mapping[str, Any]) -> str:
         tested=" or ".join(told["tested"]).capitalize(), estimated=listed(told["estimated"]).capitalize()
     )
     left = f", of which {len(told['outliers'])} were left out as outliers," if told["outliers"] else ""
+    if untested := untested_joints(told):
+        words = f"{words} {untested}"
     change, rest = (probability(told[test]["p"]) for test in ("changed", "rest"))
     return (
         f"{words} From {count_of(told['n_poses'], 'pose')}{left} the update estimated "
@@ -61,7 +64,9 @@ def _offsets(told: Mapping[str, Any]) -> Table:
         )
     columns = ["", "change of offset", "standard error", "p", ""]
     follow = [entry for entry in told["offsets"] if entry.get("follows") is not None]
-    says = " ".join(follows_words(entry["joint"], entry["follows"]) for entry in follow)
+    says = " ".join(
+        [untested_words(told), *(follows_words(entry["joint"], entry["follows"]) for entry in follow)]
+    ).strip()
     return Table("Joint offsets", columns, rows, says=says, left=(0, 4))
 
 

@@ -23,6 +23,7 @@ from truearm.updating.options import UpdateOptions
 from truearm.updating.scene import Scene, State
 from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
 from truearm.updating.unknowns import Unknowns
+from truearm.updating.untested import way_out_of_keeping
 from truearm.updating.updated import updated
 from truearm.updating.validating import errors_at_left_out, left_out_errors
 from truearm.validation import Errors
@@ -76,9 +77,14 @@ class Update:
     def estimated(self) -> tuple[str, ...]:
         """What was estimated: "offsets", and unless kept "frame" (in a known world "base") and "tool"."""
         frame = "base" if self.calibration.arm.world_is_known else "frame"
-        parts = ((frame, self.frames), ("tool", self.tools))
-        free = (name for name, found in parts if not (found and all(motion.kept for motion in found)))
+        free = (shown for name, shown in (("frame", frame), ("tool", "tool")) if name not in self.kept)
         return ("offsets", *free)
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """What of "frame" and "tool" was kept as it was."""
+        parts = (("frame", self.frames), ("tool", self.tools))
+        return tuple(name for name, found in parts if found and all(motion.kept for motion in found))
 
     @property
     def tested(self) -> tuple[str, ...]:
@@ -325,10 +331,12 @@ def _check_plausible(scene: Scene, found: Estimate) -> None:
     ratios = np.abs(found.state.arm[:joints]) / std
     wild = int(np.argmax(ratios))
     if ratios[wild] > IMPLAUSIBLE:
+        kept = way_out_of_keeping(scene.unknowns.kept)
+        check = f"{kept}; check" if kept else "Check"
         raise WorkError(
             f"joint {wild + 1} would be off by {ratios[wild]:.0f} times what is allowed for",
             where=", ".join(scene.data.files),
             rule=f"Up to {IMPLAUSIBLE:g} times --offset-deg is believed",
-            way_out="Check that these are measurements of this arm; after a larger change give a larger "
+            way_out=f"{check} that these are measurements of this arm; after a larger change give a larger "
             "--offset-deg",
         )

@@ -10,6 +10,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from truearm.errors import WorkError
 from truearm.updating.scene import Linear, Scene, State
+from truearm.updating.untested import way_out_of_keeping
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -43,8 +44,8 @@ class Estimate:
 def begun(scene: Scene) -> tuple[Scene, State]:
     """Where the search of what moved begins: what rows say of all unknowns if only noise scatters them.
 
-    What an unchanged arm may scatter by is linearised there. The set-ups of the unchanged arm are no place for
-    that: they make up for the offsets that moved.
+    What an unchanged arm may scatter by is linearised there. The set-ups of the unchanged arm are no place
+    for that: they make up for the offsets that moved.
 
     Returns:
         The same rows with what is found anew held there, ever so gently; and the state.
@@ -73,13 +74,21 @@ def estimate(scene: Scene, spread: Floats, state: State, free: Mask) -> Estimate
         if step < STANDS_STILL:
             break
     else:
-        raise WorkError(
-            f"offsets, frame and tool did not settle in {MOST_STEPS} steps",
-            where=", ".join(scene.data.files),
-            way_out="Check that the measurements are of this arm, and their units",
-        )
+        raise _unsettled(scene)
     linear = scene.linear(state)
     return Estimate(state, linear, posterior(linear, factor, scene.unknowns.std, free), factor)
+
+
+def _unsettled(scene: Scene) -> WorkError:
+    """That no values were found; what is kept may be the cause."""
+    kept = scene.unknowns.kept
+    sought = f"with the {' and the '.join(kept)} kept, all else" if kept else "offsets, frame and tool"
+    check = "check that the measurements are of this arm, and their units"
+    return WorkError(
+        f"{sought} did not settle in {MOST_STEPS} steps",
+        where=", ".join(scene.data.files),
+        way_out=f"{way_out_of_keeping(kept)}; {check}" if kept else f"C{check[1:]}",
+    )
 
 
 def _stepped(scene: Scene, factor: Floats, state: State, free: Mask) -> tuple[State, float]:

@@ -83,9 +83,8 @@ class Scene:
 
     def first(self) -> State:
         """Nothing moved but what is found anew; all else is where the calibration has it."""
-        return State(
-            np.zeros(len(self.unknowns.arm_names)), self._with_known(self.found_free, self.unknowns.std >= OPEN)
-        )
+        setup = self._with_known(self.found_free, self.unknowns.std >= OPEN)
+        return State(np.zeros(len(self.unknowns.arm_names)), setup)
 
     def about(self, setup: Setup) -> "Scene":
         """The same rows, with what is found anew held at other set-ups."""
@@ -95,7 +94,7 @@ class Scene:
     def found_free(self) -> Setup:
         """Set-ups that the unchanged arm finds in the rows, whatever is known of them.
 
-        Where rows hardly tell a part, as the height of a SCARA's target, a changed offset takes it metres off.
+        A part that they hardly tell, as a SCARA's height, is metres off where an offset changed.
         """
         with core_errors(self.data):
             options = fit_options(self.task, parameters=self.parameters)

@@ -81,6 +81,12 @@ class Unknowns:
         found[: len(base)] |= base
         return found
 
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """What of "frame" and "tool" is kept in all set-ups."""
+        parts = (("frame", self.frame), ("tool", self.tool))
+        return tuple(name for name, chosen in parts if chosen.any() and not self.std[chosen].any())
+
     def holding(self, numbers: Iterable[int]) -> "Unknowns":
         """The same with some unknowns of the arm held where they were."""
         std = self.std.copy()

@@ -1,0 +1,71 @@
+"""The joints that an update did not test for a change, and what would have to be known, in sentences."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+OPTIONS: Final = {
+    "frame": ("--keep-frame", "the device stands where it stood"),
+    "tool": ("--keep-tool", "the target sits where it sat"),
+}
+"""Of what a joint may be confounded with: the option that keeps it, and when that is right."""
+
+
+def untested_joints(told: Mapping[str, Any]) -> str:
+    """That some joints were not tested, in a sentence; "" where all were.
+
+    Args:
+        told: What `Update.to_dict` gives.
+    """
+    joints = [entry["joint"] for entry in told["offsets"] if not entry["told"]]
+    return f"{_named(joints)} {_were(joints)} not tested." if joints else ""
+
+
+def untested_words(told: Mapping[str, Any]) -> str:
+    """The same with reasons, and with the options that would tell more; "" where all were tested."""
+    by_reason: dict[str, list[int]] = {}
+    for entry in told["offsets"]:
+        if not entry["told"]:
+            by_reason.setdefault(entry["confounded"], []).append(entry["joint"])
+    return " ".join(_reason(told, reason, joints) for reason, joints in by_reason.items())
+
+
+def way_out_of_keeping(kept: tuple[str, ...]) -> str:
+    """What to do where what was kept may have moved: "frame", "tool"."""
+    if not kept:
+        return ""
+    chosen = [OPTIONS[name] for name in kept]
+    return "Leave " + ", and ".join(f"{option} out unless {right}" for option, right in chosen)
+
+
+def _reason(told: Mapping[str, Any], reason: str, joints: list[int]) -> str:
+    if not reason:
+        return f"{_named(joints)} {_were(joints)} not tested: these poses do not determine {_it(joints)}."
+    words = f"{_named(joints)} {_were(joints)} not tested, since confounded with the {reason}"
+    parts = reason.split(" and ")
+    if not all(_may_be_kept(told, part) for part in parts):
+        return f"{words}."
+    options, conditions = zip(*(OPTIONS[part] for part in parts), strict=True)
+    verb = "tells" if len(options) == 1 else "tell"
+    return f"{words}: if {' and '.join(conditions)}, {' '.join(options)} {verb} {_it(joints)}."
+
+
+def _may_be_kept(told: Mapping[str, Any], part: str) -> bool:
+    """Whether a frame is known that could be kept, or a tool that is not said to be another one."""
+    if part == "frame":
+        return bool(told["frames"])
+    return any(motion["p"] is not None for motion in told["tools"])
+
+
+def _named(joints: list[int]) -> str:
+    numbers = [str(joint) for joint in joints]
+    if len(numbers) == 1:
+        return f"Joint {numbers[0]}"
+    return f"Joints {', '.join(numbers[:-1])} and {numbers[-1]}"
+
+
+def _were(joints: list[int]) -> str:
+    return "was" if len(joints) == 1 else "were"
+
+
+def _it(joints: list[int]) -> str:
+    return "it" if len(joints) == 1 else "them"
