@@ -1,8 +1,10 @@
 """Outliers of a calibration: which they are, and that nothing of them stays in it."""
 
 import numpy as np
+import pytest
 
 import truearm as ta
+from truearm.cli import main
 from truearm.simulation import VirtualArm
 
 
@@ -40,7 +42,7 @@ def test_outliers_leave_nothing_behind_of_what_was_found_with_them():
 
 
 def test_one_row_far_out_spoils_no_model():
-    """A wrong decimal point, and readings of the row before: neither constants nor what varies remember it."""
+    """A wrong decimal point, readings of the row before: neither constants nor what varies remember it."""
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
     table = arm.measure_table(arm.poses(100))
     trained = int(np.random.default_rng(7).permutation(100)[3])
@@ -57,3 +59,23 @@ def test_one_row_far_out_spoils_no_model():
         rows = [entry["row"] - 1 for entry in calibration.summary["outliers"]]
         assert rows == [trained] * (len(each) == len(table))
     assert np.max(np.divide(found[1:], found[0])) < 1.3, found
+
+
+@pytest.mark.parametrize(
+    ("robust", "said", "advised"),
+    [
+        ("none", "Outliers, not taken out of the fit:", True),
+        ("huber", "Outliers, given less weight in the fit:", False),
+    ],
+)
+def test_a_robust_fit_is_advised_where_it_is_none(tmp_path, monkeypatch, capsys, robust, said, advised):
+    monkeypatch.chdir(tmp_path)
+    arm = VirtualArm.paper(seed=2)
+    table = arm.measure_table(arm.poses(60))
+    table.loc[[11], "x"] += 0.05
+    table.to_csv("m.csv", index=False)
+    options = ["--model", "constant", "--robust", robust, "-o", "out"]
+    assert main(["calibrate", "rv-m2", "m.csv", *options]) == 0
+    words = " ".join(capsys.readouterr().out.split())
+    assert said in words
+    assert ("--robust huber gives" in words) == advised
