@@ -3,12 +3,17 @@
 import json
 import subprocess
 import sys
+import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from tests.report_support import words_of, write_arm_and_later
 from truearm.cli import main
+from truearm.errors import WorkError
+from truearm.reporting import pdf
 
 PROGRAM = str(Path(sys.executable).parent / "truearm")
 
@@ -105,6 +110,35 @@ def test_a_browser_that_prints_nothing_leaves_no_pdf(folder, tmp_path, monkeypat
     assert main(["report", "arm.calib", "-o", "report.pdf"]) == 1
     assert "something broke" in capsys.readouterr().err
     assert not (folder / "report.pdf").exists()
+
+
+def test_a_browser_that_is_ended_leaves_neither_processes_nor_files(tmp_path, monkeypatch):
+    fake = tmp_path / "chromium"
+    fake.write_text(f"#!/bin/sh\n(echo $$ > {tmp_path}/pid; sleep 60) &\nsleep 60\n")
+    fake.chmod(0o755)
+    made = tmp_path / "made"
+    made.mkdir()
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    monkeypatch.setattr(tempfile, "tempdir", str(made))
+    monkeypatch.setattr(pdf, "PATIENCE_S", 0.5)
+    began = time.monotonic()
+    with pytest.raises(WorkError, match="longer than"):
+        pdf.write_pdf("<p>", tmp_path / "report.pdf")
+    assert time.monotonic() - began < 30.0
+    assert list(made.iterdir()) == []
+    group = int((tmp_path / "pid").read_text())
+    assert commands_of(group) == []
+
+
+def commands_of(group):
+    """Names of the living processes of a process group, as /proc tells them."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(FileNotFoundError, ProcessLookupError):
+            name, _, rest = stat.read_text().partition("(")[2].rpartition(")")
+            state, _, own = rest.split()[:3]
+            found += [name] if int(own) == group and state != "Z" else []
+    return found
 
 
 def test_help_imports_no_numbers(folder):

@@ -14,11 +14,14 @@ import pytest
 from distributed import LocalCluster
 
 import truearm as ta
+from tests.report_support import figures_of
 from truearm.errors import InputError, UsageError
 from truearm.fleet import Fleet, run_fleet
-from truearm.fleet.attention import order, reasons
+from truearm.fleet.attention import Reason, order, reasons
 from truearm.fleet.drift import MOVED, drift_of
 from truearm.fleet.fleet_file import LimitsSection
+from truearm.fleet.page import fleet_page
+from truearm.fleet.rows import Judged
 from truearm.simulation import Imperfections, VirtualArm
 
 POSES = 60
@@ -254,6 +257,38 @@ def test_reasons(changed, limits, kinds):
     row = {**ROW, **changed}
     found = reasons(row, [row], LimitsSection(**limits))
     assert [reason.kind for reason in found] == kinds
+
+
+def test_an_error_beyond_its_limit_is_told_as_larger():
+    row = {**ROW, "mean_mm": 0.15004}
+    (found,) = reasons(row, [row], LimitsSection(mean_mm=0.15))
+    assert "Mean error 0.15004 mm on held-out rows, beyond 0.15 mm." in found.words
+
+
+def test_a_failed_arm_does_not_lead_to_the_report_of_an_earlier_run(plant, again):
+    (again / "R1" / "report.html").write_text("earlier")
+    text = HEAD + arms("R1", "R2", R1='robot = "ur99"')
+    run = run_fleet(Fleet.from_toml(text, folder=plant), again, workers=1)
+    failed = by_name(run)["R1"]
+    assert failed.row["earlier"] == ["calibration.calib", "summary.json", "report.html"]
+    assert "results of an earlier run: calibration.calib" in failed.reasons[0].words
+    assert 'href="R1/report.html"' not in (again / "fleet.html").read_text()
+
+
+def test_a_page_of_many_long_names_keeps_its_figures(runs, plant):
+    first = by_name(runs[0])["R1"]
+    names = [f"{number:02d} {'line ' * 12}{number:02d}" for number in range(9)]
+    reason = Reason("failed", "It stopped.", 1.0)
+    many = [Judged(first.row | {"arm": name}, (reason,)) for name in names]
+    page = fleet_page(Fleet.from_toml(FIRST, folder=plant), many, [])
+    assert "4 more arms need attention." in page
+    layout = figures_of(page)["figures"][0]["layout"]
+    assert layout["xaxis"]["tickvals"] == names
+    assert len(set(layout["xaxis"]["ticktext"])) == len(names)
+    assert max(map(len, layout["xaxis"]["ticktext"])) <= 18
+    assert layout["yaxis"]["type"] == "log"
+    assert layout["yaxis"]["ticktext"]
+    assert page.count('class="left long"') == len(names)
 
 
 def test_an_arm_stands_out_of_its_kind():

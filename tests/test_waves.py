@@ -30,7 +30,11 @@ def found():
 
 
 def waves_of(calibration):
-    return [block for block in calibration.summary["blocks"] if block["name"] == "wave"]
+    return blocks_of(calibration, "wave")
+
+
+def blocks_of(calibration, name):
+    return [block for block in calibration.summary["blocks"] if block["name"] == name]
 
 
 def test_a_wave_is_found_and_taken_away(found):
@@ -99,6 +103,9 @@ def test_the_pitch_of_a_screw_is_found():
     assert wave["joints"] == [3]
     assert wave["period_mm"] == pytest.approx(pitch_mm, rel=0.02)
     assert wave["amplitudes"]["lengths_mm"] == pytest.approx(amplitude_mm, rel=0.15)
+    own = {tuple(block["joints"]): block["amplitudes"] for block in blocks_of(calibration, "own")}
+    assert set(own[3,]) == {"lengths_mm"}
+    assert set(own[1,]) == {"theta_mrad"}
     assert calibration.validation.holdout["variable"].position.mean < 0.05
     says = [part.says for part in varying(Facts(calibration)).parts if isinstance(part, Figure)]
     assert any("waves with a period of" in words for words in says)

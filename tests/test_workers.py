@@ -1,5 +1,6 @@
 """Tasks over processes and over a real Dask cluster: errors, workers that die, and the end by Ctrl-C."""
 
+import logging
 import os
 import signal
 import socket
@@ -9,12 +10,14 @@ import time
 from contextlib import closing
 from pathlib import Path
 
+import distributed
 import pytest
 from distributed import LocalCluster
 
 from tests.tasks import LONG_S, bad_answer, cube, die_sometimes, native_threads, wait_to_be_killed
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.workers import check_workers, processors, run_tasks
+from truearm.workers import cluster as over_cluster
 from truearm.workers.done import ATTEMPTS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -88,8 +91,9 @@ def test_a_worker_that_dies_is_replaced_a_few_times(tmp_path):
     items = [(tmp_path, "once", 1), (tmp_path, "unlucky", ATTEMPTS), (tmp_path, "hopeless", ATTEMPTS + 1)]
     found = {done.index: done for done in run_tasks(die_sometimes, items, workers=2)}
     assert [found[k].value for k in range(3)] == ["once", "unlucky", None]
-    with pytest.raises(WorkError, match=f"died, {ATTEMPTS} times"):
+    with pytest.raises(WorkError, match=f"died, {ATTEMPTS} times") as caught:
         found[2].result()
+    assert "__main__" not in str(caught.value)
 
 
 def test_closing_ends_the_processes(tmp_path):
@@ -168,6 +172,20 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
         assert time.monotonic() - began < 10.0
     with pytest.raises(InputError, match="here there: no Dask scheduler answers"):
         next(run_tasks(cube, [1], scheduler="here there"))
+
+
+def test_a_client_that_loses_its_scheduler_is_not_heard_as_it_is_closed(monkeypatch, caplog):
+    class Lost:
+        def __init__(self, *_, **__):
+            """A client whose scheduler is gone."""
+
+        def close(self, timeout):
+            logging.getLogger("distributed.client").error("closed after %g s", timeout)
+
+    monkeypatch.setattr(distributed, "Client", Lost)
+    monkeypatch.setattr(over_cluster, "check_scheduler", lambda _: None)
+    assert list(over_cluster.run_on_cluster(str, [], "tcp://127.0.0.1:1")) == []
+    assert caplog.records == []
 
 
 def test_without_dask_the_extra_is_named(monkeypatch):

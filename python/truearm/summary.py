@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from truearm._core import ANGLE_ARM_M
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -97,12 +98,13 @@ def _describe(
     lengths = _lengths(name, block["axes"], hyper)
     scales = [axis[1] for axis in block["axes"]]
     found: dict[str, Any] = {"name": name}
+    first = next(iter(block["inputs"]), joints)
+    slides = first < joints and calibration.robot.joints[first] == "prismatic"
     if name == WAVE:
-        slides = calibration.robot.joints[block["inputs"][0]] == "prismatic"
         found |= _wave(scales[0], float(math.sqrt(2.0) * block["weights"].std()), slides=slides)
         scales = []
     else:
-        found["amplitudes"] = _amplitudes(name, hyper)
+        found["amplitudes"] = _amplitudes(name, hyper, slides=slides)
     if name == OWN and block["axes"][0][0] and (ripples := _ripples(hyper)) is not None:
         found["ripples"] = ripples
     cells = 1
@@ -149,8 +151,11 @@ def _lengths(name: str, axes: Sequence[Any], hyper: dict[str, list[float]]) -> l
     return hyper.get(f"{name}_lengths") or (of_lines or hyper[f"{name}_length"]) * len(axes)
 
 
-def _amplitudes(name: str, hyper: dict[str, list[float]]) -> dict[str, float]:
+def _amplitudes(name: str, hyper: dict[str, list[float]], *, slides: bool) -> dict[str, float]:
+    """Prior standard deviations of a block; `slides` tells whether its first joint moves along its axis."""
     if name == "sag":
         return {"theta_mrad_per_m": hyper["sag"][0] * MRAD_PER_RAD}
+    if name == OWN and slides:
+        return {"lengths_mm": hyper[OWN][0] * ANGLE_ARM_M * MM_PER_METRE}
     values = hyper.get(f"{name}_amplitudes") or hyper[name]
     return {key: value * unit for (key, unit), value in zip(AMPLITUDES, values, strict=False)}

@@ -21,6 +21,8 @@ STANDS_OUT: Final = 2.0
 FEWEST_COVERED: Final = 0.85
 MOST_OUTLIERS: Final = 0.02
 HALF: Final = 0.5
+LEAST_DECIMALS: Final = 3
+MOST_DECIMALS: Final = 8
 
 
 @dataclass(frozen=True)
@@ -52,10 +54,16 @@ def reasons(arm: Row, fleet: Sequence[Row], limits: LimitsSection) -> list[Reaso
         limits: Of the fleet file.
     """
     if arm["status"] == FAILED:
-        return [Reason("failed", str(arm["error"]), np.inf)]
+        return [Reason("failed", f"{arm['error']}{_earlier(arm)}", np.inf)]
     found = [*_no_gain(arm), *_drifted(arm, limits), *_beyond(arm, limits), *_stands_out(arm, fleet)]
     found += [*_outliers(arm), *_intervals(arm)]
     return sorted(found, key=lambda reason: KINDS.index(reason.kind))
+
+
+def _earlier(arm: Row) -> str:
+    """A sentence on the results of an earlier run, which a failed arm's directory still holds."""
+    names = arm.get("earlier") or []
+    return f" In its directory are results of an earlier run: {', '.join(names)}." if names else ""
 
 
 def order(found: Sequence[Reason]) -> tuple[int, float]:
@@ -102,8 +110,14 @@ def _beyond(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
     for kind, limit, noun in (("mean", limits.mean_mm, "Mean"), ("max", limits.max_mm, "Largest")):
         value = arm[f"{kind}_mm"]
         if limit is not None and value > limit:
-            words = f"{noun} error {value:.3f} mm on held-out rows, beyond {limit:g} mm."
+            words = f"{noun} error {_above(value, limit)} mm on held-out rows, beyond {limit:g} mm."
             yield Reason(kind, words, value / limit)
+
+
+def _above(value: float, limit: float) -> str:
+    """A value with as many decimals as show that it is above a limit, three at least."""
+    texts = (f"{value:.{decimals}f}" for decimals in range(LEAST_DECIMALS, MOST_DECIMALS))
+    return next((text for text in texts if float(text) > limit), repr(value))
 
 
 def _stands_out(arm: Row, fleet: Sequence[Row]) -> Iterator[Reason]:

@@ -16,6 +16,13 @@ REPORT_NAME: Final = "report.html"
 ROW_NAME: Final = "arm.json"
 
 
+def earlier_files(folder: Path) -> list[str]:
+    """Names of the results of a finished run in the directory of an arm; none where no run finished it."""
+    if not (folder / ROW_NAME).is_file():
+        return []
+    return [name for name in (CALIBRATION_NAME, SUMMARY_NAME, REPORT_NAME) if (folder / name).is_file()]
+
+
 def kept_row(inputs: Inputs, output: Path) -> Row | None:
     """The row of an arm that was finished with the same inputs, options and version; None if it was not."""
     folder = output / inputs.entry.name

@@ -5,12 +5,13 @@ from importlib.metadata import version
 from typing import Any, Final
 from urllib.parse import quote
 
+from truearm.errors import count_of
 from truearm.fleet.attention import ATTENTION, FAILED, GOOD
 from truearm.fleet.drift import SURE
 from truearm.fleet.fleet_file import Fleet
 from truearm.fleet.kept import REPORT_NAME
 from truearm.fleet.rows import Judged, counts
-from truearm.reporting.charts import legend
+from truearm.reporting.charts import axis, legend, log_axis
 from truearm.reporting.page import page
 from truearm.reporting.parts import Card, Cell, Figure, Head, Section, Table, Text, Tone
 from truearm.reporting.style import marker_of
@@ -29,6 +30,16 @@ COLUMNS: Final = (
     "why",
 )
 LEFT: Final = (0, 1, 2, 9)
+SMALLEST: Final = 1e-4
+"""In mm: smaller errors are drawn there."""
+AROUND: Final = 1.3
+"""Times the largest error, and parts of the smallest, that the axis goes to."""
+FIRST: Final = 5
+"""Arms that the first screen names."""
+HEIGHT: Final = 380
+"""Of figures, in pixels: names stand upright where arms are many."""
+LONGEST: Final = 18
+"""Characters of a name below a figure; the middle of a longer one is left out."""
 
 
 def fleet_page(fleet: Fleet, arms: Sequence[Judged], reports: Collection[str]) -> str:
@@ -43,11 +54,14 @@ def fleet_page(fleet: Fleet, arms: Sequence[Judged], reports: Collection[str]) -
     tone: Tone = "bad" if number[FAILED] else "fair" if number[ATTENTION] else "good"
     head = Head(
         title=fleet.name,
-        about=f"{len(arms)} arms",
+        about=count_of(len(arms), "arm"),
         verdict=in_words(number),
         tone=tone,
-        cards=[Card(str(number[word]), "arms", word, TONES[word]) for word in (GOOD, ATTENTION, FAILED)],
-        advice=[(arm.row["arm"], arm.reasons[0].words) for arm in arms if arm.reasons][:5],
+        cards=[
+            Card(str(number[word]), "arm" if number[word] == 1 else "arms", word, TONES[word])
+            for word in (GOOD, ATTENTION, FAILED)
+        ],
+        advice=_first(arms),
     )
     done = [arm for arm in arms if arm.verdict != FAILED]
     sections = [
@@ -69,6 +83,15 @@ def in_words(number: dict[str, int]) -> str:
     if number[FAILED]:
         parts.append(f"{number[FAILED]} could not be calibrated")
     return ", ".join(parts) + "."
+
+
+def _first(arms: Sequence[Judged]) -> list[tuple[str, str]]:
+    """The arms that need most attention, with why, and how many more there are."""
+    named = [(arm.row["arm"], arm.reasons[0].words) for arm in arms if arm.reasons]
+    more = len(named) - FIRST
+    need = "needs" if more == 1 else "need"
+    rest = [(f"{count_of(more, 'more arm')} {need} attention.", "The table names them.")] if more > 0 else []
+    return named[:FIRST] + rest
 
 
 def _table(arms: Sequence[Judged], reports: Collection[str]) -> Table:
@@ -109,18 +132,21 @@ def _errors(arms: Sequence[Judged]) -> Figure | None:
             "mode": "markers",
             "name": label,
             "x": names,
-            "y": [arm.row[key] for arm in arms],
+            "y": [max(float(arm.row[key]), SMALLEST) for arm in arms],
             "marker": {"color": f"@{model}", "symbol": marker_of(model), "size": 10},
         }
         for model, label, key in marks
     ]
     worst = max(arms, key=lambda arm: float(arm.row["mean_mm"]))
-    layout = {"xaxis": _names(), "yaxis": {"title": {"text": "mean error, mm"}, "type": "log"}}
+    shown = [max(float(arm.row[key]), SMALLEST) for _, _, key in marks for arm in arms]
+    error = log_axis("mean error, mm (logarithmic)", min(shown) / AROUND, max(shown) * AROUND)
+    layout = {"xaxis": _names(names), "yaxis": error}
     return Figure(
         "Mean held-out error of each arm",
         f"The largest is that of {worst.row['arm']}: {worst.row['mean_mm']:.3f} mm.",
         traces,
         {**layout, **legend()},
+        height=HEIGHT,
         is_wide=True,
     )
 
@@ -146,19 +172,23 @@ def _drift(arms: Sequence[Judged]) -> Figure | None:
         "marker": {"color": "@ink", "symbol": "line-ew-open", "size": 24, "line": {"width": 2}},
     }
     name, most = max(known, key=lambda entry: float(entry[1]["mean_mm"]))
-    layout = {"xaxis": _names(), "yaxis": {"title": {"text": "change, mm"}, "rangemode": "tozero"}}
+    layout = {"xaxis": _names(names), "yaxis": axis("change, mm", rangemode="tozero")}
     return Figure(
         "Change of predicted positions since the last calibration",
         f"{name} changed most: {most['mean_mm']:.3f} mm on average. A change below its line, "
         f"{SURE:g} standard deviations of both calibrations together, is not significant.",
         [bars, unsure],
         {**layout, **legend()},
+        height=HEIGHT,
         is_wide=True,
     )
 
 
-def _names() -> dict[str, Any]:
-    return {"title": {"text": "arm"}, "type": "category"}
+def _names(names: Sequence[str]) -> dict[str, Any]:
+    """An axis of arms, whose ticks are their names with the middle of long ones left out."""
+    half = LONGEST // 2
+    short = [name if len(name) <= LONGEST else f"{name[:half]}…{name[-half + 1 :]}" for name in names]
+    return axis("arm", type="category", tickvals=list(names), ticktext=short)
 
 
 def _meaning(fleet: Fleet) -> list[str]:

@@ -96,11 +96,11 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
     }
 
 
-def row_of_failed(arm: str, error: Exception) -> Row:
-    """The row of an arm that could not be calibrated."""
+def row_of_failed(arm: str, error: Exception, earlier: Sequence[str] = ()) -> Row:
+    """The row of an arm that could not be calibrated; `earlier` are names of results of an earlier run."""
     kind = type(error).__name__
     words = str(error) if is_expected(error) else f"{kind}: {error}"
-    return {"arm": arm, "status": FAILED, "error": words, "kind": kind}
+    return {"arm": arm, "status": FAILED, "error": words, "kind": kind, "earlier": list(earlier)}
 
 
 def judged(fleet: Fleet, rows: Sequence[Row]) -> list[Judged]:

@@ -14,7 +14,7 @@ from truearm.fitting import Stages, no_stages
 from truearm.fleet.attention import FAILED
 from truearm.fleet.fleet_file import Entry, Fleet
 from truearm.fleet.inputs import Inputs, find_inputs
-from truearm.fleet.kept import REPORT_NAME, keep, kept_row
+from truearm.fleet.kept import REPORT_NAME, earlier_files, keep, kept_row
 from truearm.fleet.page import fleet_page
 from truearm.fleet.rows import Judged, Row, content, counts, judged, row_of_failed, table_of
 from truearm.fleet.task import ArmTask, calibrate_arm
@@ -106,7 +106,7 @@ def _open(fleet: Fleet, output: Path, rows: dict[str, Row]) -> list[tuple[Inputs
             else:
                 todo.append((inputs, _task(inputs)))
         except (TruearmError, OSError) as error:
-            rows[entry.name] = row_of_failed(entry.name, error)
+            rows[entry.name] = row_of_failed(entry.name, error, earlier_files(output / entry.name))
     return todo
 
 
@@ -127,7 +127,7 @@ def _row(inputs: Inputs, done: Done[Any], output: Path) -> Row:
     try:
         return keep(inputs, done.result(), output)
     except Exception as error:  # noqa: BLE001 - one arm stops no other; it is told in the arm's row
-        return row_of_failed(inputs.entry.name, error)
+        return row_of_failed(inputs.entry.name, error, earlier_files(output / inputs.entry.name))
 
 
 def _write(fleet: Fleet, arms: Sequence[Judged], output: Path) -> dict[str, Any]:
@@ -135,6 +135,7 @@ def _write(fleet: Fleet, arms: Sequence[Judged], output: Path) -> dict[str, Any]
     found = content(fleet, arms, version("truearm"))
     write_whole(output / JSON_NAME, json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     write_whole(output / CSV_NAME, table_of(arms))
-    reports = {arm.row["arm"] for arm in arms if (output / arm.row["arm"] / REPORT_NAME).is_file()}
+    done = [arm.row["arm"] for arm in arms if arm.verdict != FAILED]
+    reports = {name for name in done if (output / name / REPORT_NAME).is_file()}
     write_whole(output / PAGE_NAME, fleet_page(fleet, arms, reports))
     return found

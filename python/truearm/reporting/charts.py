@@ -114,7 +114,7 @@ def data_points(x: ArrayLike, y: ArrayLike, **more: Any) -> Trace:
         "name": "measured",
         "x": lean(x),
         "y": lean(y),
-        "marker": {"color": "@data", "size": 3},
+        "marker": {"color": "@paper", "size": 4, "line": {"color": "@ink", "width": 0.7}},
         "hoverinfo": "skip",
     } | more
 

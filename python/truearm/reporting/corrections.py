@@ -43,7 +43,8 @@ def compensation(facts: Facts) -> Section:
         data.readings, tool=None if named else facts.point
     )
     of = "the robot file's tool" if named else "the measured target, as the robot file names no tool"
-    parts: list[Part] = [Text(_overall(found, (task, of), len(rows.data))), *_sizes(facts, found)]
+    words = _overall(found, (task, of), len(rows.data)) + facts.at_features
+    parts: list[Part] = [Text(words), *_sizes(facts, found)]
     return Section(title, [*parts, *largest(facts, data, found), *_refusals(data, found)])
 
 

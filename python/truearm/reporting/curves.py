@@ -1,4 +1,4 @@
-"""Figures: which parameter varies along which joint, and its curves with their uncertainty."""
+"""Figures: which parameter varies along which joint or feature, and its curves with their uncertainty."""
 
 from typing import Final
 
@@ -8,58 +8,68 @@ from numpy.typing import NDArray
 from truearm.models import VARIABLE
 from truearm.reporting.charts import axis, band, colour_bar, line
 from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import fixed, lean, short
+from truearm.reporting.numbers import fixed, lean, short, significant
 from truearm.reporting.parameters import per_unit, unit_of
 from truearm.reporting.parts import Choice, Figure
 from truearm.reporting.style import SEQUENTIAL
-from truearm.reporting.sweeps import deviations, own_name, sweep
+from truearm.reporting.sweeps import deviations, feature_ends, moved_mm, own_name, sweep, swept_names
 from truearm.reporting.waves import strongest_wave
 from truearm.summary import waves_in_words
 
 Floats = NDArray[np.float64]
 
 SHOWN_ALONG: Final = 3
-"""Parameters whose curves are shown for each joint."""
+"""Parameters whose curves are shown for each joint and feature."""
 SURE: Final = 2.0
 """Standard deviations of the band on either side."""
 
 
 def influence(facts: Facts, effects: Floats) -> Figure:
-    """What each parameter's variation along each joint does to the judged point; effects (N, 5 L) in mm."""
+    """What each parameter's variation along each input does to the judged point; effects (I, 5 L) in mm."""
     candidates = facts.calibration.arm.candidates
     columns = [candidates.columns[k] for k in candidates.driven]
     names = [candidates.names[k] for k in candidates.driven]
     shown = effects[:, columns]
-    joint, k = np.unravel_index(int(np.argmax(shown)), shown.shape)
-    along = np.sum(shown, axis=1)
+    inputs = swept_names(facts)
+    which, k = np.unravel_index(int(np.argmax(shown)), shown.shape)
+    summed = int(np.argmax(np.sum(shown, axis=1)))
     trace = {
         "type": "heatmap",
         "x": names,
-        "y": [f"joint {j + 1}" for j in range(len(facts.joints))],
+        "y": inputs,
         "z": lean(shown, 3),
         "colorscale": SEQUENTIAL,
         "colorbar": colour_bar("mm"),
     }
     return Figure(
-        "Which parameter varies along which joint: the effect on the measured point",
-        f"Largest: {names[k]} along joint {joint + 1}, {fixed(shown[joint, k])} mm peak to peak. Summed over "
-        f"the parameters, the effect is largest along joint {int(np.argmax(along)) + 1}.",
+        f"Which parameter varies along which {_kinds(facts)}: the effect on the measured point",
+        f"Largest: {names[k]} along {inputs[which]}, {fixed(shown[which, k])} mm peak to peak. Summed over "
+        f"the parameters, the effect is largest along {inputs[summed]}.",
         [trace],
         {
             "xaxis": axis("parameter", tickangle=-60),
             "yaxis": {**axis("varies along"), "autorange": "reversed"},
         },
-        height=120 + 34 * len(facts.joints),
+        height=120 + 34 * len(inputs),
         is_wide=True,
     )
 
 
-def along(facts: Facts, joint: int, effects: Floats) -> Figure:
-    """Curves of the parameters that vary most along a joint, its own first; effects (5 L,) in mm."""
-    names = _chosen(facts, joint, effects)
-    found = sweep(facts, joint)
-    q = facts.shown(_as_readings(facts, joint, found.q))[:, joint]
-    spread = deviations(facts, joint, names) if facts.best == VARIABLE else None
+def _kinds(facts: Facts) -> str:
+    return "joint or feature" if len(swept_names(facts)) > len(facts.joints) else "joint"
+
+
+def along(facts: Facts, which: int, effects: Floats) -> Figure:
+    """Curves of the parameters that vary most along an input, a joint's own first; effects (5 L,) in mm.
+
+    Joints count from 0; features follow.
+    """
+    names = _chosen(facts, which, effects)
+    found = sweep(facts, which)
+    is_joint, swept = which < len(facts.joints), swept_names(facts)[which]
+    unit = facts.unit(which) if is_joint else f"units of {swept}"
+    q = facts.shown(_as_readings(facts, which, found.q))[:, which] if is_joint else found.q
+    spread = deviations(facts, which, names) if facts.best == VARIABLE else None
     traces, choices, says = [], [], ""
     candidates = facts.calibration.arm.candidates
     each = 1 if spread is None else 2
@@ -76,17 +86,15 @@ def along(facts: Facts, joint: int, effects: Floats) -> Figure:
         title = {"yaxis": axis(f"{name}, {unit_of(column)}")}
         choices.append(Choice(name, shown, title))
         if k == 0:
-            says = _says(
-                name, unit_of(column), q, values, facts.unit(joint), _surely(spread, k, per_unit(column))
-            )
-    says += _fine_waves(facts, joint)
+            says = in_words(name, unit_of(column), q, values, unit, _surely(spread, k, per_unit(column)))
+    says = says + _fine_waves(facts, which) if is_joint else f"{_moves(facts, swept)} {says}"
     first = candidates.column(names[0])
     return Figure(
-        f"Variation along joint {joint + 1}",
+        f"Variation along {swept}",
         says,
         traces,
         {
-            "xaxis": axis(f"joint {joint + 1}, {facts.unit(joint)}"),
+            "xaxis": axis(f"{swept}, {unit}" if is_joint else f"{swept}, in its own unit"),
             "yaxis": axis(f"{names[0]}, {unit_of(first)}"),
         },
         height=270,
@@ -94,10 +102,21 @@ def along(facts: Facts, joint: int, effects: Floats) -> Figure:
     )
 
 
-def _chosen(facts: Facts, joint: int, effects: Floats) -> list[str]:
-    """Names of the parameters to show, the joint's own first."""
+def _moves(facts: Facts, feature: str) -> str:
+    """What a feature does to the judged point as a whole."""
+    moved, ends = moved_mm(facts, feature), feature_ends(facts, feature)
+    mean, most = short(float(moved.mean()), float(moved.max()))
+    poses = "measured poses" if facts.readings is not None else "poses"
+    return (
+        f"Between {significant(ends[0])} and {significant(ends[1])} {feature} moves the {facts.point_name} "
+        f"by {mean} mm on average over {poses}, by {most} mm at most."
+    )
+
+
+def _chosen(facts: Facts, which: int, effects: Floats) -> list[str]:
+    """Names of the parameters to show, a joint's own first."""
     candidates = facts.calibration.arm.candidates
-    own = own_name(facts.calibration, joint)
+    own = own_name(facts.calibration, which) if which < len(facts.joints) else ""
     others = [candidates.names[k] for k in candidates.driven if candidates.names[k] != own]
     others.sort(key=lambda name: -effects[candidates.column(name)])
     return [*([own] if own in candidates.names else []), *others][:SHOWN_ALONG]
@@ -114,8 +133,11 @@ def _surely(spread: Floats | None, k: int, unit: float) -> float | None:
     return None if spread is None else SURE * float(np.median(spread[:, k])) / unit
 
 
-def _says(name: str, unit: str, q: Floats, values: Floats, joint_unit: str, sure: float | None) -> str:
-    """How far the curve goes, whether that is more than its uncertainty, and its strongest wave."""
+def in_words(name: str, unit: str, q: Floats, values: Floats, joint_unit: str, sure: float | None) -> str:
+    """How far the curve goes, whether that is more than its uncertainty, and its strongest wave.
+
+    A wave within the band is none that these data show, and not told.
+    """
     reach = float(np.ptp(values))
     if sure is None:
         start = f"{name} varies by {_four(reach)} {unit} over the measured range."
@@ -123,12 +145,12 @@ def _says(name: str, unit: str, q: Floats, values: Floats, joint_unit: str, sure
     start = f"{name} varies by {_four(reach)} {unit}; its 95 % band is {_four(2.0 * sure)} {unit} wide"
     if reach < 2.0 * sure:
         return f"{start}: these data do not show whether it varies."
-    return f"{start}.{_wave(q, values, joint_unit, unit)}"
+    return f"{start}.{_wave(q, values, joint_unit, unit, least=sure)}"
 
 
-def _wave(q: Floats, values: Floats, joint_unit: str, unit: str) -> str:
+def _wave(q: Floats, values: Floats, joint_unit: str, unit: str, *, least: float = 0.0) -> str:
     wave = strongest_wave(q, values)
-    if wave is None:
+    if wave is None or wave.amplitude <= least:
         return ""
     return (
         f" A wave with a period of {short(wave.period)[0]} {joint_unit} and an amplitude of "

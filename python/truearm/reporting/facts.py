@@ -15,7 +15,7 @@ from truearm.evaluation import Evaluation
 from truearm.grids import grid_steps, grid_words
 from truearm.held_rows import HeldRows
 from truearm.models import NOMINAL, ArmModel
-from truearm.reporting.numbers import shown_readings, unit_of
+from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
 from truearm.stillness import still_warning
 from truearm.summary import WAVE
 from truearm.units import MM_PER_METRE
@@ -196,6 +196,18 @@ class Facts:
         if rows is None:
             return dict.fromkeys(names, 0.0)
         return {name: float(rows.data.features[name].median()) for name in names}
+
+    @property
+    def at_features(self) -> str:
+        """A sentence, after a blank, on the features that hold where none is named; empty without."""
+        if not self.features:
+            return ""
+        if self.readings is None:
+            return (
+                f" Features ({listed([*self.features])}) are zero: their values were left out of this file."
+            )
+        values = [f"{name} = {significant(value)}" for name, value in self.features.items()]
+        return f" Where nothing else is said, features are at the medians of the rows: {listed(values)}."
 
     @cached_property
     def point(self) -> Floats:

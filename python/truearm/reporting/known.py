@@ -66,7 +66,7 @@ def known(facts: Facts) -> Known | None:
     count, is_exact = _affordable(facts)
     readings = configurations(facts, count)
     rows = facts.drawn(count // 3)
-    return Known(readings, _std_mm(facts, readings, is_exact), _std_mm(facts, rows, is_exact), is_exact)
+    return Known(readings, std_mm(facts, readings, is_exact), std_mm(facts, rows, is_exact), is_exact)
 
 
 def configurations(facts: Facts, count: int) -> Floats:
@@ -84,7 +84,8 @@ def _affordable(facts: Facts) -> tuple[int, bool]:
     return int(np.clip(count, FEWEST, MOST)), True
 
 
-def _std_mm(facts: Facts, readings: Floats, is_exact: bool) -> Floats:
+def std_mm(facts: Facts, readings: Floats, is_exact: bool) -> Floats:
+    """Root of the sum of the variances of x, y and z of the judged point (n,), or a bound of it, mm."""
     calibration, features = facts.calibration, facts.features or None
     if is_exact:
         found = np.linalg.norm(

@@ -57,6 +57,11 @@ def short(*values: float) -> list[str]:
     return [f"{_no_minus_zero(value, decimals):.{decimals}f}" for value in values]
 
 
+def significant(value: float) -> str:
+    """A number whose unit is not known, such as a feature, with four significant digits."""
+    return f"{value:.{DIGITS}g}"
+
+
 def percent(share: float) -> str:
     """A share in percent: "64 %"; of one that is hardly any, "less than 1 %"."""
     return "less than 1 %" if share < 0.005 else f"{100.0 * share:.0f} %"

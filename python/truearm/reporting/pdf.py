@@ -2,8 +2,11 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -19,6 +22,9 @@ BROWSERS: Final = (
     "msedge",
 )
 PATIENCE_S: Final = 180
+ENDING_S: Final = 0.2
+"""How long processes of a browser that was killed may take to be gone: less than Ctrl-C leaves them."""
+PULSE_S: Final = 0.02
 DRAWING_MS: Final = 900_000
 """Time of the page's own clock in which figures are drawn; it runs only while there is nothing to do."""
 
@@ -47,7 +53,7 @@ def write_pdf(html: str, path: Path) -> None:
         WorkError: If there is no Chromium, or it fails; says what it said.
     """
     program = browser()
-    with tempfile.TemporaryDirectory(prefix="truearm-") as folder:
+    with tempfile.TemporaryDirectory(prefix="truearm-", ignore_cleanup_errors=True) as folder:
         source, target = Path(folder) / "page.html", Path(folder) / "page.pdf"
         source.write_text(html, encoding="utf-8")
         said = run_browser(
@@ -61,19 +67,49 @@ def write_pdf(html: str, path: Path) -> None:
 def run_browser(program: str, folder: str, arguments: list[str]) -> str:
     """Run Chromium without a window on a page that draws figures; what it said.
 
+    It has a process group of its own, all of which is gone where this is interrupted.
+
     Raises:
         WorkError: If it takes minutes.
     """
-    command = browser_command(program, folder, arguments)
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)  # noqa: S603
-    except subprocess.TimeoutExpired:
-        raise WorkError(
-            f"Chromium took longer than {PATIENCE_S} s",
-            where=program,
-            way_out="Write report.html and print it from a browser",
-        ) from None
-    return done.stderr
+    said = Path(folder) / "said.txt"
+    with said.open("wb") as words:
+        running = subprocess.Popen(  # noqa: S603
+            browser_command(program, folder, arguments),
+            stdout=subprocess.DEVNULL,
+            stderr=words,
+            start_new_session=True,
+        )
+        try:
+            _wait(running, program)
+        finally:
+            if running.returncode is None:
+                _end(running)
+    return said.read_text(encoding="utf-8", errors="replace")
+
+
+def _wait(running: subprocess.Popen[bytes], program: str) -> None:
+    """Wait for a program to end; looks now and then, so that Ctrl-C counts at once."""
+    end = time.monotonic() + PATIENCE_S
+    while running.poll() is None:
+        if time.monotonic() > end:
+            raise WorkError(
+                f"Chromium took longer than {PATIENCE_S} s",
+                where=program,
+                way_out="Write report.html and print it from a browser",
+            )
+        time.sleep(PULSE_S)
+
+
+def _end(running: subprocess.Popen[bytes]) -> None:
+    """End a program and all processes of its group, and wait until they write nothing any more."""
+    end = time.monotonic() + ENDING_S
+    with suppress(ProcessLookupError):
+        os.killpg(running.pid, signal.SIGKILL)
+        running.wait()
+        while time.monotonic() < end:
+            os.killpg(running.pid, signal.SIGKILL)
+            time.sleep(PULSE_S)
 
 
 def browser_command(program: str, folder: str, arguments: list[str]) -> list[str]:

@@ -1,5 +1,6 @@
 """Figure: the errors as arrows in space with the arm drawn, before and after."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -24,7 +25,10 @@ LONGER: Final = 10
 SHARED: Final = 0.3
 """Errors whose mean vector is longer than this part of their mean length share a direction."""
 ROUND: Final = (1, 2, 5)
-CAMERA: Final = {"eye": {"x": 1.2, "y": -1.4, "z": 0.6}, "center": {"x": 0.0, "y": 0.0, "z": -0.06}}
+MARGIN: Final = 0.02
+"""Of the axes' ranges, on either side."""
+CAMERA: Final = {"eye": {"x": 1.2, "y": -1.4, "z": 0.6}, "center": {"x": 0.0, "y": 0.0, "z": 0.0}}
+"""Where the picture is seen from; the page steps back until all of it is in view."""
 
 
 def quiver(facts: Facts) -> Figure | None:
@@ -53,13 +57,38 @@ def quiver(facts: Facts) -> Figure | None:
             "scene": {
                 **{f"{name}axis": {"title": {"text": f"{name}, mm"}} for name in "xyz"},
                 "camera": CAMERA,
+                "aspectmode": "manual",
             },
             "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         },
         height=520,
         is_wide=True,
-        choices=[Choice(label, which) for label, which in zip(labels, shown, strict=True)],
+        choices=[
+            Choice(
+                label,
+                which,
+                {"scene": _box([trace for trace, is_in in zip(traces, which, strict=True) if is_in])},
+            )
+            for label, which in zip(labels, shown, strict=True)
+        ],
     )
+
+
+def _box(traces: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Axes that hold all of some traces, and the sides of their box in parts of its size.
+
+    The page needs the sides to see all of the box.
+    """
+    found: dict[str, Any] = {}
+    sides = {}
+    for name in "xyz":
+        values = np.array([value for trace in traces for value in trace[name] if value is not None])
+        margin = MARGIN * float(np.ptp(values)) or 1.0
+        low, high = float(values.min()) - margin, float(values.max()) + margin
+        found[f"{name}axis"] = {"range": lean([low, high])}
+        sides[name] = high - low
+    size = float(np.prod(list(sides.values())) ** (1.0 / len(sides)))
+    return found | {"aspectratio": {name: side / size for name, side in sides.items()}}
 
 
 def _states(facts: Facts) -> list[tuple[str, str, int]]:

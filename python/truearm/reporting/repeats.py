@@ -14,7 +14,7 @@ from truearm.reporting.charts import axis
 from truearm.reporting.drifts import drifts
 from truearm.reporting.facts import Facts
 from truearm.reporting.floor import distance_at_floor_mm, stated_sigma_mm
-from truearm.reporting.numbers import fixed, lean, short
+from truearm.reporting.numbers import fixed, lean, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.simulation import approach_in_sequence
 from truearm.units import MM_PER_METRE
@@ -24,6 +24,9 @@ Floats = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 FEWEST_GROUPS: Final = 3
+SURE: Final = 3.0
+"""Standard deviations by which the square of a difference exceeds what scatter makes, where it stands out."""
+COORDINATES: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,23 +69,28 @@ class Repeats:
         return cls(place[again], missed[again] + moved, approach[again], _stayed(data, order, place)[again])
 
     def distances_mm(self) -> Floats:
-        """Distance of each row from the centre of its pose (n,), mm, as unbiased as n rows a pose allow."""
+        """Distance of each row from the mean of its pose (n,), mm."""
         found = np.empty(len(self.place))
         for mine in self.poses():
-            left = self.missed[mine] - self.missed[mine].mean(axis=0)
-            found[mine] = np.linalg.norm(left, axis=1) * np.sqrt(len(mine) / (len(mine) - 1))
+            found[mine] = np.linalg.norm(self.missed[mine] - self.missed[mine].mean(axis=0), axis=1)
         return MM_PER_METRE * found
+
+    def widened(self) -> Floats:
+        """How much farther rows lie from the true mean than from that of the k rows of their pose (n,)."""
+        count = np.bincount(self.place)[self.place]
+        return np.asarray(np.sqrt(count / (count - 1)))
 
     def poses(self) -> Iterator[Index]:
         """Rows of each pose."""
         for place in np.unique(self.place):
             yield np.flatnonzero(self.place == place)
 
-    def both_sides_mm(self, joint: int) -> tuple[Floats, Floats]:
+    def both_sides_mm(self, joint: int, noise_mm: float) -> tuple[Floats, Floats]:
         """For each pose that a joint reached from both sides: how far the two means lie apart, and what the
-        scatter within the sides would make of it, mm.
+        scatter within the sides would make of it, mm; the noise of a coordinate where each side has one row.
         """
         apart, scatter = [], []
+        noise = COORDINATES * (noise_mm / MM_PER_METRE) ** 2
         for mine in self.poses():
             sides = [self.missed[mine[self.approach[mine, joint] == sign]] for sign in (-1.0, 1.0)]
             if min(map(len, sides)) == 0:
@@ -90,8 +98,8 @@ class Repeats:
             apart.append(np.linalg.norm(sides[1].mean(axis=0) - sides[0].mean(axis=0)))
             freedom = sum(len(side) - 1 for side in sides)
             squares = sum(float(np.square(side - side.mean(axis=0)).sum()) for side in sides)
-            alone = squares / freedom * sum(1.0 / len(side) for side in sides) if freedom else np.nan
-            scatter.append(np.sqrt(alone))
+            alone = squares / freedom if freedom else noise
+            scatter.append(np.sqrt(alone * sum(1.0 / len(side) for side in sides)))
         return MM_PER_METRE * np.array(apart), MM_PER_METRE * np.array(scatter)
 
 
@@ -132,10 +140,13 @@ def scatter(facts: Facts, found: Repeats) -> Figure:
     distances = found.distances_mm()
     mean, spread = float(distances.mean()), float(distances.std(ddof=1)) if len(distances) > 1 else 0.0
     error = facts.calibration.validation.holdout[facts.best].position.mean
-    texts = short(mean, mean + 3.0 * spread)
+    free = float((distances * found.widened()).mean())
+    texts = short(mean, mean + 3.0 * spread, free)
     times = (
-        f" The mean error on {facts.judged} poses is {error / mean:.1f} times that scatter."
-        if mean > 0.0
+        " The mean of few measurements is drawn towards them: from the mean of many they would lie "
+        f"{texts[2]} mm on average. The mean error on {facts.judged} poses is "
+        f"{error / free:.1f} times that."
+        if free > 0.0
         else ""
     )
     poses = len(np.unique(found.place))
@@ -177,27 +188,39 @@ def _standing(found: Repeats) -> str:
 
 def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
     """How far poses lie apart that a joint reached from both sides, in the order of the rows."""
-    rows = []
+    rows, beyond = [], []
+    noise = float(np.mean(np.hypot(facts.summary["noise_mm"], stated_sigma_mm(facts))))
     for joint in range(len(facts.joints)):
-        apart, scatter_alone = found.both_sides_mm(joint)
+        apart, alone = found.both_sides_mm(joint, noise)
         if len(apart) < FEWEST_GROUPS:
             continue
-        known = scatter_alone[np.isfinite(scatter_alone)]
-        alone = fixed(float(np.sqrt(np.square(known).mean()))) if len(known) else ""
-        rows.append(
-            [f"joint {joint + 1}", str(len(apart)), fixed(float(np.sqrt(np.square(apart).mean()))), alone]
-        )
+        both, expected = (float(np.sqrt(np.square(values).mean())) for values in (apart, alone))
+        rows.append([f"joint {joint + 1}", str(len(apart)), fixed(both), fixed(expected)])
+        if both > expected * np.sqrt(1.0 + SURE * np.sqrt(2.0 / (COORDINATES * len(apart)))):
+            beyond.append(f"joint {joint + 1} ({fixed(both)} mm)")
     if not rows:
         return []
-    largest = max(rows, key=lambda row: float(row[2]))
     table = Table(
         "Poses approached from both sides",
         ["", "poses", "difference of the sides, mm", "expected from scatter, mm"],
         rows,
-        says=f"{largest[0].capitalize()} shows the largest difference: {largest[2]} mm (root mean square). "
-        "The order of the rows is taken for the order of measuring.",
+        says=f"{_beyond(beyond)} Both columns are root mean squares; scatter is that within the sides, and "
+        f"the calibration's noise of {fixed(noise)} mm per coordinate where each has one measurement. The "
+        "order of the rows is taken for the order of measuring.",
     )
     return [table]
+
+
+def _beyond(joints: list[str]) -> str:
+    """Which joints' sides lie farther apart than scatter makes them."""
+    if not joints:
+        return "No joint's sides lie farther apart than scatter makes them."
+    one = (
+        " Joints that came from the other side in the same poses share what one of them does."
+        if len(joints) > 1
+        else ""
+    )
+    return f"Farther apart than scatter makes them are the sides of {listed(joints)}.{one}"
 
 
 def _predicted(facts: Facts, data: Measurements, rows: Index, which: int) -> Floats:

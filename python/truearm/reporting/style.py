@@ -21,7 +21,6 @@ LIGHT: Final = {
     "accent": "#cc79a7",
     "arm": "#495057",
     "joint": "#212529",
-    "data": "rgba(28,33,39,0.45)",
     "band": "rgba(0,114,178,0.20)",
     "low": "#2166ac",
     "middle": "#f7f7f7",
@@ -39,7 +38,6 @@ DARK: Final = {
     "accent": "#dd9dc0",
     "arm": "#b8c1ca",
     "joint": "#f1f3f5",
-    "data": "rgba(230,237,243,0.50)",
     "band": "rgba(86,180,233,0.25)",
     "low": "#6baed6",
     "middle": "#22282f",
@@ -69,6 +67,7 @@ _SCENE_AXIS: Final = {
     "tickfont": {"color": "@muted", "size": 10},
     "title": {"font": {"color": "@ink", "size": 12}},
     "showbackground": False,
+    "nticks": 6,
 }
 LAYOUT: Final[Layout] = {
     "font": {"family": "system-ui, -apple-system, Segoe UI, Roboto, sans-serif", "size": 12, "color": "@ink"},

@@ -1,4 +1,4 @@
-"""How the parameters vary along each input of the model: asked at poses that differ in one joint or feature alone."""
+"""How the parameters vary along each joint and feature: the model asked where one of them alone differs."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -57,7 +57,7 @@ def feature_ends(facts: Facts, name: str) -> tuple[float, float]:
 def _asked(
     facts: Facts, which: int, steps: int, base: Floats | None = None
 ) -> tuple[Floats, dict[str, Floats]]:
-    """Readings (s, N) and features (s,) by name that differ in one input alone, from end to end of its range."""
+    """Readings (s, N) and features (s,) by name that differ in one input alone, end to end of its range."""
     readings = np.repeat((facts.typical if base is None else base)[None], steps, axis=0)
     features = {name: np.full(steps, value) for name, value in facts.features.items()}
     if which < len(facts.joints):

@@ -1,5 +1,7 @@
 """Chapter: where to trust it: the standard deviation and the data, over joints and workspace."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -7,20 +9,50 @@ from numpy.typing import NDArray
 
 from truearm.reporting.charts import axis, data_points, heatmap
 from truearm.reporting.facts import Facts
-from truearm.reporting.known import STRETCHES, Known, means_along
+from truearm.reporting.known import STRETCHES, Known, configurations, means_along, std_mm
 from truearm.reporting.numbers import percent, short
 from truearm.reporting.parts import Figure, Part, Section, Text
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 CELLS: Final = (6, 12)
 """Fewest and most cells of a map along an axis."""
 IN_CELL: Final = 5
 """Configurations that a cell should have on average."""
 FEWEST_IN_CELL: Final = 2
+POOL: Final = 8192
+"""Configurations among which those are looked for that a cell lacks."""
+SCALE: Final = 2.0
+"""Colours go at least to so many times the mean error: what is known as well as the judged poses is dark."""
 DRAWN: Final = 1500
 MAPPED_JOINTS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """A map: means of the standard deviation in cells over two coordinates.
+
+    Attributes:
+        means: Of each cell (c, c), mm, NaN where no configuration reaches.
+        edges: Of the cells along both coordinates (c + 1,).
+        measured: Coordinates of measured poses (n, 2); none where they are not known.
+    """
+
+    means: Floats
+    edges: tuple[Floats, Floats]
+    measured: Floats
+
+    @property
+    def middles(self) -> list[Floats]:
+        """Of the cells, along both coordinates (c,)."""
+        return [0.5 * (ends[1:] + ends[:-1]) for ends in self.edges]
+
+    def extreme(self, which: Callable[[Floats], Any]) -> tuple[float, list[float]]:
+        """The mean of the cell that np.nanargmax or np.nanargmin picks, and its middle."""
+        place = np.unravel_index(int(which(self.means)), self.means.shape)
+        return float(self.means[place]), [float(x[k]) for x, k in zip(self.middles, place, strict=True)]
 
 
 def trust(facts: Facts, found: Known | None) -> Section:
@@ -31,7 +63,7 @@ def trust(facts: Facts, found: Known | None) -> Section:
         return Section(title, [Text(words)])
     joints = _most_telling(facts, found)
     pairs = [(joints[i], joints[j]) for i in range(len(joints)) for j in range(i + 1, len(joints))]
-    parts: list[Part] = [Text(_overall(facts, found)), workspace(facts, found)]
+    parts: list[Part] = [Text(_overall(facts, found)), Text(_colours(facts, found)), workspace(facts, found)]
     return Section(title, [*parts, *(pair_map(facts, found, pair) for pair in pairs)])
 
 
@@ -44,7 +76,23 @@ def _overall(facts: Facts, found: Known) -> str:
         f"Standard deviation of the {facts.point_name} as the arm's model gives it, without noise of the "
         f"measurement (root of the summed variances of x, y and z): the median over {where} is {near} mm, "
         f"over all configurations in the joints' whole ranges {median} mm, and 90 % of these are below "
-        f"{tenth} mm. The values are {kind}, at {len(found.std_mm)} configurations."
+        f"{tenth} mm. The values are {kind}, at {len(found.std_mm)} configurations.{facts.at_features}"
+    )
+
+
+def _top_mm(facts: Facts, found: Known) -> float:
+    """Where the colours of all maps end."""
+    return max(float(np.quantile(found.std_mm, 0.98)), SCALE * facts.mean_mm())
+
+
+def _colours(facts: Facts, found: Known) -> str:
+    """What the colours of the maps mean."""
+    mean, top = short(facts.mean_mm(), _top_mm(facts, found))
+    return (
+        f"Colours go from 0 to {top} mm in all maps. The {facts.mean_error} on {facts.judged} poses is "
+        f"{mean} mm: where the standard deviation is below it, predictions are known as well as they were "
+        "found to be; in brighter cells they are known worse. Cells without a colour are out of the arm's "
+        "reach."
     )
 
 
@@ -59,62 +107,86 @@ def _most_telling(facts: Facts, found: Known) -> list[int]:
 
 def pair_map(facts: Facts, found: Known, pair: tuple[int, int]) -> Figure:
     """Means over two joints, all others anywhere."""
-    places = facts.shown(found.readings)[:, list(pair)]
+    cells = _cells(facts, found, lambda q: facts.shown(q)[:, list(pair)])
     names = [f"joint {joint + 1}, {facts.unit(joint)}" for joint in pair]
-    means, middles, _ = _means(places, found.std_mm)
-    most, least = np.nanargmax(means), np.nanargmin(means)
-    large, small = short(float(means.flat[most]), float(means.flat[least]))
+    most, place = cells.extreme(np.nanargmax)
+    large, small = short(most, cells.extreme(np.nanargmin)[0])
     where = " and ".join(
-        f"joint {joint + 1} near {middles[k][np.unravel_index(most, means.shape)[k]]:.0f} {facts.unit(joint)}"
-        for k, joint in enumerate(pair)
+        f"joint {joint + 1} near {middle:.0f} {facts.unit(joint)}"
+        for joint, middle in zip(pair, place, strict=True)
     )
-    traces = [_map(means, middles, found)]
     says = f"Means over the other joints: from {small} mm to {large} mm, the largest with {where}."
-    if facts.readings is not None:
-        q = facts.shown(facts.readings[:DRAWN])
-        traces.append(data_points(q[:, pair[0]], q[:, pair[1]]))
+    if len(cells.measured):
         says += " Dots are measured poses."
     return Figure(
         f"Standard deviation over joints {pair[0] + 1} and {pair[1] + 1}",
         says,
-        traces,
+        _traces(cells, _top_mm(facts, found)),
         {"xaxis": axis(names[0]), "yaxis": axis(names[1])},
         height=340,
     )
 
 
-def _means(places: Floats, values: Floats) -> tuple[Floats, list[Floats], list[Floats]]:
-    """Means (c, c) of values in cells of places (n, 2), with the cells' middles and edges."""
-    cells = int(np.clip(np.sqrt(len(values) / IN_CELL), *CELLS))
-    edges = [np.linspace(float(x.min()), float(x.max()), cells + 1) for x in places.T]
-    sums, _, _ = np.histogram2d(places[:, 0], places[:, 1], edges, weights=values)
-    counts, _, _ = np.histogram2d(places[:, 0], places[:, 1], edges)
-    means = np.where(counts >= FEWEST_IN_CELL, sums / np.maximum(counts, 1), np.nan)
-    return np.asarray(means), [0.5 * (ends[1:] + ends[:-1]) for ends in edges], edges
+def _cells(facts: Facts, found: Known, coordinates: Callable[[Floats], Floats]) -> Cells:
+    """Means in cells over two coordinates (n, 2) of readings (n, N); every cell that is reached has one.
+
+    Configurations that cells lack are drawn besides; a cell that only measured poses reach takes those.
+    """
+    measured = np.empty((0, len(facts.joints))) if facts.readings is None else facts.readings
+    pool = np.concatenate([configurations(facts, POOL), measured])
+    places, there = coordinates(found.readings), coordinates(pool)
+    both = np.concatenate([places, there])
+    count = int(np.clip(np.sqrt(len(places) / IN_CELL), *CELLS))
+    first, second = (np.linspace(float(x.min()), float(x.max()), count + 1) for x in both.T)
+    edges = (first, second)
+    own, others = _numbers(places, edges), _numbers(there, edges)
+    lacking = np.maximum(FEWEST_IN_CELL - np.bincount(own, minlength=count * count), 0)
+    more = np.concatenate([np.flatnonzero(others == cell)[:few] for cell, few in enumerate(lacking)])
+    values = np.concatenate([found.std_mm, std_mm(facts, pool[more], found.is_exact)])
+    numbers = np.concatenate([own, others[more]])
+    sums = np.bincount(numbers, values, count * count)
+    counts = np.bincount(numbers, minlength=count * count)
+    means = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan).reshape(count, count)
+    return Cells(means, edges, coordinates(measured))
 
 
-def _map(means: Floats, middles: list[Floats], found: Known) -> dict[str, Any]:
-    top = float(f"{np.quantile(found.std_mm, 0.98):.4g}")
-    return heatmap(middles[0], middles[1], means.T, "mm", zmin=0, zmax=top)
+def _numbers(places: Floats, edges: tuple[Floats, Floats]) -> Index:
+    """Number of the cell of each place (n, 2), first coordinate first."""
+    count = len(edges[0]) - 1
+    first, second = (
+        np.clip(np.searchsorted(ends, x, side="right") - 1, 0, count - 1)
+        for ends, x in zip(edges, places.T, strict=True)
+    )
+    return np.asarray(first * count + second)
+
+
+def _traces(cells: Cells, top_mm: float) -> list[dict[str, Any]]:
+    """The map, and dots where poses were measured."""
+    first, second = cells.middles
+    top = float(f"{top_mm:.4g}")
+    traces = [heatmap(first, second, cells.means.T, "mm", zmin=0, zmax=top, xgap=1, ygap=1)]
+    if len(cells.measured):
+        traces.append(data_points(cells.measured[:DRAWN, 0], cells.measured[:DRAWN, 1]))
+    return traces
 
 
 def workspace(facts: Facts, found: Known) -> Figure:
     """Means over distance from the base's axis and height."""
-    means, middles, edges = _means(_radius_height(facts, found.readings), found.std_mm)
-    traces = [_map(means, middles, found)]
-    k = np.unravel_index(int(np.nanargmax(means)), means.shape)
-    where = f"{middles[0][k[0]]:.0f} mm from the axis of the base at height {middles[1][k[1]]:.0f} mm"
-    says = f"Largest: {short(float(means[k]))[0]} mm, {where}."
-    if facts.readings is not None:
-        seen = _radius_height(facts, facts.readings)
-        traces.append(data_points(seen[:DRAWN, 0], seen[:DRAWN, 1]))
-        measured, _, _ = np.histogram2d(seen[:, 0], seen[:, 1], edges)
-        share = float((measured[np.isfinite(means)] > 0).mean())
-        says += f" Dots are measured poses; they lie in {percent(share)} of the cells that are filled."
+    cells = _cells(facts, found, lambda q: _radius_height(facts, q))
+    largest, place = cells.extreme(np.nanargmax)
+    small, large = short(cells.extreme(np.nanargmin)[0], largest)
+    says = (
+        f"From {small} mm to {large} mm, the largest {place[0]:.0f} mm from the axis of the base at height "
+        f"{place[1]:.0f} mm."
+    )
+    if len(cells.measured):
+        count = np.bincount(_numbers(cells.measured, cells.edges), minlength=cells.means.size)
+        share = float((count[np.isfinite(cells.means).ravel()] > 0).mean())
+        says += f" Dots are measured poses; they lie in {percent(share)} of the cells that the arm reaches."
     return Figure(
         "Standard deviation over the workspace",
         says,
-        traces,
+        _traces(cells, _top_mm(facts, found)),
         {
             "xaxis": axis("distance from the base's z axis, mm"),
             "yaxis": axis("height in the base frame, mm"),

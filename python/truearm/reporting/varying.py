@@ -20,16 +20,17 @@ def varying(facts: Facts) -> Section:
     if facts.best == CONSTANT:
         return Section(title, [Text("The parameters of this calibration are constant.")])
     effects = influence_mm(facts)
+    swept = "joint or feature" if facts.features else "joint"
     words = (
-        "Curves show the deviation of a parameter from its mean along the joint; the other joints stay in a "
-        "typical pose."
+        f"Curves show the deviation of a parameter from its mean along the {swept}; the other joints stay in "
+        f"a typical pose.{facts.at_features}"
     )
     if facts.best == VARIABLE and facts.readings is not None:
         words += " Bands are two standard deviations of that deviation to either side."
     parts: list[Part] = [Text(words, is_note=True), influence(facts, effects)]
     tree = region_tree(facts)
     parts += [tree] if tree is not None else []
-    parts += [along(facts, joint, effects[joint]) for joint in range(len(facts.joints))]
+    parts += [along(facts, which, effects[which]) for which in range(len(effects))]
     parts += slices(facts)
     weight = sag(facts)
     parts += [weight] if weight is not None else []

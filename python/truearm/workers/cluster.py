@@ -82,12 +82,12 @@ def _connected(scheduler: str) -> Iterator["Client"]:
     from distributed import Client  # noqa: PLC0415 - may not be installed
 
     client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
-    try:
-        with _unheard("distributed.client"):
+    with _unheard("distributed.client"):
+        try:
             yield client
-    finally:
-        with suppress(OSError, TimeoutError):
-            client.close(timeout=CLOSE_S)
+        finally:
+            with suppress(OSError, TimeoutError):
+                client.close(timeout=CLOSE_S)
 
 
 @contextmanager

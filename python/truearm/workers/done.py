@@ -74,8 +74,7 @@ def died() -> WorkError:
     """The error of a task whose workers died each time."""
     return WorkError(
         f"the worker that did this died, {ATTEMPTS} times",
-        way_out="Look for too little memory; a script that starts workers needs its calls below "
-        'if __name__ == "__main__"',
+        way_out="Look for too little memory, and at what the workers wrote to stderr",
     )
 
 

@@ -1,0 +1,122 @@
+"""Figures of the report: what varies with a feature, maps, arrows in space, waves and repeats."""
+
+import re
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.report_support import figures_of, repeated_measurements, small_calibration, words_of
+from truearm.reporting.advice import advise
+from truearm.reporting.curves import in_words
+from truearm.reporting.facts import Facts
+from truearm.reporting.report import report
+from truearm.simulation import Imperfections, VirtualArm
+
+WARMEST_C = 35.0
+COLDEST_C = 15.0
+TURN = 2e-3
+
+
+@pytest.fixture(scope="module")
+def warmed():
+    """The report of an arm whose joint 2 turns by TURN as it warms up, and how far that moves it, mm."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(share=0.0, noise_mm=0.02))
+    q = arm.poses(120)
+    warmth = np.random.default_rng(0).uniform(0.0, 1.0, len(q))
+    turn = TURN * np.eye(6)[1]
+    table = arm.measure_table(q + warmth[:, None] * turn)
+    table["q2"] -= TURN * warmth
+    table["temperature_c"] = COLDEST_C + (WARMEST_C - COLDEST_C) * warmth
+    data = ta.Measurements.from_dataframe(table)
+    moved = 1e3 * np.linalg.norm(arm.true_position(q + turn) - arm.true_position(q), axis=1)
+    return report(ta.calibrate(arm.robot, data, features=("temperature_c",), refit=False)), moved.mean()
+
+
+@pytest.fixture(scope="module")
+def variable():
+    return small_calibration("variable")
+
+
+@pytest.fixture(scope="module")
+def drawn(variable):
+    """Figures of a report by their titles."""
+    made = report(variable)
+    titles = [title for title, _ in made.figures]
+    return dict(zip(titles, figures_of(made.html)["figures"], strict=True))
+
+
+def test_what_varies_with_a_feature_is_told(warmed):
+    made, true_mm = warmed
+    says = dict(made.figures)
+    moved = re.findall(r"by (\d\.\d+) mm on average", says["Variation along temperature_c"])
+    assert float(moved[0]) == pytest.approx(0.98 * true_mm, rel=0.1)
+    along = next(words for title, words in says.items() if title.startswith("Which parameter varies"))
+    assert "the effect is largest along temperature_c" in along
+    assert words_of(made.html).count("features are at the medians of the rows: temperature_c = ") == 3
+
+
+def test_every_cell_with_measured_poses_is_filled_and_good_ones_are_dark(drawn, variable):
+    maps = {title: figure for title, figure in drawn.items() if title.startswith("Standard deviation over")}
+    assert len(maps) == 4
+    for figure in maps.values():
+        cells, dots = figure["traces"]
+        assert cells["zmax"] >= 1.99 * Facts(variable).mean_mm()
+        z = np.array(cells["z"], dtype=float)
+        for x, y in zip(dots["x"], dots["y"], strict=True):
+            column = np.argmin(np.abs(np.array(cells["x"]) - x))
+            row = np.argmin(np.abs(np.array(cells["y"]) - y))
+            assert np.isfinite(z[row, column])
+
+
+def test_arrows_and_arm_lie_within_the_axes_that_the_page_fits_into_view(drawn):
+    figure = next(figure for title, figure in drawn.items() if title.startswith("Errors in space"))
+    for choice in figure["choices"]:
+        scene = choice["layout"]["scene"]
+        sides = {}
+        for name in "xyz":
+            low, high = scene[f"{name}axis"]["range"]
+            sides[name] = high - low
+            for trace, is_shown in zip(figure["traces"], choice["shown"], strict=True):
+                values = [value for value in trace[name] if value is not None]
+                assert not is_shown or (low <= min(values) and max(values) <= high)
+        ratios = [scene["aspectratio"][name] / sides[name] for name in "xyz"]
+        np.testing.assert_allclose(ratios, ratios[0], rtol=1e-2)
+
+
+@pytest.mark.parametrize(("amplitude", "told"), [(0.0003, False), (0.02, True)])
+def test_a_wave_within_its_band_is_no_finding(amplitude, told):
+    x = np.linspace(-150.0, 150.0, 121)
+    values = 2e-4 * x + amplitude * np.sin(2.0 * np.pi * x / 50.0)
+    assert ("A wave with a period" in in_words("theta1", "deg", x, values, "deg", 0.0076)) == told
+
+
+def test_distances_from_the_mean_of_a_pose_are_those_of_the_table():
+    robot, data = repeated_measurements(sides_apart_mm=0.0, noise_mm=0.05)
+    points = data.targets[1::2, 0].reshape(-1, 8, 3)
+    apart = 1e3 * np.linalg.norm(points - points.mean(axis=1, keepdims=True), axis=2)
+    says = dict(report(ta.calibrate(robot, data, model="constant", drift="none")).figures)[
+        "How well poses repeat"
+    ]
+    raw, free = (float(found) for found in re.findall(r"lie (\d\.\d+) mm", says))
+    assert raw == pytest.approx(apart.mean(), abs=0.001)
+    assert free == pytest.approx(apart.mean() * np.sqrt(8 / 7), abs=0.001)
+
+
+def test_scatter_comes_from_the_noise_where_each_side_was_measured_once():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(share=0.0, noise_mm=0.05))
+    poses = arm.poses(60)
+    data = arm.measure(np.vstack([poses, poses[::-2]]))
+    text = words_of(report(ta.calibrate(arm.robot, data, model="constant")).html)
+    rows = re.findall(r"joint \d \d+ (\d\.\d+) (\d\.\d+)", text.partition("Poses approached from both")[2])
+    assert rows
+    for _, alone in rows:
+        assert float(alone) == pytest.approx(0.05 * np.sqrt(6.0), rel=0.2)
+    assert "No joint's sides lie farther apart than scatter makes them." in text
+
+
+def test_a_scara_is_not_told_to_determine_what_no_target_could():
+    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=2)
+    found = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
+    assert "alpha4" in found.identifiability.undetermined
+    assert "unseen_parameters" not in [advice.kind for advice in advise(Facts(found), None)]
