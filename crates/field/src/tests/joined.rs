@@ -15,6 +15,12 @@ fn joined(rows: Training, set: &MeasurementSet) -> Joined {
     join(rows, &set.group, set.rows_per_pose())
 }
 
+/// Gives the pose behind one the joint values of that one.
+fn note_again(set: &mut MeasurementSet, pose: usize) {
+    let joints = set.joint_count;
+    set.joints.copy_within(pose * joints..(pose + 1) * joints, (pose + 1) * joints);
+}
+
 #[test]
 fn shots_are_joined_to_their_mean() {
     let arm = six_axes(Truth::BENDING);
@@ -79,9 +85,8 @@ fn a_shot_that_its_others_contradict_stands_apart() {
 fn two_rows_that_cannot_be_shots_of_one_pose_are_none() {
     let arm = six_axes(Truth::BENDING);
     let mut set = Measure::poses(60).of(&arm);
-    let joints = arm.chain.joint_count();
-    // The readings of the pose before were noted once more: nothing else tells what shots differ by.
-    set.joints.copy_within(30 * joints..31 * joints, 31 * joints);
+    // Nothing else tells what shots differ by.
+    note_again(&mut set, 30);
     let Joined { pose_of, training, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
     assert_eq!(pose_of, (0..60).collect::<Vec<usize>>());
     assert_eq!(training.shot, [0.0; 2]);
@@ -92,8 +97,7 @@ fn two_rows_that_cannot_be_shots_of_one_pose_are_none() {
 fn few_shots_do_not_tell_the_noise_of_all() {
     let arm = six_axes(Truth::BENDING);
     let mut set = Measure::poses(40).of(&arm);
-    let joints = arm.chain.joint_count();
-    set.joints.copy_within(10 * joints..11 * joints, 11 * joints);
+    note_again(&mut set, 10);
     set.targets.copy_within(30..33, 33);
     set.targets[33] += 5e-5;
     let Joined { training, pose_of, .. } = joined(rows_of(&arm, &set, |_| ()), &set);
