@@ -126,7 +126,7 @@ def _distances(table: Table, layout: Layout) -> Floats | None:
         distance <= 0.0,
         f'column "{layout.distance.name}" is not positive in',
         "Distances are positive",
-        "Correct or remove the rows. Where a ball sat in sockets, give the distance of two of them (column `pair`)",
+        "Correct or remove the rows. Where a ball sat in sockets, give the distance of two of them (`pair`)",
     )
     return distance
 

@@ -153,8 +153,8 @@ def _check_alike(measurements: Measurements) -> None:
             f"all {len(measurements)} measured positions are equal though the joints vary",
             where=where,
             rule="Points that move with the arm tell where it is",
-            way_out="The device may have repeated one reading: measure again. Where a ball sat in a socket, touch "
-            "several sockets and give how far apart they are in columns `pair` and `distance`",
+            way_out="The device may have repeated one reading: measure again. Where a ball sat in a "
+            "socket, touch several and give how far apart they are in columns `pair` and `distance`",
         )
 
 
