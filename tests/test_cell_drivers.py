@@ -2,7 +2,8 @@
 
 import time
 from concurrent.futures import ThreadPoolExecutor
-from unittest.mock import Mock
+from importlib import import_module
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
@@ -11,10 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.cell_support import cell_text, measured, merge, possible_readings, virtual
-from truearm.cell import Cell, Connected, EmergencyStopError, Expected, RefusedError, StoppedError, movemaster
+from truearm.cell import (
+    Cell,
+    Connected,
+    EmergencyStopError,
+    Expected,
+    Managed,
+    RefusedError,
+    StoppedError,
+    movemaster,
+)
 from truearm.cell.channels import ConnectionEndedError
 from truearm.cell.conformance import ConformanceError, check_robot, check_sensor
 from truearm.cell.device_errors import DeviceGoneError
+from truearm.cell.drivers import ROBOTS, SENSORS
 from truearm.cell.line_sensor import LineSensor
 from truearm.cell.playback import PlaybackRobot, PlaybackSensor
 from truearm.cell.poses_file import Poses
@@ -226,3 +237,20 @@ def test_an_instrument_that_cannot_be_set_up_lets_go_of_its_port(monkeypatch):
         with pytest.raises(DeviceGoneError, match="cut"):
             sensor.connect()
     assert channel.close.call_count == 2
+
+
+def test_drivers_are_context_managers():
+    places = [*ROBOTS.values(), *SENSORS.values()]
+    drivers = [getattr(import_module(module), name) for module, name in (each.split(":") for each in places)]
+    assert all(issubclass(driver, Managed) for driver in drivers)
+    text = cell_text()
+    with virtual(text) as (_, found):
+        cell = Cell.from_toml(found)
+        assert isinstance(cell.sensor, TablePanel)
+        stop = Mock()
+        with patch.object(cell.sensor, "stop", stop), pytest.raises(ZeroDivisionError), cell.sensor:
+            raise ZeroDivisionError
+        stop.assert_called_once()
+        assert cell.sensor.carriage is None
+        with cell.sensor as table:
+            assert table.carriage is not None

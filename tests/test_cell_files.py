@@ -1,6 +1,7 @@
 """Cell files, lists of poses and session files: what is wrong with them is said in words."""
 
 import contextlib
+import re
 import sqlite3
 
 import numpy as np
@@ -8,12 +9,14 @@ import pytest
 
 from tests.cell_support import cell_text, poses_of, write_poses
 from truearm.cell import Cell
+from truearm.cell.cell_file import FaultsSection
 from truearm.cell.drivers import ROBOTS, driver_and_settings
 from truearm.cell.examples import EXAMPLES, example
 from truearm.cell.opening import open_session
 from truearm.cell.poses_file import Poses
 from truearm.cell.sequence import steps_of
 from truearm.cell.session import Session, Step
+from truearm.cli.cell_simulate import FAULTS
 from truearm.errors import InputError, WorkError
 from truearm.robot import Robot
 from truearm.rotations import transform_from_parts
@@ -271,3 +274,8 @@ def test_a_frame_sees_the_target_and_the_tool_that_points_there(lever):
     length = np.linalg.norm(lever)
     wanted = (point - flange[:3, 3]) / (length / 1e3) if length else flange[:3, 2]
     np.testing.assert_allclose(direction, wanted, atol=1e-9)
+
+
+def test_all_kinds_of_faults_are_named():
+    sizes = {"delay_s", "restart_s", "outlier_mm"}
+    assert set(re.findall(r"\w+", FAULTS)) >= set(FaultsSection.model_fields) - sizes

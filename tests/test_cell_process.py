@@ -193,6 +193,13 @@ def test_an_export_writes_over_no_session_and_over_nothing_that_is_not_named(
     assert len(ta.Measurements.read_csv(places[0])) == 40
 
 
+def test_a_pose_that_is_not_in_the_list_is_told_from_one_without_readings(session, capsys):
+    assert main(["session", "show", str(session[0]), "--pose", "999"]) == 2
+    assert "there is no pose 999. Its poses are 1 to 40." in capsys.readouterr().err
+    assert main(["session", "show", str(session[0]), "--pose", "0"]) == 2
+    assert "there is no pose 0." in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [

@@ -14,11 +14,12 @@ import truearm as ta
 from truearm.cell import Cell
 from truearm.cell.accepted import accepted_table, measurements_of
 from truearm.cell.checks import unsure_steps
-from truearm.cell.measuring import DONE, Process
+from truearm.cell.measuring import ACCURATE, DONE, Process
 from truearm.cell.opening import open_session
 from truearm.cell.poses_file import Poses
 from truearm.cell.reading import Reading
 from truearm.cell.session import Session
+from truearm.cell.summary import summary_of
 from truearm.cli import main
 from truearm.errors import InputError, WorkError
 from truearm.simulation import VirtualArm
@@ -114,6 +115,7 @@ def test_steps_that_are_left_keep_their_readings_and_remarks(recorded):
         session.add_event("device", "remark", step.step)
     for _ in range(2):
         with open_session(recorded.session, cell, recorded.poses) as session:
+            session.check_next()
             steps = list(islice(session.steps_left(), COUNT - 1))
             kinds = [each.kind for each in steps]
             assert kinds == ["check", *["pose"] * (COUNT - 3), "check"]
@@ -122,15 +124,75 @@ def test_steps_that_are_left_keep_their_readings_and_remarks(recorded):
             assert session.rows("SELECT step FROM events WHERE message = 'remark'") == [(step.step + 1,)]
 
 
+def without(recorded, poses):
+    """A recording that lacks some poses."""
+    table = pd.read_csv(recorded.folder / "there.csv")
+    table.drop(index=poses).to_csv(recorded.folder / "without.csv", index=False)
+
+
+def contacts(recorded):
+    with recorded.read() as session:
+        return [step.pose for step in session.steps("registration")]
+
+
 def test_a_check_that_cannot_be_measured_does_not_let_a_session_go_on(recorded):
     recorded.killed(until="pose 8 stored")
-    table = pd.read_csv(recorded.folder / "there.csv")
-    with recorded.read() as session:
-        first = session.steps("registration")[0].pose
-    table.drop(index=first).to_csv(recorded.folder / "without.csv", index=False)
+    without(recorded, contacts(recorded))
     with pytest.raises(WorkError, match="the first contact could not be measured again"):
         recorded.measure("without")
     assert recorded.measure()[1] == DONE
+
+
+def test_another_contact_is_checked_where_the_first_cannot_be_measured_again(recorded):
+    recorded.killed(until="pose 8 stored")
+    first, second, *_ = contacts(recorded)
+    without(recorded, [first])
+    told, end = recorded.measure("without")
+    assert end == DONE
+    assert told[0].startswith(f"check {first + 1} skipped")
+    assert told[1].startswith(f"check {second + 1} stored")
+    with recorded.read() as session:
+        assert [step.pose for step in session.steps("check")] == [first, second, first, second]
+        assert session.measured_poses() == COUNT - (first >= 8)
+        summary = summary_of(session)
+    assert summary["checks"] == {"measured": 2, "skipped": 2}
+    assert summary["unchecked"] == []
+
+
+def test_poses_behind_which_no_contact_could_be_measured_again_are_told(recorded, capsys):
+    recorded.killed(until=f"pose {COUNT} stored")
+    cell = Cell.from_toml(CELL.replace("FILE", str(recorded.folder / "there.csv")))
+    with Session(recorded.session, writing=True) as session:
+        for _ in contacts(recorded):
+            step = session.next_step()
+            assert step is not None
+            session.add_outcome(step.step, "skipped", reason="no way")
+            session.check_elsewhere(step.step)
+        assert session.next_step() is None
+    with open_session(recorded.session, cell, recorded.poses) as session:
+        assert Process(cell, session, lambda _: None).run() == DONE
+    output = recorded.folder / "out.csv"
+    for command in (["show"], ["export", "-o", str(output)]):
+        assert main(["session", command[0], str(recorded.session), *command[1:]]) == 0
+        said = " ".join("".join(capsys.readouterr()).split())
+        assert "and 10 more: nothing says whether something moved" in said
+    with recorded.read() as session:
+        assert summary_of(session)["unchecked"] == list(range(1, COUNT + 1))
+
+
+def test_what_was_refused_or_met_its_target_is_not_added_to(recorded):
+    refused = CELL.replace("registration_mm = 300", "registration_mm = 0.001")
+    for _ in range(2):
+        with pytest.raises(WorkError, match="implausible"):
+            recorded.measure(text=refused)
+        with recorded.read() as session:
+            assert len(session.steps("check")) == 1
+    recorded.session.unlink()
+    enough = CELL.replace("stretch = 0", "stretch = 2\ntarget_mm = 1000")
+    for _ in range(2):
+        assert recorded.measure(text=enough)[1] == ACCURATE
+        with recorded.read() as session:
+            assert len(session.steps("check")) == 1
 
 
 def test_what_was_measured_before_a_failed_check_is_a_set_up_of_its_own(recorded, capsys):

@@ -13,8 +13,10 @@ import pytest
 from tests.cell_support import cell_text, poses_of
 from truearm.cell import (
     Cell,
+    DeviceGoneError,
     DeviceSilentError,
     EmergencyStopError,
+    PortUnavailableError,
     ProtectiveStopError,
     Reading,
     RefusedError,
@@ -131,6 +133,16 @@ class Instrument:
         self._arm, self._fails = arm, fails
         self.connect = self.release = self.stop = self.close = lambda: None
 
+    def go_away(self, until):
+        """Refuse connections until a time; the error that tells that it has gone."""
+
+        def connect():
+            if time.monotonic() < until:
+                raise PortUnavailableError("no connection", where=self.name)
+
+        self.connect = connect
+        return DeviceGoneError("the connection ended", where=self.name)
+
     def prepare(self, expected):
         self._readings = expected.readings
 
@@ -141,9 +153,9 @@ class Instrument:
         return Reading(self._arm.position(self._readings), 1e-5, time.time(), True, "raw")
 
 
-def measured_with(folder, fails, count=12):
+def measured_with(folder, fails, count=12, *, tell=lambda _: None, recovery_s=2.0):
     """A session of poses in which the first joint tells the number of the pose; how it ended."""
-    cell = Cell.from_toml(example("playback"))
+    cell = Cell.from_toml(f"{example('playback')}recovery_s = {recovery_s}\n")
     readings = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 6))
     readings[:, 0] = 0.1 * np.arange(count)
     poses = Poses(readings, np.zeros(count, dtype=np.int64), ("",) * count)
@@ -153,7 +165,61 @@ def measured_with(folder, fails, count=12):
 
     cell = dataclasses.replace(cell, sensor=Instrument(cell.arm, at))
     with open_session(folder / "session.db", cell, poses) as session:
-        return Process(cell, session, lambda _: None).run()
+        return Process(cell, session, tell).run()
+
+
+class Restarting:
+    """Fails once at pose 5, and refuses connections for a while then."""
+
+    def __init__(self, away_s, monkeypatch):
+        self.away_s = away_s
+        self.told: list[str] = []
+        self.made: list[Instrument] = []
+        build = Instrument.__init__
+
+        def building(instrument, *given):
+            self.made.append(instrument)
+            build(instrument, *given)
+
+        monkeypatch.setattr(Instrument, "__init__", building)
+
+    def __call__(self, pose):
+        if pose != 5 or not self.away_s:
+            return None
+        until, self.away_s = time.monotonic() + self.away_s, 0.0
+        return self.made[-1].go_away(until)
+
+    def tell(self, progress):
+        self.told.append(progress.text)
+
+
+def test_a_device_that_starts_anew_is_waited_for_longer_each_time(tmp_path, monkeypatch):
+    fails = Restarting(0.5, monkeypatch)
+    assert measured_with(tmp_path, fails, tell=fails.tell, recovery_s=0.1) == DONE
+    assert skipped(tmp_path) == {}
+    waits = [text.partition(":")[0] for text in fails.told if text.startswith("connecting anew")]
+    assert waits[:2] == [
+        "connecting anew in 0.1 s, then 3 times more",
+        "connecting anew in 0.2 s, then 2 times more",
+    ]
+
+
+def test_a_wait_for_a_device_ends_with_the_process(tmp_path, monkeypatch):
+    fails, made, begin = Restarting(100.0, monkeypatch), [], Process.__init__
+
+    def beginning(process, *given):
+        made.append(process)
+        begin(process, *given)
+
+    def tell(progress):
+        if progress.text.startswith("connecting anew"):
+            threading.Timer(0.1, made[-1].halt).start()
+
+    monkeypatch.setattr(Process, "__init__", beginning)
+    began = time.monotonic()
+    with pytest.raises(StoppedError):
+        measured_with(tmp_path, fails, tell=tell, recovery_s=60.0)
+    assert time.monotonic() - began < 10.0
 
 
 def skipped(folder):

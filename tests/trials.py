@@ -7,13 +7,23 @@ import contextlib
 import json
 import os
 import random
+import resource
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
+
+import truearm as ta
+from truearm.cell import Cell, line_port
+from truearm.cell.accepted import accepted_table, measurements_of, moved_poses
+from truearm.cell.device_errors import silent
+from truearm.cell.line_port import LinePort
 from truearm.cell.session import Session
+from truearm.cell.summary import summary_of
 
 FULL = os.environ.get("TRUEARM_TRIALS") == "full"
 RESULTS = Path(os.environ.get("TRUEARM_TRIALS_RESULTS", "build/trials"))
@@ -101,3 +111,89 @@ def moments(count, longest_s, seed=0):
     """Random times, evenly spread."""
     source = random.Random(seed)
     return [longest_s * (k + source.random()) / count for k in source.sample(range(count), count)]
+
+
+def finished(session):
+    with Session(session, writing=False) as known:
+        return accepted_table(known), measurements_of(known), summary_of(known)
+
+
+def accepted(path):
+    """Accepted points of a session by pose (x, y, z), m; without those while something moved."""
+    with Session(path, writing=False) as known:
+        table = accepted_table(known)
+        if table.empty:
+            return pd.DataFrame(columns=list("xyz"))
+        return table[~table["pose"].isin(moved_poses(known, table))].set_index("pose")[list("xyz")]
+
+
+def apart_mm(path, clean_path):
+    """How far the accepted points of two sessions are apart, pose by pose."""
+    both = accepted(path).join(accepted(clean_path).add_suffix("_clean"), how="inner")
+    apart = both[["x", "y", "z"]].to_numpy(float) - both[["x_clean", "y_clean", "z_clean"]].to_numpy(float)
+    return 1e3 * np.linalg.norm(apart, axis=1)
+
+
+def remarks_of(path):
+    with Session(path, writing=False) as known:
+        return sum(summary_of(known)["events"].values())
+
+
+def calibrated(text, data):
+    """Where a calibration of the measurements has the target at their readings (n, 3), m."""
+    calibration = ta.calibrate(Cell.from_toml(text).arm, data, model="constant")
+    return calibration.position(data.readings, group=calibration.groups[0], target=1)
+
+
+class Wires:
+    """Counts what the drivers send, and the answers that did not come in time, without faults and with them.
+
+    Attributes:
+        more: How much more that is with faults.
+    """
+
+    def __init__(self, monkeypatch):
+        self.more = {"sent_again": 0, "too_late": 0}
+        self._share = 1
+        send, late = LinePort.send, silent
+
+        def sending(port, *texts):
+            self.more["sent_again"] += self._share
+            send(port, *texts)
+
+        def missing(*told, **words):
+            self.more["too_late"] += self._share
+            return late(*told, **words)
+
+        monkeypatch.setattr(LinePort, "send", sending)
+        monkeypatch.setattr(line_port, "silent", missing)
+
+    @contextlib.contextmanager
+    def without_faults(self):
+        self._share = -1
+        yield
+        self._share = 1
+
+
+def assert_stands(world):
+    """The arm neither moves nor begins to."""
+    motions = world.arm.ends()
+    time.sleep(0.2)
+    assert not world.arm.speed(world.shared.now()).any()
+    assert world.arm.ends() == motions
+
+
+def growth_of(used):
+    """Milliseconds a pose of the process itself and of the system for it; memory grown, and in all, MB."""
+    first, last = np.array(used[len(used) // 4]), np.array(used[-1])
+    poses, process, system, grown = (last - first).tolist()
+    milliseconds = {"process_ms_a_pose": 1e3 * process / poses, "system_ms_a_pose": 1e3 * system / poses}
+    return milliseconds, grown, float(last[-1])
+
+
+def memory_mb():
+    """Resident memory now, where the system tells it, else the most so far."""
+    pages = Path("/proc/self/statm")
+    if pages.exists():
+        return int(pages.read_text().split()[1]) * resource.getpagesize() / 1e6
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3

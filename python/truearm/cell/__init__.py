@@ -21,7 +21,7 @@ from truearm.cell.device_errors import (
     RefusedError,
     StoppedError,
 )
-from truearm.cell.protocols import Connected, Device, Robot, Sensor
+from truearm.cell.protocols import Connected, Device, Managed, Robot, Sensor
 from truearm.cell.reading import Expected, Reading
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "DeviceSilentError",
     "EmergencyStopError",
     "Expected",
+    "Managed",
     "NotReadyError",
     "PortUnavailableError",
     "ProtectiveStopError",

@@ -66,6 +66,7 @@ class ProcessSection(Section):
     contacts: Annotated[int, Field(ge=1, le=10)] = 2
     attempts: Annotated[int, Field(ge=1, le=50)] = 8
     recoveries: Annotated[int, Field(ge=0)] = 5
+    recovery_s: Annotated[float, Field(ge=0.0)] = 2.0
     agree_mm: Positive = 0.4
     suspicious: Positive = 5.0
     expected_mm: Positive = 4.0
@@ -95,6 +96,7 @@ class FaultsSection(Section):
     emergency_stop: Share = 0.0
     drift_mm_per_contact: float = 0.0
     delay_s: Positive = 2.0
+    restart_s: Positive = 5.0
     outlier_mm: Positive = 5.0
 
 

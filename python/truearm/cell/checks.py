@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.cell.cell_file import ProcessSection
 from truearm.cell.session import Session
+from truearm.errors import Notice, list_rows
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -16,6 +17,12 @@ DRIFT_MM: Final = "drift_mm"
 """In the head of a session: how far the first contact may have moved, mm."""
 # Joined crosswise the tables are looked through in this order: the last check is found at their end and the
 # first contact at their beginning, however long a session is.
+UNCHECKED: Final = """
+SELECT pose FROM outcomes JOIN steps USING (step)
+WHERE kind = 'pose' AND outcome = 'measured' AND step > ?
+AND step < (SELECT max(step) FROM outcomes JOIN steps USING (step) WHERE kind = 'check')
+ORDER BY step
+"""
 CHECKS: Final = """
 SELECT now.step, now.attempts, first.step, first.attempts
 FROM outcomes AS now
@@ -71,6 +78,29 @@ def unsure_steps(session: Session) -> list[range]:
             unsure.append(range(since, check.step))
         since = check.step + 1
     return unsure
+
+
+def unchecked_poses(session: Session) -> list[int]:
+    """Measured poses, from 1, behind the last check that told something and before one that told nothing.
+
+    Where no contact could be measured again nothing says whether arm and instrument stood still meanwhile.
+    """
+    check = last_check(session)
+    return [row[0] + 1 for row in session.rows(UNCHECKED, (-1 if check is None else check.step,))]
+
+
+def told_unchecked(poses: list[int]) -> list[Notice]:
+    """What is to be known of such poses, if there are any."""
+    if not poses:
+        return []
+    return [
+        Notice(
+            "unchecked",
+            f"{list_rows(poses, 'pose')}: nothing says whether something moved while they were measured, as "
+            "no contact could be measured again behind them. Measure some of them once more, or plan poses "
+            "that the arm can come back to.",
+        )
+    ]
 
 
 def _checks(session: Session, most: int) -> list[Check]:

@@ -2,7 +2,7 @@
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Final
 
@@ -10,25 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
-from truearm.cell.clearance import Clearance
 from truearm.cell.device_errors import Calls, DeviceError, RefusedError, StoppedError
 from truearm.cell.protocols import Device
 from truearm.cell.reading import Expected
 from truearm.cell.table_panel import TablePanel
+from truearm.cell.ways import Ways
 
 Floats = NDArray[np.float64]
 
-# How far the table goes down at first to let the arm pass; if that does not help, as far as it can.
-DEPTHS_M: Final = (0.03, 0.1)
 LETS_GO_WITHIN_S: Final = 0.7
+
+
+def places_on_the_way(cell: Cell, readings: Floats, side: int) -> list[Floats]:
+    """Readings to go through to a pose, so that every joint comes from a side: 1, -1, or 0 for any."""
+    return [readings] if side == 0 else [cell.beside(readings, side), readings]
 
 
 class Crew:
     """The two devices of a cell.
 
-    A table moves together with the arm where they cannot meet on the way; else it goes out of the way first,
-    no farther than it has to, and comes when the arm is there; and if that does not help either, the arm goes
-    by where it was at first.
+    How arm and table get by one another says truearm.cell.ways.
 
     Nothing is connected or set in motion once `halted` is set: a stop alone ends what is under way, and not
     what comes behind it.
@@ -38,7 +39,7 @@ class Crew:
         self._cell, self._note, self._halted = cell, note, halted
         self._table = cell.sensor if isinstance(cell.sensor, TablePanel) else None
         self._aside = ThreadPoolExecutor(1, thread_name_prefix="sensor")
-        self._clearance: Clearance | None = None
+        self._ways: Ways | None = None
         self._here: Floats | None = None
         self._refuge = np.clip(np.zeros(cell.arm.joint_count), *cell.arm.limits.T)
 
@@ -85,46 +86,25 @@ class Crew:
         carriage, here = table.carriage, self._here
         if carriage is None or here is None or world_from_base is None:
             raise RefusedError("where arm and table are is not known", where="the cell")
-        end = table.carriage_for(expected)
-
-        def apart(arm: Floats, carriages: Floats) -> bool:
-            return clearance.margin(arm, carriages, world_from_base) > expected.radius_m
-
-        clearance, direct = self._clearance_of(table), np.array([carriage, end])
-        for first, over in self._detours(table, way, carriage, end):
-            arm = np.array([here, *first])
-            if self._cell.file.process.together and apart(arm, direct):
-                self._together(first, expected)
-                return
-            by = np.array([carriage, *over, end])
-            if apart(arm[:1], by[:-1]) and apart(arm, by[-2:-1]) and apart(arm[-1:], by[-2:]):
-                for place in over:
-                    self.raise_if_halted()
-                    table.go_to(place)
-                self._along(first)
-                self.raise_if_halted()
-                table.prepare(expected)
-                return
-        raise RefusedError("link or tool would meet the table on every way there", where="the arm")
-
-    def _detours(
-        self, table: TablePanel, way: list[Floats], carriage: Floats, end: Floats
-    ) -> Iterator[tuple[list[Floats], list[Floats]]]:
-        """Ways of the arm, each with places that the carriage goes to before."""
-        for depth in DEPTHS_M:
-            yield way, [table.lowered(carriage, depth)]
-        low = table.released(carriage)
-        yield way, [low]
-        yield way, [low, table.released(end)]
-        yield [self._refuge, *way], [low]
-
-    def _clearance_of(self, table: TablePanel) -> Clearance:
-        if self._clearance is None:
-            file = self._cell.file
-            self._clearance = Clearance(
-                self._cell.arm, self._cell.flange_from_target, table.panel, file.clearance
-            )
-        return self._clearance
+        if self._ways is None:
+            self._ways = Ways(self._cell, table)
+        found = self._ways.to(
+            way,
+            expected,
+            here=here,
+            carriage=carriage,
+            refuge=self._refuge,
+            world_from_base=world_from_base,
+        )
+        if found.over is None:
+            self._together(found.arm, expected)
+            return
+        for place in found.over:
+            self.raise_if_halted()
+            table.go_to(place)
+        self._along(found.arm)
+        self.raise_if_halted()
+        table.prepare(expected)
 
     def _together(self, way: list[Floats], expected: Expected) -> None:
         self.raise_if_halted()

@@ -14,6 +14,7 @@ from pydantic import field_validator
 from truearm.cell.device_errors import DeviceError, DeviceSilentError, RefusedError
 from truearm.cell.line_port import LinePort, LineSection
 from truearm.cell.patterns import check_template, expression, filled, numbers_in, pattern_of
+from truearm.cell.protocols import Managed
 from truearm.cell.schema import Positive
 from truearm.errors import InputError
 from truearm.robot import Robot
@@ -29,7 +30,7 @@ AGREEING: Final = 5
 POSE: Final = ("x", "y", "z", "qw", "qx", "qy", "qz")
 
 
-class LineRobot:
+class LineRobot(Managed):
     """A robot that is told `move` and asked `where`; units and texts stand in the cell file.
 
     The command is sent, then the robot is asked where it is until it is there and still; nothing else is

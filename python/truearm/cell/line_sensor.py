@@ -13,6 +13,7 @@ from pydantic import Field, field_validator
 from truearm.cell.device_errors import DeviceSilentError
 from truearm.cell.line_port import LinePort, LineSection
 from truearm.cell.patterns import expression, numbers_in, pattern_of
+from truearm.cell.protocols import Managed
 from truearm.cell.reading import Expected, Reading, is_column
 from truearm.cell.schema import Positive
 from truearm.robot import Robot
@@ -27,7 +28,7 @@ SENDINGS: Final = 3
 NO_POINT: Final = ", or give `nothing`, which lines that mean that there is no point fit"
 
 
-class LineSensor:
+class LineSensor(Managed):
     """An instrument whose lines match `answer`, a pattern with groups x, y, z; sigma, ok, temperature if any.
 
     With `trigger` it is asked for every line; without, it streams, and the lines that come after the arm has

@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from truearm.cell.accepted import points_and_joints
 from truearm.cell.cell_file import Cell
 from truearm.cell.checks import last_check
-from truearm.cell.crew import Crew
+from truearm.cell.crew import Crew, places_on_the_way
 from truearm.cell.device_errors import (
     Calls,
     DeviceError,
+    DeviceSilentError,
     EmergencyStopError,
     PortUnavailableError,
     ProtectiveStopError,
@@ -29,13 +30,14 @@ from truearm.cell.reading import Expected, Reading, checked_reading
 from truearm.cell.registering import register_cell
 from truearm.cell.session import Session, Step, Stored
 from truearm.cell.stretches import boundaries, calibrate_so_far, good_enough
-from truearm.errors import WorkError
+from truearm.errors import WorkError, count_of
 from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
 
 # Between the last look whether to go on and the moment at which a device can be stopped.
 BEGINS_WITHIN_S: Final = 0.05
+LONGEST_RECOVERY_S: Final = 60.0
 # Steps in a row that are given up because devices fail there each time; then it is not the steps.
 GIVEN_UP_IN_A_ROW: Final = 3
 EMERGENCY, PROTECTIVE = "emergency stop", "protective stop"
@@ -44,6 +46,12 @@ MOST_STOPS: Final = {PROTECTIVE: 1, EMERGENCY: 2}
 DONE: Final = "all poses are done"
 ACCURATE: Final = "the target accuracy is met"
 DONE_STEPS: Final = "SELECT coalesce(max(step), -1) + 1 FROM outcomes"
+OTHERS_BETWEEN: Final = "SELECT 1 FROM steps WHERE step >= ? AND step < ? AND kind != 'check' LIMIT 1"
+UNCHECKED: Final = "no contact could be measured again: whether anything has moved is not known"
+CONTACTS_LEFT: Final = (
+    "SELECT 1 FROM steps LEFT JOIN outcomes USING (step) "
+    "WHERE kind = 'registration' AND outcome IS NULL LIMIT 1"
+)
 
 
 @dataclass(frozen=True)
@@ -83,6 +91,8 @@ class Process:
         self._boundaries = boundaries(self._process.stretch, self._poses)
         self._measured = session.measured_poses()
         self._done = self._done_before = int(session.rows(DONE_STEPS)[0][0])
+        # Readings may be left of the last step that a former process had begun; before it may be a check.
+        self._begun = self._done_before + 1
         self._began = time.monotonic()
 
     def run(self) -> str:
@@ -97,6 +107,7 @@ class Process:
         if end is not None:
             self._check_drift()
             return end
+        self._go_on()
         try:
             self._connect()
             return self._steps()
@@ -128,16 +139,18 @@ class Process:
         return DONE if self._session.next_step() is None else None
 
     def _steps(self) -> str:
-        for step in self._session.steps_left():
-            if step.kind == "pose" and not self._prediction.is_registered:
-                self._register()
-            measured = self._do(step)
-            if step.kind == "check":
-                self._check_drift()
-                self._check_resumed(step, measured=measured)
-            if step.kind == "pose" and measured and self._after_pose():
-                return ACCURATE
-        return DONE
+        while True:
+            for step in self._session.steps_left():
+                if step.kind == "pose" and not self._prediction.is_registered:
+                    self._register()
+                measured = self._do(step)
+                if step.kind == "check" and self._checks_elsewhere(step):
+                    # Steps behind it count on from the new one.
+                    break
+                if step.kind == "pose" and measured and self._after_pose():
+                    return ACCURATE
+            else:
+                return DONE
 
     def _do(self, step: Step) -> bool:
         """Measure a step until its readings can be believed, or it is given up; whether it is measured."""
@@ -178,11 +191,8 @@ class Process:
         return self._session.readings_of(step.step) if self._was_begun(step) else []
 
     def _was_begun(self, step: Step) -> bool:
-        """Whether a former process may have begun a step: that is its last one alone.
-
-        Before that step a session that is gone on with may have a check.
-        """
-        return step.step <= self._done_before + 1
+        """Whether a former process may have begun a step."""
+        return step.step <= self._begun
 
     def _keep(
         self, step: Step, reading: Reading, joints: Floats, expected: Floats, verdict: Verdict, attempt: int
@@ -261,10 +271,7 @@ class Process:
 
         With `anew` the arm leaves a pose that it may already be at, where any side will do.
         """
-        side = step.approach or int(anew)
-        if side == 0:
-            return [step.readings]
-        return [self._cell.beside(step.readings, side), step.readings]
+        return places_on_the_way(self._cell, step.readings, step.approach or int(anew))
 
     def _connect(self) -> None:
         """Connect for the first time; a port that cannot be opened then is not tried again."""
@@ -277,19 +284,33 @@ class Process:
             self._recoveries = 0
 
     def _recover(self, error: DeviceError, step: Step | None) -> None:
-        """Connect anew, if that may help and did not fail too often."""
+        """Connect anew, if that may help and did not fail too often.
+
+        Before a port is tried again that could not be opened it waits, twice as long each time: a device that
+        starts anew takes a while. One that is silent has had its time limit.
+        """
+        wait_s = 0.0
         while True:
             self._crew.raise_if_halted()
             self._recoveries += 1
             self._session.add_event(_kind(error), str(error), None if step is None else step.step)
             if not error.recoverable or self._recoveries > self._process.recoveries:
                 raise error
+            if wait_s and not isinstance(error, DeviceSilentError):
+                self._wait(wait_s, error)
             try:
                 self._crew.recover()
             except DeviceError as again:
-                error = again
+                error, wait_s = again, min(max(self._process.recovery_s, 2.0 * wait_s), LONGEST_RECOVERY_S)
             else:
                 return
+
+    def _wait(self, seconds: float, error: DeviceError) -> None:
+        """Wait for a device that cannot be connected, unless the process is to end."""
+        left = self._process.recoveries - self._recoveries
+        self._say(f"connecting anew in {seconds:g} s, then {count_of(left, 'time')} more: {error}")
+        self._halted.wait(seconds)
+        self._crew.raise_if_halted()
 
     def _register(self) -> None:
         _, joints, points = points_and_joints(self._session, "registration")
@@ -307,6 +328,17 @@ class Process:
         past = [count for count in self._boundaries if count <= self._measured]
         if past:
             self._learn(past[-1])
+
+    def _go_on(self) -> None:
+        """Begin with a check where a former process has measured: something may have been moved meanwhile.
+
+        What was refused for the frame is refused before anything is measured for nothing.
+        """
+        if not self._done_before:
+            return
+        if not self._prediction.is_registered and not self._session.rows(CONTACTS_LEFT):
+            self._register()
+        self._total += self._session.check_next()
 
     def _after_pose(self) -> bool:
         """Calibrate at the end of a stretch; whether that is good enough."""
@@ -351,10 +383,28 @@ class Process:
             "as a new session: a set-up of its own"
         )
 
-    def _check_resumed(self, step: Step, *, measured: bool) -> None:
-        """Raise if the check with which a session goes on was not measured: something may have moved."""
-        if measured or step.step != self._done_before:
-            return
+    def _checks_elsewhere(self, step: Step) -> bool:
+        """Look at what a check tells; whether another contact is to be checked next, since it tells nothing.
+
+        Raises:
+            WorkError: If something has moved; or if no contact can be measured again as a session goes on.
+        """
+        check = last_check(self._session)
+        if check is not None and check.step == step.step:
+            self._check_drift()
+            return False
+        if self._session.check_elsewhere(step.step):
+            self._total += 1
+            self._begun += 1
+            return True
+        done_since = self._session.rows(OTHERS_BETWEEN, (self._done_before, step.step))
+        if not done_since:
+            self._raise_unsure()
+        self._session.add_event("unchecked", UNCHECKED, step.step)
+        self._say(UNCHECKED)
+        return False
+
+    def _raise_unsure(self) -> NoReturn:
         raise WorkError(
             "the first contact could not be measured again",
             where="check",

@@ -21,9 +21,6 @@ SAME: Final = {
 def open_session(path: Path, cell: Cell, poses: Poses) -> Session:
     """The session at `path`: a new one, or the one that is there, if it is of the same arm and poses.
 
-    One that is gone on with measures its first contact again before anything else: arm or instrument may
-    have been moved meanwhile.
-
     Raises:
         InputError: If the file that is there belongs to something else, or cannot be written.
         WorkError: If another process is writing to it.
@@ -51,7 +48,6 @@ def open_session(path: Path, cell: Cell, poses: Poses) -> Session:
     try:
         session.set_meta(DRIFT_MM, drift_mm)
         session.set_meta(GROUP, poses.group)
-        session.check_next()
     except BaseException:
         session.close()
         raise

@@ -11,6 +11,7 @@ from truearm.cell.cell_file import Cell
 from truearm.cell.ordering import motion_seconds, paper_order, short_order, there_and_back
 from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
+from truearm.cell.reaching import within_reach
 from truearm.cell.rehearsal import problem_of
 from truearm.cell.session import Step
 from truearm.columns import REPEAT, VALIDATE
@@ -34,6 +35,8 @@ from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
+CHOICES: Final = 4
+"""How often poses are chosen where the arm does not get to some of them."""
 DRAWN_AT_ONCE: Final = 200
 POOL_PER_POSE: Final = 12
 POOL_PER_NUMBER: Final = 3
@@ -90,9 +93,10 @@ class Plan:
         poses: With purpose "train", "validate" or "repeat", and alternating directions of approach.
         points: Targets in the base frame (n, 3), m.
         choice: What the choice did to the indices.
-        seconds: Motion time in each order by name.
+        seconds: Time of the motions of the joints in each order by name, with the poses that are repeated.
         expected: Expected standard deviation of the calibrated position over the pool, mm, by number.
         lowest_m: The lowest place of the arm and its tool, in the base frame.
+        unreached: Which poses (from 0) the arm does not get to past the table, wherever it comes from.
     """
 
     poses: Poses
@@ -101,6 +105,7 @@ class Plan:
     seconds: dict[str, float]
     expected: dict[int, float]
     lowest_m: float
+    unreached: list[int]
 
 
 def plan_poses(
@@ -122,20 +127,56 @@ def plan_poses(
     pool = measurable_pool(arm, cell, size, options.seed, options.rules)
     wanted = ChoiceOptions(criterion=options.criterion, tool=flange_from_target)
     identified = IdentifiedArm(arm)
-    choice = choose(identified, pool, options.count, wanted)
-    rows, purposes = _with_others(pool, choice.rows)
-    points = targets_of(arm, pool[rows], flange_from_target)
-    orders = orders_of(points, pool[rows])
-    repeats = max(LEAST_REPEATED, round(REPEATED_SHARE * options.count))
-    poses, measured = in_order(pool[rows], purposes, orders[options.order], min(repeats, options.count))
+    arranged = _arranged(identified, pool, options, wanted, cell)
+    poses = arranged.orders[options.order]
     return Plan(
         poses,
-        points[measured],
-        choice,
-        {name: motion_seconds(pool[rows], each, JOINT_SPEED_RAD_S) for name, each in orders.items()},
+        targets_of(arm, poses.readings, flange_from_target),
+        arranged.choice,
+        {name: seconds_of(each) for name, each in arranged.orders.items()},
         {n: expected_mm(identified, pool, n, wanted, options.sigma_mm) for n in numbers},
-        lowest(arm, pool[rows], tool=flange_from_target),
+        lowest(arm, poses.readings, tool=flange_from_target),
+        arranged.unreached,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Arranged:
+    """A choice, its poses in each order by name, and those (from 0) of the wanted one without a way."""
+
+    choice: Choice
+    orders: dict[str, Poses]
+    unreached: list[int]
+
+
+def _arranged(
+    arm: IdentifiedArm, pool: Floats, options: PlanOptions, wanted: ChoiceOptions, cell: Cell | None
+) -> _Arranged:
+    """Choose and order poses of a pool; others come in the place of those to which there is no way."""
+    repeats = min(max(LEAST_REPEATED, round(REPEATED_SHARE * options.count)), options.count)
+    for last in [*[False] * (CHOICES - 1), True]:
+        choice = choose(arm, pool, options.count, wanted)
+        rows, purposes = _with_others(pool, choice.rows)
+        points = targets_of(
+            arm.robot, pool[rows], arm.robot.tool if cell is None else cell.flange_from_target
+        )
+        orders = {
+            name: in_order(pool[rows], purposes, order, repeats)[0]
+            for name, order in orders_of(points, pool[rows]).items()
+        }
+        unreached: list[int] = []
+        if cell is not None:
+            orders[options.order], unreached = within_reach(cell, orders[options.order])
+        if last or not unreached:
+            break
+        without = orders[options.order].readings[unreached]
+        pool = pool[~(pool[:, None] == without).all(axis=2).any(axis=1)]
+    return _Arranged(choice, orders, unreached)
+
+
+def seconds_of(poses: Poses) -> float:
+    """Time of the motions of the joints from pose to pose, s."""
+    return motion_seconds(poses.readings, np.arange(len(poses)), JOINT_SPEED_RAD_S)
 
 
 def orders_of(points: Floats, readings: Floats) -> dict[str, NDArray[np.int64]]:

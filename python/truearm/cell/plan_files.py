@@ -8,6 +8,7 @@ import pandas as pd
 
 from truearm.cell.plan import Plan
 from truearm.cell.proposed import Proposed
+from truearm.columns import REPEAT
 from truearm.files import write_whole
 from truearm.units import MM_PER_METRE
 
@@ -41,9 +42,12 @@ def draw(plan: Plan | Proposed, path: Path) -> None:
             chosen = millimetres[purposes == purpose]
             if not len(chosen):
                 continue
-            axes.plot(chosen[:, a], chosen[:, b], "o", color=colour, markersize=4, label=purpose)
+            # Repeated poses are rings around the points that they repeat.
+            ring = {"markersize": 8, "fillstyle": "none"} if purpose == REPEAT else {"markersize": 4}
+            axes.plot(chosen[:, a], chosen[:, b], "o", color=colour, label=purpose, **ring)
         axes.set_xlabel(f"{'xyz'[a]} mm")
         axes.set_ylabel(f"{'xyz'[b]} mm")
         axes.set_aspect("equal")
-    figure.axes[0].legend()
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
     figure.savefig(path)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.cell.device_errors import DeviceError, RefusedError
 from truearm.cell.poses_file import APPROACH
+from truearm.cell.protocols import Managed
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive, Section
 from truearm.errors import InputError
@@ -23,7 +24,7 @@ Floats = NDArray[np.float64]
 SAME_RAD: Final = 1e-6
 
 
-class PlaybackRobot:
+class PlaybackRobot(Managed):
     """A robot that is at once where it is told to be."""
 
     class Settings(Section):
@@ -79,7 +80,7 @@ class PlaybackRobot:
         self._readings = None
 
 
-class PlaybackSensor:
+class PlaybackSensor(Managed):
     """A sensor that says what a measurement file says about the readings it is prepared for."""
 
     class Settings(Section):

@@ -8,17 +8,17 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.cell.cell_file import Cell
-from truearm.cell.ordering import motion_seconds
 from truearm.cell.plan import (
-    JOINT_SPEED_RAD_S,
     LEAST_POOL,
     POOL_PER_POSE,
     in_order,
     measurable_pool,
     orders_of,
+    seconds_of,
     targets_of,
 )
 from truearm.cell.poses_file import Poses
+from truearm.cell.reaching import within_reach
 from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError
 from truearm.planning.accessibility import Rule, lowest
@@ -61,7 +61,7 @@ class Proposed:
     Attributes:
         poses: With purpose "train" or "acceptance", approached from both sides in turn.
         points: Targets in the base frame (n, 3), m.
-        seconds: Motion time in each order by name.
+        seconds: Time of the motions of the joints in each order by name.
         found: What was chosen, and what is expected of it.
         lowest_m: The lowest place of the arm and its tool, in the base frame.
     """
@@ -155,6 +155,14 @@ def _ordered(
     tool = arm.tool if cell is None else cell.flange_from_target
     points = targets_of(arm, readings, tool)
     orders = orders_of(points, readings)
-    poses, measured = in_order(readings, [purpose] * len(rows), orders[options.order], 0)
-    seconds = {name: motion_seconds(readings, each, JOINT_SPEED_RAD_S) for name, each in orders.items()}
-    return Proposed(poses, points[measured], seconds, found, lowest(arm, readings, tool=tool))
+    lists = {name: in_order(readings, [purpose] * len(rows), each, 0)[0] for name, each in orders.items()}
+    if cell is not None:
+        lists[options.order] = within_reach(cell, lists[options.order])[0]
+    poses, seconds = lists[options.order], {name: seconds_of(each) for name, each in lists.items()}
+    return Proposed(
+        poses,
+        targets_of(arm, poses.readings, tool),
+        seconds,
+        found,
+        lowest(arm, readings, tool=tool),
+    )

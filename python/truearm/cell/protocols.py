@@ -103,6 +103,19 @@ class Connected:
         _each(self._devices, lambda device: device.close())
 
 
+class Managed:
+    """A base of drivers that makes each a context manager, as Connected makes several devices one."""
+
+    def __enter__(self: T) -> T:
+        Connected(self).__enter__()
+        return self
+
+    def __exit__(
+        self: T, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        Connected(self).__exit__(kind, error, trace)
+
+
 def _each(devices: tuple[Device, ...], action: Callable[[Device], None]) -> None:
     """Do something to every device, and raise the first error when all had their turn."""
     first: Exception | None = None

@@ -1,4 +1,8 @@
-"""What a process would do, without moving anything: which poses can be measured, and how long it takes."""
+"""What a process would do, without moving anything: which poses can be measured, and how long it takes.
+
+Ways from each step to the next are tried as the process tries them. The arm is taken to begin at the origin
+of its driver, or with all joints at zero where that has none, and the table at the beginning of its ranges.
+"""
 
 from dataclasses import dataclass
 
@@ -7,13 +11,16 @@ from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
 from truearm.cell.clearance import Clearance
+from truearm.cell.crew import places_on_the_way
 from truearm.cell.device_errors import RefusedError
 from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
+from truearm.cell.rv_m2 import RvM2
 from truearm.cell.sequence import steps_of
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
-from truearm.units import MM_PER_METRE
+from truearm.cell.ways import Ways
+from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
 
@@ -54,16 +61,67 @@ def rehearse(cell: Cell, poses: Poses) -> Rehearsal:
     Raises:
         InputError: If there are fewer poses than registration needs.
     """
-    prediction = Prediction(cell)
+    prediction, walk = Prediction(cell), Walk(cell)
     planned = []
     for step in steps_of(poses, cell.file.process):
+        if step.kind == "pose":
+            walk.register()
         expected = prediction.expected(step)
         known = np.isfinite(expected.radius_m) and prediction.world_from_base is not None
         problem = problem_of(cell, prediction, step) if known else ""
+        problem = problem or walk.problem_of_way(step)
         beside = cell.beside(step.readings, step.approach) if step.approach else None
         planned.append(Planned(step, beside, expected.point_in_world if known else None, problem))
     possible = len(planned) - len([each for each in planned if each.problem])
     return Rehearsal(planned, cell.file.process.seconds_per_pose * possible)
+
+
+class Walk:
+    """Arm and table as they go from step to step, in thought."""
+
+    def __init__(self, cell: Cell) -> None:
+        self._cell, self._prediction = cell, Prediction(cell)
+        table = cell.sensor if isinstance(cell.sensor, TablePanel) else None
+        self._table, self._ways = table, None if table is None else Ways(cell, table)
+        self._here = self._refuge = _at_first(cell)
+        self._carriage = np.zeros(3) if table is None else table.released(np.zeros(3))
+
+    def register(self) -> None:
+        """From now on the frame is as good as known, and targets are no farther off than expected."""
+        if self._prediction.world_from_base is not None and not self._prediction.is_registered:
+            self._prediction.register(self._prediction.world_from_base, 0.0)
+
+    def problem_of_way(self, step: Step) -> str:
+        """Why there is no way to a step from the one before; empty where there is one, which it goes.
+
+        Sensors that stay away have no problem.
+        """
+        frame = self._prediction.world_from_base
+        if self._table is None or self._ways is None or frame is None:
+            return ""
+        expected = self._prediction.expected(step)
+        way = places_on_the_way(self._cell, step.readings, step.approach)
+        try:
+            carriage = self._table.carriage_for(expected)
+            self._ways.to(
+                way,
+                expected,
+                here=self._here,
+                carriage=self._carriage,
+                refuge=self._refuge,
+                world_from_base=frame,
+            )
+        except RefusedError as error:
+            return f"{error.what}, from the step before"
+        self._here, self._carriage = step.readings, carriage
+        return ""
+
+
+def _at_first(cell: Cell) -> Floats:
+    """Where the arm is (N,) before anybody moves it, as far as can be known."""
+    settings = cell.robot_settings
+    degrees = settings.origin_deg if isinstance(settings, RvM2.Settings) else np.zeros(cell.arm.joint_count)
+    return np.asarray(np.clip(to_si(np.array(degrees), "deg"), *cell.arm.limits.T))
 
 
 def problem_of(cell: Cell, prediction: Prediction, step: Step) -> str:

@@ -29,6 +29,7 @@ from truearm.cell.device_errors import (
 )
 from truearm.cell.line_port import LinePort, PortSection
 from truearm.cell.movemaster import TENTH, Tenths, readings_of, tenths
+from truearm.cell.protocols import Managed
 from truearm.cell.schema import Frame, Positive
 from truearm.inverse import Inverse
 from truearm.robot import Robot
@@ -44,7 +45,7 @@ MOTION_MARGIN: Final = 1.5
 FRESH_S: Final = 0.05
 
 
-class RvM2:
+class RvM2(Managed):
     """A Movemaster robot; see the module."""
 
     class Settings(PortSection):

@@ -35,6 +35,13 @@ FIRST_MEASURED: Final = (
     "SELECT pose, purpose, approach, readings FROM steps JOIN outcomes USING (step) "
     "WHERE outcome = 'measured' ORDER BY step LIMIT 1"
 )
+# A contact for the frame at which no check of an unbroken row of them has been tried.
+OTHER_CONTACT: Final = (
+    "SELECT pose, purpose, approach, readings FROM steps JOIN outcomes USING (step) "
+    "WHERE kind = 'registration' AND outcome = 'measured' AND pose NOT IN (SELECT pose FROM steps "
+    "WHERE step <= :step AND step > (SELECT max(step) FROM steps WHERE kind != 'check' AND step < :step)) "
+    "ORDER BY step LIMIT 1"
+)
 ADD_STEP: Final = "INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?)"
 # One step on, by way of negative numbers: no two may have the same one at any time.
 MOVE_AWAY: Final = (
@@ -256,21 +263,41 @@ class Session:
                       "WHERE kind = 'pose' AND outcome = 'measured'")[0][0]
         )  # fmt: skip
 
-    def check_next(self) -> None:
+    def check_next(self) -> bool:
         """Have the contact that was measured first measured again, before any step that is left.
 
         It becomes a step of its own; those that are left, and readings that one of them has, count on from
         it. Nothing is to be done where the next step is a check, or none is left, or nothing is measured.
+
+        Returns:
+            Whether there is a new step.
         """
         step, first = self.next_step(), self.rows(FIRST_MEASURED)
         if step is None or step.kind == "check" or not first:
-            return
+            return False
+        self._insert_check(step.step, first[0])
+        return True
+
+    def check_elsewhere(self, step: int) -> bool:
+        """Have another contact for the frame measured again behind a check that told nothing.
+
+        Returns:
+            Whether there is such a step now; not where all contacts were tried in this row of checks.
+        """
+        other = self._db.execute(OTHER_CONTACT, {"step": step}).fetchone()
+        if other is None:
+            return False
+        self._insert_check(step + 1, other)
+        return True
+
+    def _insert_check(self, step: int, contact: tuple[Any, ...]) -> None:
+        """Put a check of a contact, which is (pose, purpose, approach, readings), in the place of a step."""
         with self.together():
             for query in MOVE_AWAY:
-                self._write(query, (step.step,))
+                self._write(query, (step,))
             for query in MOVE_BACK:
                 self._write(query)
-            self._write(ADD_STEP, (step.step, "check", *first[0]))
+            self._write(ADD_STEP, (step, "check", *contact))
 
     @contextmanager
     def together(self) -> Iterator[None]:

@@ -2,11 +2,16 @@
 
 from typing import Any
 
+from truearm.cell.checks import unchecked_poses
 from truearm.cell.session import Session
 
 
 def summary_of(session: Session) -> dict[str, Any]:
-    """JSON values: poses, measured, skipped, open, readings and how many failed, frame, stretches, events."""
+    """JSON values: poses, measured, skipped, open, readings and how many failed, frame, stretches, events.
+
+    Beside them how many checks were measured and skipped, and the poses of which nothing says whether
+    something moved meanwhile.
+    """
     counts = {
         (kind, outcome): count
         for kind, outcome, count in session.rows(
@@ -29,6 +34,8 @@ def summary_of(session: Session) -> dict[str, Any]:
         "measured": counts.get(("pose", "measured"), 0),
         "open": counts.get(("pose", "open"), 0),
         "skipped": [{"pose": pose + 1, "reason": reason} for pose, reason in skipped],
+        "checks": {outcome: counts.get(("check", outcome), 0) for outcome in ("measured", "skipped")},
+        "unchecked": unchecked_poses(session),
         "readings": readings,
         "invalid_readings": invalid,
         "registration": None

@@ -28,6 +28,7 @@ from truearm.cell.device_errors import (
 from truearm.cell.framing import framed, unframed
 from truearm.cell.line_port import LinePort, PortSection
 from truearm.cell.panel import Panel
+from truearm.cell.protocols import Managed
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive, Section, Vector2, Vector3
 from truearm.robot import Robot
@@ -70,7 +71,7 @@ class PanelSection(Section):
         )
 
 
-class TablePanel:
+class TablePanel(Managed):
     """The table and its panel as a sensor; see the module."""
 
     class Settings(PortSection):

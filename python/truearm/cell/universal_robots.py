@@ -25,6 +25,7 @@ from truearm.cell.device_errors import (
     stopped,
 )
 from truearm.cell.line_port import LinePort
+from truearm.cell.protocols import Managed
 from truearm.cell.schema import Positive, Section, TcpPort
 from truearm.errors import InputError
 from truearm.robot import Robot
@@ -41,7 +42,7 @@ MOTION_MARGIN: Final = 2.0
 STARTS_WITHIN_S: Final = 0.5
 
 
-class UniversalRobots:
+class UniversalRobots(Managed):
     """An arm of Universal Robots; see the module."""
 
     class Settings(Section):

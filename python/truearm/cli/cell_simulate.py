@@ -11,7 +11,10 @@ from truearm.cli.arguments import AsJson, CellFile
 from truearm.cli.console import print_json, say, suggest, tell
 from truearm.errors import UsageError, typed
 
-FAULTS: Final = "lost, delayed, duplicated, garbled, missed, outlier, restart, emergency_stop"
+FAULTS: Final = (
+    "lost, delayed, duplicated, garbled, restart and emergency_stop are shares of the messages, missed and "
+    "outlier of the contacts; drift_mm_per_contact is a length"
+)
 
 
 def command(
@@ -31,7 +34,8 @@ def command(
     fault: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="KIND=SHARE", help="Make a share of the messages or contacts fail, as lost=0.05."
+            metavar="KIND=SHARE",
+            help=f"Make a share of the messages or contacts fail, as lost=0.05. {FAULTS}.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -89,6 +93,6 @@ def _changes(speed: float | None, seed: int | None, faults: list[str]) -> dict[s
             shares[kind] = float(share)
         except ValueError:
             raise UsageError(
-                f'"{given}" is no fault', where="--fault", rule=f"KIND=SHARE: {FAULTS}"
+                f'"{given}" is no fault', where="--fault", rule=f"KIND=SHARE. {FAULTS}"
             ) from None
     return changes | ({"faults": shares} if shares else {})

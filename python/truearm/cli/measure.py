@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from truearm.cli.arguments import AsJson, CellFile
-from truearm.cli.console import print_json, say, say_wrapped, suggest, tell
+from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, warn
 from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
 from truearm.errors import count_of, typed
@@ -42,6 +42,7 @@ def command(
       truearm measure cell.toml poses.csv -o session.db
     """
     from truearm.cell.cell_file import Cell
+    from truearm.cell.checks import told_unchecked
     from truearm.cell.measuring import Process
     from truearm.cell.opening import open_session
     from truearm.cell.poses_file import Poses
@@ -64,6 +65,7 @@ def command(
     except KeyboardInterrupt:
         tell(f"The session is in {output}; the same command goes on with it.")
         end_at_once()
+    warn(told_unchecked(found["unchecked"]))
     if as_json:
         print_json({"end": end, "session": str(output), **found})
         return

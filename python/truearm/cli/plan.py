@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Final
 from truearm.cli import plan_options as option
 from truearm.cli.again import calibrate_again
 from truearm.cli.arguments import AsJson
-from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
+from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import THERE_AND_BACK
-from truearm.errors import UsageError, count_of, list_names, typed
+from truearm.errors import Notice, UsageError, count_of, list_names, list_rows, typed
 from truearm.files import refuse_own_input, refuse_same
 from truearm.units import MM_PER_METRE
 
@@ -229,7 +229,7 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
 def _print_proposed(proposed: "Proposed", output: Path) -> None:
     told = proposed.to_dict()
     say(f"{count_of(told['count'], 'pose')}: {output}")
-    say(_motion(proposed.seconds))
+    say_wrapped(_motion(proposed.seconds))
     say_wrapped(_lowest(proposed.lowest_m))
     if "noticed" not in told:
         before, after = told["expected_before_mm"], told["expected_after_mm"][-1]
@@ -257,9 +257,27 @@ def _print_features(features: Sequence[str]) -> None:
         say_wrapped(f"Note {list_names(features)} at each pose, {where}: the calibration varies with that.")
 
 
+def _told_unreached(poses: list[int]) -> list[Notice]:
+    if not poses:
+        return []
+    return [
+        Notice(
+            "unreached",
+            f"{list_rows([pose + 1 for pose in poses], 'pose')}: link or tool would meet the table on every "
+            "way there from the other poses; truearm measure --dry-run tells what would be skipped.",
+        )
+    ]
+
+
 def _motion(seconds: "dict[str, float]") -> str:
+    from truearm.cell.plan import JOINT_SPEED_RAD_S
+
     back, short, paper = seconds[THERE_AND_BACK], seconds["short"], seconds["paper"]
-    return f"Motion: {back:.0f} s there and back, {short:.0f} s in short order, {paper:.0f} s in the paper's."
+    return (
+        f"Motion of the joints at {JOINT_SPEED_RAD_S:g} rad/s: {back:.0f} s there and back, {short:.0f} s in "
+        f"short order, {paper:.0f} s in the paper's. The way to the first pose, coming from one side, the "
+        "sensor, contacts for the frame and checks come on top."
+    )
 
 
 def _lowest(height_m: float) -> str:
@@ -280,6 +298,7 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
                 "lowest_mm": MM_PER_METRE * plan.lowest_m,
                 "order": order,
                 "expected_mm": {str(n): value for n, value in plan.expected.items()},
+                "unreached": [pose + 1 for pose in plan.unreached],
             }
         )
         return
@@ -294,7 +313,8 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
         f"They determine the parameters {times:.2f} times as well as poses at random, in the geometric mean "
         f"(index O1). Condition number {kappa} (columns at 300 mm)."
     )
-    say(_motion(plan.seconds))
+    say_wrapped(_motion(plan.seconds))
+    warn(_told_unreached(plan.unreached))
     say_wrapped(_lowest(plan.lowest_m))
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]
     say("Expected standard deviation of the calibrated position:")

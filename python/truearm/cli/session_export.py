@@ -28,6 +28,7 @@ def command(
       truearm session export session.db -o measurements.csv
     """
     from truearm.cell.accepted import accepted_table, moved_poses
+    from truearm.cell.checks import told_unchecked, unchecked_poses
     from truearm.cell.session import Session
     from truearm.cli.naming import name_of
     from truearm.errors import WorkError
@@ -40,14 +41,14 @@ def command(
     refuse_own_input(target, session)
     with Session(session, writing=False) as known:
         table, arm = accepted_table(known), Robot.from_dict(known.meta("arm"))
-        moved = moved_poses(known, table)
+        moved, unchecked = moved_poses(known, table), unchecked_poses(known)
     if table.empty:
         raise WorkError("no pose is measured yet", where=str(session))
     write_whole(target, table.drop(columns="step").to_csv(index=False, lineterminator="\n"))
-    if moved:
-        warn([_told_of(moved)])
+    warn([*([_told_of(moved)] if moved else []), *told_unchecked(unchecked)])
     if as_json:
-        print_json({"measurements": str(target), "rows": len(table), "moved": moved})
+        rows = {"rows": len(table), "moved": moved, "unchecked": unchecked}
+        print_json({"measurements": str(target), **rows})
         return
     say(f"{count_of(len(table), 'measurement')}: {target}")
     suggest(f"truearm calibrate {name_of(arm)} {typed(target)} -o result")

@@ -97,6 +97,8 @@ class VirtualCell:
                 address = self._started(device, state, stack)
                 settings = getattr(self._cell, f"{device}_settings")
                 self.content[device] = _at(self.content[device], address, settings, self.shared.speed)
+            recovery_s = self._cell.file.process.recovery_s / self.shared.speed
+            self.content["process"] = {**self.content.get("process", {}), "recovery_s": recovery_s}
             self._stack = stack.pop_all()
         return self
 

@@ -11,7 +11,6 @@ from truearm.cell.virtual.wires import Wire
 from truearm.cell.virtual.world import World
 
 LONGEST_WAIT_S: Final = 0.05
-RESTART_S: Final = 5.0
 
 
 class Machine(Protocol):
@@ -69,12 +68,15 @@ class _Server:
         self._leaving: list[tuple[float, int, bytes]] = []
         self._numbers = count()
         self._rest = b""
-        self._silent_until = 0.0
+        self._silent_until, self._away = 0.0, False
+        self._wires = [wire] if stream is None else [wire, stream.wire]
         self._next_packet = 0.0
 
     def run(self, ended: Callable[[], bool]) -> None:
         while not ended():
             self._wait()
+            if self._away and self._world.shared.now() >= self._silent_until:
+                self._come_back()
             self._take()
             now = self._world.shared.now()
             for line in _due(self._arriving, now):
@@ -108,14 +110,24 @@ class _Server:
         if now < self._silent_until:
             return
         if self._faults.restarts():
-            self._machine.restart()
-            self._wire.drop()
-            self._leaving.clear()
-            self._silent_until = now + RESTART_S
+            self._go_away(now)
             return
         if self._faults.stops():
             self._world.emergency_stop(now)
         self._answer(self._machine.received(line.decode("ascii", "replace"), now))
+
+    def _go_away(self, now: float) -> None:
+        """Lose the power for a while."""
+        self._machine.restart()
+        self._leaving.clear()
+        for wire in self._wires:
+            wire.go_away()
+        self._away, self._silent_until = True, now + self._faults.settings.restart_s
+
+    def _come_back(self) -> None:
+        for wire in self._wires:
+            wire.come_back()
+        self._away = False
 
     def _answer(self, answers: list[tuple[float, str]]) -> None:
         for due, text in answers:
@@ -128,8 +140,7 @@ class _Server:
             return
         self._stream.wire.read()
         now = self._world.shared.now()
-        if now < self._silent_until:
-            self._stream.wire.drop()
+        if self._away:
             return
         if now >= self._next_packet:
             self._stream.wire.write(self._stream.packet(now))

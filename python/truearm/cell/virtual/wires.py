@@ -25,8 +25,11 @@ class Wire(Protocol):
     def write(self, data: bytes) -> None:
         """Send, if anybody is there."""
 
-    def drop(self) -> None:
-        """End the connection, as a device does that loses its power."""
+    def go_away(self) -> None:
+        """End the connection and take no other one, as a device does that loses its power."""
+
+    def come_back(self) -> None:
+        """Take connections again."""
 
     def close(self) -> None:
         """Be no more."""
@@ -60,8 +63,11 @@ class PtyWire:
         except BlockingIOError:
             return
 
-    def drop(self) -> None:
+    def go_away(self) -> None:
         """See Wire. A serial line has no connection to end."""
+
+    def come_back(self) -> None:
+        """See Wire."""
 
     def close(self) -> None:
         """See Wire."""
@@ -73,15 +79,15 @@ class TcpWire:
     """A port at which one client at a time is served; a new one takes the place of the old."""
 
     def __init__(self, host: str = "127.0.0.1") -> None:
-        self._server = socket.create_server((host, 0))
-        self._server.setblocking(False)
+        self._host = host
         self._client: socket.socket | None = None
+        self._server: socket.socket | None = self._listening(0)
         self.port = int(self._server.getsockname()[1])
         self.address = f"tcp://{host}:{self.port}"
 
     def waits_for(self) -> list[int]:
         """See Wire."""
-        return [self._server.fileno(), *([] if self._client is None else [self._client.fileno()])]
+        return [each.fileno() for each in (self._server, self._client) if each is not None]
 
     def read(self) -> bytes:
         """See Wire."""
@@ -95,7 +101,7 @@ class TcpWire:
         except OSError:
             data = b""
         if not data:
-            self.drop()
+            self._drop()
         return data
 
     def write(self, data: bytes) -> None:
@@ -105,25 +111,41 @@ class TcpWire:
         try:
             self._client.sendall(data)
         except OSError:
-            self.drop()
+            self._drop()
 
-    def drop(self) -> None:
+    def go_away(self) -> None:
+        """See Wire. Connecting is refused meanwhile."""
+        self._drop()
+        server, self._server = self._server, None
+        if server is not None:
+            server.close()
+
+    def come_back(self) -> None:
         """See Wire."""
+        self._server = self._listening(self.port)
+
+    def close(self) -> None:
+        """See Wire."""
+        self.go_away()
+
+    def _listening(self, port: int) -> socket.socket:
+        server = socket.create_server((self._host, port))
+        server.setblocking(False)
+        return server
+
+    def _drop(self) -> None:
         client, self._client = self._client, None
         if client is not None:
             client.close()
 
-    def close(self) -> None:
-        """See Wire."""
-        self.drop()
-        self._server.close()
-
     def _accept(self) -> None:
+        if self._server is None:
+            return
         try:
             client, _ = self._server.accept()
         except BlockingIOError:
             return
-        self.drop()
+        self._drop()
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client = client
