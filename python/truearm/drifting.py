@@ -267,30 +267,35 @@ def _jump(task: Task, data: Measurements, drift: Drift, group: str, rows: tuple[
     return Jump(" and ".join(names), float(MM_PER_METRE * far_m), changed)
 
 
-def _another_place(details: DriftDetails, ways: Sequence[str]) -> str:
-    where = "; ".join(jump.between for own in details.other_places.values() for jump in own)
-    return (
-        f"The set-up moved while it was measured: {'; '.join(ways)}. No target or tripod that is touched "
-        f"moves that far: instrument or target stood elsewhere from there on ({where}), and turned as well, "
-        "which is not taken out. Give the rows before and after names of their own in a column `group`, or files of "
-        "their own, and calibrate again: each then has a frame and a tool of its own."
-    )
-
-
 def drift_notices(details: DriftDetails | None) -> list[Notice]:
     """A notice where set-ups moved."""
     if details is None:
         return []
     ways = [f"{group} by {details.way(group)}" for group in details.moved_mm]
-    if details.other_places:
-        return [Notice(ANOTHER_PLACE, _another_place(details, ways))]
-    slowly = "Arms and instruments that warm up do so."
-    at_once = "Something gave way there: a target or a tripod that was touched, play in a joint."
-    with_poses = "As the poses change there too, this may be what varies with them, and nothing gave way."
-    why = at_once if details.slips else with_poses if details.jumps else slowly
+    kind, why = _reason(details)
     text = (
         f"The set-up moved while it was measured, whatever the pose: {'; '.join(ways)}. "
         f"{why} It is taken out of all measurements, the held-out ones too. "
         "Rows are taken to be in the order of measuring: if they are not, give --drift none."
     )
-    return [Notice("drift", text)]
+    return [Notice(kind, text)]
+
+
+def _reason(details: DriftDetails) -> tuple[str, str]:
+    """The kind of a notice, and why a set-up moves so."""
+    if details.other_places:
+        where = "; ".join(jump.between for own in details.other_places.values() for jump in own)
+        return ANOTHER_PLACE, (
+            f"Nothing that is touched slips so far: instrument or target was put elsewhere ({where}), and what "
+            "it was turned by is left in. Give the rows before and after names of their own in a column `group`, "
+            "or files of their own, and calibrate again: each then has a frame and a tool of its own. As it is, "
+            "the shift alone is known."
+        )
+    if details.slips:
+        return "drift", "Something gave way there: a target or a tripod that was touched, play in a joint."
+    if details.jumps:
+        return (
+            "drift",
+            "As the poses change there too, this may be what varies with them, and nothing gave way.",
+        )
+    return "drift", "Arms and instruments that warm up do so."

@@ -191,7 +191,7 @@ class _Constants:
 
 def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> _Constants:
     with task.stages("finding frame and tool"), core_errors(data):
-        nominal = fit_constant(task.problem(measured, []), fit_options(task))
+        nominal = fit_constant(task.problem(measured, []), fit_options(task, robust=task.options.robust))
     with task.stages("asking what the poses determine"):
         found = identify(task.arm, measured, nominal.setup)
         _check_enough(task, data, found.total_rank)
@@ -205,7 +205,7 @@ def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> 
 
 def _spoilt(constant: ConstantFit, variable: FieldFit) -> bool:
     """Whether rows that the variable model takes out have bent the constants that it begins with."""
-    squares = np.square(constant.residuals.reshape(len(variable.weights), -1)).sum(axis=1)
+    squares = np.square(constant.residuals.reshape(len(variable.weights), -1)).sum(axis=1) * constant.weights
     return float(squares[variable.weights < 1.0].sum()) > SPOILING * float(squares.sum())
 
 
