@@ -288,8 +288,8 @@ def _reason(details: DriftDetails) -> tuple[str, str]:
         return ANOTHER_PLACE, (
             f"Nothing that is touched slips so far: instrument or target was put elsewhere ({where}), and "
             "what it was turned by is left in. Give the rows before and after names of their own in a column "
-            "`group`, or files of their own, and calibrate again: each then has a frame and a tool of its own. "
-            "As it is, the shift alone is known."
+            "`group`, or files of their own, and calibrate again: each then has a frame and a tool of its "
+            "own. As it is, the shift alone is known."
         )
     if details.slips:
         return "drift", "Something gave way there: a target or a tripod that was touched, play in a joint."
