@@ -7,7 +7,9 @@ import pytest
 
 import truearm as ta
 from tests.remastered import remastered_table
+from tests.report_support import words_of
 from truearm.cli import main
+from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
 SHIFT = np.array([0.0, 0.6, 0.0, 0.9, 0.0])
@@ -87,6 +89,24 @@ def test_joints_that_were_not_tested_are_named_with_the_options_that_tell_them(c
     assert "--keep-tool" not in told
     assert main(["update", "old.calib", "same.csv", "--keep-frame", "--keep-tool"]) == 0
     assert "not tested" not in capsys.readouterr().out
+
+
+def test_options_are_proposed_where_the_calibration_knows_all_set_ups(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arm = VirtualArm.paper(seed=2)
+    data = arm.measure_table(arm.poses(40)).assign(group=["near"] * 20 + ["far"] * 20)
+    data.to_csv("known.csv", index=False)
+    calibration = ta.calibrate(arm.robot, ta.Measurements.read_csv("known.csv"), model="constant")
+    calibration.save("two.calib")
+    table = arm.measure_table(arm.poses(30, seed=8), seed=8)
+    for second, proposed in (("far", True), ("elsewhere", False)):
+        table.assign(group=["near"] * 15 + [second] * 15).to_csv("later.csv", index=False)
+        assert main(["update", "two.calib", "later.csv", "-o", f"{second}.calib"]) == 0
+        told = " ".join(capsys.readouterr().out.split())
+        assert "not tested" in told
+        words = words_of(report(ta.Calibration.load(f"{second}.calib")).html)
+        for option in ("--keep-frame", "--keep-tool"):
+            assert (option in told, option in words) == (proposed, proposed)
 
 
 def test_what_was_not_written_is_proposed_with_the_same_options(folder, capsys):

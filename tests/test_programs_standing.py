@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 
 from tests.program_tools import Bend, read, rewritten, says
-from tests.programs_rig import KUKA
+from tests.programs_rig import ABB, KUKA, models
 from tests.programs_rig import read as read_file
+from tests.programs_rig import rewritten as rewritten_file
 from tests.test_programs_krl import ALREADY
 from tests.test_programs_krl import pose_text as krl_pose
 from tests.test_programs_melfa import FINE_STEPS, FLANGE, MELFA, position
+from tests.test_programs_rapid import module, points
 from tests.test_programs_tp import TP, off, pose, program
+from tests.test_programs_tp import joints as fanuc_joints
 from tests.test_programs_urscript import UR, pose_text
 from truearm.programs.csv_path import CsvPath
 from truearm.programs.tables import NOWHERE
@@ -144,3 +147,59 @@ def test_joints_beside_the_poses_of_a_path_are_no_places(universal):
     moves = read(CsvPath(), "\n".join([header, *rows, ""]), universal).moves
     assert moves.before.tolist() == [NOWHERE, NOWHERE, 1, 1, 3, 3]
     assert moves.near[moves.moving].tolist() == [0, 2, 4]
+
+
+@pytest.mark.parametrize(
+    ("more", "known"),
+    [
+        ("", True),
+        ("IF HOME.A1 > 0 THEN\nENDIF", True),
+        ("SPEED=ABS(HOME.A1)", True),
+        ("$H_POS=HOME", True),
+        ("TEACH(HOME)", False),
+        ("HOME.A1=5", False),
+    ],
+)
+def test_a_place_that_a_program_only_reads_tells_where_the_arm_stands(more, known):
+    line = krl_pose([14, -76, 98, 20, 57, -27], state=False, decimals=5)
+    home = "HOME={A1 10,A2 -80,A3 95,A4 20,A5 60,A6 -30}"
+    text = f"{ALREADY}DECL E6AXIS HOME\n{home}\nPTP HOME\nLIN {line}\n{more}\nEND\n"
+    done = rewritten_file(read_file("a.src", text, KUKA), models(KUKA))
+    assert done.changed[-1] == known
+
+
+@pytest.mark.parametrize(
+    ("more", "known"),
+    [
+        ("x:=jHome.robax.rax_1;", True),
+        ("jNext:=CalcJointT(CalcRobT(jHome,tG),tG);", True),
+        ("Teach jHome;", False),
+        ("jHome:=CJointT();", False),
+    ],
+)
+def test_a_joint_target_of_rapid_that_is_only_read_is_a_place(more, known):
+    found = read_file("a.mod", module(f"MoveAbsJ jHome,v100,fine,tG;\n{more}", points()), ABB)
+    home = next(number for number, name in found.targets.names.items() if name == "jhome")
+    assert home in found.fixed
+    assert (home not in found.unsure) == known
+
+
+@pytest.mark.parametrize(
+    ("more", "known"),
+    [("If J1.J1 > 0 Then *L", True), ("J2=J1", True), ("J1=J_Curr", False), ('CallP "T",J1', False)],
+)
+def test_joints_of_melfa_that_are_only_read_are_a_place(more, known, mitsubishi):
+    text = f"Mov J1\n{more}\n*L\nEnd\nJ1=(0.00,20.00,80.00,5.00,70.00,15.00)\n"
+    found = read(MELFA, text, mitsubishi, FLANGE)
+    assert (0 in found.fixed, 0 not in found.unsure) == (True, known)
+
+
+@pytest.mark.parametrize(
+    ("more", "known"),
+    [("PR[1]=P[1]", True), ("PR[1]=P[R[2]]", True), ("P[1]=LPOS", False), ("P[R[2]]=JPOS", False)],
+)
+def test_positions_of_a_listing_that_are_only_read_are_a_place(more, known):
+    robot = Robot.load("fanuc-lr-mate-200id")
+    text = program(["J P[1] 100% FINE", more], [fanuc_joints(1, np.deg2rad([10, 20, -10, 5, -80, 15]))])
+    found = read(TP, text, robot)
+    assert (0 in found.fixed, 0 not in found.unsure) == (True, known)

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from tests.remastered import remastered_table
 from truearm.cli import calibrate, main, session_export
-from truearm.cli.again import option_words
+from truearm.cli.again import calibrate_again, option_words
 from truearm.errors import typed
 from truearm.options import Options
 from truearm.simulation import VirtualArm
@@ -94,6 +95,71 @@ def test_features_that_a_calibration_varies_with_are_asked_for_again(folder, cap
     assert 'Note "warmth" at each pose' in told
     options = ["--seed", "3", "--features", "warmth", "--no-refit"]
     assert proposed(told, "calibrate")[4:] == ["MEASUREMENTS.csv", *options, "-o", "result"]
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """An arm, and tables of it: as it was, later, and with joint 2 re-mastered."""
+    arm = VirtualArm(ta.Robot.load("rv-m2"), seed=1)
+    moved = remastered_table(arm, arm.poses(15, seed=9), [0.0, 0.6, 0.0, 0.0, 0.0], seed=9)
+    later = arm.measure_table(arm.poses(15, seed=9), seed=9)
+    return arm.robot, arm.measure_table(arm.poses(40)), later, moved
+
+
+def updated(measured, folder, *, moved=False, group=None, **options):
+    """A calibration from old.csv that is taken over with new.csv."""
+    robot, old, later, changed = measured
+    named = {} if group is None else {"group": group}
+    old.assign(**named).to_csv(folder / "old.csv", index=False)
+    (changed if moved else later).assign(**named).to_csv(folder / "new.csv", index=False)
+    before = ta.calibrate(robot, ta.Measurements.read_csv("old.csv"), model="constant")
+    return ta.update(before, ta.Measurements.read_csv("new.csv"), **options).calibration
+
+
+def files_of(again):
+    """The files of a proposed command."""
+    return [word for word in shlex.split(again.command) if word.endswith(".csv")]
+
+
+@pytest.mark.parametrize(
+    ("given", "files", "said"),
+    [
+        ({}, ["old.csv", "new.csv"], None),
+        ({"moved": True}, ["new.csv"], "joint 2 moved"),
+        ({"group": "cell"}, ["new.csv"], '"cell" would be one set-up'),
+        ({"group": "cell", "keep_frame": True, "keep_tool": True}, ["old.csv", "new.csv"], None),
+    ],
+)
+def test_files_before_an_update_are_named_where_their_rows_belong(
+    given, files, said, measured, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    again = calibrate_again(updated(measured, tmp_path, **given), "rv-m2", "MORE.csv")
+    assert files_of(again) == [*files, "MORE.csv"]
+    assert len(again.notes) == (said is not None)
+    assert said is None or (said in again.notes[0] and 'before "new.csv"' in again.notes[0])
+
+
+def test_a_second_update_adds_its_file_to_those_before(measured, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    once = updated(measured, tmp_path)
+    arm = VirtualArm(once.robot, seed=1)
+    arm.measure_table(arm.poses(15, seed=5), seed=5).to_csv("newer.csv", index=False)
+    twice = ta.update(once, ta.Measurements.read_csv("newer.csv")).calibration
+    twice.save("twice.calib")
+    again = calibrate_again(ta.Calibration.load("twice.calib"), None, "MORE.csv")
+    assert files_of(again) == ["old.csv", "new.csv", "newer.csv", "MORE.csv"]
+    assert files_of(calibrate_again(twice.without_rows(), None, "MORE.csv")) == ["OLD.csv", "MORE.csv"]
+
+
+def test_options_that_the_command_lacks_are_named(measured):
+    robot, old, _, _ = measured
+    made = ta.calibrate(robot, ta.Measurements.from_dataframe(old), model="constant", prior_mm=3.0, rate=0.25)
+    again = calibrate_again(made, "rv-m2", "MORE.csv")
+    assert again.notes == (
+        "The command has no option for prior_mm=3.0, rate=0.25: calibrate from Python to keep that.",
+    )
+    assert "prior" not in again.command
 
 
 @pytest.mark.parametrize(

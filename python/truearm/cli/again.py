@@ -1,21 +1,46 @@
 """Commands that calibrate once more as a calibration was made."""
 
 import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from truearm.errors import typed
+from truearm.errors import list_names, typed
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
+    from truearm.measurements import Measurements
     from truearm.options import Options
 
 RENAMED: Final = {"most_regions": "regions"}
 """Options of a calibration that the command calls otherwise."""
+SAID_OTHERWISE: Final = frozenset({"by_purpose", "refit"})
+"""Options that the command has another option for."""
 SOME_FILE: Final = "OLD.csv"
+NO_LONGER: Final = "the update found that the calibration no longer fits the arm"
+BESIDE: Final = (
+    'frame and tool were found anew since, and {groups} would be one set-up: rename it in the column "group" '
+    "of one file to calibrate from both"
+)
 
 
-def calibrate_again(calibration: "Calibration", robot: str | None, more: str) -> str:
+@dataclass(frozen=True)
+class Again:
+    """How a calibration is made once more.
+
+    Attributes:
+        command: The command.
+        notes: What it leaves out, in sentences.
+    """
+
+    command: str
+    notes: tuple[str, ...] = ()
+
+
+def calibrate_again(calibration: "Calibration", robot: str | None, more: str) -> Again:
     """The command that calibrates from the same files and others, with the options that were no defaults.
+
+    After an update the files before it are among them, unless their rows do not belong with the later ones.
 
     Args:
         calibration: That is made again.
@@ -24,9 +49,47 @@ def calibrate_again(calibration: "Calibration", robot: str | None, more: str) ->
     """
     from truearm.cli.naming import name_of
 
-    files = [SOME_FILE] if calibration.rows is None else calibration.rows.data.files
+    files, notes = _files(calibration)
     words = [robot or name_of(calibration.robot), *files, more, *option_words(calibration.options)]
-    return f"truearm calibrate {' '.join(typed(word) for word in words)} -o result"
+    if missing := options_without_words(calibration.options):
+        given = ", ".join(f"{name}={value!r}" for name, value in missing.items())
+        notes.append(f"The command has no option for {given}: calibrate from Python to keep that.")
+    return Again(f"truearm calibrate {' '.join(typed(word) for word in words)} -o result", tuple(notes))
+
+
+def _files(calibration: "Calibration") -> tuple[list[str], list[str]]:
+    """Files whose rows belong together, the oldest first, and sentences on those that do not."""
+    if calibration.rows is None:
+        return [SOME_FILE], []
+    files, later = calibration.rows.data.files, [calibration.rows.data]
+    while (revision := calibration.revision) is not None:
+        before = None if revision.file is None else calibration.predecessor
+        if before is None or before.rows is None:
+            return [SOME_FILE, *files], []
+        older = before.rows.data
+        if why := _why_apart(revision.report, older, later):
+            first = list_names(calibration.rows.data.files)
+            return files, [f"What was measured before {first} is left out: {why}."]
+        files, later, calibration = list(dict.fromkeys([*older.files, *files])), [older, *later], before
+    return files, []
+
+
+def _why_apart(report: Mapping[str, Any], older: "Measurements", later: list["Measurements"]) -> str:
+    """Why rows before an update cannot be calibrated from with later ones; "" where they can."""
+    if report["verdict"] == "field":
+        return NO_LONGER
+    moved = [str(offset["joint"]) for offset in report["offsets"] if offset["moved"]]
+    if moved:
+        return f"the update found that {'joint' if len(moved) == 1 else 'joints'} {', '.join(moved)} moved"
+    common = _stated_groups(older) & set().union(*map(_stated_groups, later))
+    found_anew = {"frame", "tool"} & set(report["estimated"])
+    return BESIDE.format(groups=list_names(sorted(common))) if common and found_anew else ""
+
+
+def _stated_groups(data: "Measurements") -> set[str]:
+    """Set-ups that a column names, which keep their names among other files."""
+    called = data.default_group
+    return set((data.group if called is None else data.group[called == ""]).tolist())
 
 
 def option_words(options: "Options") -> list[str]:
@@ -43,6 +106,19 @@ def option_words(options: "Options") -> list[str]:
     if not options.split.by_purpose and options.split.holdout_range is None:
         words += [_option("holdout"), _word(options.split.holdout)]
     return words if options.refit else [*words, _option("no_refit")]
+
+
+def options_without_words(options: "Options") -> dict[str, Any]:
+    """Options that are no defaults and that `truearm calibrate` cannot be told, by name."""
+    from truearm.cli.calibrate import command
+    from truearm.options import Options
+
+    taken, usual = inspect.signature(command).parameters, Options().to_dict()
+    return {
+        name: value
+        for name, value in options.to_dict().items()
+        if RENAMED.get(name, name) not in taken and name not in SAID_OTHERWISE and value != usual[name]
+    }
 
 
 def _option(name: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from truearm.cli import plan_options as option
-from truearm.cli.again import calibrate_again
+from truearm.cli.again import Again, calibrate_again
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
@@ -222,8 +222,13 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
     if asked.acceptance is not None:
         suggest(f"truearm update {typed(asked.calibration)} MEASUREMENTS.csv", when=MEASURED)
     else:
-        again = calibrate_again(calibration, asked.robot, "MEASUREMENTS.csv")
-        suggest(again, when="Then calibrate from all:")
+        _suggest_again(calibrate_again(calibration, asked.robot, "MEASUREMENTS.csv"))
+
+
+def _suggest_again(again: Again) -> None:
+    for note in again.notes:
+        say_wrapped(note)
+    suggest(again.command, when="Then calibrate:" if again.notes else "Then calibrate from all:")
 
 
 def _print_proposed(proposed: "Proposed", output: Path) -> None:

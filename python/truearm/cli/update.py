@@ -205,7 +205,7 @@ def _print(found: "Update") -> None:
     for offset in found.offsets:
         if offset.follows is not None:
             say_wrapped(follows_words(offset.joint, offset.follows))
-    if untested := untested_words(found.to_dict()):
+    if untested := untested_words(found.to_dict(), found.calibration.groups):
         say_wrapped(untested)
     for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
         for motion in motions:

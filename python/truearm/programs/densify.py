@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from truearm.errors import UsageError
 from truearm.inverse import Inverse
+from truearm.kinds import check_positive
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
 from truearm.programs.layouts import of_joints, of_pose
@@ -46,8 +46,7 @@ class Spacing:
             UsageError: If one of them is not positive.
         """
         for option, value in (("--densify-mm", deviation_mm), ("--least-spacing-mm", least_mm)):
-            if not value > 0.0 or not np.isfinite(value):
-                raise UsageError(f"{value}", where=option, rule="It must be positive")
+            check_positive(value, option)
         return cls(deviation_mm / MM_PER_METRE, least_mm / MM_PER_METRE)
 
 

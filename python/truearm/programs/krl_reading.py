@@ -124,6 +124,7 @@ class KrlReading:
         self._targets, self._moves, self._environments = TargetTable(), MoveTable(), Environments()
         self._listed: list[Listed] = []
         self._fixed: dict[int, str] = {}
+        self._unsure: set[int] = set()
         self._storage = KrlStorage()
         self._numbers: dict[str, int] = {}
         self._accurate, self._in_spline, self._interrupting = False, False, False
@@ -154,6 +155,7 @@ class KrlReading:
             tuple(sorted(self._listed)),
             self._configuration(),
             fixed=self._fixed,
+            unsure=self._unsure,
             accurate=TAUGHT_ACCURATE if self._accurate else "",
         )
 
@@ -454,15 +456,21 @@ class KrlReading:
             elif value is not None:
                 self._list(file, value.at, self._storage.why_not(key), key.upper())
         for key, number in self._numbers.items():
-            name = key.split("[")[0]
-            if name in self._storage.read:
-                self._fixed.setdefault(number, READ)
-            if f"{name}[?]" in self._storage.values:
-                self._fixed.setdefault(number, COMPUTED)
+            self._settle_one(key, number)
         for use in self._flow.overruled:
             target = self._used[use]
             if target is not None:
                 self._fixed.setdefault(target, ROUND_AGAIN)
+
+    def _settle_one(self, key: str, number: int) -> None:
+        name = key.partition("[")[0]
+        if name in self._storage.read:
+            self._fixed.setdefault(number, READ)
+        computed = f"{name}[?]" in self._storage.values
+        if computed:
+            self._fixed.setdefault(number, COMPUTED)
+        if computed or not self._routines.given.isdisjoint({key, name}):
+            self._unsure.add(number)
 
 
 def _parts(found: Sequence[Token]) -> list[list[Token]]:

@@ -48,6 +48,7 @@ class MelfaBasic:
             listed=tuple(sorted(reader.listed)),
             configuration=configuration,
             fixed=reader.fixed,
+            unsure=reader.unsure,
         )
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:

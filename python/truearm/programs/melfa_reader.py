@@ -75,6 +75,7 @@ class Reader:
         environments: Tools, bases and offsets of the motions.
         listed: What is left as it is.
         fixed: Why variables cannot be changed whatever uses them, by target.
+        unsure: Targets of variables that may hold something else when the program runs.
     """
 
     def __init__(self, source: Source, robot: Robot, frames: Frames) -> None:
@@ -82,6 +83,7 @@ class Reader:
         self.environments = Environments()
         self.listed: list[Listed] = []
         self.fixed: dict[int, str] = {}
+        self.unsure: set[int] = set()
         self._source, self._robot, self._frames = source, robot, frames
         self._statements = list(statements(source))
         self._moves = {place: found for place, one in enumerate(self._statements) if (found := moves(one))}
@@ -115,6 +117,7 @@ class Reader:
     def _target(self, name: str, variable: Variable) -> int:
         """The number of the last target added: one for each constant of the variable."""
         number, why_not = -1, self._variables.why_not(name)
+        holds = self._variables.holds_its_constant(name)
         for at, held in variable.constants:
             layout = held.layout
             width = self._robot.joint_count if layout == JOINTS else SLOTS + FLAGS
@@ -123,6 +126,8 @@ class Reader:
             number = self.targets.add(0, at, layout, numbers, shown)
             if held.problem or why_not:
                 self.fixed[number] = held.problem or why_not
+            if not holds:
+                self.unsure.add(number)
         return number
 
     def _find_settings(self, kind: Kind) -> dict[int, str]:

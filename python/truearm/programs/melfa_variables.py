@@ -96,6 +96,11 @@ class Variables:
         """Why a variable cannot be changed whatever uses it; empty if it can."""
         return self._all[name].why_not or self._array(name).why_not
 
+    def holds_its_constant(self, name: str) -> bool:
+        """Whether a variable has one constant, and holds nothing else when the program runs."""
+        variable = self._all[name]
+        return len(variable.constants) == 1 and not variable.changed and not self._array(name).changed
+
     def named(self, text: str) -> Iterator[str]:
         """Position and joint variables in a text: those, and arrays of which any element may be meant."""
         for found in _NAMES.finditer(text):
@@ -107,8 +112,7 @@ class Variables:
         """The transform of a constant, or of a variable that is one; None if it is not constant."""
         held = constant(given, 0, joints=False, joint_count=SLOTS)
         if held is None and (variable := self._all.get(name_of(given))) is not None:
-            changed = variable.changed or self._array(name_of(given)).changed
-            held = variable.constants[0][1] if len(variable.constants) == 1 and not changed else None
+            held = variable.constants[0][1] if self.holds_its_constant(name_of(given)) else None
         values = held.numbers[:SLOTS] if held is not None and held.layout == POSE else ()
         if len(values) < SLOTS:
             return None

@@ -1,6 +1,6 @@
 """A program as a language's reader found it, and what a language has to know for that."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -47,6 +47,7 @@ class Program:
         listed: What the reader could not take for a target with certainty.
         configuration: How poses tell their branch; None in a language that does not.
         fixed: Why targets cannot be changed with certainty whatever they are used for, by number.
+        unsure: Numbers of those of them that may be others when the program runs: they tell no place.
         accurate: Why the controller is known to compute with a model of its own, where the program says so.
     """
 
@@ -60,6 +61,7 @@ class Program:
     configuration: Configuration | None = None
     accurate: str = ""
     fixed: Mapping[int, str] = field(default_factory=dict)
+    unsure: Set[int] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -151,6 +151,7 @@ class RapidReading:
         self._frames = RapidFrames(self._declarations, frames)
         self._listed: list[Listed] = []
         self._fixed: dict[int, str] = {}
+        self._unsure: set[int] = set()
         self._read: dict[str, str] = {}
         self._displaces = DISPLACEMENT.search(self._source.text) is not None
         self._displaced_anytime = any(
@@ -186,6 +187,7 @@ class RapidReading:
             tuple(sorted(self._listed)),
             configuration,
             fixed=self._fixed,
+            unsure=self._unsure,
         )
 
     # Blocks.
@@ -428,6 +430,8 @@ class RapidReading:
             self._fixed.setdefault(found, f"it {TWICE}")
         elif name in self._read:
             self._fixed.setdefault(found, self._read[name])
+        if not isinstance(found, str) and self._declarations.doubt(name):
+            self._unsure.add(found)
 
 
 def _skip(reader: Reader, opening: str, closing: str) -> None:

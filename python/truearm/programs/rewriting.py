@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.controller import Controller
-from truearm.errors import Notice, UsageError, WorkError, did_you_mean, list_names
+from truearm.errors import Notice, WorkError
 from truearm.files import make_directory
 from truearm.inverse import Inverse
-from truearm.kinds import required
+from truearm.kinds import check_values, required
 from truearm.programs.densify import Densifier, Inserted, Spacing
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
@@ -135,13 +135,7 @@ class Choices:
     language: str | None = None
 
     def __post_init__(self) -> None:
-        if self.on_refusal not in ON_REFUSAL:
-            raise UsageError(
-                f"{self.on_refusal!r}",
-                where="on_refusal",
-                rule=f"It is {list_names(ON_REFUSAL, last='or')}",
-                way_out=did_you_mean(str(self.on_refusal), ON_REFUSAL),
-            )
+        check_values(self, choices={"on_refusal": ON_REFUSAL})
         if self.spacing is not None:
             required(self.spacing, Spacing, "the spacing")
 

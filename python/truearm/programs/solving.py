@@ -136,7 +136,7 @@ class _Solver:
 
     def _known(self, target: int) -> Floats | None:
         """The readings of a target; None where they are not known."""
-        unknown = target == NOWHERE or target in self.program.fixed or np.isnan(self.q[target, 0])
+        unknown = target == NOWHERE or target in self.program.unsure or np.isnan(self.q[target, 0])
         return None if unknown else self.q[target]
 
     def _possible(self, tell: Callable[[int, int], None]) -> dict[int, _Possible]:

@@ -49,6 +49,7 @@ class FanucTp:
             listed=tuple(sorted(reader.listed)),
             configuration=reader.configuration(),
             fixed=reader.fixed,
+            unsure=reader.unsure,
         )
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:

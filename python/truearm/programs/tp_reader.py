@@ -1,7 +1,7 @@
 """Reads a FANUC listing: the motions of /MN, and how each uses the positions of /POS."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 import numpy as np
@@ -25,6 +25,7 @@ _LINE: Final = re.compile(r"[ \t]*(\d*)[ \t]*:([^\n]*)\n?|[^\n]*\n|[^\n]+")
 _MOTION: Final = re.compile(r"\s*([JLCAS])[ \t]*(?=P\[|PR\[)")
 _TARGET: Final = re.compile(r"\b(PR|P)\[\s*(\d+|A?R\[\d+[^\]]*\])[^\]]*\]")
 _COMMENT: Final = re.compile(r":[^\[\]\n]*(?=\])")
+_ASSIGNED: Final = re.compile(r"\s*=(?!=)")
 _STRING: Final = re.compile(r"'[^'\n]*'|\"[^\"\n]*\"")
 _BLEND: Final = re.compile(r"\b(FINE|CNT\s*(\d+|R\[)|CR\s*\d+|CD\s*\d+)", re.IGNORECASE)
 # fmt: off
@@ -54,6 +55,7 @@ class Reader:
         environments: Frames, tools and problems of the uses.
         listed: What is left as it is.
         fixed: Why positions cannot be changed whatever uses them, by target.
+        unsure: Positions that may be others when the program runs, by target.
         orders: Joints that turn numbers may be of.
     """
 
@@ -62,6 +64,7 @@ class Reader:
         self.environments = Environments()
         self.listed: list[Listed] = []
         self.fixed: dict[int, str] = {}
+        self.unsure: set[int] = set()
         self._source, self._robot, self._frames = source, robot, frames
         self._main = section(source, "MN")
         start, end = section(source, "POS")
@@ -133,23 +136,29 @@ class Reader:
 
     def _settle(self) -> None:
         """Positions that only a motion to a computed number may go to."""
-        for number in set(self._targets.values()) - self._used if self._chosen else ():
-            self.fixed.setdefault(number, f"only line {self._chosen} may go there, by a computed number")
+        if self._chosen:
+            unused = set(self._targets.values()) - self._used
+            self._keep(unused, f"only line {self._chosen} may go there, by a computed number")
 
     def _other_use(self, at: int, text: str) -> None:
         """A position that is read or compared: what it is changed to would be computed with."""
         line = self._source.place(at)[0]
         for found in _TARGET.finditer(text):
-            number = found.group(2)
-            if found.group(1) == "P" and not number.isdigit():
-                self._keep_all(f"it may also be used in line {line} for something else than a motion")
-            elif found.group(1) == "P" and int(number) in self._targets:
-                reason = f"it is also used in line {line} for something else than a motion"
-                self.fixed.setdefault(self._targets[int(number)], reason)
+            if found.group(1) == "PR":
+                continue
+            number, reason = found.group(2), f"used in line {line} for something else than a motion"
+            if number.isdigit():
+                touched = {self._targets[n] for n in {int(number)} & self._targets.keys()}
+                self._keep(touched, f"it is also {reason}")
+            else:
+                touched = set(self._targets.values())
+                self._keep(touched, f"it may also be {reason}")
+            if _ASSIGNED.match(text, found.end()):
+                self.unsure |= touched
 
-    def _keep_all(self, reason: str) -> None:
-        """No position can be changed with certainty."""
-        for number in self._targets.values():
+    def _keep(self, which: Iterable[int], reason: str) -> None:
+        """Positions cannot be changed with certainty, by target."""
+        for number in which:
             self.fixed.setdefault(number, reason)
 
     def _motion(self, at: int, text: str, kind: str, *, follows: bool) -> bool:
@@ -192,7 +201,7 @@ class Reader:
         self._chosen = self._chosen or self._source.place(at)[0]
         if problem:
             line = self._source.place(at)[0]
-            self._keep_all(f"line {line} may go there too: {problem}")
+            self._keep(self._targets.values(), f"line {line} may go there too: {problem}")
 
     def _why_unknown(self, kind: str, number: int | None) -> str:
         if kind == "PR":

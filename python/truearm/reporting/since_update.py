@@ -1,6 +1,6 @@
 """Chapter: what an update found, and the errors of the calibration before it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from truearm.errors import count_of
@@ -24,7 +24,12 @@ def since_update(facts: Facts) -> Section:
     title, told = "The update", facts.update
     if told is None:
         return Section(title, [])
-    parts: list[Part] = [Text(_overall(told)), _offsets(told), *_motions(told), _errors(told)]
+    parts: list[Part] = [
+        Text(_overall(told)),
+        _offsets(told, facts.calibration.groups),
+        *_motions(told),
+        _errors(told),
+    ]
     return Section(title, [*parts, *_former(told, facts.best)])
 
 
@@ -44,7 +49,7 @@ def _overall(told: Mapping[str, Any]) -> str:
     )
 
 
-def _offsets(told: Mapping[str, Any]) -> Table:
+def _offsets(told: Mapping[str, Any], groups: Sequence[str]) -> Table:
     rows = []
     for entry in told["offsets"]:
         name = f"joint {entry['joint']}"
@@ -65,7 +70,7 @@ def _offsets(told: Mapping[str, Any]) -> Table:
     columns = ["", "change of offset", "standard error", "p", ""]
     follow = [entry for entry in told["offsets"] if entry.get("follows") is not None]
     says = " ".join(
-        [untested_words(told), *(follows_words(entry["joint"], entry["follows"]) for entry in follow)]
+        [untested_words(told, groups), *(follows_words(entry["joint"], entry["follows"]) for entry in follow)]
     ).strip()
     return Table("Joint offsets", columns, rows, says=says, left=(0, 4))
 

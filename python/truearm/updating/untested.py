@@ -1,6 +1,6 @@
 """The joints that an update did not test for a change, and what would have to be known, in sentences."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 OPTIONS: Final = {
@@ -20,13 +20,18 @@ def untested_joints(told: Mapping[str, Any]) -> str:
     return f"{_named(joints)} {_were(joints)} not tested." if joints else ""
 
 
-def untested_words(told: Mapping[str, Any]) -> str:
-    """The same with reasons, and with the options that would tell more; "" where all were tested."""
+def untested_words(told: Mapping[str, Any], groups: Sequence[str]) -> str:
+    """The same with reasons, and with the options that would tell more; "" where all were tested.
+
+    Args:
+        told: What `Update.to_dict` gives.
+        groups: Names of the update's set-ups; an option is of use where the calibration knew them all.
+    """
     by_reason: dict[str, list[int]] = {}
     for entry in told["offsets"]:
         if not entry["told"]:
             by_reason.setdefault(entry["confounded"], []).append(entry["joint"])
-    return " ".join(_reason(told, reason, joints) for reason, joints in by_reason.items())
+    return " ".join(_reason(told, groups, reason, joints) for reason, joints in by_reason.items())
 
 
 def way_out_of_keeping(kept: tuple[str, ...]) -> str:
@@ -37,23 +42,22 @@ def way_out_of_keeping(kept: tuple[str, ...]) -> str:
     return "Leave " + ", and ".join(f"{option} out unless {right}" for option, right in chosen)
 
 
-def _reason(told: Mapping[str, Any], reason: str, joints: list[int]) -> str:
+def _reason(told: Mapping[str, Any], groups: Sequence[str], reason: str, joints: list[int]) -> str:
     if not reason:
         return f"{_named(joints)} {_were(joints)} not tested: these poses do not determine {_it(joints)}."
     words = f"{_named(joints)} {_were(joints)} not tested, since confounded with the {reason}"
     parts = reason.split(" and ")
-    if not all(_may_be_kept(told, part) for part in parts):
+    if not all(_may_be_kept(told, groups, part) for part in parts):
         return f"{words}."
     options, conditions = zip(*(OPTIONS[part] for part in parts), strict=True)
     verb = "tells" if len(options) == 1 else "tell"
     return f"{words}: if {' and '.join(conditions)}, {' '.join(options)} {verb} {_it(joints)}."
 
 
-def _may_be_kept(told: Mapping[str, Any], part: str) -> bool:
-    """Whether a frame is known that could be kept, or a tool that is not said to be another one."""
-    if part == "frame":
-        return bool(told["frames"])
-    return any(motion["p"] is not None for motion in told["tools"])
+def _may_be_kept(told: Mapping[str, Any], groups: Sequence[str], part: str) -> bool:
+    """Whether all frames are known and could be kept, or all tools, which are not said to be others."""
+    known = {motion["group"] for motion in told[f"{part}s"] if part == "frame" or motion["p"] is not None}
+    return known.issuperset(groups)
 
 
 def _named(joints: list[int]) -> str:
