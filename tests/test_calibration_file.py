@@ -200,6 +200,25 @@ def test_odd_values_under_a_valid_digest_are_refused_by_name(written, tmp_path, 
     assert raised.value.__cause__ is not None
 
 
+def test_numbers_of_another_kind_are_taken_where_they_are_equal(written, tmp_path):
+    arrays, content = read_calibration_file(written)
+    kept = content["options"]
+    odd = {"refit": 1, "degree": 2.0, "judge_target": True, "epochs": 2000.0, "scheme_joints": [1.0, 2, 3]}
+    for stored in (odd, {"refit": 0}):
+        changed = {**content, "options": {**kept, **stored}, "sha256": NO_DIGEST}
+        write_calibration_file(tmp_path / "old.calib", arrays, changed)
+        found = ta.Calibration.load(tmp_path / "old.calib").options.to_dict()
+        assert found == {**kept, "refit": stored["refit"] == 1}
+        assert type(found["refit"]) is bool
+        assert {type(found[name]) for name in ("degree", "judge_target", "epochs")} == {int}
+    write_calibration_file(
+        tmp_path / "odd.calib", arrays, {**content, "options": {**kept, "degree": 2.5}, "sha256": NO_DIGEST}
+    )
+    with pytest.raises(ta.InputError, match="odd.calib: degree is 2.5. It must be a whole number") as raised:
+        ta.Calibration.load(tmp_path / "odd.calib")
+    assert not isinstance(raised.value, ta.UsageError)
+
+
 def test_numbers_beyond_all_are_refused(written, tmp_path):
     arrays, content = read_calibration_file(written)
     content["constant"]["noise_m"] = 0.12345

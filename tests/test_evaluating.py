@@ -148,7 +148,7 @@ def test_the_world_as_frame_is_kept():
         ({"frame_rows": 2}, "At least 3"),
         ({"frame_rows": 10, "keep_frames": True}, "none to find"),
         ({"frame_rows": 40}, "some must be left to judge"),
-        ({"seed": -1}, "negative"),
+        ({"seed": -1}, "Zero or more"),
         ({"use": "pose"}, "no orientation was measured"),
         ({"judge_target": 2}, "no target 2"),
     ],
@@ -188,7 +188,7 @@ def test_registration_finds_a_known_frame():
     np.testing.assert_allclose(one, truth, atol=1e-12)
 
 
-def test_a_set_up_without_the_judged_target_is_named():
+def test_set_ups_without_the_judged_target_are_not_judged():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
     table = arm.measure_table(arm.poses(80)).assign(group=["a"] * 40 + ["b"] * 40)
     table[["x2", "y2", "z2"]] = table[["x", "y", "z"]]
@@ -196,10 +196,15 @@ def test_a_set_up_without_the_judged_target_is_named():
     calibration = ta.calibrate(arm.robot, data, model="constant", judge_target=2)
     table.loc[40:, ["x2", "y2", "z2"]] = np.nan
     lacking = ta.Measurements.from_dataframe(table)
-    for call in (
-        lambda: ta.calibrate(arm.robot, lacking, model="constant", judge_target=2),
-        lambda: ta.evaluate(calibration, lacking, judge_target=2),
+    for found in (
+        ta.calibrate(arm.robot, lacking, model="constant", judge_target=2),
+        ta.evaluate(calibration, lacking, judge_target=2),
     ):
-        with pytest.raises(ta.InputError, match=r'target 2 was measured in none of the rows .*"b"'):
-            call()
+        (notice,) = [notice for notice in found.notices if notice.kind == "not_judged"]
+        assert notice.message.startswith('Target 2 was measured in none of the rows of the set-up "b" that')
+        assert notice.message.endswith('errors are those of the set-up "a" alone.')
+        errors = found.validation.holdout if isinstance(found, ta.Calibration) else found.errors
+        assert errors["constant"].position.max < 1.0
+    with pytest.raises(ta.InputError, match=r'target 2 was measured in none of the rows .*"b"'):
+        ta.evaluate(calibration, lacking.select(lacking.group == "b"), judge_target=2)
     assert ta.calibrate(arm.robot, lacking, model="constant").validation.n_holdout == 24

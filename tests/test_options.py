@@ -10,6 +10,7 @@ import pytest
 import truearm as ta
 from truearm import core_set, intervals
 from truearm.cell.plan import PlanOptions
+from truearm.programs.densify import Spacing
 from truearm.scheme_options import SchemeOptions
 from truearm.simulation import VirtualArm
 
@@ -49,6 +50,21 @@ WRONG = {
     "half a frame row": (lambda: api.EvaluationOptions(frame_rows=10.5), "frame_rows is 10.5"),
     "half a seed": (lambda: api.EvaluationOptions(seed=1.5), "seed is 1.5. It must be a whole number"),
     "a kept tool in words": (lambda: api.UpdateOptions(keep_tool="no"), "keep_tool is 'no'"),
+    "an offset that is infinite": (
+        lambda: api.UpdateOptions(offset_deg=np.inf),
+        "offset_deg: inf. It must be positive and finite",
+    ),
+    "a tool that is infinite": (
+        lambda: api.UpdateOptions(tool_mm=np.inf),
+        "tool_mm: inf. It must be positive and finite",
+    ),
+    "a spacing that is infinite": (
+        lambda: Spacing.of(0.1, np.inf),
+        "--least-spacing-mm: inf. It must be positive and finite",
+    ),
+    "a seed below zero": (lambda: api.SplitRule(seed=-1), "seed: -1. Zero or more"),
+    "no rows that train": (lambda: api.SplitRule(train_size=0), "train_size: 0. It must be positive"),
+    "a word with a slip": (lambda: api.Options(robust="hubre"), 'robust: "hubre" .* Did you mean "huber"'),
     "half a region": (lambda: RULES["scheme"](most_regions=1.5), "most_regions is 1.5"),
     "joints in words": (lambda: RULES["scheme"](scheme_joints="12"), "scheme_joints is '12'"),
     "half a joint": (lambda: RULES["scheme"](scheme_joints=(1.5,)), "a number of scheme_joints is 1.5"),

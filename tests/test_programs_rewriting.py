@@ -54,7 +54,7 @@ def test_refused_targets_stop_with_their_lines():
 
 @pytest.mark.parametrize("word", ["abort", "STOP", "keep_nominal", None])
 def test_what_becomes_of_refused_targets_is_one_of_two_words(word):
-    with pytest.raises(UsageError, match='on_refusal.*It is "stop" or "keep-nominal"'):
+    with pytest.raises(UsageError, match="on_refusal.*is not known. Either stop or keep-nominal"):
         Choices(on_refusal=word)
     other = Choices()
     object.__setattr__(other, "on_refusal", word)

@@ -90,7 +90,7 @@ def calibrate(
     notices += stood_still(robot, given.readings) + seen_at_values(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     split = split_rows(given, chosen.split)
-    check_judged(given.select(split.train), task.selection)
+    notices += check_judged(given.select(split.train), given.select(split.holdout), task.selection)
     task = replace(task, sizes=() if split.planned else given.sizes)
     trained, drift = fit_settled(task, given, split.train)
     with stages("judging on held-out rows"):

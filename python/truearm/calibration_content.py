@@ -14,7 +14,7 @@ from truearm.calibration_file import AGAIN
 from truearm.core_set import Selection
 from truearm.defaults import NO_DRIFT
 from truearm.details import ConstantDetails, VariableDetails
-from truearm.errors import InputError, Notice
+from truearm.errors import InputError, Notice, UsageError
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
@@ -93,7 +93,7 @@ def unpack(arrays: Arrays, content: Mapping[str, Any], *, where: str) -> dict[st
 
 
 def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
-    options = Options.of(**LEFT_OUT | content["options"])
+    options = _read_options(content["options"])
     robot = Robot.from_dict(content["robot"])
     arm = IdentifiedArm(robot, options.frame)
     selection = content["selection"]
@@ -128,6 +128,30 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "stored_conservative": None if bounds is None else conservative.unpack(bounds, arrays),
         "revision": revision.unpack(content["update"], arrays) if content.get("update") else None,
     }
+
+
+def _read_options(content: Mapping[str, Any]) -> Options:
+    """The options of a file; numbers of another kind than is asked for today are taken where they are equal.
+
+    Raises:
+        InputError: If there is no such option, or a value breaks a rule.
+    """
+    usual = Options().to_dict()
+    given = {name: _as_asked_for(value, usual.get(name)) for name, value in content.items()}
+    try:
+        return Options.of(**{**LEFT_OUT, **given})
+    except UsageError as error:
+        raise InputError(error.what, where=error.where, rule=error.rule, way_out=AGAIN) from error
+
+
+def _as_asked_for(value: Any, usual: Any) -> Any:  # noqa: ANN401
+    """A value of JSON as the kind that an option's usual one is of: 0 and 1 as flags, 2.0 as 2, true as 1."""
+    if isinstance(usual, bool):
+        return bool(value) if value in (0, 1) else value
+    if isinstance(value, list):
+        return [_as_asked_for(part, None) for part in value]
+    is_whole = isinstance(value, float) and value.is_integer() and not isinstance(usual, float)
+    return int(value) if is_whole or isinstance(value, bool) else value
 
 
 def _notice(content: Mapping[str, Any]) -> Notice:

@@ -57,12 +57,11 @@ class EvaluationOptions:
 
     def __post_init__(self) -> None:
         kinds.settle(self, whole=("seed", "frame_rows", "judge_target"), flags=("keep_tool", "keep_frames"))
+        kinds.check_values(self, not_negative=("seed",))
         if self.keep_frames and self.frame_rows is not None:
             raise UsageError("frame rows find frames", rule="With --keep-frames there are none to find")
         if self.frame_rows is not None and self.frame_rows < FEWEST_FRAME_ROWS:
             raise UsageError(f"{self.frame_rows} frame rows", rule=f"At least {FEWEST_FRAME_ROWS} are needed")
-        if self.seed < 0:
-            raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +129,7 @@ def evaluate(
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
     frame, judged = _divide(data, chosen)
     found_by = data.select(frame if len(frame) else judged)
-    check_judged(found_by, selection)
+    notices += check_judged(found_by, data.select(judged), selection)
     with stages("finding frame and tool"):
         models = {
             name: ArmModel(

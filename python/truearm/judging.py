@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Setup
 from truearm.core_set import Selection
-from truearm.errors import InputError, list_names
+from truearm.errors import InputError, Notice, list_names
 from truearm.fitting import Task, feature_values
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
@@ -23,30 +23,42 @@ def model_inputs(arm: IdentifiedArm, data: Measurements, features: tuple[str, ..
     return np.hstack([values, feature_values(data, features)])
 
 
-def check_judged(data: Measurements, selection: Selection) -> None:
-    """Check that rows of each set-up show where a judged target sits that takes no part in the fit.
+def check_judged(fitted: Measurements, judged: Measurements, selection: Selection) -> list[Notice]:
+    """A notice of the set-ups that are not judged, where the judged target takes no part in the fit.
 
     Args:
-        data: The rows that are to find its point.
+        fitted: The rows that are to find its point in each set-up.
+        judged: The rows that are to be judged.
         selection: What is used of them.
 
     Raises:
-        InputError: If a set-up has no row with it; names the set-ups.
+        InputError: If no set-up has it in rows of both; names the set-ups.
     """
     if not selection.judges_another:
-        return
-    held = np.isfinite(data.targets[:, selection.judge]).all(axis=1)
-    seen = set(data.group[held].tolist())
-    missing = [group for group in data.groups if group not in seen]
-    if missing:
+        return []
+    found, held = _groups_with(fitted, selection.judge), _groups_with(judged, selection.judge)
+    missing = [group for group in fitted.groups if group not in found]
+    words = (
+        f"target {selection.judge + 1} was measured in none of the rows of the set-up "
+        f"{list_names(missing or fitted.groups)} that would {'find it' if missing else 'be judged'}"
+    )
+    if not found & held:
         raise InputError(
-            f"target {selection.judge + 1} was measured in none of the rows of the set-up "
-            f"{list_names(missing)} that would find it",
-            where=", ".join(data.files),
-            rule="Where errors are judged at a target that takes no part in the fit, each set-up needs rows "
-            "with it",
-            way_out="Measure it there, leave the set-up out, or judge at another target",
+            words,
+            where=", ".join(fitted.files),
+            rule="Where the judged target takes no part in the fit, a set-up needs rows with it",
+            way_out="Measure it there, or judge at another target",
         )
+    if not missing:
+        return []
+    judging = [group for group in fitted.groups if group in found]
+    text = f"{words[0].upper()}{words[1:]}: errors are those of the set-up {list_names(judging)} alone."
+    return [Notice("not_judged", text)]
+
+
+def _groups_with(data: Measurements, target: int) -> set[str]:
+    """The set-ups with rows that hold a target, from 0."""
+    return set(data.group[np.isfinite(data.targets[:, target]).all(axis=1)].tolist())
 
 
 def judge(
@@ -76,24 +88,25 @@ def judge(
 def setup_of_judged(task: Task, data: Measurements, parameters: Floats, setup: Setup) -> Setup:
     """The set-up with the judged target as its only one, its point found from rows and nothing else moved.
 
+    The point is NaN where a set-up has no row with the judged target.
+
     Args:
         task: What was fitted.
         data: Rows, n of them.
         parameters: The model's parameters there (n, L, 5).
         setup: Frames of the fit.
-
-    Raises:
-        InputError: If a set-up has no row with the judged target.
     """
-    check_judged(data, task.selection)
     joints = task.arm.robot.joints_from_readings(data.readings)
     base_from_flange = task.arm.flange_chain.pose(joints, np.ascontiguousarray(parameters))
     frames = setup.frames
-    points = np.empty((len(task.groups), 1, 3))
+    points = np.full((len(task.groups), 1, 3), np.nan)
+    held = np.isfinite(data.targets[:, task.selection.judge]).all(axis=1)
     for number, group in enumerate(task.groups):
-        rows = data.group == group
+        rows = held & (data.group == group)
+        if not rows.any():
+            continue
         world_from_flange = frames[number] @ base_from_flange[rows]
         offset = data.targets[rows, task.selection.judge] - world_from_flange[:, :3, 3]
         in_flange = np.einsum("nji,nj->ni", world_from_flange[:, :3, :3], offset)
-        points[number, 0] = in_flange[np.isfinite(in_flange).all(axis=1)].mean(axis=0)
+        points[number, 0] = in_flange.mean(axis=0)
     return Setup(frames, points, setup.rotations, setup.anchors)

@@ -1,5 +1,6 @@
 """Arguments of the public calls: whether they are what is needed, and options given in two ways."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from numbers import Integral, Real
@@ -15,6 +16,8 @@ WAYS: Final[Mapping[str, str]] = {
     "Measurements": "Read them: Measurements.read_csv(path), Measurements.from_dataframe(table)",
     "Robot": 'Load it: Robot.load("ur10"), or from a TOML or URDF file',
 }
+
+NO_CHOICES: Final[Mapping[str, Sequence[object]]] = {}
 
 
 def required(value: object, kind: type[T], noun: str) -> T:
@@ -59,6 +62,51 @@ def settle(
             value = getattr(options, name)
             if value is not None or name not in optional:
                 object.__setattr__(options, name, made(value, name))
+
+
+def check_values(
+    options: object,
+    *,
+    choices: Mapping[str, Sequence[object]] = NO_CHOICES,
+    positive: Sequence[str] = (),
+    not_negative: Sequence[str] = (),
+) -> None:
+    """Check what the fields of a dataclass hold, once they are of their kinds.
+
+    Args:
+        options: The dataclass.
+        choices: What the fields may hold that are one of a few.
+        positive: Names of the numbers that are above zero and finite, or None.
+        not_negative: Names of those that are zero or more, and finite.
+
+    Raises:
+        UsageError: If a field holds anything else.
+    """
+    for name, known in choices.items():
+        check_choice(getattr(options, name), name, known)
+    for name in positive:
+        check_positive(getattr(options, name), name)
+    for name in not_negative:
+        if not 0 <= (value := getattr(options, name)) < math.inf:
+            raise UsageError(f"{value:g}", where=name, rule="Zero or more, and finite")
+
+
+def check_positive(value: float | None, name: str) -> None:
+    """Raise UsageError unless the argument or option `name` is above zero and finite, or None."""
+    if value is not None and not 0 < value < math.inf:
+        raise UsageError(f"{value:g}", where=name, rule="It must be positive and finite")
+
+
+def check_choice(value: object, name: str, known: Sequence[object]) -> None:
+    """Raise UsageError unless the argument or option `name` is one of those known; None is not named."""
+    if value not in known:
+        words = [str(choice) for choice in known if choice is not None]
+        raise UsageError(
+            f'"{value}" is not known',
+            where=name,
+            rule=f"Either {' or '.join(words)}",
+            way_out=did_you_mean(str(value), words),
+        )
 
 
 def whole_numbers(values: object, name: str) -> tuple[int, ...]:

@@ -1,7 +1,6 @@
 """Measurements: joint readings and what was measured at them."""
 
 import hashlib
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from truearm.files import as_path
 from truearm.kinds import required
 from truearm.measured_fields import read_fields
 from truearm.reading import read_csv_table, table_from_frame
+from truearm.same_tables import identities, told_apart
 
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]
@@ -32,7 +32,7 @@ CONTENT: Final = (
     "anchor",
     "pair",
 )
-PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group")
+PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group", "tables")
 GROUPS_SHOWN: Final = 3
 
 
@@ -60,6 +60,8 @@ class Measurements:
         notices: What was noticed on reading.
         default_group: What the set-up is called after its file (n,), "" where a column names it; None where
             nothing is called so.
+        tables: Number of the table that each row was read from (n,), made of what the table held; None where
+            it is not asked for, as no set-up is called after a file.
     """
 
     readings: Floats
@@ -77,10 +79,17 @@ class Measurements:
     purpose: Texts | None = None
     notices: tuple[Notice, ...] = ()
     default_group: Texts | None = None
+    tables: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         if not self.joint_units:
             object.__setattr__(self, "joint_units", ("",) * self.joint_count)
+        self._freeze()
+        if self.tables is None and self.default_group is not None:
+            object.__setattr__(self, "tables", _frozen(identities(self)))
+
+    def _freeze(self) -> None:
+        """Check that arrays and features have a row for each pose, and make them own and read-only."""
         for name in PER_ROW:
             value = getattr(self, name)
             if value is not None:
@@ -255,7 +264,8 @@ class Measurements:
         another. Groups that a column names keep their names: equal names mean the same set-up. Those that
         are called after their file are set-ups of their own, as with `read_files`: files of one name are
         called by their folders as well, and tables of one name are numbered, "data" and "data 2". Rows that
-        were selected from the same file belong to the same set-up.
+        were selected from the same table belong to the same set-up. Of tables that were not read at once,
+        as one that has grown or the rows of a loaded calibration, it is told by the rows that both have.
 
         Raises:
             InputError: If there are no parts or the numbers of joints differ.
@@ -285,7 +295,7 @@ class Measurements:
 
     def identical_rows(self) -> NDArray[np.bool_]:
         """Mask (n,) of the rows equal to an earlier one in everything that was read."""
-        return np.asarray(self._as_frame().duplicated(keep="first"))
+        return np.asarray(self.content().duplicated(keep="first"))
 
     def deduplicated(self) -> "Measurements":
         """Without rows that repeat an earlier one in everything that was read."""
@@ -333,7 +343,8 @@ class Measurements:
                 way_out="Name the robot that was measured, or correct the columns",
             )
 
-    def _as_frame(self) -> pd.DataFrame:
+    def content(self) -> pd.DataFrame:
+        """Everything that was read (n, ...): a column for each number and name, features under their own."""
         columns: dict[str, NDArray[np.generic]] = {}
         for name in CONTENT:
             value = getattr(self, name)
@@ -347,7 +358,7 @@ class Measurements:
 def _concatenate(parts: Sequence[Measurements]) -> Measurements:
     if not parts:
         raise InputError("there are no measurements to put together")
-    first, parts = parts[0], _told_apart(parts)
+    first, parts = parts[0], told_apart(parts)
     for part in parts[1:]:
         if part.joint_count != first.joint_count:
             raise InputError(
@@ -370,6 +381,7 @@ def _concatenate(parts: Sequence[Measurements]) -> Measurements:
         pair=_joined_words([(_own_pairs(part, k), len(part)) for k, part in enumerate(parts)]),
         notices=tuple(notice for part in parts for notice in part.notices),
         default_group=_joined_words([(part.default_group, len(part)) for part in parts]),
+        tables=_joined_tables(parts),
     )
 
 
@@ -380,64 +392,6 @@ def _frozen(values: NDArray[Any]) -> NDArray[Any]:
     copied = values.copy()
     copied.flags.writeable = False
     return copied
-
-
-def _told_apart(parts: Sequence[Measurements]) -> list[Measurements]:
-    """The parts with different names for the set-ups of different files, where no column names them."""
-    known: dict[str, list[Measurements]] = {}
-    parts = [_own_table(part, known) for part in parts]
-    called = set[tuple[str, str]]()
-    for part in parts:
-        rows = _called_after_file(part)
-        called |= set(zip(part.group[rows].tolist(), part.sources[rows].tolist(), strict=True))
-    groups, sources = Counter(group for group, _ in called), Counter(source for _, source in called)
-    unclear = [source for group, source in called if groups[group] > 1 or sources[source] > 1]
-    return [
-        _renamed(part, _called_after_file(part) & np.isin(part.sources, unclear), group=part.sources)
-        for part in parts
-    ]
-
-
-def _own_table(part: Measurements, known: dict[str, list[Measurements]]) -> Measurements:
-    """The part with a name of its own for each table that is called as another one; adds to `known`."""
-    unnamed = _called_after_file(part)
-    for source in list(dict.fromkeys(part.sources[unnamed].tolist())):
-        mask = unnamed & (part.sources == source)
-        table, name, number = part.select(mask), source, 1
-        while any(_are_different(table, other) for other in known.get(name, [])):
-            number += 1
-            name = f"{source} {number}"
-        known.setdefault(name, []).append(table)
-        if name != source:
-            part = _renamed(part, mask, sources=np.full(len(part), name))
-    return part
-
-
-def _are_different(table: Measurements, other: Measurements) -> bool:
-    """Whether two tables of one name hold different things in a row of the same number."""
-    common, mine, others = np.intersect1d(table.rows, other.rows, return_indices=True)
-    if len(common) == 0:
-        return False
-    pair = table.select(mine), other.select(others)
-    nameless = [replace(rows, group=np.full(len(rows), "")) for rows in pair]
-    return nameless[0].hash() != nameless[1].hash()
-
-
-def _called_after_file(part: Measurements) -> NDArray[np.bool_]:
-    """Mask (n,) of the rows whose set-up is called after its file."""
-    if part.default_group is None:
-        return np.zeros(len(part), dtype=np.bool_)
-    return np.asarray((part.default_group == part.group) & (part.default_group != ""))
-
-
-def _renamed(part: Measurements, mask: NDArray[np.bool_], **names: Texts) -> Measurements:
-    """The part with other texts (n,) in the rows of a mask, `group` or `sources`."""
-    if not mask.any():
-        return part
-    if "group" in names:
-        names["default_group"] = names["group"]
-    changes: dict[str, Any] = {key: np.where(mask, text, getattr(part, key)) for key, text in names.items()}
-    return replace(part, **changes)
 
 
 def _padded_targets(parts: Sequence[Measurements]) -> Floats:
@@ -458,6 +412,14 @@ def _joined_words(values: Sequence[tuple[Texts | None, int]]) -> Texts | None:
     if all(value is None for value, _ in values):
         return None
     return np.concatenate([np.full(count, "") if value is None else value for value, count in values])
+
+
+def _joined_tables(parts: Sequence[Measurements]) -> NDArray[np.int64] | None:
+    if all(part.tables is None for part in parts):
+        return None
+    return np.concatenate(
+        [np.zeros(len(part), dtype=np.int64) if part.tables is None else part.tables for part in parts]
+    )
 
 
 def _own_pairs(part: Measurements, number: int) -> Texts | None:

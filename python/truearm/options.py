@@ -1,6 +1,5 @@
 """What a calibration may be told: the options of the command line, with the same defaults."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final, Literal
@@ -75,16 +74,8 @@ class Options:
         kinds.required(self.split, SplitRule, "the split")
         kinds.required(self.scheme, SchemeOptions, "the scheme")
         kinds.settle(self, whole=("judge_target", "degree"), numbers=POSITIVE, flags=("refit",))
+        kinds.check_values(self, choices=CHOICES, positive=POSITIVE)
         object.__setattr__(self, "features", kinds.words(self.features, "features"))
-        for name, known in CHOICES.items():
-            value = getattr(self, name)
-            if value not in known:
-                words = " or ".join(str(choice) for choice in known if choice is not None)
-                raise UsageError(f'"{value}" is not known', where=name, rule=f"Either {words}")
-        for name in POSITIVE:
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < math.inf:
-                raise UsageError(f"{value}", where=name, rule="It must be positive and finite")
         if len(set(self.features)) < len(self.features):
             raise UsageError("a feature is named twice", where="features", rule="Each is named once")
         if self.features and self.model != "variable":

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from truearm.fitted_rows import FittedRows
 from truearm.measurements import Measurements
+from truearm.same_tables import called_as_files
 
 Arrays = dict[str, NDArray[Any]]
 
 NUMBERS: Final = ("readings", "targets", "orientations", "sigma_m", "distance_m", "rows")
-WORDS: Final = ("group", "sources", "anchor", "pair")
+CALLED: Final = "default_group"
+WORDS: Final = ("group", "sources", "anchor", "pair", CALLED)
 OUTCOMES: Final = ("side", "weight", "residual", "score", "distance_m")
 OF_DRIFT: Final = ("moved", "progress")
 
@@ -26,7 +28,7 @@ def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str,
         if value is not None:
             arrays[f"rows.{name}"] = value
     for name in WORDS:
-        value = getattr(rows.data, name)
+        value = _called_otherwise(rows.data) if name == CALLED else getattr(rows.data, name)
         if value is not None:
             known, index = np.unique(value, return_inverse=True)
             words[name] = known.tolist()
@@ -52,6 +54,7 @@ def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
         name: np.array(known, dtype=np.str_)[arrays[f"rows.{name}"]]
         for name, known in content["words"].items()
     }
+    words.setdefault(CALLED, called_as_files(words["group"], words["sources"]))
     fields: dict[str, Any] = dict.fromkeys(NUMBERS)
     fields |= {name: np.array(arrays[f"rows.{name}"]) for name in NUMBERS if f"rows.{name}" in arrays}
     columns = {name: arrays[f"rows.feature.{name}"] for name in content["features"]}
@@ -63,3 +66,9 @@ def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
     )
     known = [*OUTCOMES, *(name for name in OF_DRIFT if f"outcome.{name}" in arrays)]
     return FittedRows(data, **{name: np.array(arrays[f"outcome.{name}"]) for name in known})
+
+
+def _called_otherwise(data: Measurements) -> NDArray[np.str_] | None:
+    """What set-ups are called after their files (n,), "" where a column names them; None where names tell."""
+    called = np.full(len(data), "") if data.default_group is None else data.default_group
+    return None if np.array_equal(called, called_as_files(data.group, data.sources)) else called

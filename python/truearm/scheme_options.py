@@ -1,6 +1,5 @@
 """How the paper's schemes are fitted: options of `truearm calibrate --model regions|cmac|fcmac`."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -65,20 +64,10 @@ class SchemeOptions:
     table: int | None = None
 
     def __post_init__(self) -> None:
-        for name, known in KNOWN.items():
-            if getattr(self, name) not in known:
-                raise UsageError(
-                    f'"{getattr(self, name)}" is not known', where=name, rule=f"Either {' or '.join(known)}"
-                )
         kinds.settle(self, whole=WHOLE, numbers=("sigma_cells", "rate", "tolerance_mm", "demanded_mm"))
+        kinds.check_values(self, choices=KNOWN, positive=POSITIVE, not_negative=("demanded_mm",))
         for name in ("scheme_joints", "cells"):
             object.__setattr__(self, name, kinds.whole_numbers(getattr(self, name), name))
-        for name in POSITIVE:
-            value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                raise UsageError(f"{value}", where=name, rule="It must be positive and finite")
-        if not 0.0 <= self.demanded_mm < math.inf:
-            raise UsageError(f"{self.demanded_mm}", where="demanded_mm", rule="Zero or more, and finite")
         if not self.scheme_joints or len(set(self.scheme_joints)) < len(self.scheme_joints):
             raise UsageError(f"{list(self.scheme_joints)}", where="scheme_joints", rule="Each joint once")
         if self.cells and len(self.cells) != len(self.scheme_joints):

@@ -102,6 +102,7 @@ class SplitRule:
 
     def __post_init__(self) -> None:
         kinds.settle(self, whole=("seed", "train_size"), numbers=("holdout",), flags=("by_purpose",))
+        kinds.check_values(self, positive=("train_size",), not_negative=("seed",))
         object.__setattr__(self, "split_by", kinds.words(self.split_by, "split_by"))
         tail: object = self.holdout_range
         if tail is not None:
@@ -109,10 +110,6 @@ class SplitRule:
             kinds.required(read, HoldoutRange, "the range to hold out")
             object.__setattr__(self, "holdout_range", read)
         _check_share(self.holdout, "the share to hold out")
-        if self.seed < 0:
-            raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
-        if self.train_size is not None and self.train_size < 1:
-            raise UsageError(f"the train size is {self.train_size}", rule="It must be positive")
         if self.split_by and self.holdout_range is not None:
             raise UsageError(
                 "rows can be held out by columns or by a joint's range, not both",

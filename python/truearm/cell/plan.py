@@ -18,7 +18,7 @@ from truearm.columns import REPEAT, VALIDATE
 from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError, WorkError, count_of
 from truearm.identified import IdentifiedArm
-from truearm.kinds import settle
+from truearm.kinds import check_values, settle
 from truearm.planning.accessibility import Rule, accessible, lowest
 from truearm.planning.choosing import (
     CRITERIA,
@@ -72,17 +72,10 @@ class PlanOptions:
 
     def __post_init__(self) -> None:
         settle(self, whole=("count", "seed"), numbers=("sigma_mm",))
-        if not 0.0 < self.sigma_mm < np.inf:
-            raise UsageError(f"{self.sigma_mm:g}", where="--sigma-mm", rule="It must be positive and finite")
+        choices = {"order": ORDERS, "criterion": CRITERIA}
+        check_values(self, choices=choices, positive=("sigma_mm",), not_negative=("seed",))
         if self.count < 1:
             raise UsageError(count_of(self.count, "pose"), rule="At least one is planned")
-        if self.seed < 0:
-            raise UsageError(f"the seed is {self.seed}", rule="It must not be negative")
-        for name, known in (("order", ORDERS), ("criterion", CRITERIA)):
-            if getattr(self, name) not in known:
-                raise UsageError(
-                    f'"{getattr(self, name)}" is not known', where=name, rule=f"Either {' or '.join(known)}"
-                )
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Chain
 from truearm.errors import UsageError
+from truearm.kinds import check_values
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -32,10 +33,7 @@ class Configuration:
     wrist: Literal["noflip", "flip"] | None = None
 
     def __post_init__(self) -> None:
-        for name, known in WORDS.items():
-            value = getattr(self, name)
-            if value not in (None, *known):
-                raise UsageError(f'"{value}" is not known', where=name, rule=f"Either {' or '.join(known)}")
+        check_values(self, choices={name: (None, *known) for name, known in WORDS.items()})
 
     def holds(self, robot: Robot, readings: Floats) -> NDArray[np.bool_]:
         """Whether readings (n, N) are in this configuration, (n,)."""

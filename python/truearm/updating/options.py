@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from truearm.core_set import Use
 from truearm.defaults import LEVEL, OFFSET_DEG, TOOL_MM
 from truearm.errors import UsageError
-from truearm.kinds import settle
+from truearm.kinds import check_values, settle
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,7 @@ class UpdateOptions:
     def __post_init__(self) -> None:
         sizes = ("offset_deg", "offset_mm", "tool_mm", "tool_deg")
         settle(self, numbers=(*sizes, "level"), flags=("keep_frame", "keep_tool", "new_tool"))
-        for name in sizes:
-            if not getattr(self, name) > 0.0:
-                raise UsageError(f"{getattr(self, name)}", where=name, rule="It must be positive")
+        check_values(self, positive=sizes)
         if not 0.0 < self.level < 1.0:
             raise UsageError(f"{self.level}", where="level", rule="Between 0 and 1, such as 0.01")
         if self.keep_tool and self.new_tool:

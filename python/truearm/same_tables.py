@@ -1,0 +1,121 @@
+"""Which rows of several measurements were read from the same table, and what their set-ups are called."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from truearm.measurements import Measurements
+
+Texts = NDArray[np.str_]
+
+NAMES: Final = ("group0", "pair0")
+"""Columns of names, which tables are given other ones of when they are put together."""
+IDENTITY_BYTES: Final = 8
+
+
+def identities(data: "Measurements") -> NDArray[np.int64]:
+    """What tells the table of each row from others (n,): a hash of its name and of all that was read."""
+    content, found = data.hash(), np.zeros(len(data), dtype=np.int64)
+    for source in data.files:
+        digest = hashlib.sha256(f"{source}:{content}".encode()).digest()
+        found[data.sources == source] = int.from_bytes(digest[:IDENTITY_BYTES], "little", signed=True)
+    return found
+
+
+def called_as_files(group: Texts, sources: Texts) -> Texts:
+    """The set-ups (n,) that have the name of their file, whole or without folders and ending; else ""."""
+    stems = {source: PurePath(source).stem for source in set(sources.tolist())}
+    pairs = zip(group.tolist(), sources.tolist(), strict=True)
+    own = [name in (source, stems[source]) for name, source in pairs]
+    return np.where(own, group, "")
+
+
+def told_apart(parts: Sequence["Measurements"]) -> list["Measurements"]:
+    """The parts with different names for the set-ups of different files, where no column names them."""
+    known: dict[str, list[Measurements]] = {}
+    parts = [_own_table(part, known) for part in parts]
+    called = set[tuple[str, str]]()
+    for part in parts:
+        rows = _called_after_file(part)
+        called |= set(zip(part.group[rows].tolist(), part.sources[rows].tolist(), strict=True))
+    groups, sources = Counter(group for group, _ in called), Counter(source for _, source in called)
+    unclear = [source for group, source in called if groups[group] > 1 or sources[source] > 1]
+    return [
+        _renamed(part, _called_after_file(part) & np.isin(part.sources, unclear), group=part.sources)
+        for part in parts
+    ]
+
+
+def _own_table(part: "Measurements", known: dict[str, list["Measurements"]]) -> "Measurements":
+    """The part with a name of its own for each table that is called as another one; adds to `known`."""
+    unnamed, names = _called_after_file(part), part.sources
+    for source in list(dict.fromkeys(part.sources[unnamed].tolist())):
+        mask = unnamed & (part.sources == source)
+        table = part.select(mask)
+        name = _name(table, source, known)
+        known.setdefault(name, []).append(table)
+        names = np.where(mask, name, names)
+    return _renamed(part, unnamed & (names != part.sources), sources=names)
+
+
+def _name(table: "Measurements", source: str, known: dict[str, list["Measurements"]]) -> str:
+    """What a table is called: as rows of it that are known, else by its source, with a number if taken."""
+    for name, others in known.items():
+        shared = any(_share_a_table(table, other) for other in others)
+        if shared and not any(_are_different(table, other) for other in others):
+            return name
+    name, number = source, 1
+    while any(_are_different(table, other) for other in known.get(name, [])):
+        number += 1
+        name = f"{source} {number}"
+    return name
+
+
+def _are_different(table: "Measurements", other: "Measurements") -> bool:
+    """Whether two tables hold different things in a row of the same number, or nothing says they are one."""
+    common, mine, others = np.intersect1d(table.rows, other.rows, return_indices=True)
+    if len(common) == 0:
+        return not _share_a_table(table, other)
+    one, another = table.select(mine).content(), other.select(others).content()
+    both = [name for name in one.columns if name in another.columns and name not in NAMES]
+    return not all(_agree(one[name].to_numpy(), another[name].to_numpy()) for name in both)
+
+
+def _share_a_table(table: "Measurements", other: "Measurements") -> bool:
+    """Whether rows of both were read at once from one table."""
+    if table.tables is None or other.tables is None:
+        return False
+    return bool(np.isin(table.tables, other.tables).any())
+
+
+def _agree(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Whether two columns hold the same; one that is empty was added when tables were put together."""
+    if one.dtype.kind == "O":
+        return not ((one != "").any() and (other != "").any()) or np.array_equal(one, other)
+    first, second = (np.asarray(column, dtype=np.float64) for column in (one, other))
+    empty = np.isnan(first).all() or np.isnan(second).all()
+    return bool(empty) or np.array_equal(first, second, equal_nan=True)
+
+
+def _called_after_file(part: "Measurements") -> NDArray[np.bool_]:
+    """Mask (n,) of the rows whose set-up is called after its file."""
+    if part.default_group is None:
+        return np.zeros(len(part), dtype=np.bool_)
+    return np.asarray((part.default_group == part.group) & (part.default_group != ""))
+
+
+def _renamed(part: "Measurements", mask: NDArray[np.bool_], **names: Texts) -> "Measurements":
+    """The part with other texts (n,) in the rows of a mask, `group` or `sources`."""
+    if not mask.any():
+        return part
+    if "group" in names:
+        names["default_group"] = names["group"]
+    changes: dict[str, Any] = {key: np.where(mask, text, getattr(part, key)) for key, text in names.items()}
+    return replace(part, **changes)
