@@ -175,6 +175,12 @@ class Wires:
         self._share = 1
 
 
+def heads_for(world, readings):
+    """Whether the arm is on its way to a place, rad."""
+    with_end = world.arm.at(world.arm.ends())
+    return bool(world.arm.speed(world.shared.now()).any()) and np.allclose(with_end, readings)
+
+
 def assert_stands(world):
     """The arm neither moves nor begins to."""
     motions = world.arm.ends()

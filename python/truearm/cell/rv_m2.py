@@ -121,7 +121,10 @@ class RvM2(Managed):
             return readings_of(self._known_count())
 
     def stop(self) -> None:
-        """See Device. No further increment is sent; the one under way ends by itself, and is waited for."""
+        """See Device. No further increment is sent; the one under way ends by itself, and is waited for.
+
+        The way to the origin, on connecting, ends by itself as well, but is not waited for: no command ends it.
+        """
         self._port.end_waits(self._busy)
         time.sleep(max(0.0, self._still_at - time.monotonic()))
 
