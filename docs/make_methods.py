@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from truearm.studies.accuracy.methods import TITLES
-from truearm.studies.accuracy.page import sections, table
+from truearm.studies.accuracy.page import sections
 from truearm.studies.accuracy.splits import TITLES as SPLITS
 from truearm.studies.accuracy.summary import LEVEL
+from truearm.studies.markdown import table
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "explanations" / "comparison-of-methods.md"

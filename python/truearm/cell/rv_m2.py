@@ -123,7 +123,7 @@ class RvM2(Managed):
     def stop(self) -> None:
         """See Device. No further increment is sent; the one under way ends by itself, and is waited for.
 
-        The way to the origin, on connecting, ends by itself as well, but is not waited for: no command ends it.
+        The way to the origin, on connecting, ends by itself too, and is not waited for: no command ends it.
         """
         self._port.end_waits(self._busy)
         time.sleep(max(0.0, self._still_at - time.monotonic()))
