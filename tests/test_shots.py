@@ -112,7 +112,7 @@ def test_jitter_while_the_arm_stands_is_no_approach_and_no_scatter(calibration):
     sides = [np.unique(found.approach[mine], axis=0) for mine in found.poses()]
     assert all(len(side) == 1 for side in sides)
     expected = 1e3 * OF_A_SHOT_M * np.sqrt(8.0 / np.pi)
-    assert found.distances_mm().mean() == pytest.approx(expected, rel=0.15)
+    assert (found.widened() * found.distances_mm()).mean() == pytest.approx(expected, rel=0.15)
 
 
 def test_poses_that_others_lie_between_did_not_stay(arm):
