@@ -387,12 +387,13 @@ def test_ctrl_c_in_any_state_ends_within_two_seconds(tmp_path):
     poses, session, slowest_s = tmp_path / "poses.csv", tmp_path / "session.db", 0.0
     write_poses(poses, poses_of(Cell.from_toml(text), sized(60, 600), seed=2))
     states: collections.Counter[str] = collections.Counter()
+    origin = np.radians(tomllib.loads(text)["robot"]["origin_deg"])
     with virtual(text) as (running, found):
         (tmp_path / "cell.toml").write_text(found)
         for moment in moments(count, sized(2.0, 10.0), seed=3):
             seconds, state = interrupted(tmp_path / "cell.toml", poses, session, running.world, moment)
             slowest_s, states = max(slowest_s, seconds), states + collections.Counter(state)
-            if heads_for(running.world, np.zeros(5)):
+            if heads_for(running.world, origin):
                 # No command of the RV-M2 ends the way to the origin, on which connecting sends it.
                 states[HOMING] += 1
             else:
