@@ -28,8 +28,9 @@ from truearm.cell.movemaster import parse_numbers
 from truearm.cell.patterns import expression_for, filled, numbers_in
 from truearm.cell.session import Stored
 from truearm.cell.stretches import boundaries
-from truearm.cell.table_panel import PanelSection
+from truearm.cell.table_panel import PanelSection, TablePanel
 from truearm.cell.virtual.line_devices import answer_for
+from truearm.cell.ways import Way
 from truearm.errors import InputError
 from truearm.robot import Robot
 
@@ -253,6 +254,25 @@ def test_what_ended_a_way_is_raised_where_the_sensor_fails_too():
     with pytest.raises(EmergencyStopError, match="pressed"):
         crew._together([np.zeros(5)], Mock())
     assert noted == [("failed", "stop sensor: table: no answer.")]
+
+
+@pytest.mark.parametrize(
+    ("waits", "order"),
+    [(False, ["go_to", "move_joints", "prepare"]), (True, ["go_to", "prepare", "move_joints"])],
+)
+def test_arm_and_table_go_one_after_the_other(waits, order):
+    done: list[str] = []
+    table = Mock(spec=TablePanel, carriage=np.zeros(3))
+    cell = Mock(arm=Robot.load("rv-m2"), sensor=table)
+    cell.robot.read_joints.return_value = np.zeros(5)
+    for device, action in ((cell.robot, "move_joints"), (table, "go_to"), (table, "prepare")):
+        setattr(device, action, Mock(side_effect=lambda *_, action=action: done.append(action)))
+    crew = Crew(cell, Mock(), threading.Event())
+    crew.connect()
+    crew._ways = Mock()
+    crew._ways.to.return_value = Way([np.ones(5)], [np.ones(3)], waits=waits)
+    crew.go([np.ones(5)], Mock(), np.eye(4))
+    assert done == order
 
 
 def test_joints_that_are_no_numbers_are_an_error_of_the_device():

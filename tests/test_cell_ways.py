@@ -14,7 +14,7 @@ from truearm.cell.plan import PlanOptions, plan_poses
 from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
 from truearm.cell.reaching import within_reach
-from truearm.cell.rehearsal import Walk, rehearse
+from truearm.cell.rehearsal import Walk, problem_of, rehearse
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.ways import Ways
@@ -94,6 +94,53 @@ def test_a_table_that_stands_too_near_may_leave():
     )
     assert found.over is not None
     assert found.over[0][2] < near[2]
+
+
+def legs(found, here, start, end):
+    """What moves one after another: from and to of the arm, from and to of the carriage."""
+    arm, before = [here, *found.arm], [start, *found.over, *([end] if found.waits else [])]
+    return (
+        [(here, here, a, b) for a, b in pairwise(before)]
+        + [(a, b, before[-1], before[-1]) for a, b in pairwise(arm)]
+        + [(arm[-1], arm[-1], before[-1], end)]
+    )
+
+
+def least_gaps(clearance, frame, moves):
+    """Least gap between link and column, and between tool and plate, as all of the moves are made."""
+    share = np.linspace(0.0, 1.0, 41)[:, None]
+    gaps = [clearance.gaps(a + share * (b - a), c + share * (d - c), frame) for a, b, c, d in moves]
+    return np.concatenate(gaps).min(axis=0)
+
+
+def test_the_arm_goes_first_where_it_rises_and_the_table_where_it_comes_down():
+    cell = Cell.from_toml(cell_text())
+    table, prediction = cell.sensor, Prediction(cell)
+    assert isinstance(table, TablePanel)
+    frame = prediction.world_from_base
+    assert frame is not None
+    prediction.register(frame, 0.0)
+    clearance = Clearance(cell.arm, cell.flange_from_target, table.panel, cell.file.clearance)
+    rng, radius, ways = np.random.default_rng(0), prediction.radius_m, []
+    for here in poses_of(cell, 40, seed=1).readings:
+        there = here + np.radians(rng.uniform(-2.0, 2.0, 5))
+        steps = [Step(0, "pose", 0, "", 0, readings) for readings in (here, there)]
+        if problem_of(cell, prediction, steps[1]):
+            continue
+        places = [prediction.expected(step) for step in steps]
+        start, end = (table.carriage_for(each) for each in places)
+        found = Ways(cell, table).to(
+            [there], places[1], here=here, carriage=start, refuge=here, world_from_base=frame
+        )
+        rises = places[1].point_in_world[2] > places[0].point_in_world[2]
+        ways.append("together" if found.over is None else "around" if found.over else (rises, found.waits))
+        if found.over is not None:
+            links, tool = least_gaps(clearance, frame, legs(found, here, start, end))
+            assert links > 1e-3 * cell.file.clearance.margin_mm + radius
+            assert tool > radius
+    assert ways.count((True, False)) > 5
+    assert ways.count((False, True)) > 5
+    assert ways.count("around") + ways.count((True, True)) + ways.count((False, False)) < 5
 
 
 def test_no_table_no_problem():

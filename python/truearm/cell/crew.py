@@ -102,9 +102,12 @@ class Crew:
         for place in found.over:
             self.raise_if_halted()
             table.go_to(place)
-        self._along(found.arm)
+        if not found.waits:
+            self._along(found.arm)
         self.raise_if_halted()
         table.prepare(expected)
+        if found.waits:
+            self._along(found.arm)
 
     def _together(self, way: list[Floats], expected: Expected) -> None:
         self.raise_if_halted()

@@ -50,6 +50,12 @@ class Panel:
         """Out of the face, towards the pin (3,)."""
         return np.asarray(self.axes[:, 2])
 
+    @cached_property
+    def _normal(self) -> list[float]:
+        """The normal in plain numbers, which are quicker than arrays for so few."""
+        numbers: list[float] = self.normal.tolist()
+        return numbers
+
     def point(self, carriage: Sequence[float], u: float, v: float) -> Floats:
         """The point in the table's frame (3,) that the panel shows at counts u, v, m."""
         places = zip(carriage, self._corner_and_metres_of_counts, strict=True)
@@ -59,7 +65,6 @@ class Panel:
     def _corner_and_metres_of_counts(self) -> list[list[float]]:
         """Along each axis of the table: the offset, and what a count of u and of v adds, m."""
         by_counts = self.axes[:, :2] * (self.area_m / self.counts)
-        # Plain numbers are quicker than arrays for so few.
         table: list[list[float]] = np.column_stack([self.offset_m, by_counts]).tolist()
         return table
 
@@ -92,4 +97,5 @@ class Panel:
 
     def angle(self, pointing: Floats) -> float:
         """Angle between the face and a pin along a unit vector (3,), rad; positive from the front."""
-        return math.asin(min(1.0, max(-1.0, -float(pointing @ self.normal))))
+        against = -sum([a * b for a, b in zip(pointing.tolist(), self._normal, strict=True)])
+        return math.asin(min(1.0, max(-1.0, against)))

@@ -90,9 +90,10 @@ class RvM2(Managed):
 
     def move_joints(self, readings: Floats) -> None:
         """See Robot. The arm ends at whole tenths of a degree."""
-        if not np.isfinite(readings).all():
+        wanted = np.asarray(readings)
+        if not all(map(math.isfinite, wanted.tolist())):
             raise RefusedError("readings that are no numbers", where=self._port.where)
-        target = tenths(np.asarray(readings))
+        target = tenths(wanted)
         self._check_limits(target)
         with self._busy:
             legs = math.ceil(_longest(_apart(target, self._known_count())) / self._leg)

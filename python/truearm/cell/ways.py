@@ -25,17 +25,20 @@ class Way(NamedTuple):
     Attributes:
         arm: Readings (N,) that the arm goes through, one after another.
         over: Places (3,) that the carriage goes to before, m; None where both go at the same time.
+        waits: Whether the carriage is in its place before the arm comes, and not after it.
     """
 
     arm: list[Floats]
     over: list[Floats] | None
+    waits: bool = False
 
 
 class Ways:
     """A table moves together with the arm where they cannot meet on the way.
 
-    Else it goes out of the way first, no farther than it has to, and comes when the arm is there; and if that
-    does not help either, the arm goes by a refuge, where it was at first.
+    Else one of them goes first. If that does not help the table goes out of the way, no farther than it has
+    to, and comes when the arm is there; and if that does not help either, the arm goes by a refuge, where it
+    was at first.
     """
 
     def __init__(self, cell: Cell, table: TablePanel) -> None:
@@ -71,15 +74,22 @@ class Ways:
         def apart(arm: Floats, carriages: Floats) -> bool:
             return self._clearance.margin(arm, carriages, world_from_base) > expected.radius_m
 
-        for first, over in self._detours(way, carriage, end, refuge):
-            arm = np.array([here, *first])
-            if self._together and apart(arm, direct):
-                return Way(first, None)
-            by = np.array([carriage, *over, end])
-            if not (apart(arm, by[-2:-1]) and apart(arm[-1:], by[-2:])):
+        for found in self._possible(way, carriage, end, refuge):
+            arm = np.array([here, *found.arm])
+            if found.over is None:
+                if apart(arm, direct):
+                    return found
                 continue
-            if apart(arm[:1], by[:-1]) or self._leads_away(arm[:1], by[:-1], world_from_base):
-                return Way(first, over)
+            before = np.array([carriage, *found.over, end] if found.waits else [carriage, *found.over])
+            stays, comes = before[-1:], np.array([before[-1], end])
+            if not (apart(arm, stays) and (found.waits or apart(arm[-1:], comes))):
+                continue
+            if (
+                len(before) == 1
+                or apart(arm[:1], before)
+                or self._leads_away(arm[:1], before, world_from_base)
+            ):
+                return found
         raise RefusedError("link or tool would meet the table on every way there", where="the arm")
 
     def _leads_away(self, arm: Floats, by: Floats, world_from_base: Floats) -> bool:
@@ -90,13 +100,18 @@ class Ways:
         now = self._clearance.margin(arm, by[:1], world_from_base)
         return self._clearance.margin(arm, by, world_from_base) > now - LEAVES_WITHIN_M
 
-    def _detours(
-        self, way: list[Floats], carriage: Floats, end: Floats, refuge: Floats
-    ) -> Iterator[tuple[list[Floats], list[Floats]]]:
-        """Ways of the arm, each with places that the carriage goes to before."""
+    def _possible(self, way: list[Floats], carriage: Floats, end: Floats, refuge: Floats) -> Iterator[Way]:
+        """Ways to try, the quickest first."""
+        if self._together:
+            yield Way(way, None)
+        yield Way(way, [])
+        yield Way(way, [], waits=True)
         for depth in DEPTHS_M:
-            yield way, [self._table.lowered(carriage, depth)]
+            yield Way(way, [self._table.lowered(carriage, depth)])
         low = self._table.released(carriage)
-        yield way, [low]
-        yield way, [low, self._table.released(end)]
-        yield [refuge, *way], [low]
+        yield Way(way, [low])
+        yield Way(way, [low, self._table.released(end)])
+        roundabout = [refuge, *way]
+        if self._together:
+            yield Way(roundabout, None)
+        yield Way(roundabout, [low])
