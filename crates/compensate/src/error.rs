@@ -31,6 +31,18 @@ pub enum CompensateError {
         /// Its value.
         value: f64,
     },
+    /// Joint limits between which no reading lies.
+    #[error(
+        "the limits of joint {joint} are {low} and {high}: give the lowest reading first; infinity is none"
+    )]
+    JointLimits {
+        /// Joint from 1.
+        joint: usize,
+        /// Lowest reading, rad or m.
+        low: f64,
+        /// Highest reading.
+        high: f64,
+    },
     /// Moving joints that the arm does not have, or none.
     #[error("joints {moving:?} (from 0) are to move, it must be some of the arm's {joints}, ascending")]
     Moving {

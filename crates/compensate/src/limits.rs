@@ -58,6 +58,11 @@ impl Limits {
             let (found, expected) = (self.joints.len(), joints);
             return Err(CompensateError::Length { what: "the joint limits", found, expected });
         }
+        for (joint, &[low, high]) in (1..).zip(&self.joints) {
+            if low.is_nan() || high.is_nan() || low > high {
+                return Err(CompensateError::JointLimits { joint, low, high });
+            }
+        }
         check_bounds(&[
             ("the largest joint correction", self.largest_angle),
             ("the largest joint correction", self.largest_slide),

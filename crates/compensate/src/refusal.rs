@@ -79,6 +79,12 @@ impl fmt::Display for Refusal {
             Reason::JointCorrection => above(out, &format!("joint {joint} would change"), unit, self),
             Reason::Shift => above(out, "the correction shifts the tool", MM, self),
             Reason::Turn => above(out, "the correction turns the tool", DEG, self),
+            Reason::Spread if value.is_nan() => write!(
+                out,
+                "the calibration has no standard deviation to compare with the {} that are allowed: infinity switches \
+                 the bound off",
+                MM.of(limit)
+            ),
             Reason::Spread => above(out, "the calibration is uncertain (one standard deviation)", MM, self),
             Reason::ShiftChange => {
                 above(out, "over the way from the waypoint before, the shift changes", MM, self)

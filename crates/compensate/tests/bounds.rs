@@ -72,7 +72,24 @@ fn the_other_bounds() {
     refuses(limits(Limits { largest_shift: 1e-6, ..base() }), Reason::Shift);
     refuses(limits(Limits { largest_turn: 1e-6, ..base() }), Reason::Turn);
     // Without knowledge of the uncertainty a bound on it cannot be kept.
-    refuses(limits(Limits { largest_std: 1e-3, ..base() }), Reason::Spread);
+    let text = refuses(limits(Limits { largest_std: 1e-3, ..base() }), Reason::Spread);
+    assert!(text.contains("has no standard deviation to compare with the 1.0000 mm"), "{text}");
+}
+
+#[test]
+fn joint_limits_between_which_nothing_lies() {
+    for wrong in [[f64::NAN, 1.0], [-1.0, f64::NAN], [1.0, -1.0]] {
+        let joints = [vec![[f64::NEG_INFINITY, f64::INFINITY]; 5], vec![wrong]].concat();
+        let scene = scene();
+        let made = Corrector::new(
+            scene.calibrated(),
+            scene.programming(),
+            &tool(),
+            limits(Limits { joints, ..Limits::default() }),
+        );
+        let said = made.map(drop).unwrap_err().to_string();
+        assert!(said.contains("the limits of joint 6 are"), "{said}");
+    }
 }
 
 #[test]

@@ -11,6 +11,7 @@ use truearm_kinematics::is_length;
 
 use crate::alike::leave_targets_open;
 use crate::dense::Cholesky;
+use crate::distance::Distance;
 use crate::layout::{Layout, Problem, TARGET_PRECISION};
 use crate::measurements::Noise;
 use crate::minimise::{Minimum, Objective, Reason, State};
@@ -100,6 +101,7 @@ const SCALE_RANGE: (f64, f64) = (0.1, 5.0);
 /// the set-up, or on request.
 pub fn fit_constant(problem: &Problem, options: &ConstantOptions) -> Result<ConstantFit, EstimateError> {
     problem.check(options.prior.is_some())?;
+    check_noise(problem, options.noise)?;
     let nominal = problem.chain.nominal();
     let parameters = options.parameters.clone().unwrap_or_else(|| nominal.clone());
     let sets = parameters.len() / nominal.len();
@@ -112,8 +114,23 @@ pub fn fit_constant(problem: &Problem, options: &ConstantOptions) -> Result<Cons
         Some(setup) => setup.clone(),
         None => initial_setup(problem, &parameters)?,
     };
+    setup.check_steps(&Layout::new(problem))?;
     let fit = Fit { problem, options, packets: &Packets::new(problem.measurements), nominal: &nominal };
     fit.run(State { parameters, setup })
+}
+
+/// Known noise is positive; that of orientations counts where there are some.
+fn check_noise(problem: &Problem, noise: Option<Noise>) -> Result<(), EstimateError> {
+    let Some(noise) = noise else { return Ok(()) };
+    let turned =
+        problem.measurements.has_rotations().then_some(("the noise of orientations", noise.orientation));
+    for (what, value) in [("the noise of positions", noise.position)].into_iter().chain(turned) {
+        if !(value > 0.0 && value.is_finite()) {
+            let rule = "a known noise is positive: give it in m and rad, or none to estimate it";
+            return Err(EstimateError::Option { what, value, rule });
+        }
+    }
+    Ok(())
 }
 
 struct Fit<'a> {
@@ -213,14 +230,15 @@ impl Fit<'_> {
         {
             matrix[(arm + k, arm + k)] += known.max(ROUNDING * matrix[(arm + k, arm + k)]);
         }
-        let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
-        let scaled = Mat::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-        let factor = Cholesky::new(scaled, Par::Seq).ok_or_else(|| EstimateError::Singular {
-            unknowns: n,
-            rows: self.problem.measurements.measured_values(),
-        })?;
-        let inverse = factor.inverse();
-        Ok(Mat::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+        if let Some(covariance) = inverse(&matrix) {
+            return Ok(covariance);
+        }
+        if self.options.prior.is_some() {
+            // Beside exact data the prior of confounded parameters is lost in rounding.
+            (0..arm).for_each(|k| matrix[(k, k)] *= 1.0 + ROUNDING);
+        }
+        let rows = self.problem.measurements.measured_values();
+        inverse(&matrix).ok_or(EstimateError::Singular { unknowns: n, rows })
     }
 
     fn renewed(&self, old: &Balance, minimum: &Minimum, covariance: &Mat<f64>, residuals: &[f64]) -> Balance {
@@ -281,7 +299,9 @@ impl Fit<'_> {
         let set = self.problem.measurements;
         let (mut position, mut orientation) = (Squares::default(), Squares::default());
         if set.is_distances() {
-            for (distance, residual) in set.distances.iter().zip(residuals) {
+            let counts = |distance: &Distance| set.weight[distance.pose] > 0.0;
+            let measured = set.distances.iter().zip(residuals);
+            for (distance, residual) in measured.filter(|(distance, _)| counts(distance)) {
                 let own = set.sigma[distance.pose].powi(2);
                 position.push(residual * residual, own, weights[distance.pose]);
             }
@@ -367,6 +387,15 @@ impl Fit<'_> {
             && set.sigma.iter().all(|&sigma| sigma == 0.0)
             && self.options.robust.is_none_or(|robust| robust == Robust::None)
     }
+}
+
+/// Inverse of a symmetric matrix (n, n), scaled to a unit diagonal on the way; `None` where it is not positive definite.
+fn inverse(matrix: &Mat<f64>) -> Option<Mat<f64>> {
+    let n = matrix.nrows();
+    let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].max(f64::MIN_POSITIVE).sqrt().recip()).collect();
+    let scaled = Mat::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let inverse = Cholesky::new(scaled, Par::Seq)?.inverse();
+    Some(Mat::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
 /// Share of a diagonal entry below which a pivot of the normal equations is nothing but rounding.

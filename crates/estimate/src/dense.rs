@@ -1,4 +1,4 @@
-//! Cholesky factors of symmetric positive definite matrices, with the parallelism said by the caller.
+//! Factors of matrices: Cholesky's with the parallelism said by the caller, others by one thread.
 //!
 //! faer's results do not depend on the number of threads for the routines used here except when it solves
 //! for a single right-hand side, which is therefore always done sequentially.
@@ -6,6 +6,8 @@
 use faer::diag::Diag;
 use faer::linalg::cholesky::llt::{factor, inverse};
 use faer::linalg::matmul::matmul;
+use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
+use faer::linalg::qr::no_pivoting::solve::{solve_lstsq_in_place, solve_lstsq_in_place_scratch};
 use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
@@ -94,6 +96,54 @@ impl Cholesky {
     }
 }
 
+/// Factors Q R of a matrix (m, n) with orthonormal Q, found and used by one thread.
+#[derive(Debug, Clone)]
+pub struct Orthogonal {
+    /// R on and above the diagonal, Householder's reflections that make Q below it, (m, n).
+    reflections: Mat<f64>,
+    /// Their coefficients, block by block.
+    coefficients: Mat<f64>,
+}
+
+impl Orthogonal {
+    /// Factors a matrix.
+    pub fn new(mut matrix: Mat<f64>) -> Self {
+        let (m, n) = matrix.shape();
+        let block = recommended_block_size::<f64>(m, n);
+        let mut coefficients = Mat::zeros(block, m.min(n));
+        let scratch = qr_in_place_scratch::<f64>(m, n, block, Par::Seq, Default::default());
+        let mut memory = faer::dyn_stack::MemBuffer::new(scratch);
+        let stack = faer::dyn_stack::MemStack::new(&mut memory);
+        qr_in_place(matrix.as_mut(), coefficients.as_mut(), Par::Seq, stack, Default::default());
+        Self { reflections: matrix, coefficients }
+    }
+
+    /// R without rows of zeros, (min(m, n), n).
+    pub fn upper(&self) -> Mat<f64> {
+        let (m, n) = self.reflections.shape();
+        Mat::from_fn(m.min(n), n, |i, j| if i <= j { self.reflections[(i, j)] } else { 0.0 })
+    }
+
+    /// The x (n,) that makes the matrix times x come nearest to `right` (m,), of no fewer rows than columns of full rank.
+    pub fn least_squares(&self, right: &[f64]) -> Vec<f64> {
+        let ((m, n), block) = (self.reflections.shape(), self.coefficients.nrows());
+        let mut solution = column(right);
+        let scratch = solve_lstsq_in_place_scratch::<f64>(m, n, block, 1, Par::Seq);
+        let mut memory = faer::dyn_stack::MemBuffer::new(scratch);
+        let stack = faer::dyn_stack::MemStack::new(&mut memory);
+        let factors = self.reflections.as_ref();
+        solve_lstsq_in_place(
+            factors,
+            self.coefficients.as_ref(),
+            factors,
+            solution.as_mut(),
+            Par::Seq,
+            stack,
+        );
+        (0..n).map(|i| solution[(i, 0)]).collect()
+    }
+}
+
 /// `left^T right`, by one thread: tall matrices of few columns gain nothing by more, and sum in another order with each.
 pub fn transposed_product(left: MatRef<f64>, right: MatRef<f64>) -> Mat<f64> {
     let mut out = Mat::zeros(left.ncols(), right.ncols());
@@ -162,6 +212,22 @@ mod tests {
         let solution = Cholesky::new(a.clone(), Par::Seq).unwrap().solve_vector(&right);
         let error = (&a * column(&solution) - column(&right)).norm_max();
         assert!(error < 1e-10, "{error}");
+    }
+
+    #[test]
+    fn least_squares_leave_a_rest_across_all_columns() {
+        for (m, n) in [(7, 3), (300, 40), (30, 30)] {
+            let a = Mat::from_fn(m, n, |i, j| {
+                ((3 * i + 7 * j * j) as f64).sin() + if i == j { 3.0 } else { 0.0 }
+            });
+            let right: Vec<f64> = (0..m).map(|i| (i as f64).cos()).collect();
+            let factors = Orthogonal::new(a.clone());
+            let rest = &a * column(&factors.least_squares(&right)) - column(&right);
+            assert!((a.transpose() * rest).norm_max() < 1e-10);
+            let upper = factors.upper();
+            assert_eq!(upper.shape(), (n, n));
+            assert!((upper.transpose() * &upper - a.transpose() * &a).norm_max() < 1e-10);
+        }
     }
 
     #[test]

@@ -48,6 +48,29 @@ pub enum EstimateError {
         /// The first pose concerned.
         pose: usize,
     },
+    /// A set-up is that of other measurements.
+    #[error(
+        "the set-up has {found} {what} where the measurements need {expected}: give the set-up of a fit to them"
+    )]
+    Setup {
+        /// What there are too few or too many of.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
+    /// Link parameters are those of another arm or of other poses.
+    #[error(
+        "the link parameters have {found} values where {expected} are needed, or as many for each pose: give five for \
+         each link"
+    )]
+    Parameters {
+        /// How many there are.
+        found: usize,
+        /// Those of one set.
+        expected: usize,
+    },
     /// An option is out of its range.
     #[error("{what} is {value}, but {rule}")]
     Option {

@@ -10,10 +10,10 @@
 //! on no other link, and the base's row likewise. Offered so, the paper's arm keeps exactly the paper's fifteen;
 //! with all five parameters of each row the rank is the same, but others take the place of some of them.
 
-use faer::linalg::solvers::{Qr, SolveLstsq};
 use faer::{Mat, MatRef, concat};
 
 use crate::EstimateError;
+use crate::dense::{Orthogonal, singular_values};
 use crate::distance;
 use crate::layout::{Layout, Problem};
 use crate::rows::{Linearised, Point, linearise};
@@ -53,9 +53,10 @@ pub struct Identifiability {
     pub condition: f64,
 }
 
-/// Asks the measurements' poses, at given link parameters (5 L,) and set-up.
+/// Asks the measurements' poses, at given link parameters (5 L,), or one set a pose (n, 5 L), and set-up.
 ///
 /// # Errors
+/// [`EstimateError::Parameters`], [`EstimateError::Setup`] where these are another problem's,
 /// [`EstimateError::Kinematics`].
 pub fn identifiability(
     problem: &Problem,
@@ -63,11 +64,12 @@ pub fn identifiability(
     setup: &Setup,
 ) -> Result<Identifiability, EstimateError> {
     let point = Point { parameters, setup };
+    point.check(problem)?;
     let layout = Layout::new(problem);
     let columns = if problem.measurements.is_distances() {
         dense_distances(problem, &layout, point)?
     } else {
-        folded_rows(problem, &layout, &linearise(problem, point))
+        folded_rows(problem, &layout, &linearise(problem, point)?)
     };
     Ok(in_order(columns.as_ref(), layout.len() - layout.arm))
 }
@@ -87,7 +89,7 @@ fn folded_rows(problem: &Problem, layout: &Layout, rows: &Linearised) -> Mat<f64
     let poses: Vec<usize> = (0..problem.measurements.pose_count()).collect();
     let mut parts = poses.chunks(POSES).map(|some| dense_rows(problem, layout, rows, some));
     let first = parts.next().unwrap_or_else(|| Mat::zeros(0, layout.len()));
-    parts.fold(first, |above, below| concat![[above], [below]].qr().thin_R().to_owned())
+    parts.fold(first, |above, below| Orthogonal::new(concat![[above], [below]]).upper())
 }
 
 /// Scaled columns, set-up first: rows of some poses, in mm (orientation rows at 300 mm).
@@ -164,7 +166,7 @@ fn independent(columns: MatRef<f64>) -> Vec<usize> {
 pub fn in_order(columns: MatRef<f64>, own: usize) -> Identifiability {
     let accepted = independent(columns);
     let independent = Mat::from_fn(columns.nrows(), accepted.len(), |row, k| columns[(row, accepted[k])]);
-    let factors = independent.qr();
+    let factors = Orthogonal::new(independent.clone());
     let undetermined = (own..columns.ncols())
         .filter(|column| !accepted.contains(column))
         .map(|column| confounded(columns, &factors, &accepted, own, column))
@@ -173,20 +175,19 @@ pub fn in_order(columns: MatRef<f64>, own: usize) -> Identifiability {
         determined: accepted.iter().filter(|&&column| column >= own).map(|column| column - own).collect(),
         undetermined,
         total_rank: accepted.len(),
-        condition: condition(&independent),
+        condition: condition(independent.as_ref()),
     }
 }
 
 fn confounded(
     columns: MatRef<f64>,
-    factors: &Qr<f64>,
+    factors: &Orthogonal,
     accepted: &[usize],
     own: usize,
     column: usize,
 ) -> Confounded {
-    let target = Mat::from_fn(columns.nrows(), 1, |row, _| columns[(row, column)]);
-    let solution = factors.solve_lstsq(target);
-    let parts = accepted.iter().enumerate().map(|(k, &source)| (source, solution[(k, 0)]));
+    let target: Vec<f64> = (0..columns.nrows()).map(|row| columns[(row, column)]).collect();
+    let parts = accepted.iter().copied().zip(factors.least_squares(&target));
     let noteworthy: Vec<(usize, f64)> = parts.filter(|part| part.1.abs() > NOTEWORTHY).collect();
     Confounded {
         column: column - own,
@@ -195,13 +196,11 @@ fn confounded(
     }
 }
 
-fn condition(columns: &Mat<f64>) -> f64 {
-    match columns.singular_values() {
-        Ok(values) => match (values.first(), values.last()) {
-            (Some(largest), Some(smallest)) => largest / smallest,
-            _ => 1.0,
-        },
-        Err(_) => f64::INFINITY,
+fn condition(columns: MatRef<f64>) -> f64 {
+    let Some(values) = singular_values(columns) else { return f64::INFINITY };
+    match (values.first(), values.last()) {
+        (Some(largest), Some(smallest)) => largest / smallest,
+        _ => 1.0,
     }
 }
 

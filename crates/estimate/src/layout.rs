@@ -30,10 +30,11 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// Whatever [`MeasurementSet::check`] finds, [`EstimateError::Option`] where joints or columns are not the
-    /// chain's, and [`EstimateError::TooFew`].
+    /// chain's or numbers of groups or anchors cannot be right, and [`EstimateError::TooFew`].
     pub fn check(&self, columns_have_prior: bool) -> Result<(), EstimateError> {
         self.measurements.check()?;
         self.check_chain()?;
+        self.check_counts()?;
         let layout = Layout::new(self);
         let per_pose = self.measurements.rows_per_pose().max(1);
         for group in 0..self.measurements.group_count {
@@ -63,6 +64,22 @@ impl Problem<'_> {
 }
 
 impl Problem<'_> {
+    /// Groups and anchors that nothing was measured in cannot be fitted; so many of them would fill the memory.
+    fn check_counts(&self) -> Result<(), EstimateError> {
+        let (set, refuse) = (self.measurements, |what, value, rule| {
+            Err(EstimateError::Option { what, value: value as f64, rule })
+        });
+        if set.group_count > set.pose_count() {
+            let rule = "each group needs a pose of its own: number them from 0 without gaps";
+            return refuse("the number of groups", set.group_count, rule);
+        }
+        if set.anchor_count > set.distances.len() {
+            let rule = "each anchor needs a distance of its own: number them from 0 without gaps";
+            return refuse("the number of anchors", set.anchor_count, rule);
+        }
+        Ok(())
+    }
+
     fn check_chain(&self) -> Result<(), EstimateError> {
         let refuse = |what, value, rule| Err(EstimateError::Option { what, value: value as f64, rule });
         if self.measurements.joint_count != self.chain.joint_count() {

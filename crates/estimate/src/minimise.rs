@@ -64,6 +64,10 @@ pub struct Minimum {
 const ITERATION_LIMIT: usize = 60;
 const FIRST_DAMPING: f64 = 1e-9;
 const LARGEST_DAMPING: f64 = 1e10;
+/// From this iteration on damping may fall lower: where data is almost exact, the prior alone moves confounded unknowns, and
+/// it is weaker than the first damping.
+const LATE: usize = 30;
+const LATE_DAMPING: f64 = 1e-14;
 /// A step that promises less than this share of the cost is the last one; convergence is quadratic.
 const SHARE_OF_COST: f64 = 1e-9;
 /// A step below this (m, rad) is the last one even where the cost is zero.
@@ -133,11 +137,14 @@ impl Objective<'_> {
         let mut minimum = Minimum { state: start, normal, iterations: 0, reason: Reason::IterationLimit };
         let mut cost = self.cost(&minimum.state, &minimum.normal);
         let mut damping = FIRST_DAMPING;
+        // Whether a lower damping left the matrix at this state singular.
+        let mut lowest = false;
         while minimum.iterations < ITERATION_LIMIT {
             self.cancel.check()?;
             minimum.iterations += 1;
             let Some((step, promised)) = self.step(&minimum.state, &minimum.normal, damping) else {
                 damping *= 100.0;
+                lowest = true;
                 if damping > LARGEST_DAMPING {
                     return Err(self.singular());
                 }
@@ -145,7 +152,7 @@ impl Objective<'_> {
             };
             let state = self.moved(&minimum.state, &step);
             let tiny = step.iter().all(|change| change.abs() < SMALLEST_STEP);
-            if damping <= FIRST_DAMPING && (promised <= SHARE_OF_COST * cost || tiny) {
+            if (lowest || damping <= FIRST_DAMPING) && (promised <= SHARE_OF_COST * cost || tiny) {
                 minimum.state = state;
                 minimum.reason = Reason::Converged;
                 break;
@@ -154,9 +161,12 @@ impl Objective<'_> {
             let trial = self.cost(&state, &normal);
             if trial < cost {
                 (minimum.state, minimum.normal, cost) = (state, normal, trial);
-                damping = (damping * 0.01).max(FIRST_DAMPING);
+                let least = if minimum.iterations < LATE { FIRST_DAMPING } else { LATE_DAMPING };
+                damping = (damping * 0.01).max(least);
+                lowest = false;
             } else {
                 damping = (damping * 100.0).max(1e-6);
+                lowest = false;
                 if damping > LARGEST_DAMPING {
                     minimum.reason = Reason::Stalled;
                     break;

@@ -45,7 +45,7 @@ pub struct Packets {
 impl Packets {
     /// All poses of a set, sorted by group.
     pub fn new(set: &MeasurementSet) -> Self {
-        let count = set.pose_count().div_ceil(LANES) + set.group_count;
+        let count = set.pose_count().div_ceil(LANES) + set.group_count.min(set.pose_count());
         let mut packed = Self {
             chunks: Vec::new(),
             poses: Vec::with_capacity(count),

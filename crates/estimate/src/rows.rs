@@ -28,6 +28,20 @@ pub struct Point<'a> {
     pub setup: &'a Setup,
 }
 
+impl Point<'_> {
+    /// Checks that parameters and set-ups are a problem's.
+    ///
+    /// # Errors
+    /// [`EstimateError::Parameters`], [`EstimateError::Setup`].
+    pub fn check(&self, problem: &Problem) -> Result<(), EstimateError> {
+        let (found, expected) = (self.parameters.len(), problem.chain.parameter_count());
+        if found != expected && found != expected * problem.measurements.pose_count() {
+            return Err(EstimateError::Parameters { found, expected });
+        }
+        self.setup.check(&Layout::new(problem))
+    }
+}
+
 /// Square roots of the weights of one packet's rows.
 struct Weights {
     position: Lane,
@@ -340,7 +354,11 @@ impl Kernel for Unpack<'_> {
 }
 
 /// Residuals and derivatives of all poses at a point, unweighted, in the base frame.
-pub fn linearise(problem: &Problem, point: Point) -> Linearised {
+///
+/// # Errors
+/// [`EstimateError::Parameters`], [`EstimateError::Setup`] where the point is another problem's.
+pub fn linearise(problem: &Problem, point: Point) -> Result<Linearised, EstimateError> {
+    point.check(problem)?;
     let layout = Layout::new(problem);
     let (n, rows) = (problem.measurements.pose_count(), problem.measurements.rows_per_pose());
     let mut out = Linearised {
@@ -352,14 +370,16 @@ pub fn linearise(problem: &Problem, point: Point) -> Linearised {
     let builder = RowBuilder::new(problem, point, None);
     let packets = Packets::new(problem.measurements);
     dispatch(Unpack { builder, packets: &packets, derivatives: true, out: &mut out });
-    out
+    Ok(out)
 }
 
 /// Residuals measured - predicted of all poses, (n, m), unweighted, in the base frame; of distances (d,).
 ///
 /// # Errors
+/// [`EstimateError::Parameters`], [`EstimateError::Setup`] where the point is another problem's,
 /// [`EstimateError::Kinematics`] where the chain refuses the joint values.
 pub fn residuals(problem: &Problem, point: Point) -> Result<Vec<f64>, EstimateError> {
+    point.check(problem)?;
     residuals_of(problem, &Packets::new(problem.measurements), point)
 }
 

@@ -2,6 +2,9 @@
 
 use truearm_kinematics::Transform;
 
+use crate::EstimateError;
+use crate::layout::Layout;
+
 /// What stands between the measuring device's world and the arm's first link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameMode {
@@ -40,5 +43,40 @@ impl Setup {
             flange_from_target: Transform::IDENTITY.rotation,
         };
         Self { groups: vec![group; group_count], anchors: vec![[0.0; 3]; anchor_count] }
+    }
+
+    /// Checks that every group with its targets and every anchor is there. More may be: rows that are looked at later need
+    /// not hold every group.
+    ///
+    /// # Errors
+    /// [`EstimateError::Setup`].
+    pub fn check(&self, layout: &Layout) -> Result<(), EstimateError> {
+        let refuse = |what, found, expected| Err(EstimateError::Setup { what, found, expected });
+        if self.groups.len() < layout.groups {
+            return refuse("groups", self.groups.len(), layout.groups);
+        }
+        if self.anchors.len() < layout.anchors {
+            return refuse("anchors", self.anchors.len(), layout.anchors);
+        }
+        match self.groups.iter().find(|group| group.targets.len() != layout.targets) {
+            Some(group) => refuse("targets in a group", group.targets.len(), layout.targets),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that there is nothing else, as steps of a layout's unknowns need it.
+    ///
+    /// # Errors
+    /// [`EstimateError::Setup`].
+    pub fn check_steps(&self, layout: &Layout) -> Result<(), EstimateError> {
+        self.check(layout)?;
+        let refuse = |what, found, expected| Err(EstimateError::Setup { what, found, expected });
+        if self.groups.len() != layout.groups {
+            return refuse("groups", self.groups.len(), layout.groups);
+        }
+        if self.anchors.len() != layout.anchors {
+            return refuse("anchors", self.anchors.len(), layout.anchors);
+        }
+        Ok(())
     }
 }

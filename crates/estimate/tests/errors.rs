@@ -10,7 +10,7 @@ use common::root_mean_square;
 use common::scene::{Plan, Scene};
 use truearm_estimate::{
     Cancel, ConstantOptions, Distance, DistanceTo, EstimateError, FrameMode, MeasurementSet, Point, Prior,
-    fit_constant, residuals, setup_precision,
+    Problem, Setup, fit_constant, identifiability, linearise, residuals, setup_precision,
 };
 
 fn plan() -> Plan {
@@ -248,4 +248,55 @@ fn a_request_to_stop_is_obeyed() {
     assert_eq!(fit_constant(&scene.problem(), &options).unwrap_err(), EstimateError::Cancelled);
     flag.store(false, std::sync::atomic::Ordering::Relaxed);
     assert!(fit_constant(&scene.problem(), &options).is_ok());
+}
+
+#[test]
+fn set_ups_and_parameters_of_other_measurements() {
+    let scene = Plan { poses: vec![20, 20], rotations: true, targets: 2, ..plan() }.make();
+    let problem = scene.problem();
+    let said = |parameters: &[f64], setup: &Setup| {
+        let point = Point { parameters, setup };
+        let all = [
+            residuals(&problem, point).map(drop).unwrap_err().to_string(),
+            linearise(&problem, point).map(drop).unwrap_err().to_string(),
+            identifiability(&problem, parameters, setup).map(drop).unwrap_err().to_string(),
+        ];
+        assert!(all[0] == all[1] && all[1] == all[2]);
+        all[0].clone()
+    };
+    let few = Setup { groups: scene.setup.groups[..1].to_vec(), ..scene.setup.clone() };
+    assert!(said(&scene.truth, &few).contains("the set-up has 1 groups where the measurements need 2"));
+    let other = Setup::identity(2, 1, 0);
+    assert!(said(&scene.truth, &other).contains("1 targets in a group where the measurements need 2"));
+    assert!(said(&scene.truth[..7], &scene.setup).contains("7 values where 30 are needed"));
+    for start in [few, other, Setup::identity(3, 2, 0), Setup::identity(2, 2, 1)] {
+        let options = ConstantOptions { start: Some(start), ..ConstantOptions::default() };
+        let refused = fit_constant(&problem, &options).map(drop).unwrap_err();
+        assert!(matches!(refused, EstimateError::Setup { .. }), "{refused}");
+    }
+}
+
+#[test]
+fn set_ups_of_more_groups_serve_rows_of_some() {
+    let scene = Plan { poses: vec![5, 5], ..plan() }.make();
+    let set = MeasurementSet { group_count: 1, ..scene.set.subset(&[0, 3]) };
+    let problem = Problem { measurements: &set, ..scene.problem() };
+    assert_eq!(residuals(&problem, scene.point()).unwrap().len(), 6);
+}
+
+#[test]
+fn numbers_of_groups_and_anchors_that_fill_the_memory() {
+    let scene = plan().make();
+    let mut huge = scene.clone();
+    huge.set.group[3] = 1 << 40;
+    huge.set.group_count = (1 << 40) + 1;
+    assert!(refusal(&huge, None).to_string().contains("number them from 0 without gaps"));
+    assert!(matches!(
+        residuals(&huge.problem(), scene.point()).unwrap_err(),
+        EstimateError::Setup { expected: 0x100_0000_0001, .. }
+    ));
+    let mut far = scene.with_distances(&[[1.0, 0.0, 0.0]], 0.0);
+    far.set.distances[0].to = DistanceTo::Anchor(1 << 40);
+    far.set.anchor_count = (1 << 40) + 1;
+    assert!(refusal(&far, None).to_string().contains("the number of anchors"));
 }

@@ -5,7 +5,7 @@ mod common;
 
 use common::arms::{ur10, ur10_columns, ur10_plain_columns, with_parameters};
 use common::scene::{Plan, Scene};
-use truearm_estimate::{ConstantFit, ConstantOptions, Noise, Prior, fit_constant};
+use truearm_estimate::{ConstantFit, ConstantOptions, Noise, Prior, Reason, fit_constant};
 
 fn fit(scene: &Scene, prior: Prior) -> ConstantFit {
     let options = ConstantOptions { prior: Some(prior), ..ConstantOptions::default() };
@@ -104,5 +104,28 @@ fn fewer_values_than_unknowns_promise_nothing_beyond_the_guessed_noise() {
             error.abs() > 5.0 * found.covariance[(k, k)].sqrt()
         });
         assert!(far.count() <= 1, "{poses} poses");
+    }
+}
+
+#[test]
+fn confounded_parameters_are_fitted_to_data_that_is_almost_exact() {
+    for noise in [0.0, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7] {
+        let scene = Plan { noise: (noise, 0.0), ..plan() }.make();
+        let found = fit(&scene, Prior::default());
+        assert_eq!(found.reason, Reason::Converged, "noise {noise:e}");
+        assert!(found.noise.position < 2.0 * noise.max(1e-12), "{:?} of {noise:e}", found.noise);
+        let deviations = (0..found.covariance.nrows()).map(|k| found.covariance[(k, k)]);
+        assert!(deviations.into_iter().all(|variance| variance > 0.0 && variance.is_finite()));
+    }
+}
+
+#[test]
+fn known_noise_is_positive() {
+    let scene = plan().make();
+    for position in [0.0, -1e-4, f64::NAN, f64::INFINITY] {
+        let noise = Some(Noise { position, orientation: 0.0 });
+        let options = ConstantOptions { noise, ..ConstantOptions::default() };
+        let said = fit_constant(&scene.problem(), &options).map(drop).unwrap_err().to_string();
+        assert!(said.contains("the noise of positions is"), "{said}");
     }
 }

@@ -5,10 +5,10 @@ mod common;
 
 use std::process::Command;
 
-use common::arms::{ur10, ur10_columns};
+use common::arms::{all_columns, ur10, ur10_columns};
 use common::assert_close;
 use common::scene::Plan;
-use truearm_estimate::{ConstantFit, ConstantOptions, Prior, Robust, fit_constant};
+use truearm_estimate::{ConstantFit, ConstantOptions, Prior, Robust, fit_constant, identifiability};
 
 fn fit(poses: Vec<usize>, robust: Option<Robust>) -> ConstantFit {
     let plan =
@@ -39,6 +39,21 @@ fn the_same_bits_with_one_two_and_four_threads() {
         let one = with(1);
         assert!(one == with(2) && one == with(4));
     }
+}
+
+#[test]
+fn what_is_determined_with_the_same_bits_too() {
+    let columns = all_columns(&ur10());
+    let plan = Plan { targets: 2, ..Plan::new(ur10(), columns, 0) };
+    let scene = Plan { poses: vec![900, 400, 1300], ..plan }.make();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let found = pool.install(|| identifiability(&scene.problem(), &scene.truth, &scene.setup)).unwrap();
+        (found.condition.to_bits(), found)
+    };
+    let one = with(1);
+    assert!(!one.1.undetermined.is_empty());
+    assert!(one == with(2) && one == with(4));
 }
 
 #[test]

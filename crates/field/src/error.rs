@@ -25,11 +25,35 @@ pub enum FieldError {
         /// The length needed.
         expected: usize,
     },
+    /// A number or an index that is out of its range.
+    #[error("{what} is {value}, but {rule}")]
+    Option {
+        /// What was given.
+        what: &'static str,
+        /// Its value.
+        value: usize,
+        /// The rule that it breaks, and the way out.
+        rule: &'static str,
+    },
     /// Values that are not finite, or not positive where they must be, or none at all.
     #[error("{what}: they must be given, finite, and standard deviations positive")]
     NotFinite {
         /// The values.
         what: &'static str,
+    },
+    /// A range without an inside, or a value beyond it.
+    #[error("input {input} (counted from 0) is at {value} where its range is {low} to {high}: {rule}")]
+    Range {
+        /// The input.
+        input: usize,
+        /// Its value; of ranges that are wrong themselves their lowest.
+        value: f64,
+        /// Lowest value.
+        low: f64,
+        /// Highest value.
+        high: f64,
+        /// The rule that it breaks, and the way out.
+        rule: &'static str,
     },
     /// Hyper-parameters of no arm, as a file that was changed may hold.
     #[error("the hyper-parameters of the field are of no use: {what}; calibrate again")]

@@ -1,6 +1,6 @@
 //! The variable calibration from start to end: linearise, choose, weigh, infer, judge outliers, relinearise.
 
-use truearm_estimate::{Cancel, ConstantFit, Point, Prior, Problem, Setup};
+use truearm_estimate::{Cancel, ConstantFit, Layout, Point, Prior, Problem, Setup};
 
 use crate::FieldError;
 use crate::bank::Bank;
@@ -47,6 +47,47 @@ pub struct FieldOptions {
     pub rough: bool,
     /// Looked at between evaluations.
     pub cancel: Cancel,
+}
+
+impl FieldOptions {
+    /// Checks that columns, features and payloads are those of a problem, and that something varies with something.
+    ///
+    /// # Errors
+    /// [`FieldError::Option`], [`FieldError::Length`], [`FieldError::NotFinite`].
+    pub fn check(&self, problem: &Problem) -> Result<(), FieldError> {
+        let refuse = |what, value, rule| Err(FieldError::Option { what, value, rule });
+        let (columns, features) = (problem.columns.len(), self.features.len());
+        if !matches!(self.degree, 2 | 3) {
+            return refuse("the memberships' degree", self.degree, "it must be 2 or 3");
+        }
+        let given = self.determined.iter().chain(&self.driven);
+        if let Some(&column) = given.into_iter().find(|&&column| column >= columns) {
+            let rule = "determined and driven columns are counted from 0 among the problem's: give places, not parameters";
+            return refuse("a column", column, rule);
+        }
+        if self.driven.is_empty() {
+            return refuse(
+                "the number of driven columns",
+                0,
+                "a field needs one at least: without, fit constants",
+            );
+        }
+        if let Some(&payload) = self.payloads.iter().find(|&&payload| payload >= features) {
+            return refuse(
+                "a payload",
+                payload,
+                "payloads are counted from 0 among the features: give its range too",
+            );
+        }
+        let (found, expected) = (self.feature_values.len(), features * problem.measurements.pose_count());
+        if found != expected {
+            return Err(FieldError::Length { what: "features", found, expected });
+        }
+        if !self.feature_values.iter().all(|value| value.is_finite()) {
+            return Err(FieldError::NotFinite { what: "features" });
+        }
+        Ok(())
+    }
 }
 
 /// Where a search of hyper-parameters begins.
@@ -122,6 +163,9 @@ const NOISE_SHARE: f64 = 0.3;
 
 /// Fits constants, field and set-up together, starting from a constant calibration.
 ///
+/// Poses whose weight is zero take no part. Other weights are where the search begins: after it every pose is judged by the
+/// others, and has its full weight or, as an outlier, next to none.
+///
 /// # Errors
 /// [`FieldError`].
 pub fn fit_field(
@@ -130,6 +174,7 @@ pub fn fit_field(
     options: &FieldOptions,
 ) -> Result<FieldFit, FieldError> {
     let point = Point { parameters: &constant.parameters, setup: &constant.setup };
+    point.setup.check_steps(&Layout::new(problem))?;
     let Joined { mut training, pose_of, doubtful } = rows(problem, point, options)?;
     training.take_weight(&doubtful);
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
@@ -196,8 +241,18 @@ pub fn restore(
 
 /// The rows of a problem linearised at a point, shots of the same pose as one.
 fn rows(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Joined, FieldError> {
+    options.check(problem)?;
     let set = problem.measurements;
-    Ok(join(training(problem, point, options)?, &set.group, set.rows_per_pose()))
+    let joined = join(training(problem, point, options)?, &set.group, set.rows_per_pose());
+    if joined.training.row_count() == 0 {
+        let rule = "a field needs some: give positions or orientations whose weights are not zero";
+        return Err(FieldError::Option { what: "the number of measured values", value: 0, rule });
+    }
+    let begun = options.hyper.iter().chain(options.near.as_ref().map(|near| &near.hyper));
+    for hyper in begun {
+        hyper.check(&joined.training.inputs, problem.chain.joint_count())?;
+    }
+    Ok(joined)
 }
 
 struct Judged {

@@ -50,6 +50,10 @@ impl Candidates<'_> {
 
     /// What is known of all entries, from a covariance (size, size), row-major.
     fn known(&self, covariance: &[f64], count: usize) -> Result<Known<'_>, FieldError> {
+        if self.rows == 0 {
+            let rule = "a candidate shows one at least: give noise (c, m, m) of measured values";
+            return Err(FieldError::Option { what: "the number of entries m", value: 0, rule });
+        }
         let (size, least) = (covariance.len().isqrt(), self.count() * self.rows);
         let length = |what, found, expected| Err(FieldError::Length { what, found, expected });
         if size < least || size * size != covariance.len() {
@@ -110,15 +114,16 @@ impl Known<'_> {
 /// Cohn 1996). Values are that sum. The covariance (size, size) is row-major.
 ///
 /// # Errors
-/// [`FieldError::Length`] where arrays do not fit, [`FieldError::NotPositiveDefinite`].
+/// [`FieldError::Length`] where arrays do not fit, [`FieldError::Option`] where candidates show nothing,
+/// [`FieldError::NotPositiveDefinite`].
 pub fn choose_informative(
     covariance: &[f64],
     candidates: &Candidates,
     count: usize,
     cancel: &Cancel,
 ) -> Result<Greedy, FieldError> {
-    let first = candidates.count() * candidates.rows;
     let mut known = candidates.known(covariance, count)?;
+    let first = candidates.count() * candidates.rows;
     let left =
         |known: &Known| -> f64 { (first..known.covariance.nrows()).map(|k| known.covariance[(k, k)]).sum() };
     let mut found = Greedy { chosen: Vec::new(), values: vec![left(&known)] };
@@ -141,7 +146,8 @@ pub fn choose_informative(
 /// * `unchanged`: the same without them.
 ///
 /// # Errors
-/// [`FieldError::Length`] where arrays do not fit, [`FieldError::NotPositiveDefinite`].
+/// [`FieldError::Length`] where arrays do not fit, [`FieldError::Option`] where candidates show nothing,
+/// [`FieldError::NotPositiveDefinite`].
 pub fn choose_telling(
     changed: &[f64],
     unchanged: &[f64],

@@ -33,6 +33,7 @@ mod extrapolation;
 mod fit;
 mod greedy;
 mod hyper;
+mod hyper_check;
 mod joined;
 mod kernel;
 mod linear;

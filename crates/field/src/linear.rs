@@ -12,12 +12,12 @@ use crate::training::{Column, Training};
 /// Rows of a problem linearised at a point, the constants' prior centred on the nominal arm.
 ///
 /// # Errors
-/// [`FieldError::Length`].
+/// [`FieldError::Estimate`] where the point is another problem's, [`FieldError::Length`].
 pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Training, FieldError> {
     let set = problem.measurements;
     let layout = Layout::new(problem);
     let nominal = problem.chain.nominal();
-    let linear = linearise(problem, point);
+    let linear = linearise(problem, point)?;
     let columns = columns(problem, options);
     let inputs: Vec<Input> =
         joint_inputs(problem).into_iter().chain(options.features.iter().copied()).collect();

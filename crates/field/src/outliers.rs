@@ -117,7 +117,8 @@ pub struct News {
 }
 
 impl Judgement {
-    /// Takes the weight of the outliers away and gives it back to poses judged innocent.
+    /// Takes the weight of the outliers away and gives it back to poses judged innocent: weights that the measurements came
+    /// with, between 0 and 1, were where the judgement began and no more.
     ///
     /// A model that an outlier has bent finds it less far out than it is: it may leave it too much.
     pub fn reweigh(&self, training: &mut Training) -> News {

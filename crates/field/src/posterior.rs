@@ -89,6 +89,7 @@ impl Query<'_> {
 
     /// Whether all arrays have the lengths that they need.
     fn check(&self, setup_width: usize) -> Result<(), FieldError> {
+        check_rows(self.rows)?;
         let length = |what, found, expected| {
             if found == expected { Ok(()) } else { Err(FieldError::Length { what, found, expected }) }
         };
@@ -97,6 +98,12 @@ impl Query<'_> {
         self.setup
             .map_or(Ok(()), |setup| length("setup", setup.len(), self.poses() * self.rows * setup_width))
     }
+}
+
+/// Refuses configurations without rows.
+fn check_rows(rows: usize) -> Result<(), FieldError> {
+    let rule = "a Jacobian (n, m, P) needs one at least: three for a position, six for a pose";
+    if rows > 0 { Ok(()) } else { Err(FieldError::Option { what: "the number of rows m", value: 0, rule }) }
 }
 
 /// `sum of a b v`.
@@ -197,7 +204,7 @@ impl Posterior {
     /// Covariance (n, m, m) of `J* CEP(q*)`, or of `J* CEP(q*) + S* s` where set-up columns are given.
     ///
     /// # Errors
-    /// [`FieldError::Length`].
+    /// [`FieldError::Length`], [`FieldError::Option`] where there are no rows.
     pub fn covariance(
         &self,
         values: &[f64],
@@ -225,7 +232,7 @@ impl Posterior {
     /// Covariance (n m, n m) of the same rows of all configurations with one another, row-major.
     ///
     /// # Errors
-    /// [`FieldError::Length`].
+    /// [`FieldError::Length`], [`FieldError::Option`] where there are no rows.
     pub fn joint_covariance(
         &self,
         values: &[f64],
@@ -267,7 +274,7 @@ impl Posterior {
     /// Variances of `J* CEP(q*)` before any measurement, (n, m).
     ///
     /// # Errors
-    /// [`FieldError::Length`].
+    /// [`FieldError::Length`], [`FieldError::Option`] where there are no rows.
     pub fn prior(&self, values: &[f64], jacobian: &[f64], rows: usize) -> Result<Vec<f64>, FieldError> {
         let model = self.model();
         let query = self.query(values, jacobian, None, rows)?;
@@ -284,15 +291,23 @@ impl Posterior {
     }
 
     /// Covariance (n, m, m) of what joints do not repeat, carried to rows of a Jacobian (n, m, P).
-    pub fn repeatability(&self, jacobian: &[f64], rows: usize) -> Vec<f64> {
+    ///
+    /// # Errors
+    /// [`FieldError::Option`] where it has no rows, [`FieldError::Length`] where it is not of whole configurations.
+    pub fn repeatability(&self, jacobian: &[f64], rows: usize) -> Result<Vec<f64>, FieldError> {
+        check_rows(rows)?;
         let model = self.model();
-        let poses = jacobian.len() / (rows * model.training.columns.len());
+        let size = rows * model.training.columns.len();
+        let (poses, found) = (jacobian.len() / size, jacobian.len());
+        if poses * size != found {
+            return Err(FieldError::Length { what: "jacobian", found, expected: poses * size });
+        }
         let mut out = Vec::with_capacity(poses * rows * rows);
         for pose in 0..poses {
             let noise = model.noise_covariance(jacobian, pose * rows..(pose + 1) * rows);
             (0..rows * rows).for_each(|k| out.push(noise[(k / rows, k % rows)]));
         }
-        out
+        Ok(out)
     }
 }
 

@@ -12,7 +12,8 @@ use crate::posterior::Posterior;
 /// set-up, `inputs` (n, I) joints and features. Rows that were not measured have their noise alone.
 ///
 /// # Errors
-/// [`FieldError::Length`] where inputs or groups do not fit.
+/// [`FieldError::Estimate`] where the point is another problem's, [`FieldError::Length`] where inputs or groups do not
+/// fit.
 pub fn measurement_covariance(
     posterior: &Posterior,
     problem: &Problem,
@@ -21,7 +22,7 @@ pub fn measurement_covariance(
 ) -> Result<Vec<f64>, FieldError> {
     let set = problem.measurements;
     let layout = Layout::new(problem);
-    let linear = linearise(problem, point);
+    let linear = linearise(problem, point)?;
     let (rows, width) = (linear.rows, posterior.training().setup_width);
     let mut setup = vec![0.0; set.pose_count() * rows * width];
     for pose in 0..set.pose_count() {
@@ -40,7 +41,7 @@ pub fn measurement_covariance(
         }
     }
     let mut covariance = posterior.covariance(inputs, &linear.arm, Some(&setup), rows)?;
-    let anew = posterior.repeatability(&linear.arm, rows);
+    let anew = posterior.repeatability(&linear.arm, rows)?;
     covariance.iter_mut().zip(&anew).for_each(|(sum, term)| *sum += term);
     let noise = posterior.model().hyper.noise;
     for pose in 0..set.pose_count() {

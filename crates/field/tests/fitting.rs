@@ -3,9 +3,12 @@
 
 mod common;
 
-use common::{Arm, Fitted, Measure, Truth, deviations, fit, fitted, problem, root_mean_square, six_axes};
-use truearm_estimate::Point;
-use truearm_field::measurement_covariance;
+use common::{
+    Arm, Fitted, Measure, Truth, deviations, fit, fitted, options, problem, root_mean_square, six_axes,
+    subset,
+};
+use truearm_estimate::{ConstantFit, EstimateError, MeasurementSet, Point, Problem, Setup};
+use truearm_field::{FieldError, FieldOptions, Input, fit_field, measurement_covariance};
 
 const NOISE: f64 = 3e-5;
 
@@ -132,4 +135,37 @@ fn too_few_poses_are_refused() {
     let arm = six_axes(Truth::BENDING);
     let Err(refused) = fit(&arm, &Measure::poses(2).of(&arm)) else { panic!("two poses determine nothing") };
     assert!(refused.to_string().contains("measure at least 3 poses"), "{refused}");
+}
+
+#[test]
+fn options_of_other_problems_are_refused() {
+    let arm = six_axes(Truth::RIGID);
+    let set = Measure::poses(40).of(&arm);
+    let (constant, given) = options(&arm, &set).unwrap();
+    let given = FieldOptions { rough: true, ..given };
+    let problem = problem(&arm, &set, &arm.columns);
+    let said = |problem: &Problem, spoil: &dyn Fn(&mut FieldOptions)| {
+        let mut spoilt = given.clone();
+        spoil(&mut spoilt);
+        fit_field(problem, &constant, &spoilt).map(drop).unwrap_err().to_string()
+    };
+    assert!(said(&problem, &|o| o.driven.clear()).contains("the number of driven columns is 0"));
+    assert!(said(&problem, &|o| o.driven.push(999)).contains("a column is 999"));
+    assert!(said(&problem, &|o| o.determined.push(999)).contains("a column is 999"));
+    assert!(said(&problem, &|o| o.payloads.push(0)).contains("a payload is 0"));
+    assert!(
+        said(&problem, &|o| o.features.push(Input::line(1.0))).contains("features has 0 values where 40")
+    );
+    assert!(said(&problem, &|o| o.degree = 4).contains("degree is 4"));
+    let nothing = problem.with_columns(&[]);
+    assert!(said(&nothing, &|o| o.determined.clear()).contains("a column is 0"));
+    let empty = subset(&set, &[]);
+    assert!(said(&Problem { measurements: &empty, ..problem }, &|_| ()).contains("measured values is 0"));
+    let unweighted = MeasurementSet { weight: vec![0.0; 40], ..set.clone() };
+    assert!(
+        said(&Problem { measurements: &unweighted, ..problem }, &|_| ()).contains("measured values is 0")
+    );
+    let other = ConstantFit { setup: Setup::identity(2, 1, 0), ..constant.clone() };
+    let refused = fit_field(&problem, &other, &given).map(drop).unwrap_err();
+    assert!(matches!(refused, FieldError::Estimate(EstimateError::Setup { .. })), "{refused}");
 }

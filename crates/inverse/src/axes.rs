@@ -1,6 +1,6 @@
 //! Where an arm's axes are with all joint values at zero.
 
-use truearm_kinematics::{Chain, Convention, Joint, KinematicsError, Parameters, Transform};
+use truearm_kinematics::{Chain, Convention, Joint, KinematicsError, Link, Parameters, Transform};
 
 use crate::vector::Line;
 
@@ -43,8 +43,10 @@ impl Axes {
 
 /// The frame behind the first `count` links.
 fn frame_after(chain: &Chain, count: usize) -> Result<Transform, KinematicsError> {
-    let links = chain.links()[..count].to_vec();
-    if links.iter().all(|link| link.joint == Joint::Fixed) && links.is_empty() {
+    // At zero all kinds of joints are alike, and a chain of none but fixed rows would be refused.
+    let turning = |link: &Link| Link { joint: Joint::Revolute, ..*link };
+    let links: Vec<Link> = chain.links()[..count].iter().map(turning).collect();
+    if links.is_empty() {
         return Ok(*chain.base());
     }
     let part = Chain::new(chain.convention(), links, *chain.base(), Transform::IDENTITY)?;

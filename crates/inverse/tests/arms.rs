@@ -190,3 +190,20 @@ fn bad_input_is_refused() {
     assert!(matches!(solver.near(&[Transform::IDENTITY], &seed), Err(InverseError::SeedNotFinite { .. })));
     assert!(matches!(solver.near(&[Transform::IDENTITY], &[0.0; 5]), Err(InverseError::Length { .. })));
 }
+
+#[test]
+fn arms_on_a_fixed_row_are_solved_like_those_without() {
+    let rows = spherical([0.1, 0.4, 0.3, 0.05, 0.0, 0.4], [0.0; 6]);
+    let joints = [0.3, -0.4, 0.5, 0.2, 0.7, -0.3];
+    let mut links = vec![Link { joint: Joint::Fixed, theta: 0.2, d: 0.3, a: 0.1, alpha: 0.4, beta: 0.0 }];
+    links.extend(chain(&rows).links());
+    let chain = Chain::new(Convention::Standard, links, Transform::IDENTITY, Transform::IDENTITY);
+    let chain = chain.expect("a chain");
+    let mut target = [0.0; 16];
+    chain.poses(&joints, Parameters::One(&chain.nominal()), &mut target).expect("a pose");
+    let one: Vec<f64> = (0..36).map(|k| f64::from(u8::from(k % 7 == 0))).collect();
+    let readings = Readings::new(one.clone(), one, full_circle(6), &[true; 6]).expect("readings");
+    let solver = Inverse::new(Arm { chain, readings }).expect("a solver");
+    let found = solver.solutions(&Transform::from_matrix(&target), false).expect("solutions");
+    assert!(holds(&found, &joints), "{found:?}");
+}

@@ -26,12 +26,14 @@ const TAYLOR: [f64; 12] = [
 ];
 
 /// e to the power of eight numbers, with a relative error below 4e-16; arguments below -708 give e^-708 (never zero),
-/// above 709 e^709.
+/// above 709 e^709, NaN gives NaN.
 #[inline(always)]
 pub fn exp<I: Isa>(x: Lane) -> Lane {
     let mut within = [0.0; LANES];
     for i in 0..LANES {
-        within[i] = x.0[i].max(RANGE.0).min(RANGE.1);
+        // By comparisons, which keep what is no number.
+        let above = if x.0[i] < RANGE.0 { RANGE.0 } else { x.0[i] };
+        within[i] = if above > RANGE.1 { RANGE.1 } else { above };
     }
     let shifted = I::mul_add(Lane(within), Lane::splat(std::f64::consts::LOG2_E), Lane::splat(ROUND));
     let halvings = shifted - Lane::splat(ROUND);

@@ -33,14 +33,16 @@ const COSINE: [f64; 7] = [
 /// Sine and cosine of eight angles (radians).
 ///
 /// The absolute error is below 2.3e-16 for angles up to a million radians; larger ones go to the standard library. NaN and
-/// infinite angles give NaN.
+/// infinite angles give NaN. What an angle gives does not depend on those beside it.
 #[inline(always)]
 #[allow(clippy::neg_cmp_op_on_partial_ord, reason = "NaN counts as beyond, and this is one comparison")]
 pub fn sin_cos<I: Isa>(angle: Lane) -> (Lane, Lane) {
     let (mut sine, mut cosine) = reduced::<I>(angle);
     if angle.0.iter().fold(false, |beyond, x| beyond | !(x.abs() <= LIMIT)) {
         for i in 0..LANES {
-            (sine.0[i], cosine.0[i]) = by_library(angle.0[i]);
+            if !(angle.0[i].abs() <= LIMIT) {
+                (sine.0[i], cosine.0[i]) = by_library(angle.0[i]);
+            }
         }
     }
     (sine, cosine)

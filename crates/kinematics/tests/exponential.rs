@@ -29,6 +29,16 @@ fn relative_error_is_below_the_bound_everywhere() {
 }
 
 #[test]
+fn what_is_no_number_stays_so_and_harms_no_neighbour() {
+    let x = Lane([f64::NAN, 1.0, -f64::NAN, 0.0, -3.0, 5.0, f64::INFINITY, f64::NEG_INFINITY]);
+    for set in InstructionSet::ALL {
+        let found = dispatch_on(set, Exponential(x)).0;
+        assert!(found[0].is_nan() && found[2].is_nan());
+        assert!([1, 3, 4, 5, 6, 7].iter().all(|&k| found[k].is_finite()));
+    }
+}
+
+#[test]
 fn arguments_out_of_range_count_as_its_ends() {
     let x = Lane([-1e300, -709.0, -708.0, 0.0, 709.0, 710.0, 1e300, 1.0]);
     for set in InstructionSet::ALL {

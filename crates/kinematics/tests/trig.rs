@@ -1,5 +1,6 @@
 //! Accuracy of the eight-fold sine and cosine, for every instruction set.
 
+use proptest::prelude::*;
 use truearm_kinematics::{InstructionSet, Isa, Kernel, LANES, Lane, dispatch_on, sin_cos};
 
 struct Both(Lane);
@@ -64,6 +65,23 @@ fn what_is_no_angle_gives_nan_and_harms_no_neighbour() {
             assert!(
                 (sine.0[i] - lane.0[i].sin()).abs() < 3e-16 && (cosine.0[i] - lane.0[i].cos()).abs() < 3e-16
             );
+        }
+    }
+}
+
+/// Angles of all sizes, and what is none.
+fn any_angle() -> impl Strategy<Value = f64> {
+    prop_oneof![-7.0..7.0f64, -1e6..1e6f64, -1e12..1e12f64, Just(f64::NAN), Just(f64::INFINITY)]
+}
+
+proptest! {
+    #[test]
+    fn neighbours_change_nothing(angles in prop::array::uniform8(any_angle()), lane in 0..LANES) {
+        for set in InstructionSet::ALL {
+            let among = dispatch_on(set, Both(Lane(angles)));
+            let alone = dispatch_on(set, Both(Lane::splat(angles[lane])));
+            prop_assert_eq!(among.0.0[lane].to_bits(), alone.0.0[lane].to_bits());
+            prop_assert_eq!(among.1.0[lane].to_bits(), alone.1.0[lane].to_bits());
         }
     }
 }

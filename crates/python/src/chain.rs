@@ -4,7 +4,8 @@ use std::num::NonZeroUsize;
 
 use numpy::ndarray::{Dimension, Ix2, Ix3};
 use numpy::{
-    PyArray, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    Element, PyArray, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use truearm_kinematics::{
@@ -199,10 +200,10 @@ fn prepared<'py, D: Dimension>(
 }
 
 /// The numbers of an array, row by row.
-pub fn contiguous<'a, D: Dimension>(
+pub fn contiguous<'a, T: Element, D: Dimension>(
     name: &str,
-    array: &'a PyReadonlyArray<'_, f64, D>,
-) -> PyResult<&'a [f64]> {
+    array: &'a PyReadonlyArray<'_, T, D>,
+) -> PyResult<&'a [T]> {
     if !array.is_c_contiguous() {
         return Err(not_contiguous(name));
     }

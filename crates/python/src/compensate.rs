@@ -93,6 +93,11 @@ impl Keywords<'_> {
                 return Err(CoreError::new_err(text));
             }
         };
+        let shape = self.joints.shape();
+        if shape[1] != 2 {
+            let text = format!("joints has shape {shape:?}, it must be (N, 2): lowest and highest readings");
+            return Err(CoreError::new_err(text));
+        }
         let limits = Limits {
             joints: self.joints.as_array().outer_iter().map(|row| [row[0], row[1]]).collect(),
             largest_angle: self.largest_angle,
@@ -203,7 +208,7 @@ impl Corrector {
         readings: PyReadonlyArray1<'py, f64>,
         features: Vec<f64>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Option<Told>)> {
-        let values = readings.as_slice()?;
+        let values = contiguous("readings", &readings)?;
         if values.len() != self.core.joint_count() || features.len() != self.core.feature_count() {
             let (joints, wanted) = (self.core.joint_count(), self.core.feature_count());
             return Err(CoreError::new_err(format!(

@@ -11,7 +11,7 @@ use truearm_estimate::{
 };
 
 use crate::chain::Chain;
-use crate::door::{CoreError, quick, with_threads};
+use crate::door::{CoreError, Failure, quick, with_threads};
 use crate::measured::{MeasurementSet, Setup, matrix, vector};
 
 /// What is to be identified from what, see the stub.
@@ -259,8 +259,9 @@ pub fn step_setup(
 ) -> PyResult<Setup> {
     let core = problem.core();
     let layout = Layout::new(&core);
-    let wanted = [setup.core().groups.len(), layout.group_width()];
-    if step.shape() != wanted || wanted[0] != layout.groups {
+    setup.core().check_steps(&layout).map_err(Failure::into_exception)?;
+    let wanted = [layout.groups, layout.group_width()];
+    if step.shape() != wanted {
         let shape = step.shape();
         return Err(CoreError::new_err(format!(
             "step has shape {shape:?}, it must be {wanted:?} for {} groups",
@@ -288,7 +289,7 @@ fn linearised(
         )));
     }
     let point = Point { parameters: &values, setup: setup.core() };
-    Ok(py.detach(|| linear(&core, point)))
+    quick(py, || linear(&core, point))
 }
 
 fn array3<'py>(

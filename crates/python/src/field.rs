@@ -44,12 +44,6 @@ pub struct Options<'py> {
 
 impl Options<'_> {
     fn core(&self, cancel: Cancel) -> PyResult<FieldOptions> {
-        if !matches!(self.degree, 2 | 3) {
-            return Err(CoreError::new_err(format!(
-                "the memberships' degree is {}, it must be 2 or 3",
-                self.degree
-            )));
-        }
         Ok(FieldOptions {
             degree: self.degree,
             prior: prior(self.prior)?,
@@ -404,6 +398,7 @@ impl Posterior {
                 jacobian.shape()[2]
             )));
         }
-        array3(py, self.core().repeatability(&entries, rows), (poses, rows, rows))
+        let values = quick(py, || self.core().repeatability(&entries, rows))?;
+        array3(py, values, (poses, rows, rows))
     }
 }

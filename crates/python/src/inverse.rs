@@ -95,6 +95,10 @@ fn values(rows: &Rows<'_>) -> Vec<f64> {
 }
 
 fn transforms(targets: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Transform>> {
+    let shape = targets.shape();
+    if shape[1..] != [4, 4] {
+        return Err(CoreError::new_err(format!("targets has shape {shape:?}, it must be (n, 4, 4)")));
+    }
     let numbers: Vec<f64> = targets.as_array().iter().copied().collect();
     numbers.chunks(16).map(one_transform).collect()
 }

@@ -4,6 +4,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntyped
 use pyo3::prelude::*;
 use truearm_field::{FieldError, shots_of_poses};
 
+use crate::chain::contiguous;
 use crate::door::Failure;
 
 /// Which rows were measured at the same pose, see the stub.
@@ -14,7 +15,7 @@ pub fn same_poses<'py>(
     group: PyReadonlyArray1<'py, i64>,
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
     let (rows, width) = (joints.shape()[0], joints.shape()[1]);
-    let (joints, group) = (joints.as_slice()?, group.as_slice()?);
+    let (joints, group) = (contiguous("joints", &joints)?, contiguous("group", &group)?);
     if group.len() != rows {
         let error = FieldError::Length { what: "groups of rows", found: group.len(), expected: rows };
         return Err(error.into_exception());

@@ -10,6 +10,7 @@ use truearm_text::{
     Numbers, Values, Words, find, read_numbers as read, scan_lines as scan, splice_in_pieces,
 };
 
+use crate::chain::contiguous;
 use crate::door::quick;
 
 type Integers<'py> = Bound<'py, PyArray1<i32>>;
@@ -44,7 +45,7 @@ pub fn read_numbers<'py>(
     starts: PyReadonlyArray2<'py, i32>,
 ) -> PyResult<Read<'py>> {
     let shape = (starts.shape()[0], starts.shape()[1]);
-    let starts = starts.as_slice()?;
+    let starts = contiguous("starts", &starts)?;
     let ends = PyArray2::zeros(py, shape, false);
     let values = PyArray2::zeros(py, shape, false);
     let decimals = PyArray2::zeros(py, shape, false);
@@ -72,10 +73,10 @@ pub fn splice_numbers<'py>(
     words: Vec<(usize, usize, Vec<u8>)>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let numbers = Numbers {
-        starts: spans.0.as_slice()?,
-        ends: spans.1.as_slice()?,
-        values: values.as_slice()?,
-        decimals: decimals.as_slice()?,
+        starts: contiguous("starts", &spans.0)?,
+        ends: contiguous("ends", &spans.1)?,
+        values: contiguous("values", &values)?,
+        decimals: contiguous("decimals", &decimals)?,
     };
     let words: Vec<Words<'_>> =
         words.iter().map(|(start, end, bytes)| Words { start: *start, end: *end, bytes }).collect();

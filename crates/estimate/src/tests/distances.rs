@@ -1,6 +1,5 @@
 //! Derivatives of distances against differences of the residuals.
 
-use crate::Noise;
 use crate::common::arms::{all_columns, seven_axis, ur10, with_ends};
 use crate::common::assert_close;
 use crate::common::differences::differences;
@@ -9,6 +8,7 @@ use crate::distance::derivatives;
 use crate::layout::Layout;
 use crate::packets::Packets;
 use crate::pass::normal_equations;
+use crate::{ConstantOptions, Noise, Prior, Robust, fit_constant};
 
 const ANCHORS: [[f64; 3]; 2] = [[1.5, 0.2, -0.4], [-0.3, 1.8, 0.9]];
 
@@ -48,5 +48,30 @@ fn normal_equations_are_the_sum_over_weighted_rows() {
             let sum: f64 = terms.sum();
             assert!((normal.matrix[(i, j)] - sum).abs() <= tolerance, "{i} {j}");
         }
+    }
+}
+
+/// Noise of a fit to distances of which the last third, wrong by `bias` m, is left out.
+fn noise_beside(bias: f64, robust: Robust) -> Noise {
+    let chain = ur10();
+    let plan = Plan { poses: vec![120], ..Plan::new(chain.clone(), all_columns(&chain), 0) };
+    let mut scene = plan.make().with_distances(&ANCHORS, 1e-4);
+    scene.set.weight[80..].fill(0.0);
+    scene.set.distances.iter_mut().filter(|d| d.pose >= 80).for_each(|d| d.value += bias);
+    let options = ConstantOptions {
+        prior: Some(Prior::default()),
+        robust: Some(robust),
+        start: Some(scene.setup.clone()),
+        ..ConstantOptions::default()
+    };
+    fit_constant(&scene.problem(), &options).unwrap().noise
+}
+
+#[test]
+fn distances_that_are_left_out_say_nothing_of_the_noise() {
+    for robust in [Robust::None, Robust::Huber, Robust::Cauchy] {
+        let noise = noise_beside(0.0, robust);
+        assert_eq!(noise, noise_beside(0.05, robust));
+        assert!((0.5e-4..2e-4).contains(&noise.position), "{robust:?}: {noise:?}");
     }
 }

@@ -20,7 +20,7 @@ fn paper(columns: &[usize]) -> Mat<f64> {
         ..Plan::new(rv_m2(), columns.to_vec(), 200)
     };
     let scene = plan.make();
-    let rows = linearise(&scene.problem(), scene.point()).arm;
+    let rows = linearise(&scene.problem(), scene.point()).unwrap().arm;
     let width = columns.len();
     let unit = |k: usize| if matches!(columns[k] % 5, 1 | 2) { 1e3 } else { 1e3 / 300.0 };
     Mat::from_fn(rows.len() / width, width, |i, k| rows[i * width + k] * unit(k))

@@ -31,7 +31,7 @@ fn scene(plan: &Plan) -> Scene {
 
 fn explicit(scene: &Scene, point: Point) -> Normal {
     let (problem, set) = (scene.problem(), &scene.set);
-    let rows = linearise(&problem, point);
+    let rows = linearise(&problem, point).unwrap();
     let (width, jacobian) = (Layout::new(&problem).len(), dense(&problem, &rows));
     let mut normal = Normal::zeros(width);
     for (row, line) in jacobian.chunks_exact(width).enumerate() {

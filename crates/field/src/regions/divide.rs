@@ -230,8 +230,8 @@ impl<S: Source> Work<'_, S> {
         self.division.batches.extend([(region, poses.0, false), (region, poses.1, true)]);
         let held = self.arm.held();
         let problem = self.arm.problem(&rows.identify);
-        let ceps = held.least_squares(&problem, start).ok_or_else(|| undetermined(&problem))?;
-        let errors = held.errors(&self.arm.problem(&rows.judge), &ceps);
+        let ceps = held.least_squares(&problem, start)?.ok_or_else(|| undetermined(&problem))?;
+        let errors = held.errors(&self.arm.problem(&rows.judge), &ceps)?;
         let error = errors.into_iter().fold(f64::NAN, f64::max);
         self.record(&ceps, (kappa, error), Some(rows));
         if error > self.options.accuracy {
@@ -255,7 +255,7 @@ impl<S: Source> Work<'_, S> {
     /// Halves a region along the first of the preferred axes whose halves can both have CEPs.
     fn halve(&mut self, region: usize) -> Result<(), S::Error> {
         let mut reason = Ended::TooSmall;
-        for axis in self.preferred(region) {
+        for axis in self.preferred(region)? {
             let before = self.division.regions.clone();
             let child = self.division.regions.halve(region, axis);
             let halves = [self.prepare(child)?, self.prepare(child + 1)?];
@@ -277,7 +277,7 @@ impl<S: Source> Work<'_, S> {
         Ok(())
     }
 
-    fn preferred(&self, region: usize) -> Vec<usize> {
+    fn preferred(&self, region: usize) -> Result<Vec<usize>, FieldError> {
         let longest = self.division.regions.longest_first(region);
         match (self.options.halving, &self.rows[region]) {
             (Halving::Best, Some(rows)) => {
@@ -286,7 +286,7 @@ impl<S: Source> Work<'_, S> {
                 let corners = self.division.regions.corners(region);
                 trend::best_first(self.arm, rows, ceps, corners, longest)
             }
-            _ => longest,
+            _ => Ok(longest),
         }
     }
 }

@@ -4,6 +4,8 @@ use faer::{Mat, MatRef, Par};
 use truearm_estimate::dense::{Cholesky, to_vec, transposed_product};
 use truearm_estimate::{Linearised, Point, Problem, Setup, column_unit, linearise, row_unit};
 
+use crate::FieldError;
+
 /// What is held in every region.
 #[derive(Clone, Copy)]
 pub struct Held<'a> {
@@ -26,46 +28,59 @@ impl Held<'_> {
     }
 
     /// Rows at parameters with CEPs (P,) added.
-    pub fn rows(&self, problem: &Problem<'_>, ceps: &[f64]) -> Linearised {
+    ///
+    /// # Errors
+    /// [`FieldError::Estimate`] where parameters or set-up are another problem's.
+    pub fn rows(&self, problem: &Problem<'_>, ceps: &[f64]) -> Result<Linearised, FieldError> {
         let parameters = self.with(problem.columns, ceps);
-        linearise(problem, Point { parameters: &parameters, setup: self.setup })
+        Ok(linearise(problem, Point { parameters: &parameters, setup: self.setup })?)
     }
 
     /// CEPs (P,) that leave the least squares, positions in metres and orientations at 0.3 m, by Gauss-Newton from
     /// `start`; `None` where there are fewer measured values than CEPs or they leave a CEP undetermined.
     ///
     /// The steps solve normal equations: their rounding slows convergence a little and does not move the minimum.
-    pub fn least_squares(&self, problem: &Problem<'_>, start: &[f64]) -> Option<Vec<f64>> {
+    ///
+    /// # Errors
+    /// As [`Held::rows`].
+    pub fn least_squares(
+        &self,
+        problem: &Problem<'_>,
+        start: &[f64],
+    ) -> Result<Option<Vec<f64>>, FieldError> {
         let mut ceps = start.to_vec();
         if problem.measurements.measured_values() < ceps.len() {
-            return None;
+            return Ok(None);
         }
         for _ in 0..STEPS {
-            let (matrix, residual) = scaled(problem, &self.rows(problem, &ceps));
-            let step = solve(matrix.as_ref(), residual.as_ref())?;
+            let (matrix, residual) = scaled(problem, &self.rows(problem, &ceps)?);
+            let Some(step) = solve(matrix.as_ref(), residual.as_ref()) else { return Ok(None) };
             let mut largest = 0.0_f64;
             for (k, &column) in problem.columns.iter().enumerate() {
                 ceps[k] += step[k] / column_unit(column);
                 largest = largest.max(step[k].abs());
             }
             if !largest.is_finite() {
-                return None;
+                return Ok(None);
             }
             if largest < SMALLEST_STEP {
                 break;
             }
         }
-        Some(ceps)
+        Ok(Some(ceps))
     }
 
     /// Lengths of the residuals at the first target, (n,), m; NaN where it was not measured.
-    pub fn errors(&self, problem: &Problem<'_>, ceps: &[f64]) -> Vec<f64> {
-        let rows = self.rows(problem, ceps);
+    ///
+    /// # Errors
+    /// As [`Held::rows`].
+    pub fn errors(&self, problem: &Problem<'_>, ceps: &[f64]) -> Result<Vec<f64>, FieldError> {
+        let rows = self.rows(problem, ceps)?;
         let length = |(pose, residual): (usize, &[f64])| {
             let seen = problem.measurements.has_target(pose, 0);
             if seen { residual.iter().take(3).map(|r| r * r).sum::<f64>().sqrt() } else { f64::NAN }
         };
-        rows.residual.chunks_exact(rows.rows.max(1)).enumerate().map(length).collect()
+        Ok(rows.residual.chunks_exact(rows.rows.max(1)).enumerate().map(length).collect())
     }
 }
 

@@ -61,7 +61,7 @@ impl Source for Recorded<'_> {
             let (set, _) = self.subset(&rows);
             let part = Problem { measurements: &set, ..self.problem };
             let held = Held { parameters: self.parameters, setup: self.setup };
-            let (matrix, _) = scaled(&part, &held.rows(&part, &vec![0.0; part.columns.len()]));
+            let (matrix, _) = scaled(&part, &held.rows(&part, &vec![0.0; part.columns.len()])?);
             let kappa = observability(&matrix, rows.len()).map_err(FieldError::from)?.kappa;
             if kappa <= self.limit { Verdict::Ready(kappa) } else { Verdict::IllConditioned(kappa) }
         };

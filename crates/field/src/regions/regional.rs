@@ -36,7 +36,8 @@ pub struct RegionalFit {
 /// Estimate the CEPs of every region from the measurements in it, with parameters (5 L,) and set-up held.
 ///
 /// # Errors
-/// [`FieldError::Length`] where features (n, F) do not fit, [`FieldError::NotPositiveDefinite`] where shrinking fails.
+/// [`FieldError::Length`] where features (n, F) do not fit, [`FieldError::Estimate`] where parameters or set-up are
+/// another problem's, [`FieldError::NotPositiveDefinite`] where shrinking fails.
 pub fn regional_ceps(
     regions: &Regions,
     problem: &Problem<'_>,
@@ -61,7 +62,7 @@ pub fn regional_ceps(
     };
     fit.conditions(problem, held, &members)?;
     match method {
-        Method::LeastSquares => fit.alone(problem, held, &members),
+        Method::LeastSquares => fit.alone(problem, held, &members)?,
         Method::Shrunk(halving) => fit.together(regions, problem, (held, halving), &members)?,
     }
     Ok(fit)
@@ -87,29 +88,37 @@ impl RegionalFit {
         problem: &Problem<'_>,
         held: Held<'_>,
         members: &[Vec<usize>],
-    ) -> Result<(), EstimateError> {
+    ) -> Result<(), FieldError> {
         let zero = vec![0.0; problem.columns.len()];
         for (region, poses) in members.iter().enumerate() {
             let set = problem.measurements.subset(poses);
             if set.measured_values() >= zero.len() {
                 let part = Problem { measurements: &set, ..*problem };
-                let (matrix, _) = scaled(&part, &held.rows(&part, &zero));
+                let (matrix, _) = scaled(&part, &held.rows(&part, &zero)?);
                 self.kappa[region] = observability(&matrix, poses.len())?.kappa;
             }
         }
         Ok(())
     }
 
-    fn alone(&mut self, problem: &Problem<'_>, held: Held<'_>, members: &[Vec<usize>]) {
+    fn alone(
+        &mut self,
+        problem: &Problem<'_>,
+        held: Held<'_>,
+        members: &[Vec<usize>],
+    ) -> Result<(), FieldError> {
         let width = problem.columns.len();
         for (region, poses) in members.iter().enumerate() {
             let set = problem.measurements.subset(poses);
             let part = Problem { measurements: &set, ..*problem };
-            let found = self.kappa[region].is_finite().then(|| held.least_squares(&part, &vec![0.0; width]));
-            if let Some(Some(ceps)) = found {
+            if !self.kappa[region].is_finite() {
+                continue;
+            }
+            if let Some(ceps) = held.least_squares(&part, &vec![0.0; width])? {
                 self.ceps[region * width..(region + 1) * width].copy_from_slice(&ceps);
             }
         }
+        Ok(())
     }
 
     fn together(
@@ -121,21 +130,21 @@ impl RegionalFit {
     ) -> Result<(), FieldError> {
         let width = problem.columns.len();
         // The model is linear at the CEPs of the whole workspace, from which those of its parts differ little.
-        let middle = held.least_squares(problem, &vec![0.0; width]).ok_or(undetermined(problem))?;
-        let own = |region: usize| {
+        let middle = held.least_squares(problem, &vec![0.0; width])?.ok_or(undetermined(problem))?;
+        let own = |region: usize| -> Result<Own, FieldError> {
             let poses = if regions.is_leaf(region) { members[region].as_slice() } else { &[] };
             let set = problem.measurements.subset(poses);
             let part = Problem { measurements: &set, ..*problem };
-            let (matrix, residual) = scaled(&part, &held.rows(&part, &middle));
+            let (matrix, residual) = scaled(&part, &held.rows(&part, &middle)?);
             let right = transposed_product(matrix.as_ref(), residual.as_ref());
-            Own {
+            Ok(Own {
                 normal: transposed_product(matrix.as_ref(), matrix.as_ref()),
                 right: to_vec(right.as_ref()),
                 squares: residual.squared_norm_l2(),
                 rows: set.measured_values(),
-            }
+            })
         };
-        let own: Vec<Own> = (0..regions.count()).map(own).collect();
+        let own: Vec<Own> = (0..regions.count()).map(own).collect::<Result<_, _>>()?;
         let rows = problem.measurements.measured_values();
         let (ceps, spread) =
             shrunk(regions, &own, halving).ok_or(FieldError::NotPositiveDefinite { rows })?;

@@ -3,6 +3,7 @@
 use faer::Mat;
 use truearm_estimate::MeasurementSet;
 
+use crate::FieldError;
 use crate::regions::divide::Arm;
 use crate::regions::estimate::{scaled, solve};
 use crate::regions::source::Rows;
@@ -10,16 +11,19 @@ use crate::regions::source::Rows;
 /// Axes by how much smaller the squares become when CEPs may differ between the halves, the best first.
 ///
 /// What differs has opposite signs in the halves, so each axis is allowed the same number of unknowns. `axes` breaks ties.
+///
+/// # Errors
+/// [`FieldError::Estimate`] where rows are another set-up's.
 pub fn best_first(
     arm: &Arm<'_>,
     rows: &Rows,
     ceps: &[f64],
     (low, high): (&[f64], &[f64]),
     axes: Vec<usize>,
-) -> Vec<usize> {
+) -> Result<Vec<usize>, FieldError> {
     let sets = [(&rows.identify, &rows.identify_features), (&rows.judge, &rows.judge_features)];
-    let parts: Vec<Part> =
-        sets.into_iter().filter(|s| s.0.pose_count() > 0).map(|s| part(arm, s, ceps)).collect();
+    let measured = sets.into_iter().filter(|set| set.0.pose_count() > 0);
+    let parts: Vec<Part> = measured.map(|set| part(arm, set, ceps)).collect::<Result<_, _>>()?;
     let dimensions = low.len();
     let left = |axis: usize| {
         let middle = 0.5 * (low[axis] + high[axis]);
@@ -27,7 +31,7 @@ pub fn best_first(
     };
     let mut judged: Vec<(f64, usize)> = axes.into_iter().map(|axis| (left(axis), axis)).collect();
     judged.sort_by(|a, b| a.0.total_cmp(&b.0));
-    judged.into_iter().map(|(_, axis)| axis).collect()
+    Ok(judged.into_iter().map(|(_, axis)| axis).collect())
 }
 
 struct Part {
@@ -37,11 +41,15 @@ struct Part {
     rows_per_pose: usize,
 }
 
-fn part(arm: &Arm<'_>, (set, features): (&MeasurementSet, &Vec<f64>), ceps: &[f64]) -> Part {
+fn part(
+    arm: &Arm<'_>,
+    (set, features): (&MeasurementSet, &Vec<f64>),
+    ceps: &[f64],
+) -> Result<Part, FieldError> {
     let problem = arm.problem(set);
-    let rows = arm.held().rows(&problem, ceps);
+    let rows = arm.held().rows(&problem, ceps)?;
     let (matrix, residual) = scaled(&problem, &rows);
-    Part { matrix, residual, features: features.clone(), rows_per_pose: rows.rows }
+    Ok(Part { matrix, residual, features: features.clone(), rows_per_pose: rows.rows })
 }
 
 fn squares_left(parts: &[Part], sign: impl Fn(&[f64]) -> f64, dimensions: usize) -> f64 {

@@ -169,7 +169,7 @@ impl<W: Workspace> Active<'_, W> {
         set.check()?;
         let problem =
             Problem { chain: self.chain, measurements: &set, columns: self.columns, frame: FrameMode::World };
-        let rows = linearise(&problem, Point { parameters: self.parameters, setup: self.setup });
+        let rows = linearise(&problem, Point { parameters: self.parameters, setup: self.setup })?;
         Ok((rows.arm, rows.rows))
     }
 }

@@ -57,7 +57,7 @@ fn rows_of(posterior: &Posterior, training: &Training, pose: usize) -> (Vec<f64>
     let (columns, width) = (training.columns.len(), training.setup_width);
     let jacobian = training.jacobian[rows.start * columns..rows.end * columns].to_vec();
     let setup = training.setup[rows.start * width..rows.end * width].to_vec();
-    let mut noise = posterior.repeatability(&jacobian, rows.len());
+    let mut noise = posterior.repeatability(&jacobian, rows.len()).unwrap();
     for (i, row) in rows.clone().enumerate() {
         noise[i * (rows.len() + 1)] += training.noise_variance(row, posterior.model().hyper.noise);
     }

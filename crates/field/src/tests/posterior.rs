@@ -131,7 +131,7 @@ fn refitted(posterior: &Posterior, pose: usize) -> (Vec<f64>, f64) {
     };
     let residual: Vec<f64> = rows.clone().enumerate().map(left).collect();
     let known = fewer.covariance(training.values_of(pose), jacobian, Some(setup), rows.len()).unwrap();
-    let anew = fewer.repeatability(jacobian, rows.len());
+    let anew = fewer.repeatability(jacobian, rows.len()).unwrap();
     let covariance = faer::Mat::from_fn(rows.len(), rows.len(), |i, j| {
         let row = rows.start + i;
         let noise = training.noise_variance(row, model.hyper.noise) * training.weight[row];
