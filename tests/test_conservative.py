@@ -61,6 +61,28 @@ def test_a_far_tool_whose_position_alone_was_measured_is_not_far_above():
     assert np.median(ratio[:, 0]) < 3.5
 
 
+def test_it_follows_what_is_known_where_joints_go_together():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    q = arm.poses(150)
+    # As where a target has to face its instrument.
+    q[:, 3:] = 0.2 * q[:, 3:] / np.pi
+    q[:, 3] -= q[:, 1] + q[:, 2]
+    calibration = ta.calibrate(arm.robot, arm.measure(q), refit=False)
+    seen = calibration.model.setup.targets[0, 0]
+    elsewhere = q + np.random.default_rng(0).uniform(-1.0, 1.0, q.shape)
+    bounds, exact = zip(
+        *(
+            (calibration.conservative_std(each, tool=seen)[:, 0], roots(calibration, each, seen)[:, 0])
+            for each in (q, elsewhere)
+        ),
+        strict=True,
+    )
+    assert np.median(exact[1]) > 1.8 * np.median(exact[0])
+    for bound, known in zip(bounds, exact, strict=True):
+        assert (bound >= known).all()
+        assert np.median(bound / known) < 2.2
+
+
 def test_it_is_the_same_when_read_even_without_the_measurements(calibration, readings, tmp_path):
     for name, with_rows in (("all.calib", True), ("stripped.calib", False)):
         calibration.save(tmp_path / name, with_rows=with_rows)

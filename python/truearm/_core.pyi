@@ -399,14 +399,20 @@ class Conservative:
     plus r times the second at most.
     """
 
-    def __init__(self, content: Mapping[str, Any], blocks: Sequence[dict[str, Any]]) -> None:
-        """Bounds from what `content` and `blocks` gave."""
+    def __init__(
+        self,
+        content: Mapping[str, Any],
+        blocks: Sequence[dict[str, Any]],
+        leverage: tuple[Chain, NDArray[np.float64]] | None = None,
+    ) -> None:
+        """Bounds from what `content`, `blocks` and, with the chain to the flange, `factor` gave."""
 
     @staticmethod
     def fit(
         plan: Mapping[str, Any],
         fitted: tuple[NDArray[np.float64], NDArray[np.float64]],
         fresh: tuple[NDArray[np.float64], NDArray[np.float64]],
+        chain: Chain | None = None,
     ) -> Conservative:
         """Fit to exact values, and raise the fit by what fresh ones show.
 
@@ -415,14 +421,22 @@ class Conservative:
                 inputs that are tabulated together as well; largest: bounds that are never exceeded.
             fitted: Inputs (n, I) and exact values (n, 2).
             fresh: The same at other configurations.
+            chain: To the flange, of the joint values that are the first inputs; the bound of the position is
+                then a multiple of how far uncertain constants move the centre.
 
         Raises:
             CoreError: Values are not positive or not finite, or shapes do not fit.
         """
 
+    def factor(self) -> NDArray[np.float64] | None:
+        """Standard deviations of constants, base and tool together (5 L + 9, 8); None without a chain.
+
+        The first bound is a multiple of the norm of the centre's motion by them times this.
+        """
+
     def content(self) -> dict[str, Any]:
-        """All but the tables: level, largest, ranges (None for any), looseness (median ratio to exact), and
-        centre, the point whose position is meant, in the flange's frame, m.
+        """All but tables and factor: level, largest, ranges (None for any), looseness (median ratio to
+        exact), and centre, the point whose position is meant, in the flange's frame, m.
         """
 
     def blocks(self) -> list[dict[str, Any]]:
@@ -649,8 +663,12 @@ def fit_field(problem: Problem, constant: ConstantFit, options: Mapping[str, Any
             to nearly the same rows whose hyper-parameters the search begins at, or None; rough, whether those
             of a search on a part of the rows are enough; threads, or None for all.
 
+    Weights of the measurements between zero and one are where the search begins; after it every row is judged
+    by the others. Rows of weight zero take no part.
+
     Raises:
-        CoreError: Values are far outside the model.
+        CoreError: Values are far outside the model, options or the constants' fit are another problem's, or
+            nothing was measured or is driven.
     """
 
 def find_drift(

@@ -125,7 +125,9 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "data_hash": content["data_sha256"],
         "version": content["version"],
         "notices": tuple(_notice(stored) for stored in content.get("notices", ())),
-        "stored_conservative": None if bounds is None else conservative.unpack(bounds, arrays),
+        "stored_conservative": None
+        if bounds is None
+        else conservative.unpack(bounds, arrays, robot.flange_chain),
         "revision": revision.unpack(content["update"], arrays) if content.get("update") else None,
     }
 

@@ -3,7 +3,9 @@
 The exact standard deviation of a calibration needs the measurements and takes a millisecond. For compensation
 and for controllers a calibration file carries bounds of it as tables over the configuration: one number for
 the position of a point of the flange's frame, the root of the sum of its coordinates' variances (m), and one
-for the rotation vector (rad). The point, the centre, is the middle of what was measured.
+for the rotation vector (rad). The point, the centre, is the middle of what was measured. The first is a
+multiple of how far uncertain constants, base and tool move that point: a factor of their covariance, and
+tables for what it does not follow.
 """
 
 from dataclasses import dataclass
@@ -12,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Conservative
+from truearm._core import Chain, Conservative
 from truearm.fitting import feature_values
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 SAMPLES: Final = 4000
-FEWEST_SAMPLES: Final = 1000
+FEWEST_SAMPLES: Final = 2000
 QUICK_ROWS: Final = 1200
 """Measured values up to which an exact standard deviation takes less than a millisecond."""
 ENDS: Final = 0.1
@@ -48,11 +50,14 @@ class Reach:
 
     Attributes:
         limits: Lowest and highest reading (N, 2), and features (F, 2) behind them.
-        measured: The same of the measurements; the limits where there are none.
+        box: The same of the measurements; the limits where there are none.
+        rows: Readings and features of the measurements (n, N + F), clipped to the limits; None where there
+            are none.
     """
 
     limits: Floats
-    measured: Floats
+    box: Floats
+    rows: Floats | None
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "Reach":
@@ -60,21 +65,29 @@ class Reach:
         measured = _measured(calibration)
         limits = _closed_limits(calibration.robot, measured)
         if measured is None:
-            return cls(limits, limits)
+            return cls(limits, limits, None)
         joints = len(limits)
-        inside = np.clip(measured[:joints], limits[:, :1], limits[:, 1:])
-        features = measured[joints:]
+        features = np.column_stack([measured.min(axis=0), measured.max(axis=0)])[joints:]
         around = features + BEYOND * np.diff(features) * [-1.0, 1.0]
-        return cls(np.vstack([limits, around]), np.vstack([inside, features]))
+        limits = np.vstack([limits, around])
+        rows = np.clip(measured, *limits.T)
+        return cls(limits, np.column_stack([rows.min(axis=0), rows.max(axis=0)]), rows)
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
-        """Readings and features (count, N + F): half within the limits, half where was measured.
+        """Readings and features (count, N + F): within the limits, in the box of the measurements, and on the
+        way from one measurement to another, as many of each.
 
         A joint in six lies on an end of its range: where ranges end the tables know least.
         """
         place = np.clip(rng.uniform(-ENDS, 1.0 + ENDS, (count, len(self.limits))), 0.0, 1.0)
-        box = np.where(np.arange(count)[:, None, None] % 2 == 0, self.limits, self.measured)
-        return np.asarray(box[..., 0] + (box[..., 1] - box[..., 0]) * place)
+        kind = np.arange(count) % 3
+        box = np.where(kind[:, None, None] == 0, self.limits, self.box)
+        drawn = np.asarray(box[..., 0] + (box[..., 1] - box[..., 0]) * place)
+        if self.rows is not None:
+            ends = self.rows[rng.integers(len(self.rows), size=(2, count))]
+            way = ends[0] + (ends[1] - ends[0]) * rng.uniform(size=(count, 1))
+            drawn[kind == 2] = way[kind == 2]
+        return drawn
 
 
 def conservative_of(calibration: "Calibration") -> Conservative:
@@ -97,7 +110,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
         "largest": largest.tolist(),
         "centre": centre.tolist(),
     }
-    return Conservative.fit(plan, fitted, fresh)
+    return Conservative.fit(plan, fitted, fresh, robot.flange_chain)
 
 
 def pack(conservative: Conservative, arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
@@ -106,11 +119,14 @@ def pack(conservative: Conservative, arrays: dict[str, NDArray[Any]]) -> dict[st
     for number, block in enumerate(conservative.blocks()):
         arrays[f"conservative.block{number}.weights"] = block.pop("weights")
         blocks.append({**block, "axes": [list(axis) for axis in block["axes"]]})
-    return {**conservative.content(), "blocks": blocks}
+    factor = conservative.factor()
+    if factor is not None:
+        arrays["conservative.leverage"] = factor
+    return {**conservative.content(), "blocks": blocks, "leverage": factor is not None}
 
 
-def unpack(content: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Conservative:
-    """The bounds that `pack` described.
+def unpack(content: dict[str, Any], arrays: dict[str, NDArray[Any]], chain: Chain) -> Conservative:
+    """The bounds that `pack` described, of an arm with a chain to the flange.
 
     Raises:
         KeyError: If an array is missing.
@@ -123,7 +139,8 @@ def unpack(content: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Conserva
         }
         for number, block in enumerate(content["blocks"])
     ]
-    return Conservative({"centre": FLANGE, **content}, blocks)
+    leverage = (chain, arrays["conservative.leverage"]) if content.get("leverage") else None
+    return Conservative({"centre": FLANGE, **content}, blocks, leverage)
 
 
 def _exact(calibration: "Calibration", centre: Floats, drawn: Floats) -> tuple[tuple[Floats, Floats], Floats]:
@@ -152,12 +169,11 @@ def _sample_count(calibration: "Calibration") -> int:
 
 
 def _measured(calibration: "Calibration") -> Floats | None:
-    """Lowest and highest reading and feature of the measurements, (N + F, 2)."""
+    """Readings and features of the measurements, (n, N + F)."""
     if calibration.learned_from is None:
         return None
     data = calibration.learned_from.data
-    columns = np.hstack([data.readings, feature_values(data, calibration.options.features)])
-    return np.column_stack([columns.min(axis=0), columns.max(axis=0)])
+    return np.hstack([data.readings, feature_values(data, calibration.options.features)])
 
 
 def _closed_limits(robot: "Robot", measured: Floats | None) -> Floats:
@@ -166,7 +182,8 @@ def _closed_limits(robot: "Robot", measured: Floats | None) -> Floats:
     for joint, kind in enumerate(robot.joints):
         if not np.isfinite(limits[joint]).all():
             reach = np.pi if kind == "revolute" else OPEN_REACH_M
-            seen = np.zeros(2) if measured is None or kind == "revolute" else measured[joint]
+            column = None if measured is None or kind == "revolute" else measured[:, joint]
+            seen = np.zeros(2) if column is None else np.array([column.min(), column.max()])
             stated = np.isfinite(limits[joint])
             limits[joint] = np.where(stated, limits[joint], seen + np.array([-reach, reach]))
     return limits

@@ -70,4 +70,7 @@ pub struct ConservativeContent {
     /// The flange's origin where a file does not say.
     #[serde(default)]
     pub centre: [f64; 3],
+    /// Whether the file has the factor of a leverage.
+    #[serde(default)]
+    pub leverage: bool,
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use truearm_compensate::{Limits, Model, Spread};
-use truearm_field::{Axis, Bank, Block, Conservative, ConservativeParts, Grid, Levers, UPRIGHT};
+use truearm_field::{Axis, Bank, Block, Conservative, ConservativeParts, Grid, Leverage, Levers, UPRIGHT};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Transform};
 
 use crate::container::Container;
@@ -88,7 +88,7 @@ fn calibrated(container: &Container, content: &Content, coupling: &[f64]) -> Res
         model = model.with_field(bank.compiled(), content.options.features.len())?;
     }
     if let Some(stored) = &content.conservative {
-        let conservative = conservative(container, stored, inputs)?;
+        let conservative = conservative(container, stored, inputs, &self::chain(&content.robot, false)?)?;
         model = model.with_spread(Spread::Field(Box::new(conservative)))?;
     }
     Ok(model)
@@ -98,11 +98,19 @@ fn conservative(
     container: &Container,
     stored: &ConservativeContent,
     inputs: usize,
+    to_flange: &Chain,
 ) -> Result<Conservative, LoadError> {
     let any = [f64::NEG_INFINITY, f64::INFINITY];
+    let leverage = if stored.leverage {
+        let factor = container.numbers("conservative.leverage")?;
+        Some(Leverage::new(to_flange, stored.centre, &factor)?)
+    } else {
+        None
+    };
     let blocks = blocks(container, &stored.blocks, "conservative")?;
     Ok(Conservative::new(ConservativeParts {
         tables: Bank { input_count: inputs, parameter_count: truearm_field::BOUNDED, blocks, sag: None },
+        leverage,
         level: stored.level,
         largest: stored.largest,
         ranges: stored.ranges.iter().map(|range| range.unwrap_or(any)).collect(),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use truearm_field::FieldScratch;
+use truearm_field::{ConservativeScratch, FieldScratch};
 use truearm_kinematics::{
     Chain, Isa, Kernel, LANES, Lane, LaneFrame, LaneParameters, OnePose, Screw, Transform, dispatch_on,
     lane_room, load_lanes,
@@ -64,7 +64,7 @@ pub(crate) struct AimedScratch {
     pub screws: Vec<Screw>,
     slopes: Vec<Lane>,
     field: Option<FieldScratch>,
-    pub bounds: Option<FieldScratch>,
+    pub bounds: Option<ConservativeScratch>,
 }
 
 impl AimedScratch {

@@ -1,7 +1,7 @@
 //! How uncertain a model is of where it puts the tool.
 
-use truearm_field::{Conservative, FieldScratch};
-use truearm_kinematics::{Isa, LANES, Lane, LaneFrame};
+use truearm_field::{Conservative, ConservativeScratch, MOVED, moved_with_setup};
+use truearm_kinematics::{Isa, LANES, Lane};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::error::{CompensateError, check_finite, check_length};
@@ -11,8 +11,6 @@ use crate::model::Model;
 const ROUNDING: f64 = 1e-12;
 /// Columns of a factor whose products are summed at once: sums of one would wait for one another.
 const TOGETHER: usize = 2;
-/// Unknowns of base and tool.
-const MOVED: usize = 9;
 
 /// Standard deviation of the tool's position: the root of the sum of the variances of x, y and z.
 #[derive(Debug, Clone)]
@@ -92,34 +90,6 @@ impl ConstantSpread {
     }
 }
 
-/// How the end moves with translations and rotations of the base, and with translations of the tool in the flange's frame,
-/// from which the tool is turned.
-#[inline(always)]
-fn moved_with_setup<I: Isa>(end: &LaneFrame, flange_from_tool: &[f64; 9]) -> [[Lane; 3]; MOVED] {
-    let (zero, one, [x, y, z]) = (Lane::ZERO, Lane::splat(1.0), end.position);
-    // A closure would be compiled without the instruction set of this function.
-    let mut along = [[zero; 3]; 3];
-    for axis in 0..3 {
-        for i in 0..3 {
-            for k in 0..3 {
-                let turned = Lane::splat(flange_from_tool[3 * axis + k]);
-                along[axis][i] = I::mul_add(end.rotation[3 * i + k], turned, along[axis][i]);
-            }
-        }
-    }
-    [
-        [one, zero, zero],
-        [zero, one, zero],
-        [zero, zero, one],
-        [zero, -z, y],
-        [z, zero, -x],
-        [-y, x, zero],
-        along[0],
-        along[1],
-        along[2],
-    ]
-}
-
 impl Spread {
     pub(crate) fn check(&self, model: &Model) -> Result<(), CompensateError> {
         match self {
@@ -148,7 +118,7 @@ impl Spread {
     }
 
     /// Memory for bounds.
-    pub(crate) fn scratch(&self) -> Option<FieldScratch> {
+    pub(crate) fn scratch(&self) -> Option<ConservativeScratch> {
         match self {
             Self::Constant(_) => None,
             Self::Field(bounds) => Some(bounds.scratch()),

@@ -4,8 +4,8 @@
 //! flange's frame, the centre, and `s_r`, that of the rotation vector (rad). A point of the tool at the distance `r` from
 //! the centre deviates by no more than `s_p + r s_r`: by Minkowski's inequality the root mean square of `p + w x r` is at
 //! most that of `p` plus `r` times that of `w`. The centre is where was measured: of the flange itself positions alone tell
-//! little. Each is `exp(level + sum of tables)`: B-spline tables over every input and one over a few
-//! inputs together, fitted to exact values and raised, see [`Conservative::fit`]. Where an input leaves the range
+//! little. Each is `exp(level + sum of tables)`, that of the position times a [`Leverage`]: B-spline tables over every
+//! input and one over a few inputs together, fitted to exact values and raised, see [`Conservative::fit`]. Where an input leaves the range
 //! that the tables were fitted in, and nowhere above, stands the largest value that the prior allows.
 
 use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, lane_room, load_lanes};
@@ -13,6 +13,7 @@ use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch, lane_room, load_lan
 use crate::FieldError;
 use crate::bank::Bank;
 use crate::compiled::{Compiled, FieldScratch};
+use crate::leverage::{Leverage, LeverageScratch};
 
 /// What is bounded: position (m) and rotation (rad).
 pub const BOUNDED: usize = 2;
@@ -22,6 +23,8 @@ pub const BOUNDED: usize = 2;
 pub struct ConservativeParts {
     /// Tables of both logarithms: outputs 0 and 1 of a bank with two parameters.
     pub tables: Bank,
+    /// What the position's is a multiple of; one where there is none.
+    pub leverage: Option<Leverage>,
     /// Added to the tables.
     pub level: [f64; BOUNDED],
     /// Never exceeded, and the value outside the ranges; m and rad.
@@ -39,6 +42,13 @@ pub struct ConservativeParts {
 pub struct Conservative {
     parts: ConservativeParts,
     compiled: Compiled,
+}
+
+/// What an evaluation writes to.
+#[derive(Debug, Clone)]
+pub struct ConservativeScratch {
+    tables: FieldScratch,
+    leverage: Option<LeverageScratch>,
 }
 
 impl Conservative {
@@ -79,8 +89,11 @@ impl Conservative {
     }
 
     /// Room for a group of eight configurations.
-    pub fn scratch(&self) -> FieldScratch {
-        self.compiled.scratch()
+    pub fn scratch(&self) -> ConservativeScratch {
+        ConservativeScratch {
+            tables: self.compiled.scratch(),
+            leverage: self.parts.leverage.as_ref().map(Leverage::scratch),
+        }
     }
 
     /// Both numbers of a group's first `poses` configurations, at most eight; `inputs` are I lanes. The others get the
@@ -90,10 +103,14 @@ impl Conservative {
         &self,
         inputs: &[Lane],
         poses: usize,
-        scratch: &mut FieldScratch,
+        scratch: &mut ConservativeScratch,
     ) -> [Lane; BOUNDED] {
         let mut logs = [0.0; BOUNDED * LANES];
-        self.compiled.excite_and_add::<I>(inputs, scratch, &mut logs[..BOUNDED * poses]);
+        self.compiled.excite_and_add::<I>(inputs, &mut scratch.tables, &mut logs[..BOUNDED * poses]);
+        let mut units = [Lane::splat(1.0); BOUNDED];
+        if let (Some(leverage), Some(room)) = (&self.parts.leverage, &mut scratch.leverage) {
+            units[0] = leverage.group::<I>(inputs, poses, room);
+        }
         let mut inside = [true; LANES];
         for (lane, range) in inputs.iter().zip(&self.parts.ranges) {
             for (inside, value) in inside.iter_mut().zip(&lane.0) {
@@ -104,7 +121,8 @@ impl Conservative {
         for (k, lane) in out.iter_mut().enumerate() {
             for (pose, value) in lane.0[..poses].iter_mut().enumerate() {
                 if inside[pose] {
-                    *value = value.min((logs[BOUNDED * pose + k] + self.parts.level[k]).exp());
+                    let tables = (logs[BOUNDED * pose + k] + self.parts.level[k]).exp();
+                    *value = value.min(units[k].0[pose] * tables);
                 }
             }
         }

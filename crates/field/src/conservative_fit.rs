@@ -1,6 +1,6 @@
 //! Fitting the conservative standard deviation to exact values.
 //!
-//! The logarithms are fitted by least squares with a small ridge, in which a value that the tables fall short of weighs
+//! First a [`Leverage`] is fitted to the position's, where a chain is given; what follows is about what is left. The logarithms are fitted by least squares with a small ridge, in which a value that the tables fall short of weighs
 //! a hundred times one that they exceed, so that the tables lie along the upper edge of what they cannot follow. Then
 //! they are raised by the largest shortfall at configurations that took no part, and beyond it by what the tail
 //! of the shortfalls lets expect: peaks over a threshold whose excesses fall off exponentially.
@@ -9,12 +9,14 @@ use std::f64::consts::{PI, TAU};
 
 use faer::Mat;
 use truearm_estimate::dense::{Cholesky, parallelism};
+use truearm_kinematics::Chain;
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::cells::{Axis, Grid};
 use crate::conservative::{BOUNDED, Conservative, ConservativeParts};
 use crate::kernel::{Input, InputKind};
+use crate::leverage::Leverage;
 
 /// Cells of a turn along one input; fine curves of single joints are about this wide.
 const FINE: f64 = 40.0;
@@ -36,6 +38,8 @@ const SELDOM: f64 = 1e-6;
 /// The least raise beyond what was seen, in logarithms: tails of a smooth function are no exponentials.
 const LEAST: f64 = 0.02;
 const DEGREE: usize = 2;
+/// So far beyond a range, as a share of it, values are at its end but for rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Exact values at configurations.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +63,8 @@ pub struct ConservativePlan {
     pub largest: [f64; BOUNDED],
     /// The point whose position the samples are of, in the flange's frame, m.
     pub centre: [f64; 3],
+    /// The chain to the flange whose joint values are the first inputs, for a leverage.
+    pub chain: Option<Chain>,
 }
 
 impl Conservative {
@@ -66,18 +72,23 @@ impl Conservative {
     ///
     /// # Errors
     /// [`FieldError::Length`], [`FieldError::NotFinite`] where values are not positive or there are none,
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::Range`] where samples lie beyond the ranges, [`FieldError::NotPositiveDefinite`].
     pub fn fit(plan: &ConservativePlan, fitted: Samples, fresh: Samples) -> Result<Self, FieldError> {
         check(plan, fitted)?;
         check(plan, fresh)?;
+        plan.check_ranges()?;
+        plan.check_within(fitted)?;
+        plan.check_within(fresh)?;
         let grids = plan.grids();
         let rows = Rows::new(&grids, plan.kinds.len(), fitted.inputs);
         let mut solved = Vec::with_capacity(BOUNDED);
+        let (leverage, units) = leverage(plan, fitted)?;
         for k in 0..BOUNDED {
-            solved.push(solve(&rows, &logs(fitted, k))?);
+            solved.push(solve(&rows, &logs(fitted, &units, k))?);
         }
         let parts = ConservativeParts {
             tables: bank(plan, grids, &solved),
+            leverage,
             level: [solved[0].level, solved[1].level],
             largest: plan.largest,
             centre: plan.centre,
@@ -109,6 +120,31 @@ fn check(plan: &ConservativePlan, samples: Samples) -> Result<(), FieldError> {
 }
 
 impl ConservativePlan {
+    fn check_ranges(&self) -> Result<(), FieldError> {
+        for (input, &[low, high]) in self.ranges.iter().enumerate() {
+            if !(low <= high && low.is_finite() && high.is_finite()) {
+                let rule = "give the lowest and then the highest value, both finite";
+                return Err(FieldError::Range { input, value: low, low, high, rule });
+            }
+        }
+        Ok(())
+    }
+
+    /// Beyond the ranges nothing is fitted: a sample there would raise all tables.
+    fn check_within(&self, samples: Samples) -> Result<(), FieldError> {
+        let limits: Vec<[f64; 2]> = self.ranges.iter().zip(&self.kinds).map(limits).collect();
+        for inputs in samples.inputs.chunks_exact(limits.len().max(1)) {
+            for (input, (&value, &[low, high])) in inputs.iter().zip(&limits).enumerate() {
+                let slack = ROUNDING * (1.0 + high - low);
+                if value < low - slack || value > high + slack {
+                    let rule = "take samples within the ranges, or widen these";
+                    return Err(FieldError::Range { input, value, low, high, rule });
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// A fine line over each input, and a coarse grid over those together.
     fn grids(&self) -> Vec<Grid> {
         let axis = |k: usize, per_turn: f64| axis(self.kinds[k], self.ranges[k], per_turn);
@@ -154,8 +190,18 @@ fn limits((range, kind): (&[f64; 2], &InputKind)) -> [f64; 2] {
     if turn { [f64::NEG_INFINITY, f64::INFINITY] } else { *range }
 }
 
-fn logs(samples: Samples, k: usize) -> Vec<f64> {
-    samples.std.chunks_exact(BOUNDED).map(|pair| pair[k].ln()).collect()
+/// The leverage that the position's standard deviations follow, and both numbers' units (n, 2) with it.
+fn leverage(plan: &ConservativePlan, fitted: Samples) -> Result<(Option<Leverage>, Vec<f64>), FieldError> {
+    let Some(chain) = &plan.chain else { return Ok((None, vec![1.0; fitted.std.len()])) };
+    let position: Vec<f64> = fitted.std.iter().copied().step_by(BOUNDED).collect();
+    let found = Leverage::fit(chain, plan.centre, fitted.inputs, &position)?;
+    let units = found.at(fitted.inputs, plan.kinds.len()).into_iter().flat_map(|unit| [unit, 1.0]).collect();
+    Ok((Some(found), units))
+}
+
+fn logs(samples: Samples, units: &[f64], k: usize) -> Vec<f64> {
+    let pairs = samples.std.chunks_exact(BOUNDED).zip(units.chunks_exact(BOUNDED));
+    pairs.map(|(std, unit)| (std[k] / unit[k]).ln()).collect()
 }
 
 /// Excited cells of each sample, numbered through all grids.

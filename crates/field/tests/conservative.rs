@@ -4,7 +4,8 @@
 mod common;
 
 use common::Random;
-use truearm_field::{Conservative, ConservativePlan, FieldError, InputKind, Samples};
+use truearm_field::{Conservative, ConservativePlan, FieldError, InputKind, Leverage, Samples};
+use truearm_kinematics::{Chain, Convention, Joint, Link, Parameters, Transform};
 
 const JOINTS: usize = 4;
 const RANGES: [[f64; 2]; JOINTS] = [[-6.3, 6.3], [-2.0, 1.0], [-2.5, 2.5], [0.1, 0.6]];
@@ -48,6 +49,7 @@ fn plan() -> ConservativePlan {
         together: vec![1, 2],
         largest: LARGEST,
         centre: CENTRE,
+        chain: None,
     }
 }
 
@@ -136,4 +138,88 @@ fn samples_that_are_no_standard_deviations_are_refused() {
     bad.std.pop();
     let refused = Conservative::fit(&plan(), bad.samples(), good.samples());
     assert!(matches!(refused, Err(FieldError::Length { .. })));
+}
+
+/// An arm of the four joints, to its flange.
+fn chain() -> Chain {
+    let link = |joint, d, a, alpha| Link { joint, theta: 0.0, d, a, alpha, beta: 0.0 };
+    let links = vec![
+        link(Joint::Revolute, 0.4, 0.05, -1.5),
+        link(Joint::Revolute, 0.0, 0.5, 0.1),
+        link(Joint::Revolute, 0.1, 0.0, 1.5),
+        link(Joint::Prismatic, 0.0, 0.0, 0.0),
+    ];
+    Chain::new(Convention::Standard, links, Transform::IDENTITY, Transform::IDENTITY).unwrap()
+}
+
+/// What constants leave of which one combination is known much less well than all others, and a joint's share of it.
+fn of_constants(inputs: &[f64]) -> Vec<f64> {
+    let to_centre = chain().with_end(Transform { translation: CENTRE, ..Transform::IDENTITY }).unwrap();
+    let (n, width) = (inputs.len() / JOINTS, to_centre.parameter_count());
+    let mut jacobian = vec![0.0; n * 3 * width];
+    let nominal = to_centre.nominal();
+    to_centre.position_jacobian(inputs, Parameters::One(&nominal), &mut jacobian).unwrap();
+    let variance = |(rows, q): (&[f64], &[f64])| {
+        let mut sum = 0.0;
+        for row in rows.chunks_exact(width) {
+            let lean: f64 = row.iter().enumerate().map(|(k, value)| value * (0.7 * k as f64).cos()).sum();
+            sum += 1e-6 * lean * lean + row.iter().map(|value| 1e-10 * value * value).sum::<f64>();
+        }
+        sum * (1.0 + 0.1 * (3.0 * q[1]).sin())
+    };
+    let poses = jacobian.chunks_exact(3 * width).zip(inputs.chunks_exact(JOINTS));
+    poses.map(variance).flat_map(|variance: f64| [variance.sqrt(), 1e-3]).collect()
+}
+
+#[test]
+fn a_leverage_follows_what_constants_leave_where_tables_cannot() {
+    let [fitted, fresh, drawn] = [1, 2, 3].map(|seed| {
+        let mut drawn = Drawn::new(3000, seed);
+        drawn.std = of_constants(&drawn.inputs);
+        drawn
+    });
+    let median = |chain| {
+        let plan = ConservativePlan { chain, largest: [1.0; 2], together: Vec::new(), ..plan() };
+        let found = Conservative::fit(&plan, fitted.samples(), fresh.samples()).unwrap();
+        let ratios = ratios(&found, &drawn, 0);
+        assert!(ratios[0] >= 1.0, "{}", ratios[0]);
+        assert_eq!(found.std(&drawn.inputs[..JOINTS]).unwrap(), found.std(&drawn.inputs).unwrap()[..2]);
+        ratios[ratios.len() / 2]
+    };
+    let (without, with) = (median(None), median(Some(chain())));
+    assert!(with < 1.1 && without > 1.4, "{with} {without}");
+}
+
+#[test]
+fn a_leverage_is_the_same_however_many_threads_and_once_stored() {
+    let (inputs, centre) = (Drawn::new(700, 1).inputs, [0.1, 0.0, 0.2]);
+    let std: Vec<f64> = of_constants(&inputs).into_iter().step_by(2).collect();
+    let by = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Leverage::fit(&chain(), centre, &inputs, &std)).unwrap()
+    };
+    let found = by(1);
+    assert_eq!(found, by(3));
+    assert_eq!(Leverage::new(&chain(), centre, &found.factor()).unwrap(), found);
+    let mut spoilt = found.factor();
+    spoilt[3] = f64::NAN;
+    let error = Leverage::new(&chain(), centre, &spoilt).unwrap_err();
+    assert_eq!(error, FieldError::NotFinite { what: "factor of the standard deviation" });
+    assert!(matches!(Leverage::new(&chain(), centre, &spoilt[8..]), Err(FieldError::Length { .. })));
+}
+
+#[test]
+fn ranges_and_samples_that_do_not_fit_are_refused() {
+    let (fitted, fresh) = (Drawn::new(300, 1), Drawn::new(300, 2));
+    let refusal = |ranges: Vec<[f64; 2]>| {
+        let plan = ConservativePlan { ranges, ..plan() };
+        Conservative::fit(&plan, fitted.samples(), fresh.samples()).map(drop).unwrap_err().to_string()
+    };
+    for wrong in [[1.0, -2.0], [f64::NAN, 1.0], [-2.0, f64::INFINITY]] {
+        let ranges = RANGES.map(|range| if range == RANGES[1] { wrong } else { range });
+        assert!(refusal(ranges.to_vec()).contains("input 1 (counted from 0)"), "{wrong:?}");
+    }
+    let narrow = RANGES.map(|range| if range == RANGES[3] { [0.1, 0.5] } else { range });
+    let said = refusal(narrow.to_vec());
+    assert!(said.contains("input 3") && said.contains("take samples within the ranges"), "{said}");
 }

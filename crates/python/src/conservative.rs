@@ -4,10 +4,12 @@ use numpy::{PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_field::{
-    BOUNDED, Bank, Conservative as Core, ConservativeParts, ConservativePlan, InputKind, Samples,
+    BOUNDED, Bank, Conservative as Core, ConservativeParts, ConservativePlan, FACTOR_COLUMNS, InputKind,
+    Leverage, Samples,
 };
 
 use crate::blocks::{block_from, block_into};
+use crate::chain::Chain;
 use crate::door::{CoreError, Failure, quick};
 use crate::field::numbers;
 use crate::measured::matrix;
@@ -55,12 +57,22 @@ pub struct Plan {
 #[pymethods]
 impl Conservative {
     #[new]
-    fn new(content: &Bound<'_, PyDict>, blocks: Vec<Bound<'_, PyDict>>) -> PyResult<Self> {
+    #[pyo3(signature = (content, blocks, leverage=None))]
+    fn new(
+        content: &Bound<'_, PyDict>,
+        blocks: Vec<Bound<'_, PyDict>>,
+        leverage: Option<(PyRef<'_, Chain>, PyReadonlyArray2<'_, f64>)>,
+    ) -> PyResult<Self> {
         let stored: Stored = content.extract()?;
         let blocks = blocks.iter().map(block_from).collect::<PyResult<_>>()?;
         let any = [f64::NEG_INFINITY, f64::INFINITY];
         let ranges: Vec<[f64; 2]> = stored.ranges.into_iter().map(|range| range.unwrap_or(any)).collect();
+        let leverage = leverage
+            .map(|(chain, factor)| Leverage::new(chain.core(), stored.centre, &numbers(&factor)))
+            .transpose()
+            .map_err(Failure::into_exception)?;
         let parts = ConservativeParts {
+            leverage,
             tables: Bank { input_count: ranges.len(), parameter_count: BOUNDED, blocks, sag: None },
             level: stored.level,
             largest: stored.largest,
@@ -73,11 +85,13 @@ impl Conservative {
 
     /// Fits to exact values, and raises the fit by what fresh ones show.
     #[staticmethod]
+    #[pyo3(signature = (plan, fitted, fresh, chain=None))]
     fn fit(
         py: Python<'_>,
         plan: Plan,
         fitted: StoredSamples<'_>,
         fresh: StoredSamples<'_>,
+        chain: Option<&Chain>,
     ) -> PyResult<Self> {
         let kind = |&angle: &bool| if angle { InputKind::Angle } else { InputKind::Line };
         let plan = ConservativePlan {
@@ -86,6 +100,7 @@ impl Conservative {
             together: plan.together,
             largest: plan.largest,
             centre: plan.centre,
+            chain: chain.map(|chain| chain.core().clone()),
         };
         let arrays = [&fitted.0, &fitted.1, &fresh.0, &fresh.1].map(numbers);
         let core = quick(py, || {
@@ -106,6 +121,11 @@ impl Conservative {
         stored.set_item("looseness", parts.looseness)?;
         stored.set_item("centre", parts.centre)?;
         Ok(stored)
+    }
+
+    /// The factor of the leverage, (5 L + 9, 8); None where there is no leverage.
+    fn factor<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        self.core.parts().leverage.as_ref().map(|leverage| matrix(py, &leverage.factor(), FACTOR_COLUMNS))
     }
 
     /// The tables as dictionaries.

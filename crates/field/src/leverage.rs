@@ -1,0 +1,379 @@
+//! How far uncertain constants move a point of the flange's frame: what its standard deviation mostly follows over the
+//! configurations.
+//!
+//! With the covariance F F^T of the constants, and of base and tool, a point deviates by |J F|, where J is its motion by
+//! them. Of a variable model no covariance of constants says all; but a factor F of few columns, found by least squares
+//! of the logarithms, follows the exact standard deviation where single joints cannot tell it: close to what was measured,
+//! where other combinations of joints are.
+
+use rayon::prelude::*;
+use truearm_kinematics::{
+    Chain, Isa, Kernel, KinematicsError, LANES, Lane, LaneFrame, LaneParameters, OnePose, Screw,
+    SharedParameters, Transform, dispatch, lane_room, load_lanes,
+};
+
+use crate::FieldError;
+use crate::evidence::Score;
+use crate::hyper::Range;
+use crate::optimise::{Limits, maximise};
+
+/// Columns of a factor.
+pub const FACTOR_COLUMNS: usize = LANES;
+/// Unknowns of base and tool.
+pub const MOVED: usize = 9;
+
+/// Columns whose products are summed at once: sums of one would wait for one another.
+const TOGETHER: usize = 2;
+/// Samples of one piece of work.
+const PIECE: usize = 256;
+/// The search for a factor ends after so many evaluations, or with a step that gains less, in nats.
+const SEARCH: Limits = Limits { evaluations: 250, gain: 0.5 };
+/// Bounds of the factor's entries, in units of their mean size.
+const ENTRIES: Range = Range { start: 1.0, low: 1e-30, high: 1e30, spread: f64::INFINITY };
+/// Squares of what does not move a point at all, m^2; logarithms are still taken.
+const STILL: f64 = 1e-30;
+
+/// Deviations |J F| of a point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Leverage {
+    chain: Chain,
+    shared: SharedParameters,
+    columns: Vec<usize>,
+    /// A row for each constant, then for base and tool.
+    factor: Vec<Lane>,
+}
+
+/// What an evaluation writes to.
+#[derive(Debug, Clone)]
+pub struct LeverageScratch {
+    one: OnePose,
+    screws: Vec<Screw>,
+}
+
+/// How the end moves with translations and rotations of the base, and with translations of the tool in the flange's frame,
+/// from which the tool is turned.
+#[inline(always)]
+pub fn moved_with_setup<I: Isa>(end: &LaneFrame, flange_from_tool: &[f64; 9]) -> [[Lane; 3]; MOVED] {
+    let (zero, one, [x, y, z]) = (Lane::ZERO, Lane::splat(1.0), end.position);
+    // A closure would be compiled without the instruction set of this function.
+    let mut along = [[zero; 3]; 3];
+    for axis in 0..3 {
+        for i in 0..3 {
+            for k in 0..3 {
+                let turned = Lane::splat(flange_from_tool[3 * axis + k]);
+                along[axis][i] = I::mul_add(end.rotation[3 * i + k], turned, along[axis][i]);
+            }
+        }
+    }
+    [
+        [one, zero, zero],
+        [zero, one, zero],
+        [zero, zero, one],
+        [zero, -z, y],
+        [z, zero, -x],
+        [-y, x, zero],
+        along[0],
+        along[1],
+        along[2],
+    ]
+}
+
+impl Leverage {
+    /// From a factor (5 L + 9, 8), row-major, of a chain to the flange, for a point of the flange's frame, m.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`], [`FieldError::NotFinite`], or if the point is not finite.
+    pub fn new(to_flange: &Chain, point: [f64; 3], factor: &[f64]) -> Result<Self, FieldError> {
+        let (chain, rows) = (ended(to_flange, point)?, to_flange.parameter_count() + MOVED);
+        if factor.len() != rows * FACTOR_COLUMNS {
+            let (what, found) = ("the factor of the standard deviation", factor.len());
+            return Err(FieldError::Length { what, found, expected: rows * FACTOR_COLUMNS });
+        }
+        if !factor.iter().all(|value| value.is_finite()) {
+            return Err(FieldError::NotFinite { what: "factor of the standard deviation" });
+        }
+        let row = |row: &[f64]| Lane::from_fn(|column| row[column]);
+        Ok(Self {
+            shared: SharedParameters::new(&chain.nominal()),
+            columns: (0..chain.parameter_count()).collect(),
+            factor: factor.chunks_exact(FACTOR_COLUMNS).map(row).collect(),
+            chain,
+        })
+    }
+
+    /// The factor whose deviations follow standard deviations `std` (n,), m, at `inputs` (n, I), whose first J are the
+    /// joint values.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn fit(to_flange: &Chain, point: [f64; 3], inputs: &[f64], std: &[f64]) -> Result<Self, FieldError> {
+        let rows = to_flange.parameter_count() + MOVED;
+        let unknown = Self::new(to_flange, point, &vec![0.0; rows * FACTOR_COLUMNS])?;
+        let mut motions = unknown.motions_at(inputs, inputs.len() / std.len().max(1));
+        let sizes: Vec<f64> = (0..rows).map(|row| size(&motions, rows, row)).collect();
+        for (at, motion) in motions.iter_mut().enumerate() {
+            motion.iter_mut().for_each(|value| *value /= sizes[at % rows]);
+        }
+        let logs: Vec<f64> = std.iter().map(|std| 2.0 * std.ln()).collect();
+        let targets = Targets { motions: &motions, rows, logs: &logs };
+        let start = targets.start();
+        let ranges = vec![ENTRIES; start.len()];
+        let scale = targets.scale(&start);
+        let found = maximise(|entries| Ok(targets.score(entries, scale)), (&start, None), &ranges, SEARCH)?;
+        let factor: Vec<f64> = found
+            .point
+            .iter()
+            .enumerate()
+            .map(|(k, entry)| scale * entry / sizes[k / FACTOR_COLUMNS])
+            .collect();
+        Self::new(to_flange, point, &factor)
+    }
+
+    /// The factor (5 L + 9, 8), row-major.
+    pub fn factor(&self) -> Vec<f64> {
+        self.factor.iter().flat_map(|row| row.0).collect()
+    }
+
+    /// Room for a group of eight configurations.
+    pub fn scratch(&self) -> LeverageScratch {
+        LeverageScratch { one: OnePose::new(&self.shared), screws: vec![Screw::ZERO; self.columns.len()] }
+    }
+
+    /// Deviations of the point, m, at the joint values of a group of which the first `poses` count.
+    #[inline(always)]
+    pub fn group<I: Isa>(&self, inputs: &[Lane], poses: usize, scratch: &mut LeverageScratch) -> Lane {
+        let moved = self.sweep::<I>(inputs, poses == 1, scratch);
+        let count = self.columns.len();
+        let motion = |row: usize| if row < count { &scratch.screws[row].linear } else { &moved[row - count] };
+        if poses == 1 {
+            // Columns of the factor stand side by side in place of poses.
+            let mut motions = [Lane::ZERO; 3];
+            for (row, factor) in self.factor.iter().enumerate() {
+                let linear = motion(row);
+                for i in 0..3 {
+                    motions[i] = I::mul_add(Lane::splat(linear[i].0[0]), *factor, motions[i]);
+                }
+            }
+            return Lane::splat(squared::<I>(&motions).sum()).sqrt();
+        }
+        let mut squares = [Lane::ZERO; FACTOR_COLUMNS];
+        for first in (0..FACTOR_COLUMNS).step_by(TOGETHER) {
+            let mut motions = [[Lane::ZERO; 3]; TOGETHER];
+            for (row, factor) in self.factor.iter().enumerate() {
+                let linear = motion(row);
+                for column in 0..TOGETHER {
+                    let factor = Lane::splat(factor.0[first + column]);
+                    for i in 0..3 {
+                        motions[column][i] = I::mul_add(linear[i], factor, motions[column][i]);
+                    }
+                }
+            }
+            for column in 0..TOGETHER {
+                squares[first + column] = squared::<I>(&motions[column]);
+            }
+        }
+        // In the order of Lane::sum, so that a pose alone gets the same bits.
+        let [a, b, c, d, e, f, g, h] = squares;
+        (((a + e) + (b + f)) + ((c + g) + (d + h))).sqrt()
+    }
+
+    /// Deviations (n,) of the point at inputs (n, I), m.
+    pub fn at(&self, inputs: &[f64], width: usize) -> Vec<f64> {
+        let mut out = vec![0.0; inputs.len() / width.max(1)];
+        dispatch(Deviations { leverage: self, inputs, width, out: &mut out });
+        out
+    }
+
+    /// Motions of the point by the constants, in the scratch, and by base and tool.
+    #[inline(always)]
+    fn sweep<I: Isa>(
+        &self,
+        inputs: &[Lane],
+        alone: bool,
+        scratch: &mut LeverageScratch,
+    ) -> [[Lane; 3]; MOVED] {
+        let LeverageScratch { one, screws } = scratch;
+        let joints = &inputs[..self.chain.joint_count()];
+        let parameters = if alone {
+            one.move_to::<I>(&self.chain, joints);
+            LaneParameters::One(one)
+        } else {
+            LaneParameters::Shared(&self.shared)
+        };
+        let mut frame = LaneFrame::splat(&Transform::IDENTITY);
+        self.chain.sweep::<I>(joints, parameters, &self.columns, &mut frame, screws);
+        moved_with_setup::<I>(&frame, &Transform::IDENTITY.rotation)
+    }
+
+    /// Motions (n, 5 L + 9) of the point at inputs (n, I).
+    fn motions_at(&self, inputs: &[f64], width: usize) -> Vec<[f64; 3]> {
+        let rows = self.factor.len();
+        let mut motions = vec![[0.0; 3]; inputs.len() / width.max(1) * rows];
+        motions.par_chunks_mut(LANES * rows).enumerate().for_each(|(group, out)| {
+            dispatch(Motions { leverage: self, inputs, width, group, out });
+        });
+        motions
+    }
+}
+
+struct Deviations<'a> {
+    leverage: &'a Leverage,
+    inputs: &'a [f64],
+    width: usize,
+    out: &'a mut [f64],
+}
+
+impl Kernel for Deviations<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        let mut lanes = vec![Lane::ZERO; lane_room(self.width)];
+        let mut scratch = self.leverage.scratch();
+        for (group, out) in self.out.chunks_mut(LANES).enumerate() {
+            load_lanes::<I>(self.inputs, self.width, group * LANES, &mut lanes);
+            let deviations = self.leverage.group::<I>(&lanes, out.len(), &mut scratch);
+            out.copy_from_slice(&deviations.0[..out.len()]);
+        }
+    }
+}
+
+/// The chain to a point of the flange's frame.
+fn ended(to_flange: &Chain, point: [f64; 3]) -> Result<Chain, KinematicsError> {
+    let at = Transform { translation: point, ..Transform::IDENTITY };
+    to_flange.with_end(to_flange.end().compose(&at))
+}
+
+#[inline(always)]
+fn squared<I: Isa>(motion: &[Lane; 3]) -> Lane {
+    let mut sum = Lane::ZERO;
+    for value in motion {
+        sum = I::mul_add(*value, *value, sum);
+    }
+    sum
+}
+
+struct Motions<'a> {
+    leverage: &'a Leverage,
+    inputs: &'a [f64],
+    width: usize,
+    group: usize,
+    out: &'a mut [[f64; 3]],
+}
+
+impl Kernel for Motions<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        let Self { leverage, inputs, width, group, out } = self;
+        let mut lanes = vec![Lane::ZERO; lane_room(width)];
+        load_lanes::<I>(inputs, width, group * LANES, &mut lanes);
+        let mut scratch = leverage.scratch();
+        let moved = leverage.sweep::<I>(&lanes, false, &mut scratch);
+        let rows = leverage.factor.len();
+        let by_all = scratch.screws.iter().map(|screw| &screw.linear).chain(&moved);
+        for (row, motion) in by_all.enumerate() {
+            for (pose, out) in out.chunks_exact_mut(rows).enumerate() {
+                out[row] = motion.map(|lane| lane.0[pose]);
+            }
+        }
+    }
+}
+
+/// Root mean square of the motions by one unknown; one where it moves nothing.
+fn size(motions: &[[f64; 3]], rows: usize, row: usize) -> f64 {
+    let squares: f64 = motions.iter().skip(row).step_by(rows).flatten().map(|value| value * value).sum();
+    let size = (squares / (motions.len() / rows).max(1) as f64).sqrt();
+    if size > 0.0 { size } else { 1.0 }
+}
+
+/// What a factor is to follow: logarithms (n,) of variances, with motions (n, rows).
+struct Targets<'a> {
+    motions: &'a [[f64; 3]],
+    rows: usize,
+    logs: &'a [f64],
+}
+
+impl Targets<'_> {
+    /// Entries (rows, 8) of which none is like another.
+    fn start(&self) -> Vec<f64> {
+        (0..self.rows * FACTOR_COLUMNS).map(|k| ((k * k + 1) as f64).sin()).collect()
+    }
+
+    /// What entries are multiplied by for their deviations to be as large as the targets in the mean.
+    fn scale(&self, entries: &[f64]) -> f64 {
+        let off = self.pieces(entries, 1.0).iter().map(|piece| piece.off).sum::<f64>();
+        (-0.5 * off / self.logs.len().max(1) as f64).exp()
+    }
+
+    /// The likelihood of the entries, were what is left in the logarithms of one unknown size.
+    fn score(&self, entries: &[f64], scale: f64) -> Score {
+        let pieces = self.pieces(entries, scale);
+        let left = pieces.iter().map(|piece| piece.squares).sum::<f64>().max(f64::MIN_POSITIVE);
+        let count = self.logs.len() as f64;
+        let mut gradient = vec![0.0; entries.len()];
+        for piece in &pieces {
+            for (sum, row) in gradient.chunks_exact_mut(FACTOR_COLUMNS).zip(&piece.gradient) {
+                sum.iter_mut().zip(row.0).for_each(|(sum, value)| *sum -= count / left * value);
+            }
+        }
+        Score { value: -0.5 * count * (left / count).ln(), gradient }
+    }
+
+    /// Sums over samples, in pieces that do not depend on the number of threads.
+    fn pieces(&self, entries: &[f64], scale: f64) -> Vec<Piece> {
+        let rows: Vec<Lane> = entries
+            .chunks_exact(FACTOR_COLUMNS)
+            .map(|row| Lane::from_fn(|column| scale * row[column]))
+            .collect();
+        let samples = self.motions.par_chunks(PIECE * self.rows).zip(self.logs.par_chunks(PIECE));
+        samples.map(|(motions, logs)| dispatch(Sum { factor: &rows, scale, motions, logs })).collect()
+    }
+}
+
+/// Sums over some samples: of what logarithms are too large by, of its square, and half the square's gradient.
+struct Piece {
+    off: f64,
+    squares: f64,
+    gradient: Vec<Lane>,
+}
+
+struct Sum<'a> {
+    factor: &'a [Lane],
+    scale: f64,
+    motions: &'a [[f64; 3]],
+    logs: &'a [f64],
+}
+
+impl Kernel for Sum<'_> {
+    type Output = Piece;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Piece {
+        let Self { factor, scale, motions, logs } = self;
+        let mut piece = Piece { off: 0.0, squares: 0.0, gradient: vec![Lane::ZERO; factor.len()] };
+        for (motions, log) in motions.chunks_exact(factor.len()).zip(logs) {
+            let mut moved = [Lane::ZERO; 3];
+            for (motion, factor) in motions.iter().zip(factor) {
+                for i in 0..3 {
+                    moved[i] = I::mul_add(Lane::splat(motion[i]), *factor, moved[i]);
+                }
+            }
+            let variance = squared::<I>(&moved).sum() + STILL;
+            let off = variance.ln() - log;
+            piece.off += off;
+            piece.squares += off * off;
+            let slope = Lane::splat(2.0 * off * scale / variance);
+            for value in &mut moved {
+                *value = *value * slope;
+            }
+            for (motion, sum) in motions.iter().zip(&mut piece.gradient) {
+                for i in 0..3 {
+                    *sum = I::mul_add(Lane::splat(motion[i]), moved[i], *sum);
+                }
+            }
+        }
+        piece
+    }
+}
