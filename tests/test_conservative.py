@@ -1,5 +1,7 @@
 """Bounds of the standard deviation against exact ones at configurations they have never seen."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -113,6 +115,16 @@ def test_outside_the_limits_stands_the_largest_value(calibration):
     assert any(bounds is not None for bounds in ranges)
     bounds = calibration.conservative.content()
     assert calibration.conservative_std(q, tool=bounds["centre"]) == pytest.approx(bounds["largest"])
+
+
+def test_limits_stated_on_one_side_alone_are_closed_on_the_other(measured):
+    robot, data = measured
+    for joint, stated in ((0, (4.0, np.inf)), (1, (-np.inf, -4.0)), (0, (-np.inf, np.inf))):
+        limits = robot.limits.copy()
+        limits[joint] = stated
+        calibration = ta.calibrate(dataclasses.replace(robot, limits=limits), data, model="constant")
+        q = calibration.rows.data.readings
+        assert (calibration.conservative_std(q) >= roots(calibration, q, None)).all()
 
 
 def test_compensation_judges_by_it(calibration):

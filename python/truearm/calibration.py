@@ -330,8 +330,9 @@ class Calibration:
         """Bounds of the standard deviation of position and rotation, (n, 2), m and rad.
 
         The first is a bound of the root of the sum of the variances of x, y and z, the second of those of the
-        rotation vector. They are never below what `pose_std` says, at most moderately above it, and cost
-        less than a thousandth; compensation and controllers judge by them.
+        rotation vector. They are never below what `pose_std` says; of variable models the first is mostly
+        two to four times as large, else they are a few percent above. They cost about a thousandth;
+        compensation and controllers judge by them.
 
         Raises:
             WorkError: If the file has neither bounds nor the rows to work them out from.

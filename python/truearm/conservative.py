@@ -77,7 +77,7 @@ class Reach:
         """Readings and features (count, N + F): within the limits, in the box of the measurements, and on the
         way from one measurement to another, as many of each.
 
-        A joint in six lies on an end of its range: where ranges end the tables know least.
+        Of the first two a joint in six lies on an end of its range: there the tables know least.
         """
         place = np.clip(rng.uniform(-ENDS, 1.0 + ENDS, (count, len(self.limits))), 0.0, 1.0)
         kind = np.arange(count) % 3
@@ -184,8 +184,11 @@ def _closed_limits(robot: "Robot", measured: Floats | None) -> Floats:
             reach = np.pi if kind == "revolute" else OPEN_REACH_M
             column = None if measured is None or kind == "revolute" else measured[:, joint]
             seen = np.zeros(2) if column is None else np.array([column.min(), column.max()])
-            stated = np.isfinite(limits[joint])
-            limits[joint] = np.where(stated, limits[joint], seen + np.array([-reach, reach]))
+            low, high = limits[joint]
+            limits[joint] = (
+                low if np.isfinite(low) else min(seen[0], high) - reach,
+                high if np.isfinite(high) else max(seen[1], low) + reach,
+            )
     return limits
 
 

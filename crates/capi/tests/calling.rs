@@ -28,7 +28,9 @@ fn a_correction_brings_the_tool_to_where_the_program_means_it() {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
     }
     assert!(found.residual_m < 1e-9 && found.shift_m.iter().any(|x| x.abs() > 1e-4));
-    let flange = (-9.0_f64 + 0.01).exp();
+    let tool = nominal.pose(&corrected);
+    let flange = [3, 7].map(|at| tool[at] - 0.15 * tool[at - 1]);
+    let flange = flange[0].hypot(flange[1]) * (-9.0_f64 + 0.01).exp();
     assert!((found.std_m - (flange + 0.15 * (-8.0_f64 + 0.01).exp())).abs() < 1e-12);
 }
 

@@ -98,10 +98,17 @@ fn other_files_and_layouts_are_refused_in_words() {
     assert!(words.contains("version 7") && words.contains("0.1.0"), "{words}");
 }
 
+/// A factor with a row less.
+fn shortened(file: &mut File) {
+    let (_, shape, values) = &mut file.arrays[4];
+    shape[0] -= 1;
+    values.truncate(shape[0] * shape[1]);
+}
+
 #[test]
 fn contents_that_contradict_themselves_are_refused() {
     type Change = fn(&mut File);
-    let changes: [(Change, &str); 10] = [
+    let changes: [(Change, &str); 13] = [
         (|file| file.content["scheme"] = json!({"name": "fcmac"}), "scheme"),
         (|file| drop(file.arrays.remove(2)), "variable.block0.weights"),
         (|file| file.arrays[0].2[3] = f64::NAN, "finite"),
@@ -112,6 +119,9 @@ fn contents_that_contradict_themselves_are_refused() {
         (|file| file.content["models"]["variable"]["blocks"][0]["outputs"] = json!([99]), "outputs"),
         (|file| file.content["models"]["variable"]["blocks"][0]["axes"][0][4] = json!(0), "axes of a block"),
         (|file| file.content["conservative"]["level"] = json!([1.0]), "length 1"),
+        (|file| drop(file.arrays.remove(4)), "conservative.leverage"),
+        (|file| file.arrays[4].2[7] = f64::NAN, "finite"),
+        (shortened, "factor of the standard deviation"),
     ];
     for (change, words) in changes {
         let mut file = File::new();

@@ -107,8 +107,8 @@ pub fn fit_constant(problem: &Problem, options: &ConstantOptions) -> Result<Cons
     let sets = parameters.len() / nominal.len();
     let poses = problem.measurements.pose_count();
     if parameters.len() != nominal.len() && !(sets == poses && problem.columns.is_empty()) {
-        let expected = nominal.len();
-        return Err(EstimateError::Length { what: "parameters", found: parameters.len(), expected });
+        let (found, expected) = (parameters.len(), nominal.len());
+        return Err(EstimateError::Parameters { found, expected });
     }
     let setup = match &options.start {
         Some(setup) => setup.clone(),

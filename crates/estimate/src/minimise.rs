@@ -139,12 +139,16 @@ impl Objective<'_> {
         let mut damping = FIRST_DAMPING;
         // Whether a lower damping left the matrix at this state singular.
         let mut lowest = false;
+        let mut late_damping = LATE_DAMPING;
         while minimum.iterations < ITERATION_LIMIT {
             self.cancel.check()?;
             minimum.iterations += 1;
             let Some((step, promised)) = self.step(&minimum.state, &minimum.normal, damping) else {
                 damping *= 100.0;
                 lowest = true;
+                if minimum.iterations >= LATE {
+                    late_damping = damping;
+                }
                 if damping > LARGEST_DAMPING {
                     return Err(self.singular());
                 }
@@ -161,7 +165,7 @@ impl Objective<'_> {
             let trial = self.cost(&state, &normal);
             if trial < cost {
                 (minimum.state, minimum.normal, cost) = (state, normal, trial);
-                let least = if minimum.iterations < LATE { FIRST_DAMPING } else { LATE_DAMPING };
+                let least = if minimum.iterations < LATE { FIRST_DAMPING } else { late_damping };
                 damping = (damping * 0.01).max(least);
                 lowest = false;
             } else {

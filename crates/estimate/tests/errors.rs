@@ -95,7 +95,7 @@ fn another_arm() {
     let parameters = Some(vec![0.0; 31]);
     let options = ConstantOptions { parameters, ..ConstantOptions::default() };
     let said = fit_constant(&plan().make().problem(), &options).unwrap_err().to_string();
-    assert!(said.contains("parameters has 31 values where 30"), "{said}");
+    assert!(said.contains("parameters have 31 values where 30"), "{said}");
 }
 
 #[test]

@@ -63,6 +63,9 @@ impl Conservative {
         length("tables of the standard deviation", parts.tables.parameter_count, BOUNDED)?;
         length("ranges of the standard deviation", parts.ranges.len(), parts.tables.input_count)?;
         parts.tables.check()?;
+        if let Some(leverage) = &parts.leverage {
+            leverage.check_inputs(parts.tables.input_count)?;
+        }
         let weights = parts.tables.blocks.iter().flat_map(|block| &block.weights);
         let others = parts.level.iter().chain(&parts.largest).chain(&parts.centre);
         if !weights.chain(others).all(|value| value.is_finite()) {

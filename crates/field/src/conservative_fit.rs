@@ -1,13 +1,15 @@
 //! Fitting the conservative standard deviation to exact values.
 //!
-//! First a [`Leverage`] is fitted to the position's, where a chain is given; what follows is about what is left. The logarithms are fitted by least squares with a small ridge, in which a value that the tables fall short of weighs
-//! a hundred times one that they exceed, so that the tables lie along the upper edge of what they cannot follow. Then
-//! they are raised by the largest shortfall at configurations that took no part, and beyond it by what the tail
+//! First a [`Leverage`] is fitted to the position's, where a chain is given; what follows is about what is left. The
+//! logarithms are fitted by least squares with a small ridge, in which a value that the tables fall short of weighs a
+//! hundred times one that they exceed, so that the tables lie along the upper edge of what they cannot follow. Then they
+//! are raised by the largest shortfall at configurations that took no part, and beyond it by what the tail
 //! of the shortfalls lets expect: peaks over a threshold whose excesses fall off exponentially.
 
 use std::f64::consts::{PI, TAU};
 
 use faer::Mat;
+use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, parallelism};
 use truearm_kinematics::Chain;
 
@@ -72,8 +74,14 @@ impl Conservative {
     ///
     /// # Errors
     /// [`FieldError::Length`], [`FieldError::NotFinite`] where values are not positive or there are none,
-    /// [`FieldError::Range`] where samples lie beyond the ranges, [`FieldError::NotPositiveDefinite`].
-    pub fn fit(plan: &ConservativePlan, fitted: Samples, fresh: Samples) -> Result<Self, FieldError> {
+    /// [`FieldError::Ends`], [`FieldError::Range`] where samples lie beyond the ranges,
+    /// [`FieldError::NotPositiveDefinite`], or on request.
+    pub fn fit(
+        plan: &ConservativePlan,
+        fitted: Samples,
+        fresh: Samples,
+        cancel: &Cancel,
+    ) -> Result<Self, FieldError> {
         check(plan, fitted)?;
         check(plan, fresh)?;
         plan.check_ranges()?;
@@ -82,8 +90,9 @@ impl Conservative {
         let grids = plan.grids();
         let rows = Rows::new(&grids, plan.kinds.len(), fitted.inputs);
         let mut solved = Vec::with_capacity(BOUNDED);
-        let (leverage, units) = leverage(plan, fitted)?;
+        let (leverage, units) = leverage(plan, fitted, cancel)?;
         for k in 0..BOUNDED {
+            cancel.check()?;
             solved.push(solve(&rows, &logs(fitted, &units, k))?);
         }
         let parts = ConservativeParts {
@@ -101,6 +110,10 @@ impl Conservative {
 
 fn check(plan: &ConservativePlan, samples: Samples) -> Result<(), FieldError> {
     let count = plan.kinds.len();
+    if count == 0 {
+        let rule = "a standard deviation varies with one at least: give the kinds of joints and features";
+        return Err(FieldError::Option { what: "the number of inputs", value: count, rule });
+    }
     let poses = samples.std.len() / BOUNDED;
     let lengths = [
         ("ranges", plan.ranges.len(), count),
@@ -123,8 +136,7 @@ impl ConservativePlan {
     fn check_ranges(&self) -> Result<(), FieldError> {
         for (input, &[low, high]) in self.ranges.iter().enumerate() {
             if !(low <= high && low.is_finite() && high.is_finite()) {
-                let rule = "give the lowest and then the highest value, both finite";
-                return Err(FieldError::Range { input, value: low, low, high, rule });
+                return Err(FieldError::Ends { input, low, high });
             }
         }
         Ok(())
@@ -133,12 +145,11 @@ impl ConservativePlan {
     /// Beyond the ranges nothing is fitted: a sample there would raise all tables.
     fn check_within(&self, samples: Samples) -> Result<(), FieldError> {
         let limits: Vec<[f64; 2]> = self.ranges.iter().zip(&self.kinds).map(limits).collect();
-        for inputs in samples.inputs.chunks_exact(limits.len().max(1)) {
+        for inputs in samples.inputs.chunks_exact(limits.len()) {
             for (input, (&value, &[low, high])) in inputs.iter().zip(&limits).enumerate() {
                 let slack = ROUNDING * (1.0 + high - low);
                 if value < low - slack || value > high + slack {
-                    let rule = "take samples within the ranges, or widen these";
-                    return Err(FieldError::Range { input, value, low, high, rule });
+                    return Err(FieldError::Range { input, value, low, high });
                 }
             }
         }
@@ -191,11 +202,16 @@ fn limits((range, kind): (&[f64; 2], &InputKind)) -> [f64; 2] {
 }
 
 /// The leverage that the position's standard deviations follow, and both numbers' units (n, 2) with it.
-fn leverage(plan: &ConservativePlan, fitted: Samples) -> Result<(Option<Leverage>, Vec<f64>), FieldError> {
+fn leverage(
+    plan: &ConservativePlan,
+    fitted: Samples,
+    cancel: &Cancel,
+) -> Result<(Option<Leverage>, Vec<f64>), FieldError> {
     let Some(chain) = &plan.chain else { return Ok((None, vec![1.0; fitted.std.len()])) };
-    let position: Vec<f64> = fitted.std.iter().copied().step_by(BOUNDED).collect();
-    let found = Leverage::fit(chain, plan.centre, fitted.inputs, &position)?;
-    let units = found.at(fitted.inputs, plan.kinds.len()).into_iter().flat_map(|unit| [unit, 1.0]).collect();
+    let (position, width): (Vec<f64>, _) =
+        (fitted.std.iter().copied().step_by(BOUNDED).collect(), plan.kinds.len());
+    let found = Leverage::fit(chain, plan.centre, (fitted.inputs, width), &position, cancel)?;
+    let units = found.at(fitted.inputs, width).into_iter().flat_map(|unit| [unit, 1.0]).collect();
     Ok((Some(found), units))
 }
 

@@ -41,19 +41,33 @@ pub enum FieldError {
         /// The values.
         what: &'static str,
     },
-    /// A range without an inside, or a value beyond it.
-    #[error("input {input} (counted from 0) is at {value} where its range is {low} to {high}: {rule}")]
+    /// A range without an inside.
+    #[error(
+        "the range of input {input} (counted from 0) is {low} to {high}: give the lowest and then the highest value, \
+         both finite"
+    )]
+    Ends {
+        /// The input.
+        input: usize,
+        /// What should be the lowest value.
+        low: f64,
+        /// What should be the highest.
+        high: f64,
+    },
+    /// A value beyond its range.
+    #[error(
+        "input {input} (counted from 0) is at {value} where its range is {low} to {high}: take samples within the \
+         ranges, or widen these"
+    )]
     Range {
         /// The input.
         input: usize,
-        /// Its value; of ranges that are wrong themselves their lowest.
+        /// Its value.
         value: f64,
         /// Lowest value.
         low: f64,
         /// Highest value.
         high: f64,
-        /// The rule that it breaks, and the way out.
-        rule: &'static str,
     },
     /// Hyper-parameters of no arm, as a file that was changed may hold.
     #[error("the hyper-parameters of the field are of no use: {what}; calibrate again")]

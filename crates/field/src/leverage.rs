@@ -7,6 +7,7 @@
 //! where other combinations of joints are.
 
 use rayon::prelude::*;
+use truearm_estimate::Cancel;
 use truearm_kinematics::{
     Chain, Isa, Kernel, KinematicsError, LANES, Lane, LaneFrame, LaneParameters, OnePose, Screw,
     SharedParameters, Transform, dispatch, lane_room, load_lanes,
@@ -17,8 +18,9 @@ use crate::evidence::Score;
 use crate::hyper::Range;
 use crate::optimise::{Limits, maximise};
 
-/// Columns of a factor.
-pub const FACTOR_COLUMNS: usize = LANES;
+/// Columns of a factor, as files hold it: one to a lane.
+pub const FACTOR_COLUMNS: usize = 8;
+const _: () = assert!(FACTOR_COLUMNS == LANES);
 /// Unknowns of base and tool.
 pub const MOVED: usize = 9;
 
@@ -28,8 +30,10 @@ const TOGETHER: usize = 2;
 const PIECE: usize = 256;
 /// The search for a factor ends after so many evaluations, or with a step that gains less, in nats.
 const SEARCH: Limits = Limits { evaluations: 250, gain: 0.5 };
-/// Bounds of the factor's entries, in units of their mean size.
+/// Bounds of the factor's entries, in units of their mean size: their logarithms, no more than 69 either way, are what counts.
 const ENTRIES: Range = Range { start: 1.0, low: 1e-30, high: 1e30, spread: f64::INFINITY };
+/// Share of the largest motion below which one is rounding: such unknowns do not move the point.
+const ROUNDING: f64 = 1e-9;
 /// Squares of what does not move a point at all, m^2; logarithms are still taken.
 const STILL: f64 = 1e-30;
 
@@ -101,32 +105,59 @@ impl Leverage {
         })
     }
 
-    /// The factor whose deviations follow standard deviations `std` (n,), m, at `inputs` (n, I), whose first J are the
-    /// joint values.
+    /// The factor whose deviations follow standard deviations `std` (n,), m, at `inputs` (n, `width`), whose first J are
+    /// the joint values.
     ///
     /// # Errors
-    /// As [`Self::new`].
-    pub fn fit(to_flange: &Chain, point: [f64; 3], inputs: &[f64], std: &[f64]) -> Result<Self, FieldError> {
+    /// As [`Self::new`] and [`Self::check_inputs`], [`FieldError::Length`], or on request.
+    pub fn fit(
+        to_flange: &Chain,
+        point: [f64; 3],
+        (inputs, width): (&[f64], usize),
+        std: &[f64],
+        cancel: &Cancel,
+    ) -> Result<Self, FieldError> {
         let rows = to_flange.parameter_count() + MOVED;
         let unknown = Self::new(to_flange, point, &vec![0.0; rows * FACTOR_COLUMNS])?;
-        let mut motions = unknown.motions_at(inputs, inputs.len() / std.len().max(1));
-        let sizes: Vec<f64> = (0..rows).map(|row| size(&motions, rows, row)).collect();
+        unknown.check_inputs(width)?;
+        if inputs.len() != std.len() * width {
+            let (what, found) = ("inputs of standard deviations", inputs.len());
+            return Err(FieldError::Length { what, found, expected: std.len() * width });
+        }
+        let mut motions = unknown.motions_at(inputs, width);
+        let sizes = sizes(&motions, rows);
         for (at, motion) in motions.iter_mut().enumerate() {
-            motion.iter_mut().for_each(|value| *value /= sizes[at % rows]);
+            let size = sizes[at % rows];
+            motion.iter_mut().for_each(|value| *value = if size > 0.0 { *value / size } else { 0.0 });
         }
         let logs: Vec<f64> = std.iter().map(|std| 2.0 * std.ln()).collect();
         let targets = Targets { motions: &motions, rows, logs: &logs };
         let start = targets.start();
         let ranges = vec![ENTRIES; start.len()];
         let scale = targets.scale(&start);
-        let found = maximise(|entries| Ok(targets.score(entries, scale)), (&start, None), &ranges, SEARCH)?;
-        let factor: Vec<f64> = found
-            .point
-            .iter()
-            .enumerate()
-            .map(|(k, entry)| scale * entry / sizes[k / FACTOR_COLUMNS])
-            .collect();
+        let score = |entries: &[f64]| {
+            cancel.check()?;
+            Ok(targets.score(entries, scale))
+        };
+        let found = maximise(score, (&start, None), &ranges, SEARCH)?;
+        let entry = |(k, entry): (usize, &f64)| {
+            let size = sizes[k / FACTOR_COLUMNS];
+            if size > 0.0 { scale * entry / size } else { 0.0 }
+        };
+        let factor: Vec<f64> = found.point.iter().enumerate().map(entry).collect();
         Self::new(to_flange, point, &factor)
+    }
+
+    /// Checks that configurations of so many inputs hold all joint values.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`].
+    pub fn check_inputs(&self, width: usize) -> Result<(), FieldError> {
+        let expected = self.chain.joint_count();
+        if width < expected {
+            return Err(FieldError::Length { what: "a configuration", found: width, expected });
+        }
+        Ok(())
     }
 
     /// The factor (5 L + 9, 8), row-major.
@@ -281,11 +312,16 @@ impl Kernel for Motions<'_> {
     }
 }
 
-/// Root mean square of the motions by one unknown; one where it moves nothing.
-fn size(motions: &[[f64; 3]], rows: usize, row: usize) -> f64 {
-    let squares: f64 = motions.iter().skip(row).step_by(rows).flatten().map(|value| value * value).sum();
-    let size = (squares / (motions.len() / rows).max(1) as f64).sqrt();
-    if size > 0.0 { size } else { 1.0 }
+/// Root mean squares of the motions by each unknown; zero where it moves nothing.
+fn sizes(motions: &[[f64; 3]], rows: usize) -> Vec<f64> {
+    let mut squares = vec![0.0; rows];
+    for (at, motion) in motions.iter().enumerate() {
+        squares[at % rows] += motion.iter().map(|value| value * value).sum::<f64>();
+    }
+    let count = (motions.len() / rows).max(1) as f64;
+    let sizes: Vec<f64> = squares.iter().map(|sum| (sum / count).sqrt()).collect();
+    let least = ROUNDING * sizes.iter().copied().fold(0.0, f64::max);
+    sizes.into_iter().map(|size| if size > least { size } else { 0.0 }).collect()
 }
 
 /// What a factor is to follow: logarithms (n,) of variances, with motions (n, rows).

@@ -4,7 +4,10 @@
 mod common;
 
 use common::Random;
-use truearm_field::{Conservative, ConservativePlan, FieldError, InputKind, Leverage, Samples};
+use truearm_estimate::{Cancel, EstimateError};
+use truearm_field::{
+    Conservative, ConservativePlan, FACTOR_COLUMNS, FieldError, InputKind, Leverage, MOVED, Samples,
+};
 use truearm_kinematics::{Chain, Convention, Joint, Link, Parameters, Transform};
 
 const JOINTS: usize = 4;
@@ -55,7 +58,7 @@ fn plan() -> ConservativePlan {
 
 fn fitted() -> Conservative {
     let (fitted, fresh) = (Drawn::new(3000, 1), Drawn::new(3000, 2));
-    Conservative::fit(&plan(), fitted.samples(), fresh.samples()).unwrap()
+    Conservative::fit(&plan(), fitted.samples(), fresh.samples(), &Cancel::default()).unwrap()
 }
 
 fn ratios(field: &Conservative, drawn: &Drawn, k: usize) -> Vec<f64> {
@@ -133,10 +136,10 @@ fn stored_parts_are_the_same_field() {
 fn samples_that_are_no_standard_deviations_are_refused() {
     let (good, mut bad) = (Drawn::new(50, 1), Drawn::new(50, 2));
     bad.std[7] = 0.0;
-    let refused = Conservative::fit(&plan(), good.samples(), bad.samples());
+    let refused = Conservative::fit(&plan(), good.samples(), bad.samples(), &Cancel::default());
     assert!(matches!(refused, Err(FieldError::NotFinite { .. })));
     bad.std.pop();
-    let refused = Conservative::fit(&plan(), bad.samples(), good.samples());
+    let refused = Conservative::fit(&plan(), bad.samples(), good.samples(), &Cancel::default());
     assert!(matches!(refused, Err(FieldError::Length { .. })));
 }
 
@@ -180,7 +183,7 @@ fn a_leverage_follows_what_constants_leave_where_tables_cannot() {
     });
     let median = |chain| {
         let plan = ConservativePlan { chain, largest: [1.0; 2], together: Vec::new(), ..plan() };
-        let found = Conservative::fit(&plan, fitted.samples(), fresh.samples()).unwrap();
+        let found = Conservative::fit(&plan, fitted.samples(), fresh.samples(), &Cancel::default()).unwrap();
         let ratios = ratios(&found, &drawn, 0);
         assert!(ratios[0] >= 1.0, "{}", ratios[0]);
         assert_eq!(found.std(&drawn.inputs[..JOINTS]).unwrap(), found.std(&drawn.inputs).unwrap()[..2]);
@@ -196,7 +199,7 @@ fn a_leverage_is_the_same_however_many_threads_and_once_stored() {
     let std: Vec<f64> = of_constants(&inputs).into_iter().step_by(2).collect();
     let by = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Leverage::fit(&chain(), centre, &inputs, &std)).unwrap()
+        pool.install(|| Leverage::fit(&chain(), centre, (&inputs, JOINTS), &std, &Cancel::default())).unwrap()
     };
     let found = by(1);
     assert_eq!(found, by(3));
@@ -213,13 +216,119 @@ fn ranges_and_samples_that_do_not_fit_are_refused() {
     let (fitted, fresh) = (Drawn::new(300, 1), Drawn::new(300, 2));
     let refusal = |ranges: Vec<[f64; 2]>| {
         let plan = ConservativePlan { ranges, ..plan() };
-        Conservative::fit(&plan, fitted.samples(), fresh.samples()).map(drop).unwrap_err().to_string()
+        Conservative::fit(&plan, fitted.samples(), fresh.samples(), &Cancel::default())
+            .map(drop)
+            .unwrap_err()
+            .to_string()
     };
     for wrong in [[1.0, -2.0], [f64::NAN, 1.0], [-2.0, f64::INFINITY]] {
         let ranges = RANGES.map(|range| if range == RANGES[1] { wrong } else { range });
-        assert!(refusal(ranges.to_vec()).contains("input 1 (counted from 0)"), "{wrong:?}");
+        let rule = format!("input 1 (counted from 0) is {} to {}: give the lowest", wrong[0], wrong[1]);
+        assert!(refusal(ranges.to_vec()).contains(&rule), "{wrong:?}");
     }
     let narrow = RANGES.map(|range| if range == RANGES[3] { [0.1, 0.5] } else { range });
     let said = refusal(narrow.to_vec());
     assert!(said.contains("input 3") && said.contains("take samples within the ranges"), "{said}");
+}
+
+/// Motions (n, 5 L + 9, 3) of a point of the flange by all constants, by differences, and by base and tool.
+fn motions(chain: &Chain, point: [f64; 3], inputs: &[f64]) -> Vec<[f64; 3]> {
+    let (joints, nominal) = (chain.joint_count(), chain.nominal());
+    let to_point = chain
+        .with_end(chain.end().compose(&Transform { translation: point, ..Transform::IDENTITY }))
+        .unwrap();
+    let mut motions = Vec::new();
+    for q in inputs.chunks_exact(joints) {
+        let pose = |parameters: &[f64]| {
+            let mut pose = [0.0; 16];
+            to_point.poses(q, Parameters::One(parameters), &mut pose).unwrap();
+            pose
+        };
+        for k in 0..nominal.len() {
+            let shifted = |by: f64| {
+                let mut parameters = nominal.clone();
+                parameters[k] += by;
+                pose(&parameters)
+            };
+            let (above, below) = (shifted(1e-6), shifted(-1e-6));
+            motions.push([3, 7, 11].map(|at| (above[at] - below[at]) / 2e-6));
+        }
+        let here = pose(&nominal);
+        let [x, y, z] = [3, 7, 11].map(|at| here[at]);
+        motions.extend([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        motions.extend([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]);
+        motions.extend([0, 1, 2].map(|axis| [0, 1, 2].map(|row| here[4 * row + axis])));
+    }
+    motions
+}
+
+#[test]
+fn a_leverage_is_how_far_a_factor_moves_the_point_of_any_arm() {
+    let turned = |x: f64| Transform {
+        translation: [0.1, x, -0.2],
+        rotation: [0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+    };
+    let links = chain().links().to_vec();
+    let (point, inputs) = ([0.05, -0.1, 0.2], Drawn::new(21, 4).inputs);
+    for convention in [Convention::Standard, Convention::Modified] {
+        let arm = Chain::new(convention, links.clone(), turned(0.3), turned(-0.1)).unwrap();
+        let rows = arm.parameter_count() + MOVED;
+        let factor: Vec<f64> = (0..rows * FACTOR_COLUMNS).map(|k| (0.3 * k as f64).sin()).collect();
+        let leverage = Leverage::new(&arm, point, &factor).unwrap();
+        let found = leverage.at(&inputs, JOINTS);
+        for (found, motions) in found.iter().zip(motions(&arm, point, &inputs).chunks_exact(rows)) {
+            let moved = |column: usize, axis: usize| -> f64 {
+                (0..rows).map(|row| motions[row][axis] * factor[FACTOR_COLUMNS * row + column]).sum()
+            };
+            let squares = (0..3 * FACTOR_COLUMNS).map(|k| moved(k / 3, k % 3).powi(2));
+            let expected = squares.sum::<f64>().sqrt();
+            assert!((found - expected).abs() < 1e-7 * expected, "{convention:?}: {found} {expected}");
+        }
+        for (place, q) in inputs.chunks_exact(JOINTS).enumerate() {
+            assert_eq!(leverage.at(q, JOINTS), found[place..=place]);
+        }
+    }
+}
+
+#[test]
+fn what_moves_the_point_by_rounding_alone_has_no_factor() {
+    // The last joint slides along the axis that its theta turns about, and the point lies on it.
+    let (inputs, last) = (Drawn::new(400, 5).inputs, 5 * (JOINTS - 1));
+    let std: Vec<f64> = of_constants(&inputs).into_iter().step_by(2).collect();
+    let found =
+        Leverage::fit(&chain(), [0.0, 0.0, 0.2], (&inputs, JOINTS), &std, &Cancel::default()).unwrap();
+    let factor = found.factor();
+    let of = |row: usize| &factor[FACTOR_COLUMNS * row..][..FACTOR_COLUMNS];
+    assert_eq!(of(last), [0.0; FACTOR_COLUMNS]);
+    assert!(of(last + 1).iter().any(|entry| *entry != 0.0));
+}
+
+#[test]
+fn a_leverage_of_more_joints_than_inputs_is_refused() {
+    let (fitted, fresh) = (Drawn::new(300, 1), Drawn::new(300, 2));
+    let links = [chain().links(), chain().links()].concat();
+    let eight = Chain::new(Convention::Standard, links, Transform::IDENTITY, Transform::IDENTITY).unwrap();
+    let plan = ConservativePlan { chain: Some(eight.clone()), ..plan() };
+    let refused = Conservative::fit(&plan, fitted.samples(), fresh.samples(), &Cancel::default());
+    let error = FieldError::Length { what: "a configuration", found: JOINTS, expected: 2 * JOINTS };
+    assert_eq!(refused.map(drop), Err(error.clone()));
+    let mut parts = Conservative::fit(&self::plan(), fitted.samples(), fresh.samples(), &Cancel::default())
+        .unwrap()
+        .parts()
+        .clone();
+    let factor = vec![0.0; (eight.parameter_count() + MOVED) * FACTOR_COLUMNS];
+    parts.leverage = Some(Leverage::new(&eight, CENTRE, &factor).unwrap());
+    assert_eq!(Conservative::new(parts).map(drop), Err(error));
+}
+
+#[test]
+fn no_inputs_are_refused_and_a_fit_ends_on_request() {
+    let (fitted, fresh, cancel) = (Drawn::new(300, 1), Drawn::new(300, 2), Cancel::default());
+    let nothing = ConservativePlan { kinds: Vec::new(), ranges: Vec::new(), ..plan() };
+    let refused = Conservative::fit(&nothing, fitted.samples(), fresh.samples(), &cancel);
+    assert!(refused.unwrap_err().to_string().starts_with("the number of inputs is 0"));
+    cancel.request();
+    let plan = ConservativePlan { chain: Some(chain()), ..plan() };
+    let ended = Conservative::fit(&plan, fitted.samples(), fresh.samples(), &cancel).map(drop);
+    assert_eq!(ended, Err(FieldError::Estimate(EstimateError::Cancelled)));
 }

@@ -10,7 +10,7 @@ use truearm_field::{
 
 use crate::blocks::{block_from, block_into};
 use crate::chain::Chain;
-use crate::door::{CoreError, Failure, quick};
+use crate::door::{CoreError, Failure, long, quick};
 use crate::field::numbers;
 use crate::measured::matrix;
 
@@ -103,9 +103,9 @@ impl Conservative {
             chain: chain.map(|chain| chain.core().clone()),
         };
         let arrays = [&fitted.0, &fitted.1, &fresh.0, &fresh.1].map(numbers);
-        let core = quick(py, || {
+        let core = long(py, |cancel| {
             let samples = |k: usize| Samples { inputs: &arrays[k], std: &arrays[k + 1] };
-            Core::fit(&plan, samples(0), samples(2))
+            Core::fit(&plan, samples(0), samples(2), cancel)
         })?;
         Ok(Self { core })
     }

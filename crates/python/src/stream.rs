@@ -6,6 +6,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use truearm_compensate::{Fault, Phase, Stream as Core, StreamOptions};
 
+use crate::chain::contiguous;
 use crate::compensate::Corrector;
 use crate::door::Failure;
 
@@ -64,7 +65,7 @@ impl Stream {
     ) -> PyResult<Stepped<'py>> {
         let mut core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
         let mut out = vec![0.0; core.joint_count()];
-        let values = readings.as_ref().map(|readings| readings.as_slice()).transpose()?;
+        let values = readings.as_ref().map(|readings| contiguous("readings", readings)).transpose()?;
         let step = core.step(values, &features, elapsed, &mut out);
         let command = (step.fault != Some(Fault::NotStarted)).then(|| out.into_pyarray(py));
         Ok((command, phase(step.phase), step.gain, step.lag, step.fault.map(words)))

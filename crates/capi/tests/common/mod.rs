@@ -41,6 +41,9 @@ impl File {
         let unit = |size: usize| -> Vec<Vec<f64>> {
             (0..size).map(|i| (0..size).map(|j| f64::from(u8::from(i == j))).collect()).collect()
         };
+        // The base turns about its z axis, and nothing else is uncertain.
+        let mut factor = vec![0.0; 8 * (5 * JOINTS + 9)];
+        factor[8 * (5 * JOINTS + 5) + 2] = 1.0;
         let spacing = std::f64::consts::TAU / CELLS as f64;
         let axis = json!([true, 1.0, -std::f64::consts::PI, spacing, CELLS, true, 2]);
         let mut tool = unit(4);
@@ -63,7 +66,7 @@ impl File {
             "conservative": {
                 "blocks": [{"name": "each", "inputs": [2], "axes": [axis], "outputs": [0, 1]}],
                 "level": [-9.0, -8.0], "largest": [1e-3, 1e-3], "ranges": vec![Value::Null; JOINTS],
-                "looseness": [1.1, 1.1],
+                "looseness": [1.1, 1.1], "leverage": true,
             },
         });
         let arrays = vec![
@@ -71,6 +74,7 @@ impl File {
             ("constant.constants".to_owned(), vec![JOINTS, 5], constants),
             ("variable.block0.weights".to_owned(), vec![CELLS, 1], curve),
             ("conservative.block0.weights".to_owned(), vec![CELLS, 2], vec![0.01; 2 * CELLS]),
+            ("conservative.leverage".to_owned(), vec![5 * JOINTS + 9, 8], factor),
         ];
         Self { content, arrays }
     }
