@@ -123,8 +123,7 @@ def test_limits_stated_on_one_side_alone_are_closed_on_the_other(measured):
         limits = robot.limits.copy()
         limits[joint] = stated
         calibration = ta.calibrate(dataclasses.replace(robot, limits=limits), data, model="constant")
-        q = calibration.rows.data.readings
-        assert (calibration.conservative_std(q) >= roots(calibration, q, None)).all()
+        assert (calibration.conservative_std(data.readings) >= roots(calibration, data.readings, None)).all()
 
 
 def test_compensation_judges_by_it(calibration):

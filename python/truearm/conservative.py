@@ -182,13 +182,10 @@ def _closed_limits(robot: "Robot", measured: Floats | None) -> Floats:
     for joint, kind in enumerate(robot.joints):
         if not np.isfinite(limits[joint]).all():
             reach = np.pi if kind == "revolute" else OPEN_REACH_M
-            column = None if measured is None or kind == "revolute" else measured[:, joint]
-            seen = np.zeros(2) if column is None else np.array([column.min(), column.max()])
+            column = np.zeros(1) if measured is None or kind == "revolute" else measured[:, joint]
             low, high = limits[joint]
-            limits[joint] = (
-                low if np.isfinite(low) else min(seen[0], high) - reach,
-                high if np.isfinite(high) else max(seen[1], low) + reach,
-            )
+            limits[joint, 0] = low if np.isfinite(low) else min(column.min(), high) - reach
+            limits[joint, 1] = high if np.isfinite(high) else max(column.max(), low) + reach
     return limits
 
 
