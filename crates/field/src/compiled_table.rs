@@ -246,13 +246,21 @@ impl Sheet {
                 for (grade, along) in grades.iter_mut().zip(&excited[table.last].grade) {
                     *grade = Lane::splat(along.0[pose]);
                 }
-                for row in rows.by_ref().take(table.row_count(K)) {
-                    let first = row.cell[pose] as usize;
-                    let mut part = [Lane::ZERO; W];
-                    for (grade, weights) in grades.iter().zip(&cells[first..first + K]) {
-                        weigh::<I, W>(*grade, weights, &mut part);
+                // Cell by cell along the last axis first: its grades then count once for all rows.
+                let mut parts = [[Lane::ZERO; W]; K];
+                let mut own = rows.by_ref().take(table.row_count(K));
+                if table.outer.is_empty() {
+                    let first = own.next().map_or(0, |row| row.cell[pose] as usize);
+                    parts.copy_from_slice(&cells[first..first + K]);
+                }
+                for row in own {
+                    let (first, grade) = (row.cell[pose] as usize, Lane::splat(row.grade.0[pose]));
+                    for (part, weights) in parts.iter_mut().zip(&cells[first..first + K]) {
+                        weigh::<I, W>(grade, weights, part);
                     }
-                    weigh::<I, W>(Lane::splat(row.grade.0[pose]), &part, &mut sums);
+                }
+                for (grade, part) in grades.iter().zip(&parts) {
+                    weigh::<I, W>(*grade, part, &mut sums);
                 }
             }
             let mut found = [Lane::ZERO; MOST_LANES + 1];
