@@ -228,7 +228,7 @@ def test_a_device_that_restarts_is_connected_anew(kind, tmp_path, wires):
         path, clean_path = tmp_path / f"{seed}.db", tmp_path / f"clean{seed}.db"
         text, poses = clean_and_faulty(tmp_path, seed, count, settings, process, wires, sensor={"port": port})
         with virtual(text) as (running, cell):
-            stopped += starts_until_done(cell, poses, path) - 1
+            stopped += starts_until_done(cell, poses, path, restart_s / SPEED) - 1
             assert not running.shared.flag(COLLISIONS)
         off_mm = apart_mm(path, clean_path)
         assert (off_mm < RIGHT_MM).all(), "a wrong reading was accepted"
@@ -241,14 +241,18 @@ def test_a_device_that_restarts_is_connected_anew(kind, tmp_path, wires):
     assert kept > 0.8 * clean
 
 
-def starts_until_done(cell, poses, path):
-    """How often the same command is given until all is measured; it ends for restarts alone."""
+def starts_until_done(cell, poses, path, away_s):
+    """How often the same command is given until all is measured; it ends for restarts alone.
+
+    It is given again when the device, which is away for `away_s`, is back.
+    """
     for start in range(1, MOST_STARTS + 1):
         with contextlib.suppress(
             DeviceSilentError, DeviceGoneError, DeviceRestartedError, PortUnavailableError
         ):
             assert measured(cell, poses, path)[0] == DONE
             return start
+        time.sleep(away_s)
     raise AssertionError(f"not done after {MOST_STARTS} starts")
 
 
