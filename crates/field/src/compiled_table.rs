@@ -1,6 +1,9 @@
 //! Weights laid out for evaluation: one output over one input, or many outputs over up to three.
+//!
+//! The latter are of single precision: what an evaluation of many outputs costs is to fetch them. They are rounded by less than
+//! a ten-millionth, a thousandth of a nanometre or so in the position.
 
-use truearm_kinematics::{Isa, LANES, Lane, Pick};
+use truearm_kinematics::{Isa, LANES, Lane, Pick, Short};
 
 use crate::bank::Block;
 use crate::cells::MOST_AXES;
@@ -8,6 +11,8 @@ use crate::compiled_axis::{CompiledAxis, Excited};
 
 /// Lanes of outputs whose sums fit into registers.
 pub const MOST_LANES: usize = 5;
+/// A smaller weight, rad or m, is none: its products would leave the range of normal numbers, where processors are slow.
+const LEAST_WEIGHT: f64 = 1e-20;
 
 /// A compiled axis and its index.
 pub type Numbered<'a> = (usize, &'a CompiledAxis);
@@ -86,7 +91,7 @@ pub struct Sheet {
     pub outputs: Vec<usize>,
     tables: Vec<Table>,
     /// Of all tables, (rows, cells, lanes).
-    weights: Vec<Lane>,
+    weights: Vec<Short>,
     /// How the sums reach the parameters.
     ways: Vec<Way>,
     /// Where in the single sums the numbers of each lane begin; empty if they begin with nothing.
@@ -126,12 +131,12 @@ pub struct Row {
     /// First excited cell, in the sheet.
     cell: [u64; LANES],
     /// Product of the grades along the other axes.
-    grade: Lane,
+    grade: Short,
 }
 
 impl Row {
     /// Without any effect.
-    pub const NONE: Self = Self { cell: [0; LANES], grade: Lane::ZERO };
+    pub const NONE: Self = Self { cell: [0; LANES], grade: Short::ZERO };
 }
 
 impl Sheet {
@@ -184,12 +189,14 @@ impl Sheet {
             outer,
             closed: axes.iter().all(|axis| axis.1.is_closed()),
         };
-        let mut weights = vec![Lane::ZERO; table.cells * lanes];
+        let mut weights = vec![Short::ZERO; table.cells * lanes];
         for (cell, source) in block.weights.chunks_exact(block.outputs.len()).enumerate() {
             for place in places(axes, cell) {
                 let target = &mut weights[place * lanes..][..lanes];
-                for (i, weight) in source[offset..offset + self.outputs.len()].iter().enumerate() {
-                    target[i / LANES].0[i % LANES] = *weight;
+                let source = &source[offset..offset + self.outputs.len()];
+                for (i, weight) in source.iter().enumerate().filter(|(_, weight)| weight.abs() > LEAST_WEIGHT)
+                {
+                    target[i / LANES].0[i % LANES] = *weight as f32;
                 }
             }
         }
@@ -213,7 +220,7 @@ impl Sheet {
         let mut free = &mut rows[..];
         for table in &self.tables {
             let (own, rest) = free.split_at_mut(table.row_count(K));
-            table.excite(excited, own);
+            table.excite::<I, K>(excited, own);
             free = rest;
         }
         match self.lanes() {
@@ -247,20 +254,24 @@ impl Sheet {
                     *grade = Lane::splat(along.0[pose]);
                 }
                 // Cell by cell along the last axis first: its grades then count once for all rows.
-                let mut parts = [[Lane::ZERO; W]; K];
+                let mut parts = [[Short::ZERO; W]; K];
                 let mut own = rows.by_ref().take(table.row_count(K));
                 if table.outer.is_empty() {
                     let first = own.next().map_or(0, |row| row.cell[pose] as usize);
                     parts.copy_from_slice(&cells[first..first + K]);
                 }
                 for row in own {
-                    let (first, grade) = (row.cell[pose] as usize, Lane::splat(row.grade.0[pose]));
+                    let (first, grade) = (row.cell[pose] as usize, Short::splat(row.grade.0[pose]));
                     for (part, weights) in parts.iter_mut().zip(&cells[first..first + K]) {
-                        weigh::<I, W>(grade, weights, part);
+                        for w in 0..W {
+                            part[w] = I::mul_add_short(grade, weights[w], part[w]);
+                        }
                     }
                 }
                 for (grade, part) in grades.iter().zip(&parts) {
-                    weigh::<I, W>(*grade, part, &mut sums);
+                    for w in 0..W {
+                        sums[w] = I::mul_add(*grade, I::widen(part[w]), sums[w]);
+                    }
                 }
             }
             let mut found = [Lane::ZERO; MOST_LANES + 1];
@@ -320,7 +331,7 @@ impl Table {
     /// Takes in a table over one of its axes, where that changes no sum; says whether it did.
     ///
     /// `all` are the weights of the sheet, `weights` those of the other table.
-    fn absorb(&self, other: &Table, all: &mut [Lane], weights: &[Lane], lanes: usize) -> bool {
+    fn absorb(&self, other: &Table, all: &mut [Short], weights: &[Short], lanes: usize) -> bool {
         if !other.outer.is_empty() || !self.closed || !other.closed {
             return false;
         }
@@ -345,7 +356,7 @@ impl Table {
 
     /// The rows that eight poses excite.
     #[inline(always)]
-    fn excite<const K: usize>(&self, excited: &[Excited<K>], rows: &mut [Row]) {
+    fn excite<I: Isa, const K: usize>(&self, excited: &[Excited<K>], rows: &mut [Row]) {
         let row_cells = self.row_cells as u64;
         let mut first = excited[self.last].cell[0];
         for cell in &mut first {
@@ -355,7 +366,10 @@ impl Table {
             [(axis, _)] => {
                 let outer = &excited[axis];
                 for (k, row) in rows.iter_mut().enumerate().take(K) {
-                    *row = Row { cell: beyond(&first, &outer.cell[k], row_cells), grade: outer.grade[k] };
+                    *row = Row {
+                        cell: beyond(&first, &outer.cell[k], row_cells),
+                        grade: I::narrow(outer.grade[k]),
+                    };
                 }
             }
             [(axis, _), (next, cells)] => {
@@ -364,11 +378,11 @@ impl Table {
                     let start = beyond(&first, &outer.cell[j], cells as u64 * row_cells);
                     for (k, row) in rows.iter_mut().enumerate() {
                         let cell = beyond(&start, &inner.cell[k], row_cells);
-                        *row = Row { cell, grade: outer.grade[j] * inner.grade[k] };
+                        *row = Row { cell, grade: I::narrow(outer.grade[j] * inner.grade[k]) };
                     }
                 }
             }
-            _ => rows.fill(Row { cell: first, grade: Lane::splat(1.0) }),
+            _ => rows.fill(Row { cell: first, grade: Short::splat(1.0) }),
         }
     }
 }
@@ -381,11 +395,4 @@ fn beyond(start: &[u64; LANES], steps: &[u64; LANES], cells: u64) -> [u64; LANES
         *found += steps * cells;
     }
     found
-}
-
-#[inline(always)]
-fn weigh<I: Isa, const W: usize>(grade: Lane, weights: &[Lane; W], sums: &mut [Lane; W]) {
-    for w in 0..W {
-        sums[w] = I::mul_add(grade, weights[w], sums[w]);
-    }
 }

@@ -9,6 +9,9 @@ use truearm_kinematics::{Isa, Kernel, LANES, Lane, dispatch};
 
 const INPUTS: usize = 3;
 const PARAMETERS: usize = 10;
+/// Share of what is added that tables of single precision may be off by: a unit in the last place for each of the products and
+/// sums that follow each other.
+const ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
 
 fn block(name: &str, inputs: &[usize], outputs: &[usize], degree: usize, random: &mut Random) -> Block {
     let axis = |&k: &usize| {
@@ -105,9 +108,9 @@ fn grades(axis: &Axis, value: f64) -> Vec<f64> {
     (0..axis.count).map(of).collect()
 }
 
-/// What a bank should give for one configuration: of every block every cell.
-fn summed(bank: &Bank, q: &[f64]) -> Vec<f64> {
-    let mut wanted = vec![0.0; PARAMETERS];
+/// What a bank should give for one configuration, of every block every cell, and the sum of the sizes of what is added.
+fn summed(bank: &Bank, q: &[f64]) -> Vec<(f64, f64)> {
+    let mut wanted = vec![(0.0, 0.0); PARAMETERS];
     for block in &bank.blocks {
         let axes = block.grid.inputs.iter().zip(&block.grid.axes);
         let memberships = axes.fold(vec![1.0], |so_far: Vec<f64>, (&input, axis)| {
@@ -116,7 +119,8 @@ fn summed(bank: &Bank, q: &[f64]) -> Vec<f64> {
         });
         for (grade, weights) in memberships.iter().zip(block.weights.chunks(block.outputs.len())) {
             for (&output, weight) in block.outputs.iter().zip(weights) {
-                wanted[output] += grade * weight;
+                wanted[output].0 += grade * weight;
+                wanted[output].1 += (grade * weight).abs();
             }
         }
     }
@@ -128,12 +132,33 @@ fn a_bank_is_the_sum_of_its_cells_weights_times_b_splines() {
     for degree in [2, 3] {
         for bank in [bank(degree), turning_bank(degree), bank_of_many_outputs(degree)] {
             for q in values(20).chunks(INPUTS) {
-                for (found, wanted) in evaluate(&bank, q).iter().zip(summed(&bank, q)) {
-                    assert!((found - wanted).abs() < 1e-12, "{found} {wanted}");
+                for (found, (wanted, size)) in evaluate(&bank, q).iter().zip(summed(&bank, q)) {
+                    assert!((found - wanted).abs() <= ROUNDING * size, "{found} {wanted} {size}");
                 }
             }
         }
     }
+}
+
+#[test]
+fn single_outputs_over_single_inputs_are_exact() {
+    let mut bank = bank(2);
+    bank.blocks.truncate(1);
+    for q in values(20).chunks(INPUTS) {
+        let (found, (wanted, _)) = (evaluate(&bank, q)[0], summed(&bank, q)[0]);
+        assert!((found - wanted).abs() < 1e-13, "{found} {wanted}");
+    }
+}
+
+#[test]
+fn weights_too_small_for_single_precision_are_none() {
+    let (mut bank, q) = (bank_of_many_outputs(2), [0.5, 0.7, 0.0]);
+    let of_size = |bank: &mut Bank, size: f64| {
+        bank.blocks[0].weights.iter_mut().for_each(|weight| *weight = size * weight.signum());
+        evaluate(bank, &q)
+    };
+    assert!(of_size(&mut bank, 1e-19).iter().any(|value| value.abs() > 1e-21));
+    assert_eq!(of_size(&mut bank, 1e-21), vec![0.0; PARAMETERS]);
 }
 
 #[test]

@@ -6,7 +6,7 @@
 use std::sync::OnceLock;
 
 use crate::error::KinematicsError;
-use crate::lane::{LANES, Lane, Pick};
+use crate::lane::{LANES, Lane, Pick, Short};
 
 /// What differs between instruction sets: whether a multiplication fuses with an addition, and how rows are moved.
 pub trait Isa {
@@ -15,6 +15,29 @@ pub trait Isa {
 
     /// a b + c, with one rounding only where the instruction set has it.
     fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane;
+
+    /// The same in single precision.
+    fn mul_add_short(a: Short, b: Short, c: Short) -> Short;
+
+    /// The same numbers in double precision.
+    #[inline(always)]
+    fn widen(short: Short) -> Lane {
+        let mut out = Lane::ZERO;
+        for (out, value) in out.0.iter_mut().zip(&short.0) {
+            *out = f64::from(*value);
+        }
+        out
+    }
+
+    /// The same numbers rounded to single precision.
+    #[inline(always)]
+    fn narrow(lane: Lane) -> Short {
+        let mut out = Short::ZERO;
+        for (out, value) in out.0.iter_mut().zip(&lane.0) {
+            *out = *value as f32;
+        }
+        out
+    }
 
     /// Swap rows and columns of 8 x 8 numbers.
     #[inline(always)]
@@ -136,6 +159,26 @@ impl Isa for Plain {
         crate::x86::mul_add_sse2(a, b, c)
     }
 
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn mul_add_short(a: Short, b: Short, c: Short) -> Short {
+        crate::x86::mul_add_short_sse2(a, b, c)
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    fn mul_add_short(a: Short, b: Short, c: Short) -> Short {
+        let mut out = [0.0; LANES];
+        for i in 0..LANES {
+            out[i] = if cfg!(target_arch = "aarch64") {
+                a.0[i].mul_add(b.0[i], c.0[i])
+            } else {
+                a.0[i] * b.0[i] + c.0[i]
+            };
+        }
+        Short(out)
+    }
+
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     #[inline(always)]
     fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
@@ -155,7 +198,7 @@ impl Isa for Plain {
 
 #[cfg(target_arch = "x86_64")]
 mod vector {
-    use super::{InstructionSet, Isa, Kernel, LANES, Lane, Pick};
+    use super::{InstructionSet, Isa, Kernel, LANES, Lane, Pick, Short};
     use crate::x86;
 
     pub struct Avx2;
@@ -167,6 +210,24 @@ mod vector {
         fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
             // SAFETY: this instruction set is only used on processors that have it.
             unsafe { x86::mul_add_avx2(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn mul_add_short(a: Short, b: Short, c: Short) -> Short {
+            // SAFETY: as above.
+            unsafe { x86::mul_add_short_avx2(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn widen(short: Short) -> Lane {
+            // SAFETY: as above.
+            unsafe { x86::widen_avx2(short) }
+        }
+
+        #[inline(always)]
+        fn narrow(lane: Lane) -> Short {
+            // SAFETY: as above.
+            unsafe { x86::narrow_avx2(lane) }
         }
 
         #[inline(always)]
@@ -193,6 +254,24 @@ mod vector {
         fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
             // SAFETY: this instruction set is only used on processors that have it.
             unsafe { x86::mul_add_avx512(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn mul_add_short(a: Short, b: Short, c: Short) -> Short {
+            // SAFETY: as above.
+            unsafe { x86::mul_add_short_avx2(a, b, c) }
+        }
+
+        #[inline(always)]
+        fn widen(short: Short) -> Lane {
+            // SAFETY: as above.
+            unsafe { x86::widen_avx512(short) }
+        }
+
+        #[inline(always)]
+        fn narrow(lane: Lane) -> Short {
+            // SAFETY: as above.
+            unsafe { x86::narrow_avx512(lane) }
         }
 
         #[inline(always)]

@@ -36,7 +36,7 @@ pub use error::KinematicsError;
 pub use exponential::exp;
 pub use frame::LaneFrame;
 pub use isa::{InstructionSet, Isa, Kernel, dispatch, dispatch_on};
-pub use lane::{LANES, Lane, Pick};
+pub use lane::{LANES, Lane, Pick, Short};
 pub use levers::{LeverScratch, lever_count};
 pub use one_pose::OnePose;
 pub use parameters::{LaneParameters, Parameters, SharedParameters, is_length};

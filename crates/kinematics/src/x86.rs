@@ -2,15 +2,16 @@
 #![cfg(target_arch = "x86_64")]
 
 use std::arch::x86_64::{
-    __m128d, __m256d, __m512d, _mm_add_pd, _mm_mul_pd, _mm_sfence, _mm256_fmadd_pd, _mm256_loadu_pd,
+    __m128, __m128d, __m256, __m256d, __m512d, _mm_add_pd, _mm_add_ps, _mm_mul_pd, _mm_mul_ps, _mm_sfence,
+    _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_fmadd_pd, _mm256_fmadd_ps, _mm256_loadu_pd,
     _mm256_permute2f128_pd, _mm256_storeu_pd, _mm256_stream_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
-    _mm512_add_pd, _mm512_fmadd_pd, _mm512_loadu_epi64, _mm512_loadu_pd, _mm512_mask_storeu_pd,
-    _mm512_maskz_loadu_pd, _mm512_maskz_permutex2var_pd, _mm512_shuffle_f64x2, _mm512_storeu_pd,
-    _mm512_stream_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd,
+    _mm512_add_pd, _mm512_cvtpd_ps, _mm512_cvtps_pd, _mm512_fmadd_pd, _mm512_loadu_epi64, _mm512_loadu_pd,
+    _mm512_mask_storeu_pd, _mm512_maskz_loadu_pd, _mm512_maskz_permutex2var_pd, _mm512_shuffle_f64x2,
+    _mm512_storeu_pd, _mm512_stream_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd,
 };
 use std::mem::transmute;
 
-use crate::lane::{LANES, Lane, Pick};
+use crate::lane::{LANES, Lane, Pick, Short};
 
 type Eight = __m512d;
 type Fours = [__m256d; 2];
@@ -60,6 +61,78 @@ pub fn mul_add_sse2(a: Lane, b: Lane, c: Lane) -> Lane {
             _mm_add_pd(_mm_mul_pd(a[2], b[2]), c[2]),
             _mm_add_pd(_mm_mul_pd(a[3], b[3]), c[3]),
         ])
+    }
+}
+
+/// a b + c in single precision with one rounding, see [`mul_add_avx512`].
+///
+/// # Safety
+/// The processor must have AVX2 and FMA.
+#[inline(always)]
+pub unsafe fn mul_add_short_avx2(a: Short, b: Short, c: Short) -> Short {
+    // SAFETY: a short lane is a vector of eight f32; the caller vouches for the instruction.
+    unsafe {
+        let [a, b, c] = transmute::<[Short; 3], [__m256; 3]>([a, b, c]);
+        transmute::<__m256, Short>(_mm256_fmadd_ps(a, b, c))
+    }
+}
+
+/// a b + c in single precision with two roundings, see [`mul_add_avx512`].
+#[inline(always)]
+pub fn mul_add_short_sse2(a: Short, b: Short, c: Short) -> Short {
+    // SAFETY: a short lane is two vectors of four f32, and every x86-64 machine has the instructions.
+    unsafe {
+        let [a, b, c] = transmute::<[Short; 3], [[__m128; 2]; 3]>([a, b, c]);
+        transmute::<[__m128; 2], Short>([
+            _mm_add_ps(_mm_mul_ps(a[0], b[0]), c[0]),
+            _mm_add_ps(_mm_mul_ps(a[1], b[1]), c[1]),
+        ])
+    }
+}
+
+/// Eight numbers in double precision, see [`crate::Isa::widen`].
+///
+/// # Safety
+/// The processor must have AVX-512F.
+#[inline(always)]
+pub unsafe fn widen_avx512(short: Short) -> Lane {
+    // SAFETY: a short lane is a vector of eight f32; the caller vouches for the instruction.
+    unsafe { transmute::<Eight, Lane>(_mm512_cvtps_pd(transmute::<Short, __m256>(short))) }
+}
+
+/// Eight numbers in double precision, see [`crate::Isa::widen`].
+///
+/// # Safety
+/// The processor must have AVX.
+#[inline(always)]
+pub unsafe fn widen_avx2(short: Short) -> Lane {
+    // SAFETY: a short lane is two vectors of four f32; the caller vouches for the instruction.
+    unsafe {
+        let [low, high] = transmute::<Short, [__m128; 2]>(short);
+        transmute::<Fours, Lane>([_mm256_cvtps_pd(low), _mm256_cvtps_pd(high)])
+    }
+}
+
+/// Eight numbers rounded to single precision, see [`crate::Isa::narrow`].
+///
+/// # Safety
+/// The processor must have AVX-512F.
+#[inline(always)]
+pub unsafe fn narrow_avx512(lane: Lane) -> Short {
+    // SAFETY: a lane is a vector of eight f64; the caller vouches for the instruction.
+    unsafe { transmute::<__m256, Short>(_mm512_cvtpd_ps(transmute::<Lane, Eight>(lane))) }
+}
+
+/// Eight numbers rounded to single precision, see [`crate::Isa::narrow`].
+///
+/// # Safety
+/// The processor must have AVX.
+#[inline(always)]
+pub unsafe fn narrow_avx2(lane: Lane) -> Short {
+    // SAFETY: a lane is two vectors of four f64; the caller vouches for the instruction.
+    unsafe {
+        let [low, high] = transmute::<Lane, Fours>(lane);
+        transmute::<[__m128; 2], Short>([_mm256_cvtpd_ps(low), _mm256_cvtpd_ps(high)])
     }
 }
 
