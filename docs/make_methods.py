@@ -68,16 +68,16 @@ poses on.
 """
 ALONE = """Medians hide single runs. These are as far behind, on the same sizes:
 """
-WHY = """What we know of the causes. Where the tail of one of the first three joints of the UR10 is left out, a quarter
-to three quarters of our error there, a half in the median, is one curve of that joint over readings that
-nothing has measured, which a method can only guess
-([measured](../decisions/0015-how-methods-are-compared.md#what-a-tail-leaves-unknown)). Beyond that, what our model
-cannot hold is paid for by its constants: it takes the noise for the instrument's own, which the evidence says
-and which is best where poses are near. Splines fitted with the larger noise of the constant model's
-residual bend less far from the data. With its noise taken for larger, ours comes near to them there and
-loses on random rows
-([measured](../decisions/0015-how-methods-are-compared.md#what-a-larger-noise-does)). On the UR5's few
-and noisy poses the best of many methods is lowest by chance as well.
+WHY = """What we know of the causes. Where the tail of one of the first three joints of the UR10 is left
+out, a quarter to three quarters of our error there, a half in the median, is one curve of that
+joint over readings that nothing has measured, which a method can only guess
+([measured](../decisions/0015-how-methods-are-compared.md#what-a-tail-leaves-unknown)). Beyond
+that, what our model cannot hold is paid for by its constants: it takes the noise for the
+instrument's own, which the evidence says and which is best where poses are near. Splines fitted
+with the larger noise of the constant model's residual bend less far from the data. With its noise
+taken for larger, ours comes near to them there and loses on random rows
+([measured](../decisions/0015-how-methods-are-compared.md#what-a-larger-noise-does)). On the UR5's
+few and noisy poses the best of many methods is lowest by chance as well.
 """
 AHEAD = "Nowhere from 100 training poses on is ours more than 3 % above the lowest mean of the others.\n"
 
