@@ -1,7 +1,7 @@
 //! Weights laid out for evaluation: one output over one input, or many outputs over up to three.
 //!
 //! The latter are of single precision: what an evaluation of many outputs costs is to fetch them. They are rounded by less than
-//! a ten-millionth, a thousandth of a nanometre or so in the position.
+//! a ten-millionth, some thousandths of a nanometre in the position.
 
 use truearm_kinematics::{Isa, LANES, Lane, Pick, Short};
 
