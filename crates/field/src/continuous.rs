@@ -153,11 +153,17 @@ const PER_INPUT: usize = 3;
 impl PoseKernels {
     /// Of each input.
     pub fn own(&self) -> impl Iterator<Item = OwnSlopes<'_>> {
-        (0..self.own.iter().len()).step_by(PER_INPUT).map(|k| OwnSlopes {
-            kernel: self.own.get(k),
-            by_log_length: self.own.get(k + 1),
-            by_log_cycles: self.own.get(k + 2),
-        })
+        (0..self.own.iter().len() / PER_INPUT).map(|input| self.own_of(input))
+    }
+
+    /// Of one input.
+    pub fn own_of(&self, input: usize) -> OwnSlopes<'_> {
+        let first = PER_INPUT * input;
+        OwnSlopes {
+            kernel: self.own.get(first),
+            by_log_length: self.own.get(first + 1),
+            by_log_cycles: self.own.get(first + 2),
+        }
     }
 
     /// Of all inputs.

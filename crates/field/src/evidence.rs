@@ -21,6 +21,7 @@ use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
     AT_SMOOTH_LENGTH, AT_SMOOTH_LINE_LENGTH, Hyper, Product,
 };
+use crate::information::Slopes;
 use crate::pairs::{ByColumn, STEP, Step, add_products, step_at, write_covariance, write_step};
 use crate::product::times;
 use crate::projection::Projection;
@@ -42,6 +43,26 @@ pub struct Score {
     pub gradient: Vec<f64>,
 }
 
+impl AsRef<Score> for Score {
+    fn as_ref(&self) -> &Score {
+        self
+    }
+}
+
+/// The same with how sharply it bends.
+#[derive(Debug, Clone)]
+pub struct Informed {
+    pub score: Score,
+    /// What stands for the negative second derivatives, (H, H): never indefinite.
+    pub information: Mat<f64>,
+}
+
+impl AsRef<Score> for Informed {
+    fn as_ref(&self) -> &Score {
+        &self.score
+    }
+}
+
 /// Two matrices (R, R) that are written anew at every point.
 type Room = [Mat<f64>; 2];
 
@@ -50,6 +71,8 @@ struct Restricted {
     factor: Cholesky,
     /// P, its lower triangle.
     projected: Mat<f64>,
+    /// Q with `P = K^-1 - Q^T Q`.
+    root: Mat<f64>,
     alpha: Vec<f64>,
     value: f64,
 }
@@ -66,19 +89,46 @@ impl<'a> Evidence<'a> {
     /// # Errors
     /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn score(&self, hyper: &Hyper) -> Result<Score, FieldError> {
+        let (score, ()) = self.scored(hyper, |_, _| ())?;
+        Ok(score)
+    }
+
+    /// The same with how sharply it bends: the average information and the prior's precision.
+    ///
+    /// # Errors
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
+    pub fn informed(&self, hyper: &Hyper) -> Result<Informed, FieldError> {
+        let (score, mut information) = self.scored(hyper, |kernels, restricted| {
+            let Self { training, by_column, pairings, .. } = self;
+            let slopes = Slopes { training, by_column, pairings, hyper, kernels, alpha: &restricted.alpha };
+            slopes.information(&restricted.factor, restricted.root.as_ref())
+        })?;
+        for (k, _, spread) in deviations(hyper) {
+            information[(k, k)] += spread.powi(-2);
+        }
+        Ok(Informed { score, information })
+    }
+
+    /// Evidence and prior with their gradient, and what `further` makes of the kernels and the likelihood's quantities.
+    fn scored<T>(
+        &self,
+        hyper: &Hyper,
+        further: impl FnOnce(&Continuous, &Restricted) -> T,
+    ) -> Result<(Score, T), FieldError> {
         self.cancel.check()?;
         let kernels = Continuous::new(self.training, &self.pairings, hyper);
         let [mut covariance, projected] = self.room().take().unwrap_or_else(|| self.empty());
         write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
         let restricted = self.restricted(covariance, projected)?;
         let mut gradient = self.gradient(hyper, &kernels, &restricted);
+        let further = further(&kernels, &restricted);
         let mut value = restricted.value;
         *self.room() = Some([restricted.factor.into_matrix(), restricted.projected]);
         for (k, z, spread) in deviations(hyper) {
             value -= 0.5 * z * z;
             gradient[k] -= z / spread;
         }
-        Ok(Score { value, gradient })
+        Ok((Score { value, gradient }, further))
     }
 
     /// Evidence and prior alone, in less than half of the time.
@@ -145,7 +195,7 @@ impl<'a> Evidence<'a> {
             -1.0,
             parallelism(),
         );
-        Ok(Restricted { factor, projected, alpha, value })
+        Ok(Restricted { factor, projected, root, alpha, value })
     }
 
     /// Sums over the poses in a fixed order, whatever the threads.

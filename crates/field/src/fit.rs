@@ -10,7 +10,7 @@ use crate::hyper::{Hyper, Wave};
 use crate::joined::{Joined, join};
 use crate::kernel::Input;
 use crate::linear::{input_values, training};
-use crate::optimise::{Curvature, Limits};
+use crate::optimise::Limits;
 use crate::outliers::{self, Judgement, News};
 use crate::posterior::{Posterior, Solution};
 use crate::refine::relinearised;
@@ -94,7 +94,6 @@ impl FieldOptions {
 #[derive(Debug, Clone)]
 pub struct Start {
     hyper: Hyper,
-    curvature: Curvature,
     evidence: f64,
 }
 
@@ -122,14 +121,12 @@ pub struct FieldFit {
     pub posterior: Posterior,
     /// The posterior under widened amplitudes, where it is another one.
     pub wide: Option<Posterior>,
-    curvature: Curvature,
 }
 
 impl FieldFit {
     /// For a fit to nearly the same measurements.
     pub fn start(&self) -> Start {
-        let (hyper, curvature) = (self.hyper.clone(), self.curvature.clone());
-        Start { hyper, curvature, evidence: self.evidence }
+        Start { hyper: self.hyper.clone(), evidence: self.evidence }
     }
 
     /// Weight of every measured pose, (n,); one where nothing was measured.
@@ -178,7 +175,7 @@ pub fn fit_field(
     let Joined { mut training, pose_of, doubtful } = rows(problem, point, options)?;
     training.take_weight(&doubtful);
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
-    let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0, curvature: None };
+    let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0 };
     let mut hyper = search.first(&training, noise)?;
     let mut judged = search.judge(search.posterior(&training, &hyper)?)?;
     training = judged.posterior.training().clone();
@@ -220,7 +217,6 @@ pub fn fit_field(
         pose_of,
         posterior,
         wide,
-        curvature: search.curvature,
     })
 }
 
@@ -266,7 +262,6 @@ struct Search<'a> {
     options: &'a FieldOptions,
     evidence: f64,
     evaluations: usize,
-    curvature: Curvature,
 }
 
 impl Search<'_> {
@@ -276,7 +271,7 @@ impl Search<'_> {
         }
         let begun = match self.options.near.clone() {
             Some(near) => {
-                (self.curvature, self.evidence) = (near.curvature, near.evidence);
+                self.evidence = near.evidence;
                 near.hyper
             }
             None => return self.anew(training, noise),
@@ -292,7 +287,6 @@ impl Search<'_> {
 
     /// Hyper-parameters from nothing but the rows.
     fn anew(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
-        self.curvature = None;
         let found = self.searched(training, noise)?;
         if self.options.rough { Ok(found) } else { self.finished(training, found) }
     }
@@ -317,12 +311,12 @@ impl Search<'_> {
         let judges = if rough { middle_of(training) } else { part_of(training, ROWS_FOR_POLISH, 0) };
         let polished =
             if rough { self.again(&middle_of(training), hyper)? } else { self.cleaned(training, hyper)? };
-        let reached = (self.evidence, self.curvature.clone());
+        let reached = self.evidence;
         let other = self.anew(training, noise)?;
         if self.value(&judges, &other)? >= self.value(&judges, &polished)? {
             return Ok(other);
         }
-        (self.evidence, self.curvature) = reached;
+        self.evidence = reached;
         if rough {
             return Ok(polished);
         }
@@ -370,7 +364,7 @@ impl Search<'_> {
         let chosen = contest_up(&small, chosen, &self.options.cancel)?;
         let middle = middle_of(training).lifted(chosen.hyper.up)?;
         let evidence = Evidence::new(&middle, &self.options.cancel);
-        let mut found = refine(&evidence, chosen.hyper, chosen.curvature, SEARCH)?;
+        let mut found = refine(&evidence, chosen.hyper, SEARCH)?;
         found.evaluations += chosen.evaluations;
         let found = contest_major(&evidence, found, joints)?;
         let found = prune_major(&evidence, found)?;
@@ -383,7 +377,7 @@ impl Search<'_> {
     fn again(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
         let large = part_of(training, ROWS_FOR_POLISH, 0).lifted(hyper.up)?;
         let evidence = Evidence::new(&large, &self.options.cancel);
-        let found = refine(&evidence, hyper, self.curvature.take(), POLISH)?;
+        let found = refine(&evidence, hyper, POLISH)?;
         self.note(&found);
         Ok(found.hyper)
     }
@@ -397,7 +391,6 @@ impl Search<'_> {
     fn note(&mut self, found: &Found) {
         self.evidence = found.value;
         self.evaluations += found.evaluations;
-        self.curvature = found.curvature.clone();
     }
 
     fn posterior(&self, training: &Training, hyper: &Hyper) -> Result<Posterior, FieldError> {
@@ -422,7 +415,7 @@ fn as_loud_as_shots(mut hyper: Hyper, training: &Training) -> Hyper {
 }
 
 fn refine_more(evidence: &Evidence, found: Found, limits: Limits) -> Result<Found, FieldError> {
-    let better = refine(evidence, found.hyper, found.curvature, limits)?;
+    let better = refine(evidence, found.hyper, limits)?;
     Ok(Found { evaluations: found.evaluations + better.evaluations, ..better })
 }
 

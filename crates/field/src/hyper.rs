@@ -334,11 +334,6 @@ impl Hyper {
         other
     }
 
-    /// Position of the length scale of a `major` joint among the logarithms.
-    pub fn major_length(position: usize) -> usize {
-        AT_PRODUCTS + 3 + position
-    }
-
     /// The same hyper-parameters without one of the `major` joints.
     pub fn without_major(&self, position: usize) -> Self {
         let mut fewer = self.clone();

@@ -139,7 +139,7 @@ impl Leverage {
             cancel.check()?;
             Ok(targets.score(entries, scale))
         };
-        let found = maximise(score, (&start, None), &ranges, SEARCH)?;
+        let found = maximise(score, &start, &ranges, SEARCH)?;
         let entry = |(k, entry): (usize, &f64)| {
             let size = sizes[k / FACTOR_COLUMNS];
             if size > 0.0 { scale * entry / size } else { 0.0 }

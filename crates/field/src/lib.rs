@@ -14,6 +14,7 @@
 #[cfg(test)]
 extern crate self as truearm_field;
 
+mod ascent;
 mod bank;
 mod cells;
 pub mod cmac;
@@ -34,6 +35,7 @@ mod fit;
 mod greedy;
 mod hyper;
 mod hyper_check;
+mod information;
 mod joined;
 mod kernel;
 mod leverage;

@@ -1,5 +1,5 @@
-//! Maximising a smooth function within bounds: quasi-Newton with a dense inverse Hessian (BFGS), steps
-//! projected onto the bounds (Bertsekas 1982).
+//! Maximising a smooth function within bounds: steps that are projected onto them (Bertsekas 1982) and shortened until they
+//! bring enough; and quasi-Newton with a dense inverse Hessian (BFGS) where gradients are all that is known.
 
 use crate::FieldError;
 use crate::evidence::Score;
@@ -20,51 +20,46 @@ pub struct Optimum {
     pub point: Vec<f64>,
     pub value: f64,
     pub evaluations: usize,
-    /// What the search learned of the curvature.
-    pub curvature: Curvature,
 }
 
-/// Approximation of the inverse of the negative Hessian; `None` where none is known.
-pub type Curvature = Option<Inverse>;
-
 /// Longest step in any logarithm: a factor of about four.
-const LONGEST_STEP: f64 = 1.4;
+pub const LONGEST_STEP: f64 = 1.4;
 /// Share of the promised gain that a step must bring (Armijo 1966).
 const SUFFICIENT: f64 = 1e-4;
 
-struct Search<'a, F> {
-    function: F,
-    ranges: &'a [Range],
-    limits: Limits,
-    evaluations: usize,
+/// A search within bounds for the maximum of a function whose values tell a score.
+pub struct Search<'a, F> {
+    pub function: F,
+    pub ranges: &'a [Range],
+    pub limits: Limits,
+    pub evaluations: usize,
 }
 
-/// Maximises `function` over logarithms that start at `start`, with what an earlier search learned of its curvature.
+/// Maximises `function` over logarithms that start at `start`.
 ///
 /// # Errors
 /// Those of the function at the start; elsewhere a point where it fails counts as infinitely bad, except when the
 /// caller asked to stop.
 pub fn maximise<F>(
     function: F,
-    (start, curvature): (&[f64], Curvature),
+    start: &[f64],
     ranges: &[Range],
     limits: Limits,
 ) -> Result<Optimum, FieldError>
 where
     F: FnMut(&[f64]) -> Result<Score, FieldError>,
 {
-    Search { function, ranges, limits, evaluations: 0 }.run(start, curvature)
+    Search { function, ranges, limits, evaluations: 0 }.run(start)
 }
 
 impl<F: FnMut(&[f64]) -> Result<Score, FieldError>> Search<'_, F> {
-    fn run(&mut self, start: &[f64], curvature: Curvature) -> Result<Optimum, FieldError> {
-        let mut point = self.clamped(start);
+    fn run(&mut self, start: &[f64]) -> Result<Optimum, FieldError> {
+        let mut point = clamped(start, self.ranges);
         let mut here = self.evaluate(&point)?;
-        let known = curvature.filter(|inverse| inverse.size == point.len());
-        let mut fresh = known.is_none();
-        let mut inverse = known.unwrap_or_else(|| Inverse::identity(point.len(), 0.1));
+        let mut fresh = true;
+        let mut inverse = Inverse::identity(point.len(), 0.1);
         while self.evaluations < self.limits.evaluations {
-            let free = self.free(&point, &here.gradient);
+            let free = free(&point, &here.gradient, self.ranges);
             let direction = limited(inverse.times(&here.gradient, &free));
             let Some((next, score)) = self.line_search(&point, &here, &direction)? else {
                 if fresh {
@@ -84,50 +79,45 @@ impl<F: FnMut(&[f64]) -> Result<Score, FieldError>> Search<'_, F> {
                 break;
             }
         }
-        let curvature = (!fresh).then_some(inverse);
-        Ok(Optimum { point, value: here.value, evaluations: self.evaluations, curvature })
+        Ok(Optimum { point, value: here.value, evaluations: self.evaluations })
     }
+}
 
-    fn evaluate(&mut self, point: &[f64]) -> Result<Score, FieldError> {
+impl<T: AsRef<Score>, F: FnMut(&[f64]) -> Result<T, FieldError>> Search<'_, F> {
+    /// The function at a point.
+    ///
+    /// # Errors
+    /// Those of the function.
+    pub fn evaluate(&mut self, point: &[f64]) -> Result<T, FieldError> {
         self.evaluations += 1;
         (self.function)(point)
     }
 
-    fn clamped(&self, point: &[f64]) -> Vec<f64> {
-        point.iter().zip(self.ranges).map(|(x, range)| x.clamp(range.low.ln(), range.high.ln())).collect()
-    }
-
-    /// Coordinates that are not held at a bound by the gradient.
-    fn free(&self, point: &[f64], gradient: &[f64]) -> Vec<bool> {
-        let held = |k: usize| {
-            (point[k] <= self.ranges[k].low.ln() && gradient[k] < 0.0)
-                || (point[k] >= self.ranges[k].high.ln() && gradient[k] > 0.0)
-        };
-        (0..point.len()).map(|k| !held(k)).collect()
-    }
-
     /// The first of ever shorter steps that brings enough, by quadratic interpolation.
-    fn line_search(
+    ///
+    /// # Errors
+    /// Those of the function, but for points that are infinitely bad.
+    pub fn line_search(
         &mut self,
         point: &[f64],
         here: &Score,
         direction: &[f64],
-    ) -> Result<Option<(Vec<f64>, Score)>, FieldError> {
+    ) -> Result<Option<(Vec<f64>, T)>, FieldError> {
         let mut length = 1.0;
         for _ in 0..8 {
             let next: Vec<f64> = point.iter().zip(direction).map(|(x, d)| x + length * d).collect();
-            let next = self.clamped(&next);
+            let next = clamped(&next, self.ranges);
             let promised: f64 =
                 next.iter().zip(point).zip(&here.gradient).map(|((a, b), g)| (a - b) * g).sum();
             if promised <= 0.0 {
                 return Ok(None);
             }
             match self.evaluate(&next) {
-                Ok(score) if score.value >= here.value + SUFFICIENT * promised => {
-                    return Ok(Some((next, score)));
+                Ok(there) if there.as_ref().value >= here.value + SUFFICIENT * promised => {
+                    return Ok(Some((next, there)));
                 }
-                Ok(score) => {
-                    let curvature = promised - (score.value - here.value);
+                Ok(there) => {
+                    let curvature = promised - (there.as_ref().value - here.value);
                     length *= (0.5 * promised / curvature).clamp(0.1, 0.5);
                 }
                 Err(FieldError::NotPositiveDefinite { .. }) => length *= 0.2,
@@ -141,6 +131,20 @@ impl<F: FnMut(&[f64]) -> Result<Score, FieldError>> Search<'_, F> {
     }
 }
 
+/// A point within the bounds.
+pub fn clamped(point: &[f64], ranges: &[Range]) -> Vec<f64> {
+    point.iter().zip(ranges).map(|(x, range)| x.clamp(range.low.ln(), range.high.ln())).collect()
+}
+
+/// Coordinates that are not held at a bound by the gradient.
+pub fn free(point: &[f64], gradient: &[f64], ranges: &[Range]) -> Vec<bool> {
+    let held = |k: usize| {
+        (point[k] <= ranges[k].low.ln() && gradient[k] < 0.0)
+            || (point[k] >= ranges[k].high.ln() && gradient[k] > 0.0)
+    };
+    (0..point.len()).map(|k| !held(k)).collect()
+}
+
 fn limited(mut direction: Vec<f64>) -> Vec<f64> {
     let longest = direction.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
     if longest > LONGEST_STEP {
@@ -150,21 +154,12 @@ fn limited(mut direction: Vec<f64>) -> Vec<f64> {
 }
 
 /// A symmetric positive definite matrix.
-#[derive(Debug, Clone)]
-pub struct Inverse {
+struct Inverse {
     size: usize,
     entries: Vec<f64>,
 }
 
 impl Inverse {
-    /// The same without one coordinate.
-    pub fn without(&self, coordinate: usize) -> Self {
-        let kept = (0..self.entries.len())
-            .filter(|k| k / self.size != coordinate && k % self.size != coordinate)
-            .map(|k| self.entries[k]);
-        Self { size: self.size - 1, entries: kept.collect() }
-    }
-
     fn identity(size: usize, scale: f64) -> Self {
         let entries = (0..size * size).map(|k| if k / size == k % size { scale } else { 0.0 }).collect();
         Self { size, entries }
@@ -229,26 +224,8 @@ mod tests {
     #[test]
     fn finds_the_maximum() {
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let optimum = maximise(valley, (&[0.0; 4], None), &ranges(1e3), limits).unwrap();
+        let optimum = maximise(valley, &[0.0; 4], &ranges(1e3), limits).unwrap();
         assert!(optimum.point.iter().all(|x| (x - 0.5).abs() < 1e-4), "{optimum:?}");
-    }
-
-    #[test]
-    fn what_one_search_learned_of_the_curvature_shortens_the_next() {
-        let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let first = maximise(valley, (&[0.0; 4], None), &ranges(1e3), limits).unwrap();
-        assert!(first.curvature.is_some());
-        let again = |curvature| maximise(valley, (&[0.4; 4], curvature), &ranges(1e3), limits).unwrap();
-        let (cold, warm) = (again(None), again(first.curvature));
-        assert!(warm.point.iter().all(|x| (x - 0.5).abs() < 1e-4), "{warm:?}");
-        assert!(warm.evaluations < cold.evaluations, "{} {}", warm.evaluations, cold.evaluations);
-    }
-
-    #[test]
-    fn curvature_without_a_coordinate_keeps_the_others() {
-        let inverse = Inverse { size: 3, entries: (0..9).map(f64::from).collect() };
-        let fewer = inverse.without(1);
-        assert_eq!((fewer.size, fewer.entries), (2, vec![0.0, 2.0, 6.0, 8.0]));
     }
 
     #[test]
@@ -260,7 +237,7 @@ mod tests {
             seen.extend(point.to_vec());
             valley(point)
         };
-        let optimum = maximise(watched, (&[9.0; 4], None), &ranges, limits).unwrap();
+        let optimum = maximise(watched, &[9.0; 4], &ranges, limits).unwrap();
         assert!(optimum.point.iter().all(|x| (x - 1.2_f64.ln()).abs() < 1e-9), "{optimum:?}");
         assert!(seen.iter().all(|x| (1e-3_f64.ln()..=1.2_f64.ln()).contains(x)));
     }
@@ -270,7 +247,7 @@ mod tests {
         let mut ranges = ranges(1e3);
         ranges[1].high = 1.1;
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let optimum = maximise(valley, (&[-1.0; 4], None), &ranges, limits).unwrap();
+        let optimum = maximise(valley, &[-1.0; 4], &ranges, limits).unwrap();
         assert!((optimum.point[1] - 1.1_f64.ln()).abs() < 1e-12);
         assert!([0, 2, 3].iter().all(|&k| (optimum.point[k] - 0.5_f64).abs() < 1e-4), "{optimum:?}");
     }
@@ -281,9 +258,9 @@ mod tests {
             if point[0] > 0.4 { Err(FieldError::NotPositiveDefinite { rows: 1 }) } else { valley(point) }
         };
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let optimum = maximise(fails_beyond, (&[-1.0; 4], None), &ranges(1e3), limits).unwrap();
+        let optimum = maximise(fails_beyond, &[-1.0; 4], &ranges(1e3), limits).unwrap();
         assert!(optimum.point[0] <= 0.4 && optimum.value > valley(&[-1.0; 4]).unwrap().value + 10.0);
-        let refused = maximise(fails_beyond, (&[1.0; 4], None), &ranges(1e3), limits).unwrap_err();
+        let refused = maximise(fails_beyond, &[1.0; 4], &ranges(1e3), limits).unwrap_err();
         assert_eq!(refused, FieldError::NotPositiveDefinite { rows: 1 });
     }
 
@@ -295,7 +272,7 @@ mod tests {
             if left == 0 { Err(FieldError::Estimate(EstimateError::Cancelled)) } else { valley(point) }
         };
         let limits = Limits { evaluations: 200, gain: 1e-12 };
-        let stopped = maximise(stops, (&[0.0; 4], None), &ranges(1e3), limits).unwrap_err();
+        let stopped = maximise(stops, &[0.0; 4], &ranges(1e3), limits).unwrap_err();
         assert_eq!(stopped, FieldError::Estimate(EstimateError::Cancelled));
         assert_eq!(left, 0, "nothing is evaluated after the request");
     }
@@ -303,7 +280,7 @@ mod tests {
     #[test]
     fn evaluations_are_bounded() {
         let limits = Limits { evaluations: 3, gain: 0.0 };
-        let optimum = maximise(valley, (&[-3.0; 4], None), &ranges(1e3), limits).unwrap();
+        let optimum = maximise(valley, &[-3.0; 4], &ranges(1e3), limits).unwrap();
         assert_eq!(optimum.evaluations, 3);
         assert!(optimum.value > valley(&[-3.0; 4]).unwrap().value);
     }

@@ -9,10 +9,11 @@
 use truearm_estimate::Cancel;
 
 use crate::FieldError;
+use crate::ascent::climb;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
 use crate::kernel::InputKind;
-use crate::optimise::{Curvature, Limits, maximise};
+use crate::optimise::Limits;
 use crate::training::Training;
 
 /// A joint must bring this many nats to stay.
@@ -33,8 +34,6 @@ pub struct Found {
     pub hyper: Hyper,
     pub value: f64,
     pub evaluations: usize,
-    /// What the search learned of the evidence's curvature.
-    pub curvature: Curvature,
 }
 
 /// The usual joints of an arm, those that the search begins with first.
@@ -65,14 +64,14 @@ pub fn select_major(
     let (mut begun, mut usual) = (0, None::<Found>);
     let lines = training.inputs.iter().any(|input| input.kind == InputKind::Line);
     for start in Hyper::starts(&first, joints, noise, lines) {
-        let found = refine(&evidence, start, None, FIRST)?;
+        let found = refine(&evidence, start, FIRST)?;
         begun += found.evaluations;
         if usual.as_ref().is_none_or(|usual| found.value > usual.value) {
             usual = Some(found);
         }
     }
     let usual = usual.ok_or(FieldError::Length { what: "starts", found: 0, expected: 1 })?;
-    let all = refine(&evidence, usual.hyper.with_major((0..joints).collect()), None, FIRST)?;
+    let all = refine(&evidence, usual.hyper.with_major((0..joints).collect()), FIRST)?;
     let mut evaluations = begun + all.evaluations;
     // With fewer joints it can hardly be more.
     if all.value - WORTH * FEWEST as f64 - CHANCE <= net(&usual, joints) {
@@ -102,7 +101,7 @@ pub fn contest_major(evidence: &Evidence, found: Found, joints: usize) -> Result
         if rival.major_is_wrist() {
             continue;
         }
-        let candidate = refine(evidence, rival, None, RIVAL)?;
+        let candidate = refine(evidence, rival, RIVAL)?;
         evaluations += candidate.evaluations;
         if net(&candidate, joints) > net(&best, joints) {
             best = candidate;
@@ -136,8 +135,7 @@ fn cheapest_removal(evidence: &Evidence, from: &Found, evaluations: &mut usize) 
         if candidate.major_is_wrist() {
             continue;
         }
-        let known = from.curvature.as_ref().map(|inverse| inverse.without(Hyper::major_length(position)));
-        let found = refine(evidence, candidate, known, REFIT)?;
+        let found = refine(evidence, candidate, REFIT)?;
         *evaluations += found.evaluations;
         if best.as_ref().is_none_or(|best| found.value > best.value) {
             best = Some(found);
@@ -146,22 +144,12 @@ fn cheapest_removal(evidence: &Evidence, from: &Found, evaluations: &mut usize) 
     best.ok_or(FieldError::Length { what: "joints of the major block", found: 0, expected: 1 })
 }
 
-/// Maximises the evidence from given hyper-parameters and what is known of its curvature.
+/// Maximises the evidence from given hyper-parameters.
 ///
 /// # Errors
 /// [`FieldError`] of the evidence.
-pub fn refine(
-    evidence: &Evidence,
-    start: Hyper,
-    curvature: Curvature,
-    limits: Limits,
-) -> Result<Found, FieldError> {
-    let score = |logs: &[f64]| evidence.score(&start.with_logs(logs));
-    let optimum = maximise(score, (&start.to_logs(), curvature), &start.ranges(), limits)?;
-    Ok(Found {
-        hyper: start.with_logs(&optimum.point),
-        value: optimum.value,
-        evaluations: optimum.evaluations,
-        curvature: optimum.curvature,
-    })
+pub fn refine(evidence: &Evidence, start: Hyper, limits: Limits) -> Result<Found, FieldError> {
+    let informed = |logs: &[f64]| evidence.informed(&start.with_logs(logs));
+    let summit = climb(informed, &start.to_logs(), &start.ranges(), limits)?;
+    Ok(Found { hyper: start.with_logs(&summit.point), value: summit.value, evaluations: summit.evaluations })
 }

@@ -53,7 +53,7 @@ pub fn contest_up(training: &Training, found: Found, cancel: &Cancel) -> Result<
         return Ok(Found { evaluations, ..found });
     };
     let lifted = training.clone().lifted(hyper.up)?;
-    let other = refine(&Evidence::new(&lifted, cancel), hyper, None, REFIT)?;
+    let other = refine(&Evidence::new(&lifted, cancel), hyper, REFIT)?;
     evaluations += other.evaluations;
     let ahead = other.value > found.value + CHANCE;
     Ok(Found { evaluations, ..if ahead { other } else { found } })

@@ -1,5 +1,7 @@
 //! The evidence against its definition, and its gradient against finite differences.
 
+use faer::{Mat, Par};
+use truearm_estimate::dense::{Cholesky, column};
 use truearm_estimate::{Cancel, EstimateError};
 
 use super::oracle::{Exact, Oracle};
@@ -113,6 +115,65 @@ fn value_is_that_of_the_covariance_written_out() {
     check_value(&training, &hyper(&training, 6));
     let training = line_inputs(16);
     check_value(&training, &hyper(&training, 4));
+}
+
+/// The average information by its definition, the derivatives of the covariance by differences, and the prior's precision.
+fn check_information(training: &Training, hyper: &Hyper) {
+    const STEP: f64 = 4e-3;
+    let logs = hyper.to_logs();
+    // Beside the set-up's share, which no hyper-parameter changes, differences would have few digits.
+    let alone = Training { setup: vec![0.0; training.setup.len()], ..training.clone() };
+    let here = Oracle::new(training, hyper, Exact(training, hyper)).covariance();
+    let factor = Cholesky::new(here, Par::Seq).unwrap();
+    let alpha = column(&factor.solve_vector(&training.residual));
+    let slopes: Vec<Mat<f64>> = (0..logs.len())
+        .map(|k| {
+            let at = |step: f64| {
+                let mut moved = logs.clone();
+                moved[k] += step;
+                let hyper = hyper.with_logs(&moved);
+                Oracle::new(&alone, &hyper, Exact(&alone, &hyper)).covariance()
+            };
+            let near = (at(STEP) - at(-STEP)) * faer::Scale(8.0);
+            (near - (at(2.0 * STEP) - at(-2.0 * STEP))) * &alpha * faer::Scale(1.0 / (12.0 * STEP))
+        })
+        .collect();
+    let cancel = Cancel::default();
+    let found = Evidence::new(training, &cancel).informed(hyper).unwrap().information;
+    let halves: Vec<Mat<f64>> = slopes
+        .into_iter()
+        .map(|mut slope| {
+            factor.solve_lower(slope.as_mut());
+            slope
+        })
+        .collect();
+    for (i, range) in hyper.ranges().iter().enumerate() {
+        for j in 0..logs.len() {
+            let prior = if i == j && range.spread.is_finite() { range.spread.powi(-2) } else { 0.0 };
+            let wanted = 0.5 * (halves[i].transpose() * &halves[j])[(0, 0)] + prior;
+            let size = 0.5 * (halves[i].norm_l2() * halves[j].norm_l2());
+            assert!(
+                (found[(i, j)] - wanted).abs() <= 1e-5 * size + 1e-9,
+                "hyper-parameters {i} and {j}: {} instead of {wanted} of {size}",
+                found[(i, j)]
+            );
+        }
+    }
+}
+
+#[test]
+fn information_is_that_of_the_covariance_written_out() {
+    let training = positions(22);
+    check_information(&training, &hyper(&training, 6));
+    check_information(&training, &rippling(&training, 6));
+    let training = poses_in_two_groups(18);
+    check_information(&training, &hyper(&training, 6));
+    let training = line_inputs(16);
+    check_information(&training, &rippling(&training, 4));
+    let training = loaded(18);
+    check_information(&training, &hyper(&training, 6));
+    let training = several_shots(18);
+    check_information(&training, &hyper(&training, 6));
 }
 
 #[test]
