@@ -438,8 +438,33 @@ def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "kind"), [(0.1, 0.12, "no_gain"), (0.1, 1.3, "no_help"), (0.6, 0.7, "no_help")]
+    ("before", "after", "floor", "kind"),
+    [
+        (0.1, 0.12, 0.05, "no_gain"),
+        (0.1, 1.3, 0.05, "no_help"),
+        (0.6, 0.7, 0.05, "no_help"),
+        (1.69, 1.7, 1.6, "no_gain"),
+        (1.69, 2.4, 1.6, "no_help"),
+        (3.0, 3.1, 20.0, "no_help"),
+        (8.0, 9.0, 8.5, "no_help"),
+    ],
 )
-def test_nothing_to_gain_is_said_of_small_errors_alone(before, after, kind):
-    assert [notice.kind for notice in no_help(before, after, "mean error")] == [kind]
-    assert no_help(after, before, "mean error") == []
+def test_nothing_to_gain_is_said_of_small_errors_and_of_noise_alone(before, after, floor, kind):
+    assert [notice.kind for notice in no_help(before, after, "mean error", floor)] == [kind]
+    assert no_help(after, before, "mean error", floor) == []
+
+
+def test_errors_that_hide_in_noise_are_not_said_to_be_wrong_data(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    noisy = Imperfections(length_mm=0.0, angle_deg=0.0, share=0.0, noise_mm=1.0)
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3, imperfections=noisy)
+    arm.measure_table(arm.poses(200)).to_csv("noisy.csv", index=False)
+    assert main(["calibrate", "ur10", "noisy.csv", "-o", "noisy"]) == 0
+    told = capsys.readouterr()
+    assert "Noise alone would leave" in told.err
+    assert "right-handed" not in told.err
+    assert main(["evaluate", "noisy/calibration.calib", "noisy.csv"]) == 0
+    assert "right-handed" not in capsys.readouterr().err
+    words = words_of(Path("noisy/report.html").read_text())
+    assert "nothing to gain" in words
+    assert "right-handed" not in words

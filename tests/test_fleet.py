@@ -227,6 +227,7 @@ ROW: dict[str, Any] = {
     "rows": 100,
     "mean_mm": 0.1,
     "max_mm": 0.3,
+    "noise_mm": 0.03,
     "nominal_mean_mm": 1.0,
     "nominal_max_mm": 2.0,
     "coverage_95": 0.95,

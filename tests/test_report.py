@@ -20,7 +20,6 @@ from tests.report_support import (
 )
 from truearm.options import Options
 from truearm.reporting.facts import Facts
-from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.gravity import sag
 from truearm.reporting.option_words import GENERAL, SCHEMES, VARIABLE, shown_options
 from truearm.reporting.report import report
@@ -235,8 +234,8 @@ def floor_of(calibration, sigmas):
     facts = Facts(calibration)
     noise = facts.summary["noise_mm"]
     expected = np.sqrt(8.0 / np.pi) * np.hypot(noise, sigmas).mean()
-    assert distance_at_floor_mm(facts) == pytest.approx(expected)
-    return distance_at_floor_mm(facts)
+    assert facts.floor_mm == pytest.approx(expected)
+    return facts.floor_mm
 
 
 def test_a_variable_model_that_does_worse_is_not_said_to_gain(calibrations):
@@ -245,7 +244,7 @@ def test_a_variable_model_that_does_worse_is_not_said_to_gain(calibrations):
     swapped = {**errors, "variable": errors["constant"], "constant": errors["variable"]}
     worse = replace(whole, validation=replace(whole.validation, holdout=swapped))
     told = {advice.kind: advice.words for advice in report(worse).advice}
-    assert "does not hold where it was judged" in told["constant_better"]
+    assert "does not help where it was judged" in told["constant_better"]
     assert "constant_suffices" not in told
 
 

@@ -52,6 +52,7 @@ from truearm.robot import Robot
 from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
 from truearm.splitting import Split, split_rows
+from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.unexplained import unexplained
@@ -147,7 +148,7 @@ def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Out
     """What the errors of a calibration say against it, and which outliers may be to blame."""
     judged, best = found.validation, found.model_name
     return [
-        *doubts(task.arm, found.models, judged, best, outliers),
+        *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
         *constant_is_better(judged, best),
     ]

@@ -36,6 +36,10 @@ COMPUTED_MM: Final = 0.02
 """No real arm is where its nominal model has it to within this."""
 NEAR_MM: Final = 0.5
 """Wrong data, or those of another arm, are never so near the nominal model."""
+NOISY_MM: Final = 5.0
+"""Nor so near, and as far off as noise alone leaves them."""
+LIKE_NOISE: Final = 0.2
+"""Part of what noise leaves by which a mean error may differ from it: that of some twenty rows does."""
 MOST_NAMED: Final = 4
 UPRIGHT: Final = (0.0, 0.0, 1.0)
 SAME: Final = 0.97
@@ -96,15 +100,19 @@ def doubts(
     models: Mapping[str, ArmModel],
     validation: Validation,
     best: str,
+    floor_mm: float,
     outliers: Outliers | None = None,
 ) -> list[Notice]:
-    """What speaks against a calibration whose model `best` is used."""
+    """What speaks against a calibration whose model `best` is used; noise alone leaves `floor_mm`."""
     before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
     if before < COMPUTED_MM:
         return [_computed()]
     what = f"mean error on {validation.judged} rows"
     return [
-        *(_single_rows(before, after, best, what, outliers) or no_help(before, after, what, outliers)),
+        *(
+            _single_rows(before, after, best, what, outliers)
+            or no_help(before, after, what, floor_mm, outliers)
+        ),
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, models[CONSTANT]),
     ]
@@ -215,22 +223,31 @@ def helps(before_mm: float, after_mm: float) -> bool:
     return after_mm < min(before_mm, LARGE_MM)
 
 
-def no_help(before_mm: float, after_mm: float, what: str, outliers: Outliers | None = None) -> list[Notice]:
+def no_help(
+    before_mm: float, after_mm: float, what: str, floor_mm: float, outliers: Outliers | None = None
+) -> list[Notice]:
     """A warning where a calibration is of no use.
 
     Args:
         before_mm: Error of the nominal model.
         after_mm: That of its own.
         what: What these are.
+        floor_mm: What noise alone would leave on average.
         outliers: Rows that are far off, if any are known.
     """
     if helps(before_mm, after_mm):
         return []
-    if nothing_to_gain(before_mm, after_mm):
+    if nothing_to_gain(before_mm, after_mm, floor_mm):
+        why = (
+            "As far as these poses tell the arm is where its table has it: use the arm without a "
+            "calibration, or measure more poses."
+            if before_mm < NEAR_MM
+            else f"Noise alone would leave {floor_mm:.4g} mm: what the arm errs by is hidden in it. Measure "
+            "with a better instrument, each pose several times, or more poses."
+        )
         text = (
             f"There is nothing to gain: the {what} is {after_mm:.4g} mm, that of the nominal model "
-            f"{before_mm:.4g} mm already. As far as these poses tell the arm is where its table has it: use "
-            "the arm without a calibration, or measure more poses."
+            f"{before_mm:.4g} mm already. {why}"
         )
         return [Notice(NO_GAIN, text)]
     text = (
@@ -247,9 +264,17 @@ def to_check(outliers: Outliers | None) -> str:
     return f"Look at these rows first, which alone may spoil the fit: {outliers.named}. {CHECKS}."
 
 
-def nothing_to_gain(before_mm: float, after_mm: float) -> bool:
-    """Whether a calibration does not help where both models miss by so little that data are hardly wrong."""
-    return not helps(before_mm, after_mm) and before_mm < NEAR_MM and after_mm < NEAR_MM
+def nothing_to_gain(before_mm: float, after_mm: float, floor_mm: float) -> bool:
+    """Whether a calibration does not help where data are hardly wrong.
+
+    Both models miss by little, or by what noise alone would leave, `floor_mm`. Single rows that are far
+    off make that larger than the mean error is.
+    """
+    if helps(before_mm, after_mm):
+        return False
+    errors = (before_mm, after_mm)
+    like_noise = all(abs(error - floor_mm) <= LIKE_NOISE * floor_mm for error in errors)
+    return max(errors) < NEAR_MM or (like_noise and max(errors) < NOISY_MM)
 
 
 def _single_rows(

@@ -23,6 +23,7 @@ from truearm.measurements import Measurements
 from truearm.models import NOMINAL, ArmModel
 from truearm.plausibility import check_against
 from truearm.registration import register
+from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
 from truearm.units import MM_PER_METRE
 from truearm.validation import Errors, RowErrors
@@ -146,7 +147,7 @@ def evaluate(
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
         spoiled, outliers = _gross(task, calibration, models[best], found_by, rows, chosen)
-    notices = [*notices, *(spoiled or _of_no_use(errors, best)), *outliers]
+    notices = [*notices, *(spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration))), *outliers]
     statistics = {name: found.statistics() for name, found in errors.items()}
     return Evaluation(len(frame), len(judged), statistics, tuple(notices), held)
 
@@ -188,10 +189,10 @@ def _setup(
         return fit_constant(task.problem(measured, []), fit_options(task, parameters=parameters)).setup
 
 
-def _of_no_use(errors: Mapping[str, RowErrors], best: str) -> list[Notice]:
+def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> list[Notice]:
     """A warning where the calibration does not help; medians, since single rows may be wrong."""
     before, after = (MM_PER_METRE * float(np.nanmedian(errors[name].distance_m)) for name in (NOMINAL, best))
-    return no_help(before, after, "median error on the rows that were judged")
+    return no_help(before, after, "median error on the rows that were judged", floor_mm)
 
 
 def _gross(

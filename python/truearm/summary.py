@@ -5,12 +5,16 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M
 from truearm.units import MM_PER_METRE
+from truearm.validation import mean_distance
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
+
+Floats = NDArray[np.float64]
 
 MRAD_PER_RAD: Final = 1e3
 AXES: Final = 3
@@ -72,9 +76,22 @@ def noise_mm(calibration: "Calibration") -> float:
 def _held_out_mm(calibration: "Calibration") -> float:
     """Root mean square of a coordinate's error on held-out rows, without what rows state as their sigma."""
     square = calibration.validation.holdout[calibration.model_name].position.rms ** 2 / AXES
-    sigma = None if calibration.rows is None else calibration.rows.data.sigma_m
-    stated = 0.0 if sigma is None else float(np.square(MM_PER_METRE * np.nan_to_num(sigma)).mean())
+    stated = float(np.mean(np.square(stated_sigma_mm(calibration))))
     return math.sqrt(max(square - stated, 0.0))
+
+
+def distance_at_floor_mm(calibration: "Calibration") -> float:
+    """Mean position error that the unexplained part, and the rows' own sigma, alone would leave, mm."""
+    noise = float(np.mean(np.hypot(noise_mm(calibration), stated_sigma_mm(calibration))))
+    return mean_distance(noise, distances=calibration.selection.distances)
+
+
+def stated_sigma_mm(calibration: "Calibration") -> Floats | float:
+    """What rows (n,) say of their own noise, mm; zero where they say nothing."""
+    rows = calibration.rows
+    if rows is None or rows.data.sigma_m is None:
+        return 0.0
+    return np.asarray(MM_PER_METRE * np.nan_to_num(rows.data.sigma_m))
 
 
 def describe_blocks(calibration: "Calibration") -> list[dict[str, Any]]:

@@ -1,8 +1,10 @@
 //! How sharply the evidence bends with the logarithms of the hyper-parameters.
 //!
-//! The average information `1/2 alpha^T dK_i P dK_j alpha` is the mean of what the negative second derivatives are and of
-//! what they are expected to be (Gilmour, Thompson and Cullis 1995). It is never indefinite, and asks for products of
-//! matrices with vectors alone.
+//! The average information `1/2 alpha^T dK_i P dK_j alpha`, with `alpha = P r` and dK_i the slope of the covariance by a
+//! logarithm, is the mean of what the negative second derivatives are and of what they are expected to be, but for how the
+//! covariance itself bends, which adds nothing to what is expected (Gilmour, Thompson and Cullis 1995). It is never
+//! indefinite, and asks for products of matrices with vectors alone. With positions alone it is singular: nothing tells of
+//! the noise of orientations.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};

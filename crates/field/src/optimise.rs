@@ -22,6 +22,16 @@ pub struct Optimum {
     pub evaluations: usize,
 }
 
+/// A step that was made.
+pub struct Step<T> {
+    /// Where it led.
+    pub point: Vec<f64>,
+    /// What the function is there.
+    pub found: T,
+    /// Its share of what was asked for.
+    pub length: f64,
+}
+
 /// Longest step in any logarithm: a factor of about four.
 pub const LONGEST_STEP: f64 = 1.4;
 /// Share of the promised gain that a step must bring (Armijo 1966).
@@ -61,7 +71,8 @@ impl<F: FnMut(&[f64]) -> Result<Score, FieldError>> Search<'_, F> {
         while self.evaluations < self.limits.evaluations {
             let free = free(&point, &here.gradient, self.ranges);
             let direction = limited(inverse.times(&here.gradient, &free));
-            let Some((next, score)) = self.line_search(&point, &here, &direction)? else {
+            let Some(Step { point: next, found: score, .. }) = self.line_search(&point, &here, &direction)?
+            else {
                 if fresh {
                     break;
                 }
@@ -102,7 +113,7 @@ impl<T: AsRef<Score>, F: FnMut(&[f64]) -> Result<T, FieldError>> Search<'_, F> {
         point: &[f64],
         here: &Score,
         direction: &[f64],
-    ) -> Result<Option<(Vec<f64>, T)>, FieldError> {
+    ) -> Result<Option<Step<T>>, FieldError> {
         let mut length = 1.0;
         for _ in 0..8 {
             let next: Vec<f64> = point.iter().zip(direction).map(|(x, d)| x + length * d).collect();
@@ -113,11 +124,11 @@ impl<T: AsRef<Score>, F: FnMut(&[f64]) -> Result<T, FieldError>> Search<'_, F> {
                 return Ok(None);
             }
             match self.evaluate(&next) {
-                Ok(there) if there.as_ref().value >= here.value + SUFFICIENT * promised => {
-                    return Ok(Some((next, there)));
+                Ok(found) if found.as_ref().value >= here.value + SUFFICIENT * promised => {
+                    return Ok(Some(Step { point: next, found, length }));
                 }
-                Ok(there) => {
-                    let curvature = promised - (there.as_ref().value - here.value);
+                Ok(found) => {
+                    let curvature = promised - (found.as_ref().value - here.value);
                     length *= (0.5 * promised / curvature).clamp(0.1, 0.5);
                 }
                 Err(FieldError::NotPositiveDefinite { .. }) => length *= 0.2,

@@ -43,10 +43,10 @@ struct Sought {
 /// Joints that turn: from 8 to 520 cycles a turn of gears and encoders, which have whole numbers of teeth and poles.
 const TURNING: Sought =
     Sought { cycles: [8.0, 520.0], from: 1.0, covered: [0.1 * TAU, 16.0 * TAU], fewest: 0.0, whole: true };
-/// Joints that slide: pitches of 250 mm, of a pinion's turn, down to 1 mm.
+/// Joints that slide: pitches of 1 m, of a long rack, over those of a pinion's turn down to 1 mm.
 const SLIDING: Sought = Sought {
-    cycles: [4.0 * TAU, 1000.0 * TAU],
-    from: TAU,
+    cycles: [TAU, 1000.0 * TAU],
+    from: 0.25 * TAU,
     covered: [0.02, 200.0],
     fewest: 3.0,
     whole: false,
@@ -336,7 +336,7 @@ mod tests {
 
     #[test]
     fn screws_are_found_where_poses_stand_anywhere() {
-        for (pitch, way) in [(0.02, 1.2), (0.005, 0.3), (0.016, 0.1), (0.2, 3.0)] {
+        for (pitch, way) in [(0.02, 1.2), (0.005, 0.3), (0.016, 0.1), (0.2, 3.0), (0.314, 8.0), (0.8, 5.0)] {
             let mut found = scan(anywhere(0.5 * way), &[(4.0, TAU / pitch)]);
             found.sought = SLIDING;
             let (wave, _) = found.best(6).unwrap();

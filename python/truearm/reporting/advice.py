@@ -20,7 +20,6 @@ from truearm.errors import count_of
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
-from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import of_last_link, target_lever_mm
 from truearm.reporting.numbers import listed, percent, short, shown_readings
@@ -29,6 +28,8 @@ from truearm.row_order import ORDER_OF_POSES
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
 """A mean error within so many times what noise alone leaves has reached it."""
+FEW_FOR_NOISE: Final = 60
+"""Training poses below which noise may be told a third or half of what it is."""
 LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
@@ -117,7 +118,7 @@ def _stated_sigma(facts: Facts) -> Iterator[Advice]:
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     if facts.best != VARIABLE or any(_stated_sigma(facts)):
         return
-    floor, mean = distance_at_floor_mm(facts), facts.mean_mm()
+    floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
         if facts.grids or any(map(facts.noticed, HIDING)):
@@ -129,9 +130,14 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         yield Advice("noise_floor", "The noise floor is reached.", words, floor)
         return
     trained = facts.calibration.validation.poses_trained
+    unsure = (
+        f", though so few poses as {trained} hardly tell it from the rest"
+        if facts.calibration.validation.n_train_poses < FEW_FOR_NOISE
+        else ""
+    )
     words = (
-        f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm. The rest is what "
-        f"{trained} leave undetermined. Poses like those of the task help most."
+        f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm{unsure}. The rest is "
+        f"what {trained} leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
 
@@ -284,11 +290,10 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
         )
         yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
     elif facts.best == VARIABLE and constants_do_better(mean, constant):
-        left, before = short(mean, constant)
         words = (
-            f"The {facts.mean_error} is {left} mm with the variable model and {before} mm with constant "
-            "parameters: what it learnt does not hold where it was judged. Measure poses there, or stay with "
-            "--model constant."
+            f"The {facts.mean_error} is {mean:.4g} mm with the variable model and {constant:.4g} mm with "
+            "constant parameters: what it learnt does not help where it was judged. Measure poses there, or "
+            "stay with --model constant."
         )
         yield Advice("constant_better", "Constant parameters do better.", words, mean)
     elif facts.best == VARIABLE and mean > SAME * constant:

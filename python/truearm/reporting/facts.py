@@ -17,7 +17,7 @@ from truearm.held_rows import HeldRows
 from truearm.models import NOMINAL, ArmModel
 from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
 from truearm.stillness import still_warning
-from truearm.summary import WAVE
+from truearm.summary import WAVE, distance_at_floor_mm
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -125,7 +125,13 @@ class Facts:
         """Whether the calibration is wrong, so that nothing it says of noise or of the arm holds."""
         errors = self.calibration.validation.holdout
         before, after = (errors[name].position.mean for name in (NOMINAL, self.best))
-        return not (helps(before, after) or nothing_to_gain(before, after) or self.is_spoilt_by_rows)
+        none = nothing_to_gain(before, after, self.floor_mm)
+        return not (helps(before, after) or none or self.is_spoilt_by_rows)
+
+    @cached_property
+    def floor_mm(self) -> float:
+        """Mean position error that noise alone would leave, mm."""
+        return distance_at_floor_mm(self.calibration)
 
     @property
     def leaves_outliers_out(self) -> bool:

@@ -13,10 +13,10 @@ from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
 from truearm.reporting.drifts import drifts
 from truearm.reporting.facts import Facts
-from truearm.reporting.floor import distance_at_floor_mm, stated_sigma_mm
 from truearm.reporting.numbers import fixed, lean, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.simulation import approach_in_sequence
+from truearm.summary import stated_sigma_mm
 from truearm.units import MM_PER_METRE
 from truearm.visits import pose_numbers, visit_numbers
 
@@ -107,8 +107,10 @@ def repeats(facts: Facts) -> Section:
     """What repeated poses say."""
     title = "Repeatability and noise"
     per = "per distance" if facts.calibration.selection.distances else "per coordinate"
-    floor, noise = short(distance_at_floor_mm(facts), facts.summary["noise_mm"])
-    alone = "with what rows state as their sigma it" if np.any(stated_sigma_mm(facts)) else "alone it"
+    floor, noise = short(facts.floor_mm, facts.summary["noise_mm"])
+    alone = (
+        "with what rows state as their sigma it" if np.any(stated_sigma_mm(facts.calibration)) else "alone it"
+    )
     parts: list[Part] = [
         Text(
             f"The residual that the {facts.best} model does not explain has a standard deviation of {noise} "
@@ -189,7 +191,7 @@ def _standing(found: Repeats) -> str:
 def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
     """How far poses lie apart that a joint reached from both sides, in the order of the rows."""
     rows, beyond = [], []
-    noise = float(np.mean(np.hypot(facts.summary["noise_mm"], stated_sigma_mm(facts))))
+    noise = float(np.mean(np.hypot(facts.summary["noise_mm"], stated_sigma_mm(facts.calibration))))
     for joint in range(len(facts.joints)):
         apart, alone = found.both_sides_mm(joint, noise)
         if len(apart) < FEWEST_GROUPS:

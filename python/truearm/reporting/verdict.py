@@ -8,7 +8,6 @@ from truearm.doubts import helps, nothing_to_gain
 from truearm.errors import count_of
 from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
-from truearm.reporting.floor import distance_at_floor_mm
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
 from truearm.validation import Statistics
@@ -68,7 +67,7 @@ def verdict(facts: Facts) -> str:
     )
     if facts.is_spoilt_by_rows:
         return f"{said} Single rows are far off: correct them or leave them out, and calibrate again."
-    if nothing_to_gain(nominal.mean, after.mean):
+    if nothing_to_gain(nominal.mean, after.mean, facts.floor_mm):
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
@@ -117,7 +116,7 @@ def cards(facts: Facts) -> list[Card]:
         Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"),
     ]
     if not facts.is_of_no_help:
-        floor = distance_at_floor_mm(facts)
+        floor = facts.floor_mm
         found.append(Card(*_short_mm(floor), "mean error that noise alone would leave"))
     ratios = summary["error_to_repeatability"]
     if ratios is not None:
