@@ -80,8 +80,13 @@ def test_every_request_to_end_halts_the_process(number):
         halted.wait(5.0)
         raise StoppedError("the process was ended")
 
-    with pytest.raises(KeyboardInterrupt):
-        run(Mock(run=work, halt=halted.set))
+    # As it is without nohup, whatever the tests were started by.
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            run(Mock(run=work, halt=halted.set))
+    finally:
+        signal.signal(number, before)
     assert halted.is_set()
 
 
