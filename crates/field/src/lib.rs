@@ -60,6 +60,7 @@ mod training;
 mod unknowns;
 mod upright;
 mod waves;
+mod weight_rows;
 mod weight_space;
 mod widening;
 

@@ -323,7 +323,8 @@ pub fn write_covariance(
     mut matrix: MatMut<f64>,
 ) {
     let scratch = || (PairTable::default(), RowFactors::default());
-    by_pose(training, matrix.rb_mut()).into_par_iter().for_each_init(
+    let rows = (0..training.pose_count()).map(|pose| training.rows(pose).len());
+    by_pose(matrix.rb_mut(), rows).into_par_iter().enumerate().for_each_init(
         scratch,
         |(table, factors), (pose, out)| {
             kernels.fill(pose, table);
@@ -336,13 +337,13 @@ pub fn write_covariance(
     }
 }
 
-/// Columns of the matrix that belong to each pose.
-fn by_pose<'a>(training: &Training, matrix: MatMut<'a, f64>) -> Vec<(usize, MatMut<'a, f64>)> {
+/// Columns of a matrix pose by pose, each as many as its pose has rows.
+pub fn by_pose(matrix: MatMut<f64>, rows: impl Iterator<Item = usize>) -> Vec<MatMut<f64>> {
     let mut rest = matrix;
-    let mut parts = Vec::with_capacity(training.pose_count());
-    for pose in 0..training.pose_count() {
-        let (head, tail) = rest.split_at_col_mut(training.rows(pose).len());
-        parts.push((pose, head));
+    let mut parts = Vec::new();
+    for count in rows {
+        let (head, tail) = rest.split_at_col_mut(count);
+        parts.push(head);
         rest = tail;
     }
     parts

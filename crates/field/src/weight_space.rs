@@ -6,10 +6,9 @@
 //! with the precision of their priors.
 
 use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::prelude::ReborrowMut;
-use faer::{Accum, Mat, MatMut, MatRef};
+use faer::{Accum, Mat, MatRef};
 use truearm_estimate::Cancel;
-use truearm_estimate::dense::{Cholesky, column, mirror_lower, parallelism, to_vec};
+use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
@@ -17,8 +16,9 @@ use crate::model::{BlockPlan, Model};
 use crate::posterior::{LeaveOneOut, Query, Solution};
 use crate::product::{product, times};
 use crate::unknowns::{Unknowns, sag_start, unknowns};
+use crate::weight_rows::{Batch, WeightRows};
 
-/// Poses whose rows are formed together.
+/// Configurations of a query that are answered together.
 const BATCH: usize = 512;
 /// Left-out residuals of sets above this are found exactly for suspicious and sampled poses alone.
 const JUDGED_EXACTLY: usize = 600;
@@ -33,74 +33,18 @@ pub struct WeightSpace {
     /// I + A^T A, lower triangle.
     normal: Mat<f64>,
     factor: Cholesky,
+    cancel: Cancel,
 }
 
-/// Rows of one pose: (m, u) before whitening.
-struct Rows<'a> {
-    space: &'a WeightSpaceParts<'a>,
-    plans: &'a [BlockPlan<'a>],
-    sag: &'a [Option<(usize, f64)>],
-}
-
-/// What rows are formed from.
-struct WeightSpaceParts<'a> {
-    model: &'a Model,
-    unknowns: &'a [Unknowns],
-}
-
-impl Rows<'_> {
-    fn fill(&self, values: &[f64], jacobian: &[f64], setup: Option<&[f64]>, mut out: MatMut<f64>) {
-        let model = self.space.model;
-        let columns = model.training.columns.len();
-        let constants = model.by_column.constant.len();
-        for (row, entries) in jacobian.chunks_exact(columns).enumerate() {
-            for (k, &(p, _)) in model.by_column.constant.iter().enumerate() {
-                out[(row, k)] = entries[p] * model.constant_deviation(p);
-            }
-            if let Some(setup) = setup {
-                let width = model.training.setup_width;
-                (0..width).for_each(|k| out[(row, constants + k)] = setup[row * width + k]);
-            }
-        }
-        let levers = model.training.geometry.at(values);
-        let start = sag_start(model);
-        for (k, (term, lever)) in self.sag.iter().zip(&levers).enumerate() {
-            let Some((p, deviation)) = term else { continue };
-            for (row, entries) in jacobian.chunks_exact(columns).enumerate() {
-                out[(row, start + k)] = entries[*p] * deviation * lever;
-            }
-        }
-        for (plan, unknowns) in self.plans.iter().zip(self.space.unknowns) {
-            let features = products(plan, unknowns, values);
-            for (row, entries) in jacobian.chunks_exact(columns).enumerate() {
-                let scaled: Vec<f64> =
-                    plan.driven.iter().map(|&(p, variance)| entries[p] * variance.sqrt()).collect();
-                for (f, feature) in features.iter().enumerate() {
-                    let at = unknowns.start + f * scaled.len();
-                    scaled.iter().enumerate().for_each(|(k, entry)| out[(row, at + k)] = feature * entry);
-                }
-            }
-        }
-    }
-}
-
-fn products(plan: &BlockPlan, unknowns: &Unknowns, values: &[f64]) -> Vec<f64> {
-    let axes = plan.axes.iter().zip(&unknowns.roots);
-    let features: Vec<Vec<f64>> =
-        axes.map(|((input, cells), root)| root.features(cells, values[*input])).collect();
-    let of = |k: usize, i: usize| features.get(k).map_or(1.0, |f| f[i]);
-    unknowns.combinations.iter().map(|c| of(0, c[0]) * of(1, c[1]) * of(2, c[2])).collect()
-}
-
-/// Adds sign rows^T rows to the lower triangle.
-fn add_gram(normal: &mut Mat<f64>, rows: &Mat<f64>, sign: f64) {
+/// Adds sign rows rows^T, of rows (u, r), to the lower triangle.
+fn add_gram(normal: &mut Mat<f64>, rows: MatRef<f64>, sign: f64) {
     triangular::matmul(
         normal.as_mut(),
         BlockStructure::TriangularLower,
         Accum::Add,
-        rows.transpose(),
+        rows,
         BlockStructure::Rectangular,
-        rows.as_ref(),
+        rows.transpose(),
         BlockStructure::Rectangular,
         sign,
         parallelism(),
@@ -125,13 +69,13 @@ impl WeightSpace {
             let at = model.by_column.constant.len() + k;
             normal[(at, at)] = *known;
         }
-        let parts = WeightSpaceParts { model: &model, unknowns: &unknowns };
-        for batch in parts.batches() {
-            cancel.check()?;
-            add_gram(&mut normal, &parts.whitened(&batch, width)?, 1.0);
-        }
+        let poses: Vec<usize> = (0..model.training.pose_count()).collect();
+        WeightRows::new(&model, &unknowns, width).each(&poses, cancel, |batch| {
+            add_gram(&mut normal, batch.rows, 1.0);
+            Ok(())
+        })?;
         let factor = factored(&normal)?;
-        Ok(Self { model, unknowns, width, normal, factor })
+        Ok(Self { model, unknowns, width, normal, factor, cancel: cancel.clone() })
     }
 
     /// The same posterior with other weights of the rows: the changed poses' share is taken out and put in again.
@@ -146,17 +90,26 @@ impl WeightSpace {
             if let Some(weight) = weight {
                 self.model.training.weight = weight;
             }
-            for some in changed.chunks(BATCH) {
-                let rows = self.parts().whitened(some, self.width)?;
-                add_gram(&mut self.normal, &rows, sign);
-            }
+            WeightRows::new(&self.model, &self.unknowns, self.width).each(
+                &changed,
+                &self.cancel,
+                |batch| {
+                    add_gram(&mut self.normal, batch.rows, sign);
+                    Ok(())
+                },
+            )?;
         }
         self.factor = factored(&self.normal)?;
         Ok(self)
     }
 
-    fn parts(&self) -> WeightSpaceParts<'_> {
-        WeightSpaceParts { model: &self.model, unknowns: &self.unknowns }
+    fn rows(&self) -> WeightRows<'_> {
+        WeightRows::new(&self.model, &self.unknowns, self.width)
+    }
+
+    fn each_batch(&self, use_batch: impl FnMut(Batch) -> Result<(), FieldError>) -> Result<(), FieldError> {
+        let poses: Vec<usize> = (0..self.model.training.pose_count()).collect();
+        self.rows().each(&poses, &self.cancel, use_batch)
     }
 
     /// Constants, field and set-up from residuals (R,).
@@ -183,12 +136,12 @@ impl WeightSpace {
     }
 
     fn unknowns_of(&self, residual: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let parts = self.parts();
+        let rows = self.rows();
         let mut right = Mat::<f64>::zeros(self.width, 1);
-        for batch in parts.batches() {
-            let rows = parts.whitened(&batch, self.width)?;
-            right += product(rows.transpose(), column(&parts.whitened_values(&batch, residual)?).as_ref());
-        }
+        self.each_batch(|batch| {
+            right += product(batch.rows, column(&rows.whitened(&batch, residual)?).as_ref());
+            Ok(())
+        })?;
         Ok(self.factor.solve_vector(&to_vec(right.as_ref())))
     }
 
@@ -229,17 +182,17 @@ impl WeightSpace {
     pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
         let training = &self.model.training;
         let solution = column(&self.unknowns_of(residual)?);
-        let parts = self.parts();
+        let rows = self.rows();
         let mut out = LeaveOneOut::zeros(training.row_count());
         let stride = training.pose_count().div_ceil(JUDGED_EXACTLY);
-        for batch in parts.batches() {
-            let rows = parts.whitened(&batch, self.width)?;
-            let left =
-                column(&parts.whitened_values(&batch, residual)?) - product(rows.as_ref(), solution.as_ref());
-            let first = training.rows(batch[0]).start;
-            let square =
-                |pose: usize| training.rows(pose).map(|row| left[(row - first, 0)].powi(2)).sum::<f64>();
-            let (exact, clear): (Vec<usize>, Vec<usize>) = batch.into_iter().partition(|&pose| {
+        self.each_batch(|batch| {
+            let left = column(&rows.whitened(&batch, residual)?)
+                - product(batch.rows.transpose(), solution.as_ref());
+            let first = batch.ranges[0].start;
+            // Whitened by a weight that was taken away, the farthest pose would look clear.
+            let at_full_weight = |row: usize| left[(row - first, 0)].powi(2) / training.weight[row];
+            let square = |pose: usize| training.rows(pose).map(at_full_weight).sum::<f64>();
+            let (exact, clear): (Vec<usize>, Vec<usize>) = batch.poses.iter().partition(|&&pose| {
                 pose % stride == 0 || square(pose) > SUSPICIOUS * training.rows(pose).len() as f64
             });
             for pose in clear {
@@ -250,23 +203,22 @@ impl WeightSpace {
             for &pose in exact.iter().filter(|&&pose| pose % stride != 0) {
                 out.suspect(training.rows(pose));
             }
-            self.judge_exactly(&exact, rows.as_ref(), left.as_ref(), &mut out)?;
-        }
+            self.judge_exactly(&exact, &batch, left.as_ref(), &mut out)
+        })?;
         Ok(out)
     }
 
     fn judge_exactly(
         &self,
         poses: &[usize],
-        rows: MatRef<f64>,
+        batch: &Batch,
         left: MatRef<f64>,
         out: &mut LeaveOneOut,
     ) -> Result<(), FieldError> {
         let training = &self.model.training;
-        let Some(&pose) = poses.first() else { return Ok(()) };
-        let first = training.rows(pose - pose % BATCH).start;
+        let first = batch.ranges[0].start;
         let wanted: Vec<usize> = poses.iter().flat_map(|&pose| training.rows(pose)).collect();
-        let mut reduced = Mat::from_fn(self.width, wanted.len(), |k, r| rows[(wanted[r] - first, k)]);
+        let mut reduced = Mat::from_fn(self.width, wanted.len(), |k, r| batch.rows[(k, wanted[r] - first)]);
         self.factor.solve_lower(reduced.as_mut());
         let mut at = 0;
         for &pose in poses {
@@ -315,92 +267,8 @@ impl WeightSpace {
 
     /// Rows of some configurations by unknowns of unit variance, (u, k).
     fn reduced(&self, query: &Query, poses: std::ops::Range<usize>) -> Mat<f64> {
-        let plans = self.model.plans();
-        let parts = self.parts();
-        let sag = self.model.sag_terms();
-        let rows = Rows { space: &parts, plans: &plans, sag: &sag };
-        let width = self.model.training.setup_width;
-        let mut filled = Mat::zeros(poses.len() * query.rows, self.width);
-        for (index, pose) in poses.enumerate() {
-            let setup = query.setup.map(|s| &s[pose * query.rows * width..(pose + 1) * query.rows * width]);
-            let target = filled.as_mut().subrows_mut(index * query.rows, query.rows);
-            rows.fill(query.values_of(pose), query.jacobian_of(pose), setup, target);
-        }
-        let mut reduced = filled.transpose().to_owned();
+        let mut reduced = self.rows().of(query, poses);
         self.factor.solve_lower(reduced.as_mut());
         reduced
-    }
-}
-
-impl WeightSpaceParts<'_> {
-    fn batches(&self) -> Vec<Vec<usize>> {
-        let poses: Vec<usize> = (0..self.model.training.pose_count()).collect();
-        poses.chunks(BATCH).map(<[usize]>::to_vec).collect()
-    }
-
-    /// Whitened rows (r, u) of a batch of poses.
-    fn whitened(&self, poses: &[usize], width: usize) -> Result<Mat<f64>, FieldError> {
-        let training = &self.model.training;
-        let plans = self.model.plans();
-        let sag = self.model.sag_terms();
-        let rows = Rows { space: self, plans: &plans, sag: &sag };
-        let count = poses.iter().map(|&pose| training.rows(pose).len()).sum();
-        let mut out = Mat::zeros(count, width);
-        let mut at = 0;
-        for &pose in poses {
-            let range = training.rows(pose);
-            let columns = training.columns.len();
-            let jacobian = &training.jacobian[range.start * columns..range.end * columns];
-            let setup = &training.setup[range.start * training.setup_width..range.end * training.setup_width];
-            let mut target = out.as_mut().subrows_mut(at, range.len());
-            at += range.len();
-            rows.fill(training.values_of(pose), jacobian, Some(setup), target.rb_mut());
-            self.model.noise_cholesky(pose)?.solve_lower(target);
-        }
-        Ok(out)
-    }
-
-    fn whitened_values(&self, poses: &[usize], values: &[f64]) -> Result<Vec<f64>, FieldError> {
-        let mut out = Vec::new();
-        for &pose in poses {
-            let mut local = column(&values[self.model.training.rows(pose)]);
-            self.model.noise_cholesky(pose)?.solve_lower(local.as_mut());
-            out.extend(to_vec(local.as_ref()));
-        }
-        Ok(out)
-    }
-}
-
-impl Model {
-    /// Factor of the noise covariance of one pose's rows: instrument and what its joints do not repeat.
-    fn noise_cholesky(&self, pose: usize) -> Result<Cholesky, FieldError> {
-        let rows = self.training.rows(pose);
-        let noise = self.noise_covariance(&self.training.jacobian, rows.clone());
-        let noise = Mat::from_fn(rows.len(), rows.len(), |i, j| {
-            let own =
-                if i == j { self.training.noise_variance(rows.start + i, self.hyper.noise) } else { 0.0 };
-            noise[(i, j)] + own
-        });
-        Cholesky::new(noise, faer::Par::Seq).ok_or(FieldError::NotPositiveDefinite { rows: rows.len() })
-    }
-
-    /// The lower factor itself, (m, m).
-    fn noise_factor(&self, pose: usize) -> Result<Mat<f64>, FieldError> {
-        Ok(self.noise_cholesky(pose)?.lower())
-    }
-
-    /// What joints do not repeat, carried to rows of a Jacobian (rows, P).
-    pub fn noise_covariance(&self, jacobian: &[f64], rows: std::ops::Range<usize>) -> Mat<f64> {
-        let columns = self.training.columns.len();
-        let mut noise = Mat::zeros(rows.len(), rows.len());
-        for (p, lever) in self.by_column.own.iter().flatten() {
-            let entry =
-                |i: usize| jacobian[(rows.start + i) * columns + p] * lever * self.hyper.repeatability;
-            for i in 0..rows.len() {
-                (0..=i).for_each(|j| noise[(i, j)] += entry(i) * entry(j));
-            }
-        }
-        mirror_lower(&mut noise);
-        noise
     }
 }

@@ -127,6 +127,12 @@ fn many_rows_go_to_weight_space_where_suspicious_poses_are_judged_exactly() {
     assert!(judgement.distance.iter().all(|&distance| distance > 0.0), "all poses have residuals");
     let left_out = posterior.leave_one_out(&training.residual).unwrap();
     assert!(!left_out.sampled[3 * 101] && left_out.sampled[0] && !left_out.sampled[3 * 7]);
+    let news = judgement.reweigh(&mut training);
+    assert!(news.poses);
+    let posterior = posterior.reweighed(training.weight.clone(), &Cancel::default()).unwrap();
+    let again = crate::outliers::judge(&posterior).unwrap();
+    assert_eq!(again.outliers, [101, 1503], "what has lost its weight is judged at its full weight");
+    assert!(!again.reweigh(&mut training).poses);
 }
 
 #[test]
