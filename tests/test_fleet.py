@@ -228,6 +228,7 @@ ROW: dict[str, Any] = {
     "mean_mm": 0.1,
     "max_mm": 0.3,
     "noise_mm": 0.03,
+    "floor_mm": 0.05,
     "nominal_mean_mm": 1.0,
     "nominal_max_mm": 2.0,
     "coverage_95": 0.95,
@@ -258,6 +259,25 @@ def test_reasons(changed, limits, kinds):
     row = {**ROW, **changed}
     found = reasons(row, [row], LimitsSection(**limits))
     assert [reason.kind for reason in found] == kinds
+
+
+@pytest.mark.parametrize(
+    ("floor", "said"), [(1.6, "There is nothing to gain"), (0.05, "The calibration does not help")]
+)
+def test_an_arm_whose_errors_hide_in_noise_has_nothing_to_gain(floor, said):
+    row = {**ROW, "nominal_mean_mm": 1.69, "mean_mm": 1.7, "floor_mm": floor}
+    (found,) = reasons(row, [row], LimitsSection())
+    assert found.words.startswith(said)
+
+
+def test_what_noise_alone_would_leave_holds_the_sigma_of_rows(tmp_path):
+    rows = table(1, 0)
+    rows.to_csv(tmp_path / "silent.csv", index=False)
+    rows.assign(sigma_mm=3.0).to_csv(tmp_path / "stated.csv", index=False)
+    text = HEAD + arms("silent", "stated")
+    found = by_name(run_fleet(Fleet.from_toml(text, folder=tmp_path), tmp_path / "out", workers=1))
+    assert found["silent"].row["floor_mm"] < 1.0
+    assert found["stated"].row["floor_mm"] > 3.0
 
 
 def test_an_error_beyond_its_limit_is_told_as_larger():

@@ -8,7 +8,6 @@ import numpy as np
 
 from truearm.doubts import helps, nothing_to_gain
 from truearm.fleet.fleet_file import LimitsSection
-from truearm.validation import mean_distance
 
 Row = Mapping[str, Any]
 
@@ -77,7 +76,7 @@ def order(found: Sequence[Reason]) -> tuple[int, float]:
 def _no_gain(arm: Row) -> Iterator[Reason]:
     before, after = arm["nominal_mean_mm"], arm["mean_mm"]
     if not helps(before, after):
-        none = nothing_to_gain(before, after, mean_distance(arm["noise_mm"], distances=False))
+        none = nothing_to_gain(before, after, arm["floor_mm"])
         said = "There is nothing to gain" if none else "The calibration does not help"
         words = f"{said}: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
         yield Reason("no_gain", words, after / before)

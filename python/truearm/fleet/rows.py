@@ -87,6 +87,7 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "nominal_mean_mm": before["mean_mm"],
         "nominal_max_mm": before["max_mm"],
         "noise_mm": summary["noise_mm"],
+        "floor_mm": made.floor_mm,
         "coverage_95": summary["coverage_95"],
         "outliers": len(summary["outliers"]),
         "determined": summary["identifiability"]["rank"],

@@ -11,6 +11,7 @@ from truearm.measurements import Measurements
 from truearm.options import Options
 from truearm.reporting.report import report
 from truearm.robot import Robot
+from truearm.summary import distance_at_floor_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,7 @@ class ArmMade:
         calibration: Bytes of the calibration file.
         summary: Content of summary.json.
         model: Name of the model that predicts.
+        floor_mm: Mean position error that noise alone would leave.
         drift: What changed since the last calibration; None where there is none.
         report: The page; None where it was not asked for.
     """
@@ -51,6 +53,7 @@ class ArmMade:
     calibration: bytes
     summary: dict[str, Any]
     model: str
+    floor_mm: float
     drift: dict[str, Any] | None
     report: str | None
 
@@ -71,6 +74,7 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         calibration=made.to_bytes(with_rows=not task.strip),
         summary=made.summary,
         model=made.model_name,
+        floor_mm=distance_at_floor_mm(made),
         drift=None if previous is None else drift_of(previous, made, task.data.deduplicated()),
         report=report(made).html if task.with_report else None,
     )
