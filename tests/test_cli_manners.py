@@ -244,6 +244,9 @@ def test_time_left_follows_the_pace(now):
     assert work.share == pytest.approx(1 / 3)
     assert work.left_s == pytest.approx(60.0)
     assert work.words == ["33 %", "60 s left"]
+    resumed = Counted("methods", now - 30.0, 83.0, 103.0, before=80.0)
+    assert resumed.left_s == pytest.approx(200.0), "what an earlier run has done says nothing of the pace"
+    assert Counted("methods", now - 30.0, 80.0, 103.0, before=80.0).left_s is None
     assert [in_words(s) for s in (89.0, 600.0, 7260.0)] == ["89 s", "10 min", "2 h 01 min"]
 
 

@@ -63,11 +63,13 @@ class Counted(Work):
         done: Parts that are done.
         total: Parts in all.
         known_left_s: Time left as whoever does the work knows it.
+        before: Parts that were done when it began, as where interrupted work goes on.
     """
 
     done: float = 0.0
     total: float = 1.0
     known_left_s: float | None = None
+    before: float = 0.0
 
     @property
     def share(self) -> float | None:
@@ -77,9 +79,10 @@ class Counted(Work):
     @property
     def left_s(self) -> float | None:
         """Time left; None before anything is done."""
-        if self.known_left_s is not None or not self.done:
+        done = self.done - self.before
+        if self.known_left_s is not None or not done:
             return self.known_left_s
-        return self.elapsed_s * (self.total - self.done) / self.done
+        return self.elapsed_s * (self.total - self.done) / done
 
 
 @dataclass(eq=False)

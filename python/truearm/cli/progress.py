@@ -35,7 +35,7 @@ def told_progress() -> Callable[[str, int, int], None]:
 
     def tell_progress(what: str, done: int, of: int) -> None:
         if what not in counted:
-            counted[what] = Counted(what)
+            counted[what] = Counted(what, before=done)
             DISPLAY.begin(counted[what])
         work = counted[what]
         work.text, work.done, work.total = f"{what}: {done} of {of}", done, of
