@@ -135,8 +135,22 @@ def runs_of(summary: Mapping[str, Any]) -> str:
     seeds = "one seed" if count == 1 else f"{count} seeds"
     return (
         "Numbers are medians over runs; a run is a seed and, for tails, a joint. Every table says how many "
-        f"runs it has; {share:.0%} of the results of {seeds} are there. The data are those of "
-        "[the results](../reference/results.md)."
+        f"runs it has; {share:.0%} of the results of {seeds} are there.{fewer_of(summary)} The data are "
+        "those of [the results](../reference/results.md)."
+    )
+
+
+def fewer_of(summary: Mapping[str, Any]) -> str:
+    """A sentence on the sizes of which no group has all seeds: they cannot be held against the others."""
+    most = {
+        size: max(g["seeds"] for g in summary["groups"] if g["size"] == size) for size in summary["sizes"]
+    }
+    fewer = [f"{size} ({count})" for size, count in most.items() if count < len(summary["seeds"])]
+    if not fewer:
+        return ""
+    return (
+        f" Sizes with fewer seeds: {', '.join(fewer)}; methods compare there, but a curve's step to them "
+        "is also one to other rows."
     )
 
 
