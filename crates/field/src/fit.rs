@@ -117,6 +117,8 @@ pub struct FieldFit {
     pub judgement: Judgement,
     /// Which of the posterior's poses each measured one is a shot of, (n,).
     pub pose_of: Vec<usize>,
+    /// Weight of every measured pose, (n,); one where nothing was measured.
+    pub weights: Vec<f64>,
     /// The posterior that the field was taken from.
     pub posterior: Posterior,
     /// The posterior under widened amplitudes, where it is another one.
@@ -127,13 +129,6 @@ impl FieldFit {
     /// For a fit to nearly the same measurements.
     pub fn start(&self) -> Start {
         Start { hyper: self.hyper.clone(), evidence: self.evidence }
-    }
-
-    /// Weight of every measured pose, (n,); one where nothing was measured.
-    pub fn weights(&self) -> Vec<f64> {
-        let training = self.posterior.training();
-        let of = |&pose: &usize| training.rows(pose).next().map_or(1.0, |row| training.weight[row]);
-        self.pose_of.iter().map(of).collect()
     }
 
     /// For standard deviations.
@@ -152,9 +147,9 @@ const ROWS_FOR_POLISH: usize = 3000;
 const ROWS_FOR_EXTRAPOLATION: usize = 1200;
 const SEARCH: Limits = Limits { evaluations: 60, gain: 0.02 };
 const POLISH: Limits = Limits { evaluations: 12, gain: 0.05 };
-/// Reweightings of outliers at the most, and as long as those that are found spoil what was found with them.
-const REWEIGHTINGS: usize = 2;
-const REWEIGHTINGS_OF_SPOILED: usize = 5;
+/// Reweightings of outliers at the most, and how many of them have hyper-parameters of their own where none is spoiled.
+const REWEIGHTINGS: usize = 5;
+const REWEIGHTINGS_WITH_SEARCH: usize = 2;
 /// The field leaves this share of the constants' residual to noise at the start of the search.
 const NOISE_SHARE: f64 = 0.3;
 
@@ -177,12 +172,11 @@ pub fn fit_field(
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
     let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0 };
     let mut hyper = search.first(&training, noise)?;
-    let mut judged = search.judge(search.posterior(&training, &hyper)?)?;
-    training = judged.posterior.training().clone();
+    let mut judged = search.judge(search.posterior(&training, &hyper)?, &training)?;
     let large = training.row_count() > ROWS_FOR_POLISH;
-    for round in 0..REWEIGHTINGS_OF_SPOILED {
+    for round in 0..REWEIGHTINGS {
         let News { poses, spoils } = judged.judgement.reweigh(&mut training);
-        if !spoils && (!poses || round >= if large { 1 } else { REWEIGHTINGS }) {
+        if !spoils && !poses {
             break;
         }
         let Judged { posterior, .. } = judged;
@@ -190,16 +184,16 @@ pub fn fit_field(
             drop(posterior);
             hyper = search.contested(&training, hyper, noise)?;
             search.posterior(&training, &hyper)?
-        } else if options.rough || large {
+        } else if options.rough || large || round >= REWEIGHTINGS_WITH_SEARCH {
             // Where few rows of many change, hyper-parameters stay.
-            posterior.reweighed(training.weight.clone(), &options.cancel)?
+            posterior.reweighed(&training, &options.cancel)?
         } else {
             // Two posteriors of many rows take gigabytes.
             drop(posterior);
             hyper = search.cleaned(&training, hyper)?;
             search.posterior(&training, &hyper)?
         };
-        judged = search.judge(posterior)?;
+        judged = search.judge(posterior, &training)?;
     }
     let Judged { posterior, solution, judgement } = judged;
     let values = input_values(problem, options);
@@ -214,6 +208,7 @@ pub fn fit_field(
         evaluations: search.evaluations,
         residuals: refined.residuals,
         judgement: judgement.of_shots(&pose_of),
+        weights: pose_of.iter().map(|&pose| training.weight_of(pose).unwrap_or(1.0)).collect(),
         pose_of,
         posterior,
         wide,
@@ -398,12 +393,12 @@ impl Search<'_> {
         Posterior::new(training.clone(), hyper, self.options.degree, &self.options.cancel)
     }
 
-    fn judge(&self, posterior: Posterior) -> Result<Judged, FieldError> {
+    fn judge(&self, posterior: Posterior, all: &Training) -> Result<Judged, FieldError> {
         let cancel = &self.options.cancel;
         cancel.check()?;
         let solution = posterior.solve(&posterior.training().residual)?;
         cancel.check()?;
-        let judgement = outliers::judge(&posterior)?;
+        let judgement = outliers::judge(&posterior, &solution, all)?;
         Ok(Judged { posterior, solution, judgement })
     }
 }

@@ -4,8 +4,13 @@
 //! judged by its leave-one-out residual under constants and field, standardised by everything that the model knows of
 //! its own uncertainty, at full weight even where an earlier judgement took its weight away.
 
+use std::collections::BTreeMap;
+
+use faer::Mat;
+
 use crate::FieldError;
-use crate::posterior::Posterior;
+use crate::posterior::{Posterior, Solution, standardised};
+use crate::refine::explained;
 use crate::training::Training;
 
 /// Judgement of every pose by the others.
@@ -28,6 +33,8 @@ const OVERWHELMING: f64 = 4.753_424_308_8;
 const NEGLIGIBLE: f64 = 1e-3;
 /// Share of all squared residuals from which outliers have spoiled what noise and amplitudes were taken for.
 const SPOILING: f64 = 0.1;
+/// A pose is suspicious when its squared residual reaches this many times its number of rows.
+pub const SUSPICIOUS: f64 = 3.0;
 /// 95 % of a standard normal variable lies within this.
 pub const QUANTILE_95: f64 = 1.959_963_984_540_054;
 
@@ -38,47 +45,97 @@ pub fn chi_squared(freedom: f64, normal_quantile: f64) -> f64 {
     freedom * (1.0 - spread + normal_quantile * spread.sqrt()).powi(3)
 }
 
-/// Judges every pose of a posterior's training set.
+/// Judges every pose of a training set by a posterior, which may have been inferred from a part of them, and its solution.
 ///
 /// # Errors
 /// [`FieldError::NotPositiveDefinite`].
-pub fn judge(posterior: &Posterior) -> Result<Judgement, FieldError> {
+pub fn judge(posterior: &Posterior, solution: &Solution, all: &Training) -> Result<Judgement, FieldError> {
     let training = posterior.training();
     let left_out = posterior.leave_one_out(&training.residual)?;
     let poses = 0..training.pose_count();
-    let squares: Vec<f64> = poses
-        .clone()
-        .map(|pose| left_out.standardised[training.rows(pose)].iter().map(|z| z * z).sum())
-        .collect();
+    let mut squares: Vec<f64> =
+        poses.clone().map(|pose| square_of(&left_out.standardised[training.rows(pose)])).collect();
+    let mut distance: Vec<f64> =
+        poses.clone().map(|pose| distance_of(&left_out.residual[training.rows(pose)])).collect();
+    for aside in judge_aside(posterior, solution, all)? {
+        (squares[aside.pose], distance[aside.pose]) = (aside.square, aside.distance);
+    }
     let sampled = |pose: usize| training.rows(pose).next().is_some_and(|row| left_out.sampled[row]);
     let trusted: Vec<usize> =
         poses.clone().filter(|&pose| is_trusted(training, pose) && sampled(pose)).collect();
     let shares =
         trusted.iter().map(|&pose| squares[pose] / chi_squared(training.rows(pose).len() as f64, 0.0));
     let typical = quantile(shares, 0.5).max(1.0);
-    let score = |pose: usize| match training.rows(pose).len() {
+    let score = |pose: usize| match all.rows(pose).len() {
         0 => 0.0,
         rows => squares[pose] / (typical * chi_squared(rows as f64, OVERWHELMING)),
     };
     let components = trusted.iter().flat_map(|&pose| &left_out.standardised[training.rows(pose)]);
     let inflation = (quantile(components.map(|z| z.abs()), 0.95) / QUANTILE_95).max(1.0);
-    let distance = |pose: usize| {
-        let rows = training.rows(pose);
-        let first = rows.start..(rows.start + 3).min(rows.end);
-        left_out.residual[first].iter().map(|x| x * x).sum::<f64>().sqrt()
-    };
     let score: Vec<f64> = poses.clone().map(score).collect();
-    Ok(Judgement {
-        distance: poses.clone().map(distance).collect(),
-        outliers: poses.filter(|&pose| score[pose] > 1.0).collect(),
-        score,
-        inflation,
-    })
+    Ok(Judgement { distance, outliers: poses.filter(|&pose| score[pose] > 1.0).collect(), score, inflation })
+}
+
+fn square_of(standardised: &[f64]) -> f64 {
+    standardised.iter().map(|z| z * z).sum()
+}
+
+/// Length of a pose's residual (m,) of the first target.
+fn distance_of(residual: &[f64]) -> f64 {
+    residual.iter().take(3).map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// What is left of a pose that others stood for.
+struct Aside {
+    pose: usize,
+    square: f64,
+    distance: f64,
+}
+
+/// Judges poses that no posterior was inferred from: all that took part are others. Beside the noise alone, what is not
+/// suspicious needs no covariance of the prediction.
+fn judge_aside(posterior: &Posterior, solution: &Solution, all: &Training) -> Result<Vec<Aside>, FieldError> {
+    let took_part = posterior.training();
+    let is_aside = |&pose: &usize| took_part.rows(pose).is_empty() && !all.rows(pose).is_empty();
+    let poses: Vec<usize> = (0..all.pose_count()).filter(is_aside).collect();
+    if poses.is_empty() {
+        return Ok(Vec::new());
+    }
+    let part = all.select(&poses);
+    let explained = explained(&part, solution)?;
+    let left: Vec<f64> =
+        part.residual.iter().zip(explained).map(|(residual, known)| residual - known).collect();
+    let noise = |row: usize| part.weight[row] * part.noise_variance(row, posterior.model().hyper.noise);
+    let mut found = Vec::with_capacity(poses.len());
+    let mut suspicious: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (k, &pose) in poses.iter().enumerate() {
+        let rows = part.rows(k);
+        let square = rows.clone().map(|row| left[row].powi(2) / noise(row)).sum();
+        if square > SUSPICIOUS * rows.len() as f64 {
+            suspicious.entry(rows.len()).or_default().push(k);
+        }
+        found.push(Aside { pose, square, distance: distance_of(&left[rows]) });
+    }
+    for (count, some) in suspicious {
+        let chosen = part.select(&some);
+        let setup = Some(chosen.setup.as_slice());
+        let known = posterior.covariance(&chosen.values, &chosen.jacobian, setup, count)?;
+        let anew = posterior.repeatability(&chosen.jacobian, count)?;
+        for (at, k) in some.into_iter().enumerate() {
+            let first = part.rows(k).start;
+            let covariance = Mat::from_fn(count, count, |i, j| {
+                let entry = (at * count + i) * count + j;
+                known[entry] + anew[entry] + if i == j { noise(first + i) } else { 0.0 }
+            });
+            found[k].square = square_of(&standardised(covariance, &left[part.rows(k)])?);
+        }
+    }
+    Ok(found)
 }
 
 /// Whether a pose takes part with its full weight.
 fn is_trusted(training: &Training, pose: usize) -> bool {
-    training.rows(pose).next().is_some_and(|row| training.weight[row] > NEGLIGIBLE)
+    training.weight_of(pose).is_some_and(|weight| weight > NEGLIGIBLE)
 }
 
 fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
@@ -126,7 +183,7 @@ impl Judgement {
         for pose in 0..training.pose_count() {
             let weight = if self.score[pose] > 1.0 { NEGLIGIBLE / self.score[pose] } else { 1.0 };
             let rows = training.rows(pose);
-            let Some(before) = rows.clone().next().map(|row| training.weight[row]) else { continue };
+            let Some(before) = training.weight_of(pose) else { continue };
             poses |= (before < 1.0) != (weight < 1.0);
             changed += (before - weight).abs() * self.distance[pose].powi(2);
             kept += weight * self.distance[pose].powi(2);

@@ -137,11 +137,14 @@ impl Posterior {
         Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)))
     }
 
-    /// The same posterior with other weights of the rows (R,).
+    /// The same posterior with the weights of `all` poses, which its training set may be a part of.
     ///
     /// # Errors
     /// [`FieldError::NotPositiveDefinite`].
-    pub fn reweighed(self, weight: Vec<f64>, cancel: &Cancel) -> Result<Self, FieldError> {
+    pub fn reweighed(self, all: &Training, cancel: &Cancel) -> Result<Self, FieldError> {
+        let own = self.training();
+        let took_part = (0..all.pose_count()).filter(|&pose| !own.rows(pose).is_empty());
+        let weight = took_part.flat_map(|pose| &all.weight[all.rows(pose)]).copied().collect();
         match self {
             Self::Weight(space) => Ok(Self::Weight(Box::new(space.reweighed(weight)?))),
             Self::Data(space) => {
@@ -311,6 +314,17 @@ impl Posterior {
     }
 }
 
+/// Residuals (m,) by the lower factor of their covariance (m, m).
+///
+/// # Errors
+/// [`FieldError::NotPositiveDefinite`].
+pub fn standardised(covariance: Mat<f64>, residual: &[f64]) -> Result<Vec<f64>, FieldError> {
+    let error = FieldError::NotPositiveDefinite { rows: residual.len() };
+    let mut standardised = column(residual);
+    Cholesky::new(covariance, faer::Par::Seq).ok_or(error)?.solve_lower(standardised.as_mut());
+    Ok(to_vec(standardised.as_ref()))
+}
+
 /// Leave-one-pose-out residuals.
 #[derive(Debug, Clone)]
 pub struct LeaveOneOut {
@@ -345,11 +359,8 @@ impl LeaveOneOut {
             let noise = model.training.noise_variance(row, model.hyper.noise);
             covariance[(i, i)] -= noise * (1.0 - model.training.weight[row]);
         }
-        let error = FieldError::NotPositiveDefinite { rows: rows.len() };
-        let mut standardised = column(residual);
-        Cholesky::new(covariance, faer::Par::Seq).ok_or(error)?.solve_lower(standardised.as_mut());
         self.residual[rows.clone()].copy_from_slice(residual);
-        self.standardised[rows.clone()].copy_from_slice(&to_vec(standardised.as_ref()));
+        self.standardised[rows].copy_from_slice(&standardised(covariance, residual)?);
         Ok(())
     }
 

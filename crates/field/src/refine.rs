@@ -5,6 +5,7 @@ use truearm_estimate::{Layout, Point, Problem, Setup, residuals};
 use crate::FieldError;
 use crate::bank::Bank;
 use crate::posterior::{Posterior, Solution};
+use crate::training::Training;
 
 /// Gauss-Newton steps on the exact model after the linear solution.
 const RELINEARISATIONS: usize = 2;
@@ -32,7 +33,7 @@ pub fn relinearised(
 ) -> Result<Refined, FieldError> {
     let mut refined = apply(problem, point, posterior, values, &solution)?;
     for _ in 0..RELINEARISATIONS {
-        let explained = explained(posterior, &solution)?;
+        let explained = explained(posterior.training(), &solution)?;
         let left = |shots: &Vec<usize>| {
             shots.iter().map(|&at| refined.residuals[at]).sum::<f64>() / shots.len() as f64
         };
@@ -44,9 +45,11 @@ pub fn relinearised(
     Ok(refined)
 }
 
-/// What constants, field and set-up of a solution explain of the training's residual, (R,).
-fn explained(posterior: &Posterior, solution: &Solution) -> Result<Vec<f64>, FieldError> {
-    let training = posterior.training();
+/// What constants, field and set-up of a solution explain of a training set's residual, (R,).
+///
+/// # Errors
+/// [`FieldError`] of the bank.
+pub fn explained(training: &Training, solution: &Solution) -> Result<Vec<f64>, FieldError> {
     let mut ceps = vec![0.0; training.pose_count() * training.parameter_count];
     solution.bank.add(&training.values, &mut ceps)?;
     let mut out = Vec::with_capacity(training.row_count());

@@ -103,6 +103,11 @@ impl Training {
         self.offsets[pose]..self.offsets[pose + 1]
     }
 
+    /// Weight of a pose's rows; none where it has no rows.
+    pub fn weight_of(&self, pose: usize) -> Option<f64> {
+        self.rows(pose).next().map(|row| self.weight[row])
+    }
+
     /// Values of a pose's inputs, (I,).
     pub fn values_of(&self, pose: usize) -> &[f64] {
         &self.values[pose * self.inputs.len()..(pose + 1) * self.inputs.len()]

@@ -13,6 +13,7 @@ use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
 use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::model::{BlockPlan, Model};
+use crate::outliers::SUSPICIOUS;
 use crate::posterior::{LeaveOneOut, Query, Solution};
 use crate::product::{product, times};
 use crate::unknowns::{Unknowns, sag_start, unknowns};
@@ -22,8 +23,6 @@ use crate::weight_rows::{Batch, WeightRows};
 const BATCH: usize = 512;
 /// Left-out residuals of sets above this are found exactly for suspicious and sampled poses alone.
 const JUDGED_EXACTLY: usize = 600;
-/// A pose is suspicious when its squared residual reaches this many times its number of rows.
-const SUSPICIOUS: f64 = 3.0;
 
 /// Factors of the weights' normal equations.
 pub struct WeightSpace {

@@ -22,6 +22,20 @@ fn gross_errors_are_named_and_others_are_not() {
     assert!(fit.field.judgement.distance[97] > 4e-3);
 }
 
+/// As where a robust loss has taken genuine local error for gross errors, and gross ones for none.
+#[test]
+fn outliers_are_those_that_have_lost_their_weight() {
+    let arm = six_axes(Truth::BENDING);
+    let mut set = Measure::poses(120).of(&arm);
+    (0..120).step_by(4).for_each(|pose| set.weight[pose] = 1e-3);
+    for pose in [3, 50, 97] {
+        set.targets[3 * pose] += 6e-4;
+    }
+    let fit = fit(&arm, &set).unwrap().field;
+    let without: Vec<usize> = (0..120).filter(|&pose| fit.weights[pose] < 1.0).collect();
+    assert_eq!((without.as_slice(), fit.judgement.outliers.as_slice()), (&[3, 50, 97][..], &[3, 50, 97][..]));
+}
+
 #[test]
 fn genuine_local_error_is_no_outlier() {
     let arm = six_axes(Truth { own: 6e-4, ..Truth::BENDING });

@@ -145,7 +145,7 @@ impl FieldFit {
     /// Weight of each pose in the fit, (n,).
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        vector(py, &self.core.weights())
+        vector(py, &self.core.weights)
     }
 
     /// The posterior of the fit itself.

@@ -77,7 +77,7 @@ fn a_shot_that_its_others_contradict_stands_apart() {
     assert_eq!((&pose_of[30..33], &doubtful[..]), (&[10, 11, 10][..], &[11][..]));
     let fit = fit(&arm, &set).unwrap();
     assert_eq!(fit.field.judgement.outliers, [31]);
-    let weights = fit.field.weights();
+    let weights = &fit.field.weights;
     assert!(weights[31] < 0.01 && weights[30] == 1.0);
 }
 

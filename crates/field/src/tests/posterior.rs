@@ -186,7 +186,7 @@ fn other_weights_are_a_new_start() {
         reweighted.weight[training.rows(pose)].fill(1e-3);
     }
     for (posterior, anew) in spaces(&training, 6).into_iter().zip(spaces(&reweighted, 6)) {
-        let changed = posterior.reweighed(reweighted.weight.clone(), &Cancel::default()).unwrap();
+        let changed = posterior.reweighed(&reweighted, &Cancel::default()).unwrap();
         assert_eq!(changed.training().weight, reweighted.weight);
         let (a, b) = (changed.solve(&training.residual).unwrap(), anew.solve(&training.residual).unwrap());
         close(&a.constant, &b.constant, 1e-6, "constants");

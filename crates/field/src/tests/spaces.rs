@@ -5,10 +5,12 @@ use faer::Side;
 use truearm_estimate::Cancel;
 
 use super::common::{Measure, Truth, scara};
+use super::posterior::close;
 use super::sets::{few_driven, hyper, positions, rows_of};
 use crate::data_space::DataSpace;
 use crate::hyper::{Hyper, WAVE_NAME};
 use crate::model::Model;
+use crate::outliers::{Judgement, judge};
 use crate::posterior::Posterior;
 use crate::training::Training;
 use crate::weight_space::WeightSpace;
@@ -102,10 +104,10 @@ fn beyond_the_cells_nothing_is_left_but_constants_sag_and_waves() {
     }
 }
 
-/// Positions of a SCARA with few weights, more rows than data space is used for.
-fn many_rows() -> (Training, Hyper) {
+/// Positions of a SCARA with few weights.
+fn of_scara(poses: usize) -> (Training, Hyper) {
     let arm = scara(Truth { own: 1e-4, ..Truth::RIGID });
-    let training = rows_of(&arm, &Measure::poses(2300).of(&arm), |_| ());
+    let training = rows_of(&arm, &Measure::poses(poses).of(&arm), |_| ());
     let mut hyper = Hyper::start(&[0, 1], 4, [3e-5, 1e-4]);
     hyper.own_length = 1.0;
     (hyper.smooth_length, hyper.smooth_line_length) = (3.0, 3.0);
@@ -116,22 +118,56 @@ fn many_rows() -> (Training, Hyper) {
 
 #[test]
 fn many_rows_go_to_weight_space_where_suspicious_poses_are_judged_exactly() {
-    let (mut training, hyper) = many_rows();
+    let (mut training, hyper) = of_scara(2300);
     for pose in [101, 1503] {
         training.residual[3 * pose] += 2e-3;
     }
     let posterior = Posterior::new(training.clone(), hyper, 2, &Cancel::default()).unwrap();
     assert!(matches!(posterior, Posterior::Weight(_)));
-    let judgement = crate::outliers::judge(&posterior).unwrap();
+    let judgement = judged(&posterior, &training);
     assert_eq!(judgement.outliers, [101, 1503]);
     assert!(judgement.distance.iter().all(|&distance| distance > 0.0), "all poses have residuals");
     let left_out = posterior.leave_one_out(&training.residual).unwrap();
     assert!(!left_out.sampled[3 * 101] && left_out.sampled[0] && !left_out.sampled[3 * 7]);
     let news = judgement.reweigh(&mut training);
     assert!(news.poses);
-    let posterior = posterior.reweighed(training.weight.clone(), &Cancel::default()).unwrap();
-    let again = crate::outliers::judge(&posterior).unwrap();
+    let posterior = posterior.reweighed(&training, &Cancel::default()).unwrap();
+    let again = judged(&posterior, &training);
     assert_eq!(again.outliers, [101, 1503], "what has lost its weight is judged at its full weight");
+    assert!(!again.reweigh(&mut training).poses);
+}
+
+fn judged(posterior: &Posterior, all: &Training) -> Judgement {
+    let solution = posterior.solve(&posterior.training().residual).unwrap();
+    judge(posterior, &solution, all).unwrap()
+}
+
+#[test]
+fn poses_that_others_stand_for_are_judged_by_them() {
+    let (mut training, hyper) = of_scara(300);
+    let kept = training.fill_space(200);
+    let aside: Vec<usize> = (0..300).filter(|pose| !kept.contains(pose)).collect();
+    let mut wrong = vec![aside[10], aside[70], kept[50]];
+    wrong.sort_unstable();
+    for pose in &wrong {
+        training.residual[3 * pose + 1] += 5e-4;
+    }
+    let of = |training: Training| {
+        Posterior::Data(Box::new(
+            DataSpace::new(Model::new(training, hyper.clone(), 2), &Cancel::default()).unwrap(),
+        ))
+    };
+    let posterior = of(training.only(&kept));
+    let judgement = judged(&posterior, &training);
+    assert_eq!(judgement.outliers, wrong);
+    let pose = aside[10];
+    let with_it: Vec<usize> = (0..300).filter(|&k| k == pose || kept.contains(&k)).collect();
+    let all = judged(&of(training.only(&with_it)), &training);
+    close(&[judgement.distance[pose]], &[all.distance[pose]], 1e-6, "left out");
+    close(&[judgement.score[pose]], &[all.score[pose]], 0.05, "but for what is typical");
+    assert!(judgement.reweigh(&mut training).poses);
+    let again = judged(&posterior.reweighed(&training, &Cancel::default()).unwrap(), &training);
+    assert_eq!(again.outliers, wrong);
     assert!(!again.reweigh(&mut training).poses);
 }
 
