@@ -13,7 +13,7 @@ import truearm as ta
 from tests.report_support import words_of
 from truearm.cli import main
 from truearm.conventions import Convention
-from truearm.doubts import no_help
+from truearm.doubts import no_help, poses_aside
 from truearm.grids import grid_steps, grid_words
 from truearm.identified import IdentifiedArm
 from truearm.planning import JointSpace, choose, draw_pool
@@ -452,6 +452,12 @@ def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
 def test_nothing_to_gain_is_said_of_small_errors_and_of_noise_alone(before, after, floor, kind):
     assert [notice.kind for notice in no_help(before, after, "mean error", floor)] == [kind]
     assert no_help(after, before, "mean error", floor) == []
+
+
+def test_poses_that_others_stood_for_are_told():
+    (told,) = poses_aside(1000, 5000)
+    assert (told.kind, "4000 of 5000 poses" in told.message) == ("poses_aside", True)
+    assert poses_aside(0, 5000) == []
 
 
 def test_errors_that_hide_in_noise_are_not_said_to_be_wrong_data(tmp_path, monkeypatch, capsys):

@@ -354,6 +354,10 @@ class FieldFit:
         """Weight of each pose in the fit, (n,): one, or next to nothing for outliers."""
 
     @property
+    def stood_aside(self) -> int:
+        """Poses, shots of one counted once, that were judged but not fitted: others stood for them."""
+
+    @property
     def posterior(self) -> Posterior:
         """What the rows leave uncertain."""
 

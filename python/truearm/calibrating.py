@@ -20,6 +20,7 @@ from truearm.doubts import (
     constant_is_better,
     doubts,
     mounting,
+    poses_aside,
     seen_at_values,
     stated_too_large,
     stood_still,
@@ -233,7 +234,12 @@ def _fitted_rows(
 
 def _of_fit(task: Task, final: Fits, variable: VariableDetails | None) -> list[Notice]:
     """What the last fit shows of the set-up and of how the arm stands."""
-    return [*_open_setup(task, final.identifiability, final.data), *mounting(variable)]
+    aside = 0 if final.variable is None else final.variable.stood_aside
+    return [
+        *_open_setup(task, final.identifiability, final.data),
+        *poses_aside(aside, pose_count(final.data)),
+        *mounting(variable),
+    ]
 
 
 def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[Notice]:

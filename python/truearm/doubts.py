@@ -168,6 +168,18 @@ def mounting(variable: VariableDetails | None) -> list[Notice]:
     return [Notice("mounting", text)]
 
 
+def poses_aside(aside: int, poses: int) -> list[Notice]:
+    """A notice where some of the poses were judged but not fitted: others stood for them."""
+    if not aside:
+        return []
+    text = (
+        f"What varies was fitted to {poses - aside} of {poses} poses, which fill the space of the joints: it "
+        "varies over such short distances that all of them are beyond what can be computed. The others were "
+        "judged by it."
+    )
+    return [Notice("poses_aside", text)]
+
+
 def stood_still(robot: Robot, readings: Floats) -> list[Notice]:
     """A warning where a joint has one reading in all rows of `readings` (n, N)."""
     text = still_warning(readings, robot.joints)

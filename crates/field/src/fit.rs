@@ -119,6 +119,8 @@ pub struct FieldFit {
     pub pose_of: Vec<usize>,
     /// Weight of every measured pose, (n,); one where nothing was measured.
     pub weights: Vec<f64>,
+    /// Poses that were judged but not fitted, since others that fill the space stood for them.
+    pub stood_aside: usize,
     /// The posterior that the field was taken from.
     pub posterior: Posterior,
     /// The posterior under widened amplitudes, where it is another one.
@@ -210,6 +212,7 @@ pub fn fit_field(
         judgement: judgement.of_shots(&pose_of),
         weights: pose_of.iter().map(|&pose| training.weight_of(pose).unwrap_or(1.0)).collect(),
         pose_of,
+        stood_aside: posterior.training().aside(&training).len(),
         posterior,
         wide,
     })

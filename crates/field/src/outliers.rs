@@ -95,9 +95,7 @@ struct Aside {
 /// Judges poses that no posterior was inferred from: all that took part are others. Beside the noise alone, what is not
 /// suspicious needs no covariance of the prediction.
 fn judge_aside(posterior: &Posterior, solution: &Solution, all: &Training) -> Result<Vec<Aside>, FieldError> {
-    let took_part = posterior.training();
-    let is_aside = |&pose: &usize| took_part.rows(pose).is_empty() && !all.rows(pose).is_empty();
-    let poses: Vec<usize> = (0..all.pose_count()).filter(is_aside).collect();
+    let poses = posterior.training().aside(all);
     if poses.is_empty() {
         return Ok(Vec::new());
     }

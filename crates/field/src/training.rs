@@ -167,6 +167,12 @@ impl Training {
         thinned
     }
 
+    /// Poses that have rows among `all` of the same poses, and none here.
+    pub fn aside(&self, all: &Training) -> Vec<usize> {
+        let is_aside = |&pose: &usize| self.rows(pose).is_empty() && !all.rows(pose).is_empty();
+        (0..all.pose_count()).filter(is_aside).collect()
+    }
+
     /// The rows of some poses, in the given order.
     pub fn select(&self, poses: &[usize]) -> Training {
         let rows: Vec<usize> = poses.iter().flat_map(|&pose| self.rows(pose)).collect();

@@ -148,6 +148,12 @@ impl FieldFit {
         vector(py, &self.core.weights)
     }
 
+    /// Poses that were judged but not fitted.
+    #[getter]
+    fn stood_aside(&self) -> usize {
+        self.core.stood_aside
+    }
+
     /// The posterior of the fit itself.
     #[getter]
     fn posterior(&self) -> Posterior {

@@ -158,6 +158,7 @@ fn poses_that_others_stand_for_are_judged_by_them() {
         ))
     };
     let posterior = of(training.only(&kept));
+    assert_eq!(posterior.training().aside(&training), aside);
     let judgement = judged(&posterior, &training);
     assert_eq!(judgement.outliers, wrong);
     let pose = aside[10];
