@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
 from truearm import kinds
@@ -20,6 +19,7 @@ from truearm.turning_sense import check_turns
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
+from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
 from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
 from truearm.updating.unknowns import Unknowns
@@ -151,33 +151,47 @@ def update(
     with stages("asking what the calibration expects"):
         _ = calibration.spread
     with stages("finding what moved"):
-        held = _held(Scene(task, data, calibration, unknowns))
-        unknowns = unknowns.holding(held)
-        kept, outliers = _without_outliers(calibration, task, data, unknowns)
-        _check_groups(data.select(kept), task)
-        scene, start = begun(Scene(task, data.select(kept), calibration, unknowns))
-        found = _Found(calibration, scene, start, chosen, held)
+        rows = _Rows.of(Scene(task, data, calibration, unknowns))
+        held = untold(rows.scene, rows.scatter, rows.start)
+        if held:
+            rows = _Rows.of(Scene(task, data, calibration, unknowns.holding(held)))
+        rows, outliers = _without_outliers(calibration, rows)
+        _check_groups(rows.scene.data, task)
+        found = _Found(calibration, rows, chosen, held)
         return found.told(data.rows[outliers].tolist(), (*notices, *_outlier_notices(data, outliers)))
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
-    """A calibration, the measurements that count, where the search begins, and joints that are not told."""
+class _Rows:
+    """Measurements, where the search for what moved begins, and how an unchanged arm may scatter there."""
 
-    calibration: Calibration
     scene: Scene
     start: State
+    scatter: Scatter
+
+    @classmethod
+    def of(cls, whole: Scene) -> "_Rows":
+        scene, start = begun(whole)
+        return cls(scene, start, Scatter(scene.covariance(start)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A calibration, the measurements that count, and joints that are not told."""
+
+    calibration: Calibration
+    rows: _Rows
     options: UpdateOptions
     held: dict[int, str]
 
     def told(self, outliers: list[int], notices: tuple[Notice, ...]) -> Update:
         """What the measurements say."""
-        scene, unknowns, level = self.scene, self.scene.unknowns, self.options.level
-        spread = scene.covariance(self.start)
-        found = estimate(scene, spread, self.start, unknowns.free)
+        scene, start, scatter = self.rows.scene, self.rows.start, self.rows.scatter
+        unknowns, level = scene.unknowns, self.options.level
+        found = estimate(scene, scatter, start, unknowns.free)
         _check_plausible(scene, found)
         anew = unknowns.free & unknowns.nuisance
-        still = estimate(scene, spread, scene.unchanged(self.start), anew)
+        still = estimate(scene, scatter, scene.unchanged(start), anew)
         judge = Judge(level, scale_freedom(self.calibration))
         changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
         verdict = _verdict(changed, rest, level)
@@ -186,7 +200,7 @@ class _Found:
             found = replace(found, covariance=found.covariance * max(rest.squares / rest.freedom, 1.0))
             judge = replace(judge, known=min(judge.known, rest.freedom))
         frames, tools = motions(scene, found, judge)
-        judged = left_out_errors(self.calibration, scene, found, spread)
+        judged = left_out_errors(self.calibration, scene, found)
         told = Update(
             calibration=self.calibration,
             verdict=verdict,
@@ -196,7 +210,7 @@ class _Found:
             tools=tools,
             changed=changed,
             rest=rest,
-            before=errors_at_left_out(scene, still, spread, anew).statistics(),
+            before=errors_at_left_out(scene, still, anew).statistics(),
             after=judged[self.calibration.model_name].statistics(),
             n_poses=len(scene.data) + len(outliers),
             outliers=tuple(outliers),
@@ -210,12 +224,6 @@ def _verdict(changed: SquaresTest, rest: SquaresTest, level: float) -> Verdict:
     if rest.p < level / 2.0:
         return "field"
     return "moved" if changed.p < level / 2.0 else "holds"
-
-
-def _held(whole: Scene) -> dict[int, str]:
-    """Joints, from 0, whose offsets the poses do not tell, and what from."""
-    scene, start = begun(whole)
-    return untold(scene, scene.covariance(start), start)
 
 
 def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, stages: Stages) -> Task:
@@ -295,26 +303,24 @@ def _check_groups(data: Measurements, task: Task) -> None:
             )
 
 
-def _without_outliers(
-    calibration: Calibration, task: Task, data: Measurements, unknowns: Unknowns
-) -> tuple[NDArray[np.int64], list[int]]:
+def _without_outliers(calibration: Calibration, all_rows: _Rows) -> tuple[_Rows, list[int]]:
     """Rows without those that no other row supports, the worst one taken out first; and these.
 
     Where they would be too many, it is not the rows that are wrong: all are kept.
     """
-    kept, out = np.arange(len(data)), list[int]()
-    while len(out) <= MOST_OUTLIERS * len(data):
-        scene, start = begun(Scene(task, data.select(kept), calibration, unknowns))
-        spread = scene.covariance(start)
-        found = estimate(scene, spread, start, unknowns.free)
-        squares, freedom = surprise(found.linear, spread, unknowns.std, unknowns.free)
+    whole, rows = all_rows.scene, all_rows
+    kept, out = np.arange(len(whole.data)), list[int]()
+    while len(out) <= MOST_OUTLIERS * len(whole.data):
+        found = estimate(rows.scene, rows.scatter, rows.start, whole.unknowns.free)
+        squares, freedom = surprise(found, whole.unknowns.std, whole.unknowns.free)
         score = squares / (2.0 * gammainccinv(freedom / 2.0, OVERWHELMING))
         worst = int(np.argmax(score))
         if score[worst] <= 1.0:
-            return kept, out
+            return rows, out
         out.append(int(kept[worst]))
         kept = np.delete(kept, worst)
-    return np.arange(len(data)), []
+        rows = _Rows.of(Scene(whole.task, whole.data.select(kept), calibration, whole.unknowns))
+    return all_rows, []
 
 
 def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:

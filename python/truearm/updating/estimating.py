@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from truearm.errors import WorkError
+from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Linear, Scene, State
 from truearm.updating.untested import way_out_of_keeping
 
@@ -32,13 +32,13 @@ class Estimate:
         state: The values.
         linear: Residuals and derivatives.
         covariance: Of all unknowns (u, u); zero for those that are kept.
-        factor: Lower Cholesky factor (R, R) of the residuals' covariance.
+        scatter: What the residuals of an unchanged arm may scatter by.
     """
 
     state: State
     linear: Linear
     covariance: Floats
-    factor: Floats
+    scatter: Scatter
 
 
 def begun(scene: Scene) -> tuple[Scene, State]:
@@ -51,32 +51,31 @@ def begun(scene: Scene) -> tuple[Scene, State]:
         The same rows with what is found anew held there, ever so gently; and the state.
     """
     state = scene.first()
-    factor = factored(scene.scatter(state))
+    noise = Scatter(scene.scatter(state))
     for _ in range(MOST_STEPS):
-        state, step = _stepped(scene, factor, state, scene.unknowns.free)
+        state, step = _stepped(scene, noise, state, scene.unknowns.free)
         if step < NEAR:
             break
     return scene.about(state.setup), state
 
 
-def estimate(scene: Scene, spread: Floats, state: State, free: Mask) -> Estimate:
+def estimate(scene: Scene, scatter: Scatter, state: State, free: Mask) -> Estimate:
     """The most likely values of the unknowns that are `free` (u,), from a state on.
 
-    Gauss-Newton on `r^T V^-1 r + x^T P^-1 x`: V (R, R) is what an unchanged arm may scatter by, field, noise
-    and kept set-ups; P the prior's variances.
+    Gauss-Newton on `r^T V^-1 r + x^T P^-1 x`: V is the covariance of what an unchanged arm may scatter by,
+    field, noise and kept set-ups; P the prior's variances.
 
     Raises:
         WorkError: If V is not positive definite, or the steps do not come to a standstill.
     """
-    factor = factored(spread)
     for _ in range(MOST_STEPS):
-        state, step = _stepped(scene, factor, state, free)
+        state, step = _stepped(scene, scatter, state, free)
         if step < STANDS_STILL:
             break
     else:
         raise _unsettled(scene)
     linear = scene.linear(state)
-    return Estimate(state, linear, posterior(linear, factor, scene.unknowns.std, free), factor)
+    return Estimate(state, linear, posterior(linear, scatter, scene.unknowns.std, free), scatter)
 
 
 def _unsettled(scene: Scene) -> WorkError:
@@ -91,72 +90,70 @@ def _unsettled(scene: Scene) -> WorkError:
     )
 
 
-def _stepped(scene: Scene, factor: Floats, state: State, free: Mask) -> tuple[State, float]:
+def _stepped(scene: Scene, scatter: Scatter, state: State, free: Mask) -> tuple[State, float]:
     """A state after one more step, and how long that was, in prior standard deviations."""
     std = scene.unknowns.std
-    step = solved(scene.linear(state), factor, std, free)
+    step = solved(scene.linear(state), scatter, std, free)
     return scene.moved(state, step), float(np.abs(step[free] / std[free]).max(initial=0.0))
 
 
-def posterior(linear: Linear, factor: Floats, std: Floats, free: Mask) -> Floats:
+def posterior(linear: Linear, scatter: Scatter, std: Floats, free: Mask) -> Floats:
     """Covariance (u, u) of the unknowns, zero for those that are not free."""
     covariance = np.zeros((len(std), len(std)))
-    scaled = _whitened(linear.jacobian[:, free] * std[free], factor)
+    scaled = scatter.whitened(linear.jacobian[:, free] * std[free])
     inverse = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
     covariance[np.ix_(free, free)] = inverse * np.outer(std[free], std[free])
     return covariance
 
 
-def factored(spread: Floats) -> Floats:
-    """Lower Cholesky factor.
-
-    Raises:
-        WorkError: If there is none.
-    """
-    try:
-        return np.asarray(np.linalg.cholesky(spread))
-    except np.linalg.LinAlgError:
-        raise WorkError(
-            "the calibration's spread at these poses is not positive definite",
-            way_out="Look for poses that were measured several times without noise",
-        ) from None
-
-
-def solved(linear: Linear, factor: Floats, std: Floats, free: Mask) -> Floats:
+def solved(linear: Linear, scatter: Scatter, std: Floats, free: Mask) -> Floats:
     """The step (u,) to the most likely values of the free unknowns."""
-    scaled = _whitened(linear.jacobian[:, free] * std[free], factor)
-    right = scaled.T @ _whitened(linear.residual, factor) - linear.departure[free] / std[free]
+    scaled = scatter.whitened(linear.jacobian[:, free] * std[free])
+    right = scaled.T @ scatter.whitened(linear.residual) - linear.departure[free] / std[free]
     step = np.zeros(len(std))
     step[free] = std[free] * np.linalg.solve(scaled.T @ scaled + np.eye(scaled.shape[1]), right)
     return step
 
 
-def left_out(linear: Linear, spread: Floats, std: Floats, free: Mask) -> Floats:
+def left_out(found: Estimate, std: Floats, free: Mask) -> Floats:
     """Residuals (R,) of each pose's values when the free unknowns are found from the others."""
-    found = np.empty_like(linear.residual)
-    for poses, step in folds(linear, spread, std, free):
+    linear = found.linear
+    left = np.empty_like(linear.residual)
+    for poses, step in folds(found, std, free):
         out = np.isin(linear.pose, poses)
-        found[out] = linear.residual[out] - linear.jacobian[out] @ step
-    return found
+        left[out] = linear.residual[out] - linear.jacobian[out] @ step
+    return left
 
 
-def folds(
-    linear: Linear, spread: Floats, std: Floats, free: Mask
-) -> Iterator[tuple[NDArray[np.int64], Floats]]:
-    """Poses that are left out together, and the step (u,) that the others make of the free unknowns."""
+def folds(found: Estimate, std: Floats, free: Mask) -> Iterator[tuple[NDArray[np.int64], Floats]]:
+    """Poses that are left out together, and the step (u,) that the others make of the free unknowns.
+
+    With P the inverse of the covariance of all values, that of the others alone is `P - P_o^T P_oo^-1 P_o`,
+    o being the values left out: one inverse serves all parts.
+    """
+    linear, precision = found.linear, found.scatter.precision
+    scaled = linear.jacobian[:, free] * std[free]
+    pulls = precision @ np.column_stack([scaled, linear.residual])
+    whole = scaled.T @ pulls
     poses = np.unique(linear.pose)
     for part in range(min(MOST_PARTS, len(poses))):
         left = poses[part::MOST_PARTS]
         out = np.isin(linear.pose, left)
-        rest = Linear(linear.residual[~out], linear.jacobian[~out], linear.departure, linear.pose[~out])
-        yield left, solved(rest, factored(spread[np.ix_(~out, ~out)]), std, free)
+        own = np.linalg.solve(precision[np.ix_(out, out)], pulls[out])
+        rest = whole - pulls[out, :-1].T @ own
+        step = np.zeros(len(std))
+        right = rest[:, -1] - linear.departure[free] / std[free]
+        step[free] = std[free] * np.linalg.solve(rest[:, :-1] + np.eye(len(rest)), right)
+        yield left, step
 
 
-def surprise(linear: Linear, spread: Floats, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:
+def surprise(found: Estimate, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:
     """Of each pose (n,) how unlikely it is given all others: squared standardised length, and its values."""
+    linear, precision = found.linear, found.scatter.precision
     scaled = linear.jacobian[:, free] * std[free]
-    whole = cho_factor(spread + scaled @ scaled.T, lower=True)
-    inverse = cho_solve(whole, np.eye(len(spread)))
+    pulls = precision @ scaled
+    known = pulls @ np.linalg.solve(scaled.T @ pulls + np.eye(pulls.shape[1]), pulls.T)
+    inverse = precision - known
     pull = inverse @ (linear.residual + linear.jacobian[:, free] @ linear.departure[free])
     poses = np.unique(linear.pose)
     squares = np.empty(len(poses))
@@ -164,7 +161,3 @@ def surprise(linear: Linear, spread: Floats, std: Floats, free: Mask) -> tuple[F
         own = linear.pose == pose
         squares[k] = pull[own] @ np.linalg.solve(inverse[np.ix_(own, own)], pull[own])
     return squares, np.array([int((linear.pose == pose).sum()) for pose in poses])
-
-
-def _whitened(values: Floats, factor: Floats) -> Floats:
-    return np.asarray(solve_triangular(factor, values, lower=True))

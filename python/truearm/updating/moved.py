@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
-from truearm.updating.estimating import Estimate, factored, posterior
+from truearm.updating.estimating import Estimate, posterior
+from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
 from truearm.updating.squares import student_p, wald
 from truearm.updating.unknowns import Unknowns
@@ -116,18 +117,18 @@ class Motion:
         return {**asdict(self), "kept": self.kept}
 
 
-def untold(scene: Scene, spread: Floats, state: State) -> dict[int, str]:
+def untold(scene: Scene, scatter: Scatter, state: State) -> dict[int, str]:
     """Joints, from 0, whose offsets the poses do not tell, and what they cannot be told from.
 
     It depends on the poses and on what may have moved, not on what was measured.
 
     Args:
         scene: The measurements.
-        spread: Covariance (R, R) of the residuals of an unchanged arm.
+        scatter: What the residuals of an unchanged arm may scatter by.
         state: Where derivatives are taken.
     """
     unknowns = scene.unknowns
-    covariance = posterior(scene.linear(state), factored(spread), unknowns.std, unknowns.free)
+    covariance = posterior(scene.linear(state), scatter, unknowns.std, unknowns.free)
     joints = range(scene.task.arm.robot.joint_count)
     error = np.sqrt(np.diag(covariance))
     return {

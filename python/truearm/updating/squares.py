@@ -5,7 +5,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.special import fdtrc, stdtr
 
 from truearm.calibration import Calibration
@@ -87,7 +86,7 @@ def _whitened(estimate: Estimate, unknowns: Unknowns, chosen: Mask) -> tuple[Flo
     """Residuals (R,) and columns of the chosen unknowns (R, k) in standard deviations, of both."""
     columns = estimate.linear.jacobian[:, chosen] * unknowns.std[chosen]
     both = np.column_stack([estimate.linear.residual, columns])
-    whitened = solve_triangular(estimate.factor, both, lower=True)
+    whitened = estimate.scatter.whitened(both)
     return whitened[:, 0], whitened[:, 1:]
 
 

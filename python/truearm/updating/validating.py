@@ -21,40 +21,37 @@ Floats = NDArray[np.float64]
 TURN: Final = 3
 
 
-def left_out_errors(
-    calibration: Calibration, scene: Scene, found: Estimate, spread: Floats
-) -> dict[str, RowErrors]:
+def left_out_errors(calibration: Calibration, scene: Scene, found: Estimate) -> dict[str, RowErrors]:
     """Errors of all models at each pose of an update, none of which had a part in what they were found from.
 
     Args:
         calibration: As it was.
         scene: The measurements, n poses.
         found: Values of the unknowns from all poses.
-        spread: Covariance (R, R) of the residuals of an unchanged arm.
     """
-    own = errors_at_left_out(scene, found, spread, scene.unknowns.free)
+    own = errors_at_left_out(scene, found, scene.unknowns.free)
     return {
-        name: own if name == calibration.model_name else _others(name, model, scene, found, spread)
+        name: own if name == calibration.model_name else _others(name, model, scene, found)
         for name, model in calibration.models.items()
     }
 
 
-def errors_at_left_out(scene: Scene, found: Estimate, spread: Floats, free: NDArray[np.bool_]) -> RowErrors:
+def errors_at_left_out(scene: Scene, found: Estimate, free: NDArray[np.bool_]) -> RowErrors:
     """Errors of the model that predicts: of the first target that each row holds, and of the orientation."""
     left = np.full(scene.seen.shape, np.nan)
-    left[scene.seen] = left_out(found.linear, spread, scene.unknowns.std, free)
+    left[scene.seen] = left_out(found, scene.unknowns.std, free)
     turned = left[:, -TURN:] if scene.task.selection.orientation else None
     return RowErrors(at_first_measured(left, scene.data, scene.task.selection), turned)
 
 
-def _others(name: str, model: ArmModel, scene: Scene, found: Estimate, spread: Floats) -> RowErrors:
+def _others(name: str, model: ArmModel, scene: Scene, found: Estimate) -> RowErrors:
     """Errors of a model that does not predict: its frame and tool, and its offsets but for the nominal
     model's, are found from the other poses.
     """
     task, data, unknowns = scene.task, scene.data, scene.unknowns
     position = np.full((len(data), TURN), np.nan)
     turned = np.full((len(data), TURN), np.nan)
-    for out, step in folds(found.linear, spread, unknowns.std, unknowns.free):
+    for out, step in folds(found, unknowns.std, unknowns.free):
         change = np.zeros(len(unknowns.arm_names))
         if name != NOMINAL:
             change = found.state.arm + step[: len(change)]
