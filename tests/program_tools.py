@@ -31,6 +31,7 @@ class Shift:
             correction_mm=zeros,
             correction_mrad=zeros,
             residual_mm=zeros,
+            residual_mrad=zeros,
             std_mm=zeros,
             refused=np.zeros(len(q), dtype=bool),
             refusals=(),

@@ -38,6 +38,8 @@ class Shift:
             q=np.where(refused[:, None], np.nan, q + self.by_rad),
             correction_mm=np.full(count, 1.5),
             correction_mrad=np.full(count, 2.5),
+            residual_mm=np.zeros(count),
+            residual_mrad=np.zeros(count),
             std_mm=np.full(count, 0.1),
             refused=refused,
             refusals=tuple(refusals),

@@ -167,11 +167,13 @@ def test_the_commands_lead_from_a_cell_file_to_measurements(tmp_path, capsys, mo
     assert main(["session", "show", "session.db"]) == 0
     shown = capsys.readouterr().out
     assert "15 of 15 poses measured" in shown
+    assert "The session is complete: nothing is left to measure." in shown
     assert max(map(len, shown.splitlines())) <= 80
     assert main(["session", "show", "session.db", "--pose", "2"]) == 0
     assert "accepted" in capsys.readouterr().out
     assert main(["session", "show", "session.db", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["measured"] == 15
+    told = json.loads(capsys.readouterr().out)
+    assert (told["measured"], told["complete"]) == (15, True)
     assert main(["session", "export", "session.db"]) == 0
     assert len(ta.Measurements.read_csv("measurements.csv")) == 15
 

@@ -306,3 +306,76 @@ def test_inserted_waypoints_are_counted(capsys):
     lines = Path("dense.mod").read_text(encoding="latin-1").count("MoveL [[")
     assert lines > 0
     assert f"Waypoints inserted on straight lines: {lines}." in told
+
+
+def test_the_model_of_another_arm_is_refused_and_nothing_is_written(capsys):
+    other = ta.Robot.load("abb-irb-1200")
+    Path("other.toml").write_text(other.to_toml())
+    words = ["compensate", "arm.calib", "demo.mod", "-o", "wrong.mod", "--controller"]
+    assert main([*words, "other.toml"]) == 1
+    told = " ".join(capsys.readouterr().err.split())
+    assert "other.toml: at the same joints its flange is up to" in told
+    assert "Declare the model of this very arm" in told
+    assert not Path("wrong.mod").exists()
+    compensator = ta.Compensator(ta.Calibration.load("arm.calib"))
+    with pytest.raises(ta.InputError, match="away from that of ABB IRB 120"):
+        ta.compensate_program("demo.mod", compensator, controller=ta.Controller.nominal(other))
+    Path("other.toml").write_text(ABB.to_toml())
+    assert main([*words, "other.toml"]) == 0
+
+
+def test_how_far_written_positions_moved_holds_what_the_controller_knows(capsys):
+    """With a model of its own they move by more or less than the correction does."""
+    table = ABB.table + np.eye(6, 5, k=-1) * 2e-3
+    own = ta.Robot.from_dict({**ABB.to_dict(), "table": table.tolist()})
+    Path("own_model.toml").write_text(own.to_toml())
+    words = ["compensate", "arm.calib", "demo.mod", "-o", "moved.mod", "--controller", "own_model.toml"]
+    assert main([*words, "--report", "moved.json"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    report = json.loads(Path("moved.json").read_text())
+    moved = [one["moved_mm"] for one in report["targets"] if one["moved_mm"] is not None]
+    assert len(moved) == 3, "jHome says joints"
+    assert f"Written positions moved by {max(moved):.3f} mm at most." in told
+    assert report["moved_mm"]["largest"] == max(moved)
+    before, after = (read(name, Path(name).read_text("latin-1"), ABB) for name in ("demo.mod", "moved.mod"))
+    for one in report["targets"]:
+        if one["moved_mm"] is not None:
+            xyz = [values_of(program, one["name"])[:3] for program in (before, after)]
+            assert one["moved_mm"] == pytest.approx(np.linalg.norm(xyz[1] - xyz[0]), abs=1e-9)
+            assert abs(one["moved_mm"] - one["correction_mm"]) > 0.05
+
+
+def values_of(program, name):
+    target = next(number for number, known in program.targets.names.items() if known == name)
+    first = program.targets.first[target]
+    return program.targets.values[first : first + 7]
+
+
+def test_what_fewer_joints_leave_is_told(capsys):
+    q = np.array([[0.0, 0.2, 0.1, 0.1, 0.5, 0.0], [0.3, 0.2, 0.1, 0.1, 0.7, 0.2]])
+    np.savetxt("few.csv", q, delimiter=",", header="q1,q2,q3,q4,q5,q6", comments="", fmt="%.9f")
+    words = ["compensate", "arm.calib", "few.csv", "--controller", "nominal", "-o", "few_out.csv"]
+    assert main([*words, "--moving", "1,2,3", "--report", "few.json"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    targets = json.loads(Path("few.json").read_text())["targets"]
+    found = ta.Compensator(ta.Calibration.load("arm.calib"), moving=(1, 2, 3)).joints(q)
+    assert [one["residual_mrad"] for one in targets] == pytest.approx(found.residual_mrad)
+    assert [one["residual_mm"] for one in targets] == pytest.approx(found.residual_mm)
+    assert found.residual_mrad.max() > 0.1
+    assert f"in full: up to {found.residual_mrad.max():.3f} mrad are left." in told
+    assert main(words) == 0
+    assert "are left." not in capsys.readouterr().out
+
+
+def test_a_path_gets_no_rows_and_says_so(capsys):
+    q = np.array([[0.0, 0.2, 0.1, 0.1, 0.5, 0.0], [0.6, 0.2, 0.1, 0.1, 0.5, 0.0]])
+    poses = ABB.pose(q)
+    turns = Rotation.from_matrix(poses[:, :3, :3]).as_rotvec()
+    names = "x_mm,y_mm,z_mm,rx,ry,rz,q1,q2,q3,q4,q5,q6"
+    table = np.hstack([1e3 * poses[:, :3, 3], turns, q])
+    np.savetxt("two.csv", table, delimiter=",", header=names, comments="", fmt="%.9f")
+    words = ["compensate", "arm.calib", "two.csv", "--controller", "nominal", "-o", "two_out.csv"]
+    assert main([*words, "--densify-mm", "0.0001", "--least-spacing-mm", "2"]) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert "1 linear move deviates by more than 0.0001 mm (--densify-mm)" in told
+    assert "mm; a path gets no rows but its author's)" in told

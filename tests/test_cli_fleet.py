@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import truearm as ta
+import truearm.fleet
 from truearm.cli import main
 from truearm.simulation import VirtualArm
 
@@ -85,6 +86,17 @@ def test_errors_are_told_in_words(folder, monkeypatch, capsys, arguments, status
     assert main(["fleet", *arguments]) == status
     assert words in capsys.readouterr().err
     assert not Path("bad").exists()
+
+
+def test_a_fleet_that_is_interrupted_before_any_arm_is_finished_says_so(folder, monkeypatch, capsys):
+    def interrupted(*_arguments, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(truearm.fleet, "run_fleet", interrupted)
+    assert main(["fleet", "fleet.toml", "-o", "none"]) == 130
+    said = capsys.readouterr().err
+    assert said == "No arm is finished yet; the same command begins anew.\nInterrupted.\n"
 
 
 def test_an_interrupted_fleet_ends_at_once_and_continues(folder, tmp_path):

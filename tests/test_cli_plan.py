@@ -42,6 +42,16 @@ def test_a_plan_for_a_cell_can_be_measured_there(tmp_path, capsys, monkeypatch):
     assert_repeats(table, [f"q{j}" for j in range(1, 6)])
 
 
+def test_the_number_of_poses_that_is_asked_for_is_among_those_whose_accuracy_is_told(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plan", "ur10", "-n", "30", "--json"]) == 0
+    expected = json.loads(capsys.readouterr().out)["expected_mm"]
+    assert list(expected) == ["20", "30", "40", "60", "100", "200"]
+    assert expected["40"] < expected["30"] < expected["20"]
+
+
 def test_poses_stay_above_a_floor_and_in_a_box(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     arm = Robot.load("ur10")

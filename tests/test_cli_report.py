@@ -8,6 +8,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from tests.report_support import words_of, write_arm_and_later
@@ -53,7 +54,8 @@ def test_the_report_of_a_calibration_stays_beside_it_as_others_are_written(folde
 def test_json_alone_on_stdout(folder, capsys):
     assert main(["report", "arm.calib", "-o", "there.html", "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert list(printed) == ["report", "verdict", "advice", "figures"]
+    assert list(printed) == ["report", "verdict", "advice", "figures", "other"]
+    assert printed["other"] is None
     assert printed["report"] == "there.html"
     assert {"kind", "words"} == set(printed["advice"][0])
     page = words_of((folder / "there.html").read_text())
@@ -75,6 +77,34 @@ def test_other_measurements_get_their_chapter(folder, capsys):
     assert f"later.csv: {judged['n_judged']} rows judged" in page
     for key in ("mean_mm", "p95_mm", "max_mm"):
         assert f"{judged['errors']['constant'][key]:.3f}" in page.partition("later.csv: ")[2]
+
+
+def test_json_has_the_errors_on_other_measurements(folder, capsys):
+    assert main(["evaluate", "arm.calib", "later.csv", "--json"]) == 0
+    judged = json.loads(capsys.readouterr().out)
+    assert main(["report", "arm.calib", "later.csv", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["other"] == {"files": ["later.csv"], **judged}
+    assert "other_measurements" not in [advice["kind"] for advice in printed["advice"]]
+
+
+def test_measurements_that_are_not_met_are_the_first_advice(folder, tmp_path, capsys):
+    table = pd.read_csv("later.csv")
+    table[["x", "y", "z"]] = table[["x", "y", "z"]].to_numpy()[::-1]
+    strange = tmp_path / "strange.csv"
+    table.to_csv(strange, index=False)
+    assert main(["report", "arm.calib", str(strange)]) == 0
+    advice = " ".join(capsys.readouterr().out.partition("What would help most next:")[2].split())
+    assert advice.startswith(
+        "- Look at the other measurements first. Of strange.csv: The calibration does not help"
+    )
+    assert "Look at the other measurements first. Of strange.csv:" in words_of(
+        (folder / "arm.html").read_text()
+    )
+    assert main(["report", "arm.calib", str(strange), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["advice"][0]["kind"] == "other_measurements"
+    assert printed["other"]["errors"]["constant"]["mean_mm"] > 10.0
 
 
 @pytest.mark.parametrize(

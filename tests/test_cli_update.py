@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -47,6 +48,29 @@ def test_an_update_is_told_written_and_rolled_back(folder, capsys):
     assert main(["update", "--roll-back", "small.calib", "-o", "never.calib"]) == 1
     assert "left out when the file was stripped" in capsys.readouterr().err
     assert not (folder / "never.calib").exists()
+
+
+def test_the_two_tests_are_said_to_share_the_level(capsys):
+    assert main(["update", "old.calib", "moved.csv", "--level", "0.03"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "each counts below 0.015, half the level of 0.03 that the two share." in told
+    assert main(["update", "old.calib", "moved.csv", "--level", "0.03", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["level"], printed["threshold"]) == (0.03, 0.015)
+    found = ta.update(ta.Calibration.load("old.calib"), ta.Measurements.read_csv("moved.csv"), level=0.03)
+    page = words_of(report(found.calibration).html)
+    assert "share the level of significance, 3 %: each counts where p is below 0.015." in page
+
+
+def test_a_p_between_half_the_level_and_the_level_does_not_count(folder):
+    calibration, table = ta.Calibration.load("old.calib"), pd.read_csv("same.csv")
+    axes = ["x", "y", "z"]
+    table[axes] += np.random.default_rng(3).normal(scale=3e-5, size=(len(table), 3))
+    data = ta.Measurements.from_dataframe(table)
+    p = ta.update(calibration, data).rest.p
+    assert 1e-6 < p < 0.3
+    assert ta.update(calibration, data, level=1.5 * p).verdict == "holds"
+    assert ta.update(calibration, data, level=2.5 * p).verdict == "field"
 
 
 def test_without_output_nothing_is_written(folder, capsys):

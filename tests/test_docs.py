@@ -26,7 +26,7 @@ from truearm.cell.schema import checked
 from truearm.cli import COMMANDS
 from truearm.fleet import Fleet
 from truearm.programs.frames import FramesFile
-from truearm.reporting import advice, gravity
+from truearm.reporting import advice, gravity, other_data
 from truearm.reporting import known as certainty
 from truearm.robot import Robot
 from truearm.robot_file import RobotFile
@@ -205,7 +205,8 @@ def test_every_key_of_a_summary_is_explained(tables):
 
 def test_the_report_page_has_the_rules_of_the_report():
     text = (ROOT / "docs" / "how-to" / "read-a-report.md").read_text()
-    named = set(re.findall(r'Advice\(\s*"?\w+"?,\s*"([^"]+)"', Path(advice.__file__).read_text()))
+    code = "".join(Path(f"{module.__file__}").read_text() for module in (advice, other_data))
+    named = set(re.findall(r'Advice\(\s*"?\w+"?,\s*"([^"]+)"', code))
     assert set(re.findall(r"^\| ([A-Z][^|]*\.) \|", text, re.MULTILINE)) == named
     for rule in (
         f"at most {advice.AT_THE_FLOOR:g} times what noise alone would leave",

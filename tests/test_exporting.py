@@ -25,6 +25,7 @@ from truearm.exporting import FORMATS, Options, constant_robot, export
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
 from truearm.library import library_names
 from truearm.simulation import VirtualArm
+from truearm.ur_kinematics import has_ur_structure, robot_from_yaml
 
 ARM_URDF = """<?xml version="1.0"?>
 <robot name="hand made">
@@ -306,12 +307,23 @@ def test_ur_yaml_says_what_comes_behind_its_last_axis(ur10):
     assert made.difference_m == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["franka-panda", "adept-cobra-600", "fanuc-lr-mate-200id", "rv-m2"])
+NO_URS = ["franka-panda", "adept-cobra-600", "fanuc-lr-mate-200id", "rv-m2", "abb-irb-120"]
+
+
+@pytest.mark.parametrize("name", NO_URS)
 def test_ur_yaml_is_for_arms_of_universal_robots(name):
     arm = VirtualArm(Robot.load(name), seed=1)
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant")
-    with pytest.raises(InputError, match="is no arm of Universal Robots"):
+    with pytest.raises(InputError, match=f"{re.escape(arm.robot.name)} is no arm of Universal Robots"):
         export(calibration, "ur-yaml")
+
+
+def test_arms_of_universal_robots_are_known_by_their_axes(ur10):
+    """By those of their nominal tables, and of tables that a controller was calibrated with."""
+    known = {name for name in library_names() if has_ur_structure(Robot.load(name))}
+    assert known == {name for name in library_names() if name.startswith("ur")}
+    assert has_ur_structure(constant_robot(ur10))
+    assert has_ur_structure(robot_from_yaml(export(ur10, "ur-yaml").text, where="the YAML"))
 
 
 def test_tables_hold_the_constants(ur10):
@@ -429,6 +441,7 @@ def test_what_cannot_be_exported_is_refused(ur10, to, options, error, message):
         "q1=nan",
         "q0=1",
         "q1=0:9:3000000",
+        "q1=0:1:2,q1=5",
     ],
 )
 def test_bad_grids_are_refused(variable, grid):

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -31,6 +32,11 @@ def test_a_pipe_stays_one_and_is_written_to(tmp_path):
     reader.join(5.0)
     assert pipe.is_fifo()
     assert got == ["through"]
+
+
+def test_a_device_that_takes_nothing_is_named():
+    with pytest.raises(InputError, match="/dev/full: this cannot be written: No space left"):
+        write_whole(Path("/dev/full"), "text")
 
 
 def test_standard_output_is_written_to_through_a_pipe_and_into_a_file(tmp_path):

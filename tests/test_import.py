@@ -16,6 +16,7 @@ from truearm.errors import InputError, UsageError
 from truearm.importing import ImportPlan, import_table
 from truearm.measurements import Measurements
 from truearm.rotation_columns import RotationColumns
+from truearm.units import unit_in_header
 
 IPA_OPTIONS = [
     *("--delimiter", ";", "--decimal", ",", "--joint-unit", "rad", "--length-unit", "mm"),
@@ -217,6 +218,27 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         {"decimal": "."},
         'column "px" holds "n/a" in row 2. It must hold numbers.*--missing TEXT',
     ),
+    "another unit in brackets": (
+        PLAIN.replace("J1", "J1 [deg]"),
+        {"columns": COLUMNS | {"q1": "J1 [deg]"}, "joint_unit": "rad"},
+        'column "J1 \\[deg\\]" says deg, --joint-unit says rad.*must agree.*'
+        "--map 'q1=J1 \\[deg\\]:rad' if its name is wrong, 'q1=J1 \\[deg\\]:deg' if its name is right",
+    ),
+    "another unit in parentheses": (
+        PLAIN.replace("px", "X (mm)"),
+        {"columns": COLUMNS | {"x": "X (mm)"}, "length_unit": "m"},
+        'column "X \\(mm\\)" says mm, --length-unit says m',
+    ),
+    "another unit at the end of a name": (
+        PLAIN.replace("px", "px_m"),
+        {"columns": COLUMNS | {"x": "px_m"}},
+        'column "px_m" says m, --length-unit says mm',
+    ),
+    "a unit that cannot be stated": (
+        PLAIN.replace("pz", "pz (cm)"),
+        {"columns": COLUMNS | {"z": "pz (cm)"}},
+        'column "pz \\(cm\\)" says cm, --length-unit says mm.*if its name is wrong\\.$',
+    ),
     "no joint unit": (
         PLAIN,
         {"joint_unit": None},
@@ -377,3 +399,31 @@ def test_angles_longer_than_a_turn_are_refused(kind: str, tmp_path: Path) -> Non
     assert len(import_table(path, plan(rotation=stated["deg"])).frame) == 2
     with pytest.raises(InputError, match="angles of 170 rad.*If these are degrees, say deg"):
         import_table(path, plan(rotation=stated["rad"]))
+
+
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        *(("J1 [deg]", "deg"), ("J1(°)", "deg"), ("J1 in Degrees", "deg"), ("j1_rad", "rad")),
+        *(("X (mm)", "mm"), ("X (mm) nominal", "mm"), ("X, mm", "mm"), ("X/m", "m"), ("dX [\u00b5m]", "um")),
+        *(
+            ("Z [in]", "in"),
+            ("Z inch", "in"),
+            ("J1", ""),
+            ("X in", ""),
+            ("arm", ""),
+            ("x [1]", ""),
+            ("mm", ""),
+        ),
+    ],
+)
+def test_units_in_headers_are_seen(header: str, unit: str) -> None:
+    assert unit_in_header(header) == unit
+
+
+def test_a_unit_behind_a_column_goes_before_that_of_its_name(tmp_path: Path) -> None:
+    path = write(tmp_path, PLAIN.replace("px", "px (mm)"))
+    stated = COLUMNS | {"x": "px (mm):m"}
+    assert import_table(path, plan(columns=stated)).frame["x"].tolist() == [1000.0, 1500.0]
+    agreed = COLUMNS | {"x": "px (mm)"}
+    assert import_table(path, plan(columns=agreed)).frame["x"].tolist() == [1.0, 1.5]

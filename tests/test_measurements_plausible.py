@@ -98,6 +98,16 @@ def test_degrees_of_small_motions_read_as_radians(name: str) -> None:
         check_against(data, robot)
 
 
+def test_radians_of_another_arm_are_not_taken_for_degrees_alone() -> None:
+    robot = Robot.load("abb-irb-120")
+    q = np.random.default_rng(0).uniform(-2.0 * np.pi, 2.0 * np.pi, (40, 6))
+    with pytest.raises(InputError, match="--angle-unit deg.*if they are radians, they are of another arm"):
+        check_against(Measurements.from_dataframe(table(robot, q)), robot)
+    with pytest.raises(InputError, match="--angle-unit deg") as caught:
+        check_against(Measurements.from_dataframe(table(robot, 10.0 * q)), robot)
+    assert "another arm" not in str(caught.value)
+
+
 def test_radians_read_as_degrees() -> None:
     robot = Robot.load("ur10")
     data = Measurements.from_dataframe(table(robot, readings(robot)), angle_unit="deg")

@@ -52,7 +52,8 @@ def test_no_waypoints_where_they_would_not_be_executed_as_their_motion_is(line):
     done, told = densified(f"PTP {HERE}\n{line}")
     assert done.changed.all()
     assert done.inserted == 0
-    assert "waypoints could not be inserted" in told
+    assert "waypoints could not be inserted there: a.src, line " in told
+    assert " mm; its statement is not a plain one, or belongs to others)" in told
 
 
 @pytest.mark.parametrize("word", ["SPLINE", "PTP_SPLINE"])

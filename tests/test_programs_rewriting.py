@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 
 from tests.programs_rig import ABB, KUKA, Shift, again, models, obeyed, read, rewritten
+from tests.test_controller import CONF
 from tests.test_programs_rapid import GO, NOTHING, SEEN, module, numbers, points
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.programs.configuration import nearest_turns, with_turns
-from truearm.programs.declaring import declared_controller, may_differ, refuse_contradiction
+from truearm.programs.declaring import (
+    declared_controller,
+    may_differ,
+    refuse_another_arm,
+    refuse_contradiction,
+)
 from truearm.programs.densify import Spacing
 from truearm.programs.folding import constant
 from truearm.programs.frames import Frames
@@ -141,6 +147,34 @@ def test_a_nominal_controller_contradicts_points_of_an_accurate_one():
     refuse_contradiction(program, Controller(KUKA, "factory", "f"), force=False)
 
 
+@pytest.mark.parametrize(
+    ("arm", "other"),
+    [("ur10", "ur5"), ("abb-irb-120", "abb-irb-1200"), ("ur3", "ur3e"), ("kuka-iiwa-7", "kuka-iiwa-14")],
+)
+def test_the_model_of_another_arm_is_refused(arm, other):
+    robot, wrong = Robot.load(arm), Robot.load(other)
+    refuse_another_arm(Controller(robot, "factory", "own.toml"), robot)
+    with pytest.raises(InputError, match=r"other\.toml: .* its flange is up to \d+ mm .* 20 mm and 3 deg"):
+        refuse_another_arm(Controller(wrong, "factory", "other.toml"), robot)
+
+
+def test_the_factory_kinematics_of_the_arm_are_no_other_arm(tmp_path):
+    """Its parameters differ by metres, and poses of its flange by millimetres."""
+    path, robot = tmp_path / "calibration.conf", Robot.load("ur10")
+    path.write_text(CONF)
+    refuse_another_arm(Controller.load(path, robot=robot), robot)
+    path.write_text(CONF.replace("81.328", "81.228"))
+    with pytest.raises(InputError, match="away from that of UR10, which was calibrated"):
+        refuse_another_arm(Controller.load(path, robot=robot), robot)
+
+
+def test_a_base_that_is_turned_is_refused_by_the_angle():
+    base = np.eye(4)
+    base[:2, :2] = [[-1.0, 0.0], [0.0, -1.0]]
+    with pytest.raises(InputError, match=r"180\.0 deg away"):
+        refuse_another_arm(Controller(but(ABB, base=base, base_row=None), "factory", "ros.urdf"), ABB)
+
+
 def test_payloads_are_compared():
     loaded = Robot(
         **{**{name: getattr(ABB, name) for name in ABB.__dataclass_fields__}, "payload": Payload(0.5)}
@@ -188,8 +222,56 @@ def test_waypoints_are_inserted_until_the_line_is_straight_enough():
         points_said @ (points_said[-1] - points_said[0]) / np.linalg.norm(points_said[-1] - points_said[0])
     )
     assert np.diff(along).min() > 0.0095, "each waypoint lies behind the one before"
+
+
+def test_a_move_that_needs_more_waypoints_is_named_with_its_deviation():
+    given = models(ABB)
+    given = type(given)(given.programming, given.inverse, given.controller, Wavy(np.zeros(6)))
+    program = long_line()
     bent = rewritten(program, given, spacing=Spacing.of(0.001, 100.0))
-    assert [notice.kind for notice in bent.notices] == ["deviation"]
+    (one,) = report_of(bent)["deviating"]
+    text = program.sources[0].content.decode("latin-1").splitlines()
+    assert text[one["line"] - 1].strip() == one["name"] == "MoveL p1,v100,fine,tG;"
+    assert one["reason"] == "the least spacing of 100 mm is too wide"
+    assert rewritten(program, given, spacing=Spacing.of(1.01 * one["deviation_mm"], 100.0)).inserted == 0
+    assert rewritten(program, given, spacing=Spacing.of(0.99 * one["deviation_mm"], 10.0)).inserted > 0
+    (notice,) = bent.notices
+    assert (notice.kind, notice.rows) == ("deviation", (one["line"],))
+    assert notice.message == (
+        "1 linear move deviates by more than 0.001 mm (--densify-mm), and waypoints could not be inserted "
+        f"there: line {one['line']} ({one['deviation_mm']:.3g} mm; {one['reason']})"
+    )
+
+
+def test_the_first_moves_that_need_waypoints_are_named_and_the_others_counted():
+    given = models(ABB)
+    given = type(given)(given.programming, given.inverse, given.controller, Wavy(np.zeros(6)))
+    again_and_again = ",v100,fine,tG;\n    MoveL ".join(["p1", "p0"] * 4)
+    done = rewritten(long_line(again_and_again), given, spacing=Spacing.of(0.001, 100.0))
+    (notice,) = done.notices
+    assert notice.message.startswith("8 linear moves deviate by more")
+    assert notice.message.count("line ") == 5
+    assert notice.message.endswith("; and 3 more")
+    assert len(report_of(done)["deviating"]) == len(notice.rows) == 8
+
+
+class Doubtful(Shift):
+    """Refuses what is more than a few targets."""
+
+    def joints(self, q, *, tool=None, author=None):
+        self.refuse = (7,)
+        return super().joints(q, tool=tool, author=author)
+
+
+def test_where_waypoints_are_refused_that_is_the_reason():
+    given = models(ABB)
+    given = type(given)(given.programming, given.inverse, given.controller, Doubtful(np.zeros(6)))
+    done = rewritten(long_line(), given, spacing=Spacing.of(0.1, 10.0))
+    (one,) = report_of(done)["deviating"]
+    assert one["deviation_mm"] is None
+    assert one["reason"] == "waypoints between are refused: too far"
+    assert "deviates, or may, by more" in done.notices[0].message
+    assert "(how far is not known; waypoints between are refused: too far)" in done.notices[0].message
 
 
 @pytest.mark.parametrize("target", ["Offs(p1,0,0,-20)", "RelTool(p1,0,0,20)"])
@@ -201,6 +283,8 @@ def test_a_line_to_a_shifted_target_gets_no_waypoints(target):
     assert done.inserted == 0
     assert done.changed[program.moves.target].all()
     assert [notice.kind for notice in done.notices] == ["deviation"]
+    assert done.deviating[0].listed.reason == "its target has an offset, which a waypoint would not have"
+    assert done.deviating[0].deviation_mm > 0.1
 
 
 def tool_of_module():

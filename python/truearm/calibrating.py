@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from truearm.doubts import (
     stood_still,
 )
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
-from truearm.errors import InputError, Notice, UsageError
+from truearm.errors import InputError, Notice, UsageError, count_of
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
     ENOUGH_FOR_HYPER,
@@ -47,6 +47,7 @@ from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge
 from truearm.measurements import Measurements
+from truearm.models import VARIABLE
 from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.robot import Robot
@@ -57,8 +58,14 @@ from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.unexplained import unexplained
+from truearm.units import MM_PER_METRE
 from truearm.validation import Validation
 from truearm.visits import pose_count
+
+STUCK: Final = 0.2
+"""Ratio of what constants leave below which those of the training rows were no minimum to judge."""
+ASTRAY: Final = 2.0
+"""Ratio of the median errors of held-out rows, known and not, from which a fit went astray."""
 
 
 def calibrate(
@@ -94,14 +101,14 @@ def calibrate(
     split = split_rows(given, chosen.split)
     notices += check_judged(given.select(split.train), given.select(split.holdout), task.selection)
     task = replace(task, sizes=() if split.planned else given.sizes)
-    trained, drift = fit_settled(task, given, split.train)
+    order = np.random.default_rng(chosen.split.seed).permutation(len(given)) if chosen.refit else split.train
+    trained, drift, final = _fit_both(task, given, split.train, order)
     with stages("judging on held-out rows"):
         validation, held = _validate(task, trained, drift, (given, split))
-    final, order, searched = trained, split.train, trained
-    if chosen.refit:
-        order, known = np.random.default_rng(chosen.split.seed).permutation(len(given)), _kept_hyper(trained)
-        final = fit_rows(task, drift.taken_out(given).select(order), known)
-        searched = final if known.exactly is None else trained
+        astray = _astray(task, (trained, final), drift.taken_out(given).select(split.holdout), held)
+    if astray:
+        final, order = trained, split.train
+    searched = trained if _keeps_hyper(trained) else final
     variable = _variable_details(task, final, searched)
     found = Calibration(
         robot=robot,
@@ -118,7 +125,12 @@ def calibrate(
         data_hash=given.hash(),
         version=version("truearm"),
         scheme=None if final.scheme is None else final.scheme.details,
-        notices=(*notices, *_of_fit(task, final, variable), *_over_time(task, given, drift, validation)),
+        notices=(
+            *notices,
+            *astray,
+            *_of_fit(task, final, variable),
+            *_over_time(task, given, drift, validation),
+        ),
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable),
     )
@@ -151,7 +163,7 @@ def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Out
     return [
         *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
-        *constant_is_better(judged, best),
+        *constant_is_better(judged, best, outliers),
     ]
 
 
@@ -267,16 +279,61 @@ def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> V
     return VariableSpread(columns, fits.variable.posterior, details.inflation, noises, place)
 
 
-def _kept_hyper(trained: Fits) -> KnownHyper:
-    """Hyper-parameters for the fit to all rows, which are found again where few rows trained.
+def _fit_both(
+    task: Task, data: Measurements, train: NDArray[np.int64], order: NDArray[np.int64]
+) -> tuple[Fits, Drift, Fits]:
+    """The fits to the training rows, their drift, and the fits to the rows in order."""
+    trained, drift = fit_settled(task, data, train)
+    if order is train:
+        return trained, drift, trained
+    final = _fit_all(task, trained, drift.taken_out(data).select(order))
+    if final.constant.noise[0] < STUCK * trained.constant.noise[0]:
+        trained, drift = fit_settled(_begun_at(task, final), data, train)
+        final = _fit_all(task, trained, drift.taken_out(data).select(order))
+    return trained, drift, final
 
-    Not without those that were validated: a search may end at a lesser maximum.
+
+def _fit_all(task: Task, trained: Fits, rows: Measurements) -> Fits:
+    """The fits to all rows; constants are not lost that the training rows found.
+
+    Hyper-parameters are found again where few rows trained, and not without those that were validated: a
+    search may end at a lesser maximum.
     """
-    if trained.variable is None:
-        return NOTHING_KNOWN
-    if len(trained.data) < ENOUGH_FOR_HYPER:
-        return KnownHyper(near=trained.variable, contested=True)
-    return KnownHyper(trained.variable.hyper)
+    known = NOTHING_KNOWN
+    if trained.variable is not None and _keeps_hyper(trained):
+        known = KnownHyper(trained.variable.hyper)
+    elif trained.variable is not None:
+        known = KnownHyper(near=trained.variable, contested=True)
+    return fit_rows(_begun_at(task, trained), rows, known)
+
+
+def _begun_at(task: Task, fits: Fits) -> Task:
+    """The task where constants are looked for near those of fits as well."""
+    return replace(task, starts=(fits.constant,))
+
+
+def _keeps_hyper(trained: Fits) -> bool:
+    """Whether hyper-parameters of the training rows serve all rows."""
+    return trained.variable is not None and len(trained.data) >= ENOUGH_FOR_HYPER
+
+
+def _astray(task: Task, fits: tuple[Fits, Fits], held: Measurements, judged: HeldRows) -> list[Notice]:
+    """A notice where the fit to all rows misses held-out rows by far more than one that did not know them."""
+    trained, final = fits
+    if final is trained or final.variable is None or not len(held):
+        return []
+    found = judge(task, {VARIABLE: final.models(task.arm)[VARIABLE]}, held, trained.data)
+    before, after = (
+        float(MM_PER_METRE * np.nanmedian(errors[VARIABLE].distance_m)) for errors in (judged.errors, found)
+    )
+    if after <= ASTRAY * before:
+        return []
+    text = (
+        f"Fitted to all rows the variable model misses the held-out rows by {after:.4g} mm in the median, "
+        f"fitted to {count_of(len(trained.data), 'training row')} by {before:.4g} mm: the calibration in the "
+        "file stays that of the training rows. Look at the table of the robot, and for rows that are wrong."
+    )
+    return [Notice("refit_astray", text)]
 
 
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:

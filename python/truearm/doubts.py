@@ -139,9 +139,16 @@ def constants_do_better(mean_mm: float, constant_mm: float) -> bool:
     return SAME * mean_mm > constant_mm
 
 
-def constant_is_better(validation: Validation, best: str) -> list[Notice]:
-    """A notice where what varies was learnt and the constants alone are nearer."""
-    means = {name: found.position.mean for name, found in validation.holdout.items()}
+def judged_means_mm(validation: Validation, outliers: Outliers | None) -> dict[str, float]:
+    """Mean errors of the models on the judged rows, without the outliers where these are known."""
+    if outliers is not None and outliers.means_mm:
+        return dict(outliers.means_mm)
+    return {name: found.position.mean for name, found in validation.holdout.items()}
+
+
+def constant_is_better(validation: Validation, best: str, outliers: Outliers | None = None) -> list[Notice]:
+    """A notice where what varies was learnt and the constants alone are nearer, outliers left out."""
+    means = judged_means_mm(validation, outliers)
     if best in {NOMINAL, CONSTANT} or not helps(means[NOMINAL], means[best]):
         return []
     if not constants_do_better(means[best], means[CONSTANT]):

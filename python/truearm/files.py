@@ -140,8 +140,15 @@ def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
             raise InputError(f"this cannot be written: {_reason(error)}", where=str(path)) from None
         raise
     for path, data in streams:
+        _write_stream(path, data)
+
+
+def _write_stream(path: Path, data: bytes) -> None:
+    try:
         with path.open("ab") as stream:
             stream.write(data)
+    except OSError as error:
+        raise InputError(f"this cannot be written: {_reason(error)}", where=str(path)) from None
 
 
 def make_directory(path: Path) -> None:

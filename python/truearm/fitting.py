@@ -42,6 +42,16 @@ ANY_TARGET_M: Final = 0.3
 """How many poses are drawn for each row, and how far from the flange targets lie, to count unknowns."""
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
+FAR_FROM_CONSTANTS: Final = 0.1
+"""Weight that Cauchy's loss gives a row some seven deviations from what constants leave."""
+MOST_FAR: Final = 0.25
+"""Share of such rows from which they are no outliers."""
+SUSPECTED: Final = 1e-4
+"""Weight of a row with which a fit begins that is to judge it."""
+CLEARER: Final = 0.7
+"""Ratio of the median distances of rows left out, below which a fit is believed that begins without some."""
+OTHER_MINIMUM: Final = 0.7
+"""Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1
 """Share of all squares that constants leave from which rows that are taken out have bent them."""
 
@@ -83,6 +93,8 @@ class Task:
         threads: Threads at the most; the result does not depend on it.
         stages: Told what is being done.
         sizes: Rows of each file that a share is held out of; empty where none is.
+        starts: Fits of nearly the same rows: the search for constants begins there too, with their noise.
+            With more the prior would draw constants away that are far from nominal.
     """
 
     arm: IdentifiedArm
@@ -92,6 +104,7 @@ class Task:
     threads: int | None = None
     stages: Stages = no_stages
     sizes: tuple[int, ...] = ()
+    starts: tuple[ConstantFit, ...] = ()
 
     def __post_init__(self) -> None:
         """Check what the core takes as it is."""
@@ -168,7 +181,10 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
         began = time.perf_counter()
         variable = _fit_field(task, measured, constants, data, known)
         if _spoilt(constants.constant, variable):
-            constants, variable = _without_outliers(task, data, variable, known)
+            known = replace(known, near=variable, contested=not known.rough)
+            constants, variable = _without_outliers(task, data, variable.weights, known)
+        if known.exactly is None and not known.rough:
+            constants, variable = _unmasked(task, data, (constants, variable))
         seconds[VARIABLE] = time.perf_counter() - began
     nominal, found, constant = constants.nominal, constants.identifiability, constants.constant
     scheme = None
@@ -197,10 +213,19 @@ def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> 
         _check_enough(task, data, found.total_rank)
     with task.stages("fitting the constants"), core_errors(data):
         chosen = task.problem(measured, task.columns(found.determined))
-        constant = fit_constant(
-            chosen, fit_options(task, prior=task.options.prior, robust=task.options.robust)
-        )
+        options = fit_options(task, prior=task.options.prior, robust=task.options.robust)
+        constant = fit_constant(chosen, options)
+        for start in task.starts:
+            near = {"parameters": start.parameters, "start": start.setup, "noise": start.noise}
+            other = fit_constant(chosen, {**options, **near})
+            if _typically_left(other) < OTHER_MINIMUM * _typically_left(constant):
+                constant = other
     return _Constants(nominal, found, constant)
+
+
+def _typically_left(constant: ConstantFit) -> float:
+    """Median of the residuals' absolute values."""
+    return float(np.median(np.abs(constant.residuals)))
 
 
 def _spoilt(constant: ConstantFit, variable: FieldFit) -> bool:
@@ -210,13 +235,33 @@ def _spoilt(constant: ConstantFit, variable: FieldFit) -> bool:
 
 
 def _without_outliers(
-    task: Task, data: Measurements, variable: FieldFit, known: KnownHyper
+    task: Task, data: Measurements, weights: Floats, known: KnownHyper
 ) -> tuple[_Constants, FieldFit]:
-    """All models anew, where the rows that a variable model takes out begin without weight."""
-    measured = core_set(task.arm.robot, data, task.selection, task.groups, variable.weights)
+    """All models anew, where rows (n,) begin with these weights."""
+    measured = core_set(task.arm.robot, data, task.selection, task.groups, weights)
     constants = _fit_constants(task, measured, data)
-    known = replace(known, near=variable, contested=not known.rough)
     return constants, _fit_field(task, measured, constants, data, known)
+
+
+def _unmasked(
+    task: Task, data: Measurements, fits: tuple[_Constants, FieldFit]
+) -> tuple[_Constants, FieldFit]:
+    """The fits, or those that begin without rows far from constants, if these are by far the clearer.
+
+    Many outliers among few rows become part of the noise that the evidence finds, and no row is far off then.
+    Rows that are innocent have their weight back once a model without them judges them.
+    """
+    constants, variable = fits
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
+    problem = task.problem(measured, task.columns(constants.identifiability.determined))
+    with core_errors(data):
+        robust = fit_constant(problem, fit_options(task, prior=task.options.prior, robust="cauchy"))
+    far = robust.weights < FAR_FROM_CONSTANTS
+    if not far[variable.weights >= 1.0].any() or far.mean() > MOST_FAR:
+        return fits
+    found = _without_outliers(task, data, np.where(far, SUSPECTED, 1.0), NOTHING_KNOWN)
+    clearer = np.median(found[1].distances) < CLEARER * np.median(variable.distances)
+    return found if clearer else fits
 
 
 def _fit_scheme(

@@ -10,11 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.columns import DISTANCE, JOINT, QUATERNION, SIGMA, TARGET, WORDS
-from truearm.errors import InputError, UsageError, did_you_mean, list_names, list_rows
+from truearm.errors import InputError, UsageError, did_you_mean, list_names, list_rows, typed
 from truearm.measurements import Measurements
 from truearm.raw_tables import Marks, RawTable, join_tables, read_raw
 from truearm.rotation_columns import RotationColumns
-from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
+from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si, unit_in_header
 
 Floats = NDArray[np.float64]
 
@@ -221,7 +221,7 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
     """Unit of a column; "" where it has none.
 
     Raises:
-        UsageError: If it is not stated, or is one that no such column has.
+        UsageError: If it is not stated, is one that no such column has, or another one than its name says.
     """
     _, unit = _split_unit(table, theirs)
     known: tuple[str, ...] = UNITS if JOINT.fullmatch(ours) else STATED_LENGTH_UNITS
@@ -235,7 +235,27 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
             rule=f'"{ours}" {kind}',
             way_out=f"Write --map {ours}=COLUMN{':' + known[-1] if known else ''}",
         )
-    return unit or (_stated_unit(ours, plan) if known else "")
+    if unit or not known:
+        return unit
+    stated = _stated_unit(ours, plan)
+    _check_header(table, ours, theirs, stated)
+    return stated
+
+
+def _check_header(table: RawTable, ours: str, theirs: str, stated: str) -> None:
+    """Raise UsageError if the column's own name says another unit than the option for all of them."""
+    said = unit_in_header(table.parts[theirs].name)
+    if said in ("", stated):
+        return
+    option = "--joint-unit" if JOINT.fullmatch(ours) else "--length-unit"
+    correct = f", {typed(f'{ours}={theirs}:{said}')} if its name is right" if said in UNITS else ""
+    raise UsageError(
+        f'column "{theirs}" says {said}, {option} says {stated}',
+        where=table.where,
+        rule="The name of a column and the unit that is stated for it must agree",
+        way_out=f"Give the right {option}, or state the unit of this column alone behind it: --map "
+        f"{typed(f'{ours}={theirs}:{stated}')} if its name is wrong{correct}",
+    )
 
 
 def _written(ours: str, unit: str) -> str:

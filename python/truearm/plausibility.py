@@ -116,7 +116,8 @@ def _check_degrees(measurements: Measurements, robot: Robot) -> None:
             f"{measurements.row_names(rows)}, beyond what {robot.name} can reach",
             where=", ".join(measurements.files),
             rule="Revolute joints are in radians unless their columns say so (q1_deg)",
-            way_out="If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ...",
+            way_out="If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ..."
+            + ("" if far.any() else "; if they are radians, they are of another arm: name that one"),
         )
 
 

@@ -16,6 +16,7 @@ Joint = Literal["revolute", "prismatic"]
 Floats = NDArray[np.float64]
 
 MIN_COUPLING_DETERMINANT: Final = 1e-9
+TRANSFORMS: Final = ("base", "flange", "tool")
 
 
 @dataclass(frozen=True)
@@ -72,11 +73,11 @@ class RobotData:
         n = len(self.joints)
         _check_known("convention", (self.convention,), get_args(Convention))
         _check_known("joints", self.joints, get_args(Joint))
-        shapes = {"table": (n, 5), "base": (4, 4), "flange": (4, 4), "tool": (4, 4)}
+        shapes = {"table": (n, 5), **dict.fromkeys(TRANSFORMS, (4, 4))}
         shapes |= {"coupling": (n, n), "limits": (n, 2)}
         for field, shape in shapes.items():
             value = _checked(field, getattr(self, field), shape)
-            object.__setattr__(self, field, _rigid(field, value) if shape == (4, 4) else value)
+            object.__setattr__(self, field, _rigid(field, value) if field in TRANSFORMS else value)
         if self.base_row is not None:
             object.__setattr__(self, "base_row", _checked("base_row", self.base_row, (5,)))
         unordered = np.flatnonzero(~(self.limits[:, 0] < self.limits[:, 1]))

@@ -1,6 +1,7 @@
 """Units at the edges: metres and radians per unit that a file or an option states; imports nothing heavy."""
 
 import math
+import re
 from typing import TYPE_CHECKING, Final, Literal, TypeVar
 
 if TYPE_CHECKING:
@@ -18,6 +19,24 @@ ANGLE_UNITS: Final = ("rad", "deg")
 RADIANS_PER_DEGREE: Final = math.pi / 180.0
 MM_PER_METRE: Final = 1e3
 MM_PER_INCH: Final = 25.4
+
+HEADER_UNITS: Final = {
+    word: unit
+    for unit, words in {
+        "deg": ("deg", "degs", "degree", "degrees", "°"),
+        "rad": ("rad", "rads", "radian", "radians"),
+        "mrad": ("mrad",),
+        "mm": ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
+        "cm": ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),
+        "m": ("m", "meter", "meters", "metre", "metres"),
+        "um": ("um", "\N{MICRO SIGN}m", "\N{GREEK SMALL LETTER MU}m"),
+        "in": ("in", "inch", "inches"),
+    }.items()
+    for word in words
+}
+"""Units as headers of other people's tables write them; some of them nothing can be stated in."""
+BEHIND_A_NAME: Final = re.compile(r"(?<=\S)[\s_/.,;:-]+([^\W\d_]+|°)$")
+IN_BRACKETS: Final = re.compile(r"[\[({<]\s*([^\W\d_]+|°)\s*[\])}>]")
 
 Number = TypeVar("Number", float, "NDArray[np.float64]")
 
@@ -37,3 +56,14 @@ def to_si(value: Number, unit: str) -> Number:
     if unit in ("m", "rad"):
         return value
     raise KeyError(unit)
+
+
+def unit_in_header(name: str) -> str:
+    """The unit that a column's name says in brackets or at its end, as in "J1 [deg]" and "x_mm"; "" if none.
+
+    A last word "in" is no unit: it is mostly the word.
+    """
+    bracketed = [HEADER_UNITS.get(word.lower(), "") for word in IN_BRACKETS.findall(name)]
+    behind = BEHIND_A_NAME.search(name.strip())
+    last = behind[1].lower() if behind else ""
+    return next(filter(None, bracketed), "" if last == "in" else HEADER_UNITS.get(last, ""))

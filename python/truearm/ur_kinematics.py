@@ -13,8 +13,10 @@ alpha of each row of the nominal Denavit-Hartenberg table.
 
 import configparser
 import json
+import math
 import re
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -34,6 +36,36 @@ NUMBERS: Final = ("x", "y", "z", "roll", "pitch", "yaw")
 URDF_CONVENTION: Final = "urdf"
 DELTAS: Final = {"delta_theta": 0, "delta_d": 1, "delta_a": 2, "delta_alpha": 3}
 ONE_TURN_EACH_WAY: Final = (-2.0 * np.pi, 2.0 * np.pi)
+PARALLEL: Final = (False, True, True, False, False)
+"""Whether each axis is parallel to the next one, else they meet at a right angle."""
+ABOUT_RAD: Final = 0.05
+ABOUT_M: Final = 0.01
+"""No arm is built so badly that its axes are further from what the drawing has."""
+
+
+def has_ur_structure(robot: Robot) -> bool:
+    """Whether an arm's six joints turn one by one about axes that lie as those of Universal Robots' arms do.
+
+    Axes 2, 3 and 4 are parallel; 1 meets 2, 4 meets 5 and 5 meets 6 at a right angle.
+    """
+    if robot.joints != ("revolute",) * len(LINKS) or not np.array_equal(robot.coupling, np.eye(len(LINKS))):
+        return False
+    axes, _ = axes_at_zero(robot)
+    pairs = zip(pairwise(axes), PARALLEL, strict=True)
+    return all(_are_parallel(*pair) if parallel else _meet_squarely(*pair) for pair, parallel in pairs)
+
+
+def _are_parallel(one: Axis, other: Axis) -> bool:
+    sine = np.linalg.norm(np.cross(one.direction_in_base, other.direction_in_base))
+    return bool(sine < math.sin(ABOUT_RAD))
+
+
+def _meet_squarely(one: Axis, other: Axis) -> bool:
+    if abs(one.direction_in_base @ other.direction_in_base) > math.sin(ABOUT_RAD):
+        return False
+    normal = np.cross(one.direction_in_base, other.direction_in_base)
+    between = (other.point_in_base - one.point_in_base) @ normal / np.linalg.norm(normal)
+    return bool(abs(between) < ABOUT_M)
 
 
 def robot_from_yaml(text: str, *, where: str, nominal: Robot | None = None) -> Robot:

@@ -41,6 +41,8 @@ DRAWN_AT_ONCE: Final = 200
 POOL_PER_POSE: Final = 12
 POOL_PER_NUMBER: Final = 3
 LEAST_POOL: Final = 400
+MOST_TOLD: Final = 1000
+"""Poses of which the expected accuracy is told in a second; of more it takes as long as the choice itself."""
 MOST_DRAWS: Final = 200_000
 UNLIMITED_RAD: Final = np.pi
 JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
@@ -110,7 +112,8 @@ def plan_poses(
         arm: The nominal arm.
         options: How many, and what is best.
         cell: Cell whose sensor has to reach the poses; joint limits and rules alone without one.
-        numbers: Numbers of poses of which the expected accuracy is asked for.
+        numbers: Numbers of poses of which the expected accuracy is asked for, beside that of the options
+            up to a thousand; without any it is not.
 
     Raises:
         WorkError: If the sensor reaches too few poses, or rules allow too few.
@@ -119,7 +122,8 @@ def plan_poses(
     size = max(LEAST_POOL, POOL_PER_POSE * options.count, POOL_PER_NUMBER * max(numbers, default=0))
     pool = measurable_pool(arm, cell, size, options.seed, options.rules)
     wanted = ChoiceOptions(criterion=options.criterion, tool=flange_from_target)
-    identified = IdentifiedArm(arm)
+    identified, asked = IdentifiedArm(arm), [options.count] if options.count <= MOST_TOLD else []
+    told = sorted({*numbers, *asked}) if numbers else []
     arranged = _arranged(identified, pool, options, wanted, cell)
     poses = arranged.orders[options.order]
     return Plan(
@@ -127,7 +131,7 @@ def plan_poses(
         targets_of(arm, poses.readings, flange_from_target),
         arranged.choice,
         {name: seconds_of(each) for name, each in arranged.orders.items()},
-        {n: expected_mm(identified, pool, n, wanted, options.sigma_mm) for n in numbers},
+        {n: expected_mm(identified, pool, n, wanted, options.sigma_mm) for n in told},
         lowest(arm, poses.readings, tool=flange_from_target),
         arranged.unreached,
     )

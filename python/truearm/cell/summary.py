@@ -9,8 +9,8 @@ from truearm.cell.session import Session
 def summary_of(session: Session) -> dict[str, Any]:
     """JSON values: poses, measured, skipped, open, readings and how many failed, frame, stretches, events.
 
-    Beside them how many checks were measured and skipped, and the poses of which nothing says whether
-    something moved meanwhile.
+    "complete" says whether no step is open, neither pose nor check. Beside them how many checks were measured
+    and skipped, and the poses of which nothing says whether something moved meanwhile.
     """
     counts = {
         (kind, outcome): count
@@ -33,6 +33,7 @@ def summary_of(session: Session) -> dict[str, Any]:
         "poses": sum(count for (kind, _), count in counts.items() if kind == "pose"),
         "measured": counts.get(("pose", "measured"), 0),
         "open": counts.get(("pose", "open"), 0),
+        "complete": session.next_step() is None,
         "skipped": [{"pose": pose + 1, "reason": reason} for pose, reason in skipped],
         "checks": {outcome: counts.get(("check", outcome), 0) for outcome in ("measured", "skipped")},
         "unchecked": unchecked_poses(session),

@@ -13,7 +13,7 @@ from truearm.cli.progress import told_stages
 from truearm.errors import typed
 
 if TYPE_CHECKING:
-    from truearm.fleet import FleetRun
+    from truearm.fleet import Fleet, FleetRun
     from truearm.fleet.rows import Judged
 
 COLUMNS = ("arm", "verdict", "mean", "max", "before", "drift", "at most")
@@ -45,7 +45,7 @@ def command(
 
     known = Fleet.load(fleet)
     check_directory(output)
-    with ends_promptly(f"Finished arms are in {output}; the same command goes on with the others."):
+    with ends_promptly(lambda: _kept(known, output)):
         run = run_fleet(known, output, scheduler=scheduler, workers=workers, stages=told_stages())
     for arm, trace in run.traces.items():
         tell(f"{arm}: this is a defect of truearm, please report it:\n{trace}")
@@ -55,6 +55,15 @@ def command(
         _print(run, output, again=f"truearm fleet {typed(fleet)} -o {typed(output)}")
     if run.failed:
         raise typer.Exit(FAILED)
+
+
+def _kept(fleet: "Fleet", output: Path) -> str:
+    """What an interrupted run leaves behind, and how to go on."""
+    from truearm.fleet.kept import earlier_files
+
+    if any(earlier_files(output / entry.name) for entry in fleet.arms):
+        return f"Finished arms are in {output}; the same command goes on with the others."
+    return "No arm is finished yet; the same command begins anew."
 
 
 def _print(run: "FleetRun", output: Path, *, again: str) -> None:

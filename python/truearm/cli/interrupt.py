@@ -4,7 +4,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Final, NoReturn
@@ -16,11 +16,11 @@ GRACE_S: Final = 0.6
 
 
 @contextmanager
-def ends_promptly(kept: str = "") -> Iterator[None]:
+def ends_promptly(kept: Callable[[], str] | None = None) -> Iterator[None]:
     """Around long work: Ctrl-C raises KeyboardInterrupt, and ends the process if that takes too long.
 
-    Files are written whole or not at all, so that ending at any moment leaves no half-written one. `kept`
-    is told then: what is there already, and how to go on.
+    Files are written whole or not at all, so that ending at any moment leaves no half-written one. What
+    `kept` says is told then: what is there already, and how to go on.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -36,9 +36,8 @@ def ends_promptly(kept: str = "") -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         ended.set()
-        if kept:
-            put_away()
-            tell(kept)
+        if kept is not None:
+            _tell(kept)
         raise
     finally:
         ended.set()
@@ -54,10 +53,14 @@ def end_at_once() -> NoReturn:
     os._exit(INTERRUPTED)
 
 
-def _end_unless(ended: threading.Event, kept: str) -> None:
+def _tell(kept: Callable[[], str] | None) -> None:
+    put_away()
+    if kept is not None:
+        tell(kept())
+
+
+def _end_unless(ended: threading.Event, kept: Callable[[], str] | None) -> None:
     if not ended.wait(GRACE_S):
-        put_away()
-        if kept:
-            tell(kept)
+        _tell(kept)
         tell("Interrupted.")
         os._exit(INTERRUPTED)

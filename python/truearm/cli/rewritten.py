@@ -1,12 +1,17 @@
 """A compensated program as `truearm compensate` shows it."""
 
+import numpy as np
+
 from truearm.cli.console import print_table, say, say_wrapped
 from truearm.errors import count_of
+from truearm.programs.listing import describe
 from truearm.programs.report import counts, table_rows, unified_diff
-from truearm.programs.rewriting import Rewritten, describe
+from truearm.programs.rewriting import Rewritten
 
 ROWS_SHOWN = 100
 LISTED_SHOWN = 30
+ROUNDING_MM = 1e-3
+ROUNDING_MRAD = 1e-2
 
 
 def print_rewritten(done: Rewritten, *, dry_run: bool) -> None:
@@ -23,7 +28,10 @@ def print_rewritten(done: Rewritten, *, dry_run: bool) -> None:
     )
     if done.changed.any():
         moved = done.correction_mm[done.changed]
-        say_wrapped(f"Corrections: {moved.mean():.3f} mm mean, {moved.max():.3f} mm at most.")
+        say_wrapped(
+            f"Corrections: {moved.mean():.3f} mm mean, {moved.max():.3f} mm at most.{_positions(done)}"
+        )
+        _print_left(done)
     if done.inserted:
         say_wrapped(f"Waypoints inserted on straight lines: {done.inserted}.")
     for title, lines in (("Kept after a refusal:", done.kept), ("Left as they are:", done.listed)):
@@ -32,8 +40,23 @@ def print_rewritten(done: Rewritten, *, dry_run: bool) -> None:
             say(describe(done.program, list(lines), LISTED_SHOWN))
 
 
+def _positions(done: Rewritten) -> str:
+    """How far positions moved that the program says; nothing where it has joint targets alone."""
+    moved = done.moved_mm[done.changed & np.isfinite(done.moved_mm)]
+    return f" Written positions moved by {moved.max():.3f} mm at most." if len(moved) else ""
+
+
+def _print_left(done: Rewritten) -> None:
+    """Say how far the arm stays from its targets, where that is more than rounding."""
+    away, turned = done.residual_mm[done.changed].max(), done.residual_mrad[done.changed].max()
+    left = [f"{away:.3f} mm"] if away > ROUNDING_MM else []
+    left += [f"{turned:.3f} mrad"] if turned > ROUNDING_MRAD else []
+    if left:
+        say_wrapped(f"Not all targets are met in full: up to {' and '.join(left)} are left.")
+
+
 def _print_dry(done: Rewritten) -> None:
-    columns = ("where", "target", "shift mm", "turn mrad", "std mm")
+    columns = ("where", "target", "shift mm", "turn mrad", "std mm", "moved mm")
     print_table(columns, table_rows(done, ROWS_SHOWN), left=(0, 1))
     hidden = int(done.changed.sum()) - ROWS_SHOWN
     if hidden > 0:

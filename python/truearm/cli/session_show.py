@@ -66,11 +66,19 @@ def _show(session: "Session", *, as_json: bool) -> None:
         )
     for skipped in found["skipped"][:MOST_SHOWN]:
         say_wrapped(f"Pose {skipped['pose']} skipped: {skipped['reason']}")
-    if found["events"]:
-        counts = ", ".join(f"{count} {kind}" for kind, count in found["events"].items())
-        say_wrapped(f"Events: {counts}. The last: {found['last_event']}")
+    _show_end(found)
     if found["measured"]:
         suggest(f"truearm session export {typed(session.path)} -o measurements.csv")
+
+
+def _show_end(found: dict[str, Any]) -> None:
+    """What happened on the way, and whether something is left to measure."""
+    on_the_way, of_them = (" on the way", " of them") if found["complete"] else ("", "")
+    if found["events"]:
+        counts = ", ".join(f"{count} {kind}" for kind, count in found["events"].items())
+        say_wrapped(f"Events{on_the_way}: {counts}. The last{of_them}: {found['last_event']}")
+    if found["complete"]:
+        say("The session is complete: nothing is left to measure.")
 
 
 def _stretch(row: dict[str, Any]) -> list[str]:

@@ -88,7 +88,7 @@ def command(
     study = _study(data, robot, (length_unit, angle_unit), asked, quick=quick)
     where = Where(scheduler, workers, _again(again))
     check_directory(output)
-    with ends_promptly(f"Results so far are in {output}; the same command goes on with the others."):
+    with ends_promptly(lambda: f"Results so far are in {output}; the same command goes on with the others."):
         _warn_of(study)
         make_directory(output)
         outcome = gather(study, output) if so_far else conduct(study, output, where, told_progress())

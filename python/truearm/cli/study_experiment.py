@@ -54,7 +54,7 @@ def command(
     write_whole(output / CELL_NAME, cell_text(setting))
     kept = f"The session is in {output}; the same command goes on with it."
     try:
-        with Teller() as teller, ends_promptly(kept):
+        with Teller() as teller, ends_promptly(lambda: kept):
             result, drawn = conduct_experiment(setting, output, teller.tell, told_stages())
     except KeyboardInterrupt:
         end_at_once()

@@ -224,7 +224,8 @@ def _print(found: "Update") -> None:
     say_wrapped(
         f"Test for a change of {listed(found.tested)}: p {probability(found.changed.p)}. "
         f"Test of the residuals that remain: p {probability(found.rest.p)}. "
-        "A small p is unlikely for an arm that did not change."
+        "A small p is unlikely for an arm that did not change: "
+        f"each counts below {found.threshold:g}, half the level of {found.level:g} that the two share."
     )
 
 

@@ -142,7 +142,7 @@ def _constants(calibration: Calibration, chosen: Format, options: Options) -> Ex
     elif chosen == "ur-yaml":
         notes = [ONLY_ROS, *notes]
         stated = options.kinematics_hash or _own_hash(calibration)
-        text, left, difference = yaml_text(robot, stated, notes)
+        text, left, difference = yaml_text(robot, nominal, stated, notes)
         notes += left
     else:
         notes += beta_is_lost(robot)

@@ -57,14 +57,23 @@ def grid_axes(calibration: Calibration, stated: str | None = None) -> list[Axis]
             it each joint has five readings over its range.
 
     Raises:
-        UsageError: If it cannot be read, or leaves a joint's limits.
+        UsageError: If it cannot be read, names a joint twice, or leaves a joint's limits.
     """
     ranges = _ranges(calibration)
     if stated is None:
         return [Axis(low, high, POINTS) for low, high in ranges]
     axes = [Axis(0.5 * (low + high), 0.5 * (low + high), 1) for low, high in ranges]
+    named = set[int]()
     for part in stated.replace(" ", "").split(","):
         number, axis = _axis(part)
+        if number in named:
+            raise UsageError(
+                f'q{number} is named twice: "{stated}"',
+                where="--grid",
+                rule="A joint has one reading or one range",
+                way_out=f"Leave one q{number} out",
+            )
+        named.add(number)
         if not 1 <= number <= len(axes):
             raise UsageError(f"there is no q{number}", where="--grid", rule=f"The arm has {len(axes)} joints")
         _check_limits(calibration.robot, number, axis)

@@ -13,29 +13,33 @@ from truearm.exporting.origins import joint_origins, roll_pitch_yaw
 from truearm.exporting.parity import checked
 from truearm.robot import Robot
 from truearm.rotations import quaternion_from_matrix
-from truearm.ur_kinematics import LINKS, NUMBERS, URDF_CONVENTION, robot_from_yaml
+from truearm.ur_kinematics import LINKS, NUMBERS, URDF_CONVENTION, has_ur_structure, robot_from_yaml
 
 Floats = NDArray[np.float64]
 
 NOTHING: Final = 1e-12
 
 
-def yaml_text(robot: Robot, kinematics_hash: str, notes: list[str]) -> tuple[str, list[str], float]:
+def yaml_text(
+    robot: Robot, nominal: Robot, kinematics_hash: str, notes: list[str]
+) -> tuple[str, list[str], float]:
     """Text of the file, what beside `notes` it cannot hold, and how far its kinematics are from ours, m.
 
     Args:
         robot: The calibrated arm.
+        nominal: As it was designed.
         kinematics_hash: What the driver compares with the hash of the arm's own kinematics.
         notes: What the file cannot hold; goes into comments.
 
     Raises:
-        InputError: If this is no arm with six revolute joints of its own.
+        InputError: If the nominal arm has not the axes of Universal Robots' arms.
         WorkError: If the text read again is not the robot.
     """
-    if robot.joints != ("revolute",) * len(LINKS) or not np.array_equal(robot.coupling, np.eye(len(LINKS))):
+    if not has_ur_structure(nominal):
         raise InputError(
-            f"{robot.name} is no arm of Universal Robots",
-            rule="The file holds six revolute joints that move one by one",
+            f"{nominal.name} is no arm of Universal Robots",
+            rule="The file holds six joints that turn one by one: axes 2, 3 and 4 parallel, 1 meeting 2, 4 "
+            "meeting 5 and 5 meeting 6 at a right angle",
             way_out="Use --to urdf",
         )
     origins, rest = joint_origins(robot)

@@ -8,7 +8,7 @@ from truearm.controller import Controller
 from truearm.errors import Notice, UsageError
 from truearm.inverse import Inverse
 from truearm.kinds import required
-from truearm.programs.declaring import declared_controller, refuse_contradiction
+from truearm.programs.declaring import declared_controller, refuse_another_arm, refuse_contradiction
 from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
@@ -52,7 +52,7 @@ def compensate_program(
 
     Raises:
         UsageError: If the controller must be declared and is not, or the language is not told.
-        InputError: If a file cannot be read, or is no program.
+        InputError: If a file cannot be read, or is no program, or the controller is of another arm.
         WorkError: If targets were refused, or the program was compensated already.
     """
     chosen = required(choices or Choices(), Choices, "the choices")
@@ -60,6 +60,8 @@ def compensate_program(
     calibration, author = compensator.calibration, compensator.programming
     written_in = language_of(Path(path), chosen.language)
     declared = _declared(controller, written_in, author)
+    if declared.robot is not author:
+        refuse_another_arm(declared, calibration.robot)
     known = _frames(frames).fresh()
     program = read_program(Path(path), written_in, author, known)
     refuse_contradiction(program, declared, force=chosen.force)

@@ -80,8 +80,9 @@ class CsvPath:
         return source.first, f"# {text}{source.newline}"
 
     def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
-        """Nothing: a path says itself how densely it is sampled, and has no linear moves."""
-        return StepTexts(impossible=tuple(steps[0].move for steps in moves))
+        """Nothing: a path says itself how densely it is sampled."""
+        why = "a path gets no rows but its author's"
+        return StepTexts(impossible=tuple(steps[0].move for steps in moves), why=why)
 
 
 class _Reader:

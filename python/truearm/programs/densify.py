@@ -1,5 +1,6 @@
 """Waypoints on long straight moves, where the arm's error varies between the ends."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -7,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from truearm.errors import Notice, count_of
 from truearm.inverse import Inverse
 from truearm.kinds import check_positive
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
 from truearm.programs.layouts import of_joints, of_pose
-from truearm.programs.program import LinearStep, Program, StepTexts
+from truearm.programs.listing import listed_move
+from truearm.programs.program import LinearStep, Listed, Program, StepTexts
 from truearm.programs.tables import NOWHERE, Motion
 from truearm.robot import Robot
 from truearm.rotations import rigid_inverse
@@ -24,6 +27,9 @@ Bools = NDArray[np.bool_]
 
 MOST_SAMPLES: Final = 4000
 WITHIN: Final = 4
+MOVES_NAMED: Final = 5
+UNREACHED: Final = "the nominal arm does not reach all of the line"
+OFFSET: Final = "its target has an offset, which a waypoint would not have"
 
 
 @dataclass(frozen=True)
@@ -50,17 +56,55 @@ class Spacing:
         return cls(deviation_mm / MM_PER_METRE, least_mm / MM_PER_METRE)
 
 
+@dataclass(frozen=True)
+class Deviating:
+    """A linear move that deviates by more than was allowed and got no waypoints.
+
+    Attributes:
+        listed: Its statement, and why it got none.
+        deviation_mm: How far the path is from a straight line, as predicted; None where that is not known.
+    """
+
+    listed: Listed
+    deviation_mm: float | None
+
+
 @dataclass(frozen=True, eq=False)
 class Inserted:
     """What densification found.
 
     Attributes:
         texts: What is inserted, and moves that their language cannot say with waypoints.
-        impossible: Moves, by number, that deviate by more and got no waypoints, those included.
+        deviating: Moves that deviate by more and got no waypoints, those included, in the order of the text.
     """
 
     texts: StepTexts
-    impossible: tuple[int, ...]
+    deviating: tuple[Deviating, ...] = ()
+
+
+def deviation_notices(
+    program: Program, deviating: Sequence[Deviating], spacing: Spacing | None
+) -> tuple[Notice, ...]:
+    """What is told of moves that deviate by more than `spacing` allows: the first by line."""
+    if not deviating or spacing is None:
+        return ()
+    count, several = len(deviating), len(program.sources) > 1
+    named = "; ".join(_in_words(program, one, several=several) for one in deviating[:MOVES_NAMED])
+    more = f"; and {count - MOVES_NAMED} more" if count > MOVES_NAMED else ""
+    deviate = "deviates" if count == 1 else "deviate"
+    may = ", or may," if any(one.deviation_mm is None for one in deviating) else ""
+    largest_mm = MM_PER_METRE * spacing.deviation_m
+    text = (
+        f"{count_of(count, 'linear move')} {deviate}{may} by more than {largest_mm:g} mm (--densify-mm), "
+        f"and waypoints could not be inserted there: {named}{more}"
+    )
+    return (Notice("deviation", text, tuple(sorted({one.listed.line for one in deviating}))),)
+
+
+def _in_words(program: Program, one: Deviating, *, several: bool) -> str:
+    file = f"{program.sources[one.listed.file].path.name}, " if several else ""
+    far = "how far is not known" if one.deviation_mm is None else f"{one.deviation_mm:.3g} mm"
+    return f"{file}line {one.listed.line} ({far}; {one.listed.reason})"
 
 
 class Densifier:
@@ -75,6 +119,7 @@ class Densifier:
     ) -> None:
         self._program, self._encoder, self._spacing = program, encoder, spacing
         self._robot, self._inverse, self._compensator = models
+        self._deviation_mm: dict[int, float] = {}
 
     def insert(self, nominal: Floats, changed: Bools) -> Inserted:
         """Waypoints for every linear move between two changed targets, (t, N) readings and (t,)."""
@@ -82,18 +127,23 @@ class Densifier:
         ends = np.stack([moves.before, moves.target], axis=1)
         lines = (moves.motion == Motion.LINEAR) & (moves.before != NOWHERE) & changed[ends].all(axis=1)
         stepped: list[list[LinearStep]] = []
-        impossible: list[int] = []
+        why: dict[int, str] = {}
         for move in np.flatnonzero(lines).tolist():
             found = self._between(move, ends[move], nominal[ends[move]])
-            if found is None:
-                impossible.append(move)
+            if isinstance(found, str):
+                why[move] = found
             elif found:
                 stepped.append(found)
         texts = self._program.language.linear_steps(self._program, stepped) if stepped else StepTexts()
-        return Inserted(texts, tuple(sorted([*impossible, *texts.impossible])))
+        why.update(dict.fromkeys(texts.impossible, texts.why))
+        deviating = (
+            Deviating(listed_move(self._program, move, reason), self._deviation_mm.get(move))
+            for move, reason in sorted(why.items())
+        )
+        return Inserted(texts, tuple(deviating))
 
-    def _between(self, move: int, targets: Integers, ends: Floats) -> list[LinearStep] | None:
-        """Waypoints before a move; None where it deviates by more and that cannot be helped.
+    def _between(self, move: int, targets: Integers, ends: Floats) -> list[LinearStep] | str:
+        """Waypoints before a move, or why it gets none though it deviates by more.
 
         Args:
             move: Its number.
@@ -117,17 +167,19 @@ class Densifier:
         if start == end:
             nominal[0] = ends[0]
         if np.isnan(nominal).any():
-            return None
+            return UNREACHED
         found = self._compensator.joints(
             np.ascontiguousarray(nominal),
             tool=environment.tool.true,
             author=author_of(self._robot, environment.tool, displacement),
         )
         if np.asarray(found.refused).any():
-            return None
-        chosen, enough = _needed(self._written(found.q, environment), self._spacing.deviation_m)
+            return f"waypoints between are refused: {found.refusals[0].reason}"
+        points = self._written(found.q, environment)
+        self._deviation_mm[move] = MM_PER_METRE * _deviation(points)
+        chosen, enough = _needed(points, self._spacing.deviation_m)
         if not enough:
-            return None
+            return f"the least spacing of {MM_PER_METRE * self._spacing.least_m:g} mm is too wide"
         return self._steps(move, environment, found.q[chosen]) if chosen else []
 
     def _written(self, q: Floats, environment: Environment) -> Floats:
@@ -137,13 +189,13 @@ class Densifier:
         points: Floats = (poses @ environment.tool.controller)[:, :3, 3]
         return points
 
-    def _steps(self, move: int, environment: Environment, q: Floats) -> list[LinearStep] | None:
-        """Waypoints that say readings (n, N); None where one cannot be said with certainty.
+    def _steps(self, move: int, environment: Environment, q: Floats) -> list[LinearStep] | str:
+        """Waypoints that say readings (n, N), or why one cannot be said with certainty.
 
         A waypoint is written out in numbers, without the offsets that the move's own target has.
         """
         if not environment.places_as_stored:
-            return None
+            return OFFSET
         program, moves = self._program, self._program.moves
         target, file = int(moves.target[move]), int(moves.source[move])
         layout = program.layouts[int(program.targets.layout[target])]
@@ -152,8 +204,9 @@ class Densifier:
             values, decimals = self._encoder.pose_numbers(which, layout, environment, q)
         elif of_joints(layout):
             values, decimals = self._encoder.joint_numbers(which, layout, q)
-        if self._encoder.reasons.pop(target, None) is not None:
-            return None
+        reason = self._encoder.reasons.pop(target, None)
+        if reason is not None:
+            return f"waypoints between cannot be written: {reason}"
         line, _ = program.sources[file].place(int(moves.at[move]))
         return [
             LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()))

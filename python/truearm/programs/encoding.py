@@ -16,6 +16,7 @@ from truearm.programs.solving import AT_ONCE, are_singular, numbers_of
 from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -36,12 +37,15 @@ class Written:
         values: What to write, in the text's units, (m,).
         decimals: With how many digits behind the point, (m,).
         reasons: Why a target cannot be written, by its number.
+        moved_mm: How far the position that each target says moves, (t,); NaN for joint targets and those
+            that are not written.
     """
 
     places: Integers
     values: Floats
     decimals: Integers
     reasons: dict[int, str]
+    moved_mm: Floats
 
 
 def encode_targets(
@@ -76,6 +80,7 @@ class Encoder:
     def __init__(self, program: Program, uses: Uses, robot: Robot, inverse: Inverse) -> None:
         self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
         self.reasons: dict[int, str] = {}
+        self._moved_mm: Floats = np.full(len(program.targets), np.nan)
         self._found: list[tuple[Integers, Floats, Integers]] = []
 
     def joints(self, which: Integers, layout: JointLayout, q: Floats) -> None:
@@ -84,7 +89,13 @@ class Encoder:
 
     def poses(self, which: Integers, layout: PoseLayout, environment: Environment, q: Floats) -> None:
         """Cartesian targets say where the controller's model puts the tool at q^c."""
-        self._keep(which, layout, *self.pose_numbers(which, layout, environment, q))
+        values, decimals = self.pose_numbers(which, layout, environment, q)
+        self._keep(which, layout, values, decimals)
+        width = layout.width - layout.configuration
+        before = layout.to_poses(numbers_of(self.program, which, layout)[:, :width])
+        after = layout.to_poses((values * self._factors(which, layout))[:, :width])
+        moved = np.linalg.norm((after - before)[:, :3, 3], axis=1)
+        self._moved_mm[which] = np.where(np.isin(which, list(self.reasons)), np.nan, MM_PER_METRE * moved)
 
     def pose_numbers(
         self, which: Integers, layout: PoseLayout, environment: Environment, q: Floats
@@ -186,12 +197,12 @@ class Encoder:
         """All that was found, in the order of the numbers."""
         if not self._found:
             nothing = np.empty(0, dtype=np.int64)
-            return Written(nothing, np.empty(0), nothing, self.reasons)
+            return Written(nothing, np.empty(0), nothing, self.reasons, self._moved_mm)
         if len(self._found) == 1:
-            return Written(*self._found[0], self.reasons)
+            return Written(*self._found[0], self.reasons, self._moved_mm)
         places, values, decimals = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
         order = np.argsort(places, kind="stable")
-        return Written(places[order], values[order], decimals[order], self.reasons)
+        return Written(places[order], values[order], decimals[order], self.reasons, self._moved_mm)
 
 
 def joints_of(robot: Robot, base_from_flange: Floats, near: Floats) -> tuple[Floats, NDArray[np.bool_]]:

@@ -108,11 +108,13 @@ class StepTexts:
         insertions: Texts; those for one place follow each other.
         waypoints: How many waypoints they say.
         impossible: Numbers of moves whose waypoints it cannot say.
+        why: Why it cannot, in words that end a listing.
     """
 
     insertions: tuple[Insertion, ...] = ()
     waypoints: int = 0
     impossible: tuple[int, ...] = ()
+    why: str = "its statement is not a plain one, or belongs to others"
 
 
 class Language(Protocol):

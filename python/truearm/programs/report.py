@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from truearm.programs.listing import listed_target
 from truearm.programs.program import Listed, Program
-from truearm.programs.rewriting import Rewritten, listed_target
+from truearm.programs.rewriting import Rewritten
 from truearm.programs.uses import target_count
 
 FORMAT = 1
@@ -26,10 +27,16 @@ def report_of(done: Rewritten, outputs: Sequence[Path] = ()) -> dict[str, Any]:
         "correction_mm": _spread(done.correction_mm[done.changed]),
         "correction_mrad": _spread(done.correction_mrad[done.changed]),
         "std_mm": _spread(done.std_mm[done.changed]),
+        "residual_mm": _spread(done.residual_mm[done.changed]),
+        "residual_mrad": _spread(done.residual_mrad[done.changed]),
+        "moved_mm": _spread(done.moved_mm[done.changed]),
         "inserted": done.inserted,
         "targets": [_target(done, int(number)) for number in np.flatnonzero(done.changed)],
         "kept": [_line(done.program, one) for one in done.kept],
         "listed": [_line(done.program, one) for one in done.listed],
+        "deviating": [
+            {**_line(done.program, one.listed), "deviation_mm": one.deviation_mm} for one in done.deviating
+        ],
         "notices": [{"kind": notice.kind, "message": notice.message} for notice in done.notices],
     }
 
@@ -54,7 +61,10 @@ def counts(done: Rewritten) -> dict[str, int]:
 
 
 def table_rows(done: Rewritten, most: int) -> Iterator[tuple[str, ...]]:
-    """Rows about the first `most` changed targets: place, name, shift in mm, turn in mrad, std in mm."""
+    """Rows about the first `most` changed targets: place, name, shift in mm, turn in mrad, std in mm.
+
+    And how far the position that it says moves, in mm; nothing for joint targets.
+    """
     for number in np.flatnonzero(done.changed)[:most]:
         place = listed_target(done.program, int(number), "")
         yield (
@@ -63,6 +73,7 @@ def table_rows(done: Rewritten, most: int) -> Iterator[tuple[str, ...]]:
             f"{done.correction_mm[number]:.3f}",
             f"{done.correction_mrad[number]:.3f}",
             f"{done.std_mm[number]:.3f}",
+            "" if np.isnan(done.moved_mm[number]) else f"{done.moved_mm[number]:.3f}",
         )
 
 
@@ -130,8 +141,15 @@ def _target(done: Rewritten, number: int) -> dict[str, Any]:
         "corrected": done.corrected[number].tolist(),
         "correction_mm": float(done.correction_mm[number]),
         "correction_mrad": float(done.correction_mrad[number]),
-        "std_mm": None if np.isnan(done.std_mm[number]) else float(done.std_mm[number]),
+        "std_mm": _number(done.std_mm[number]),
+        "residual_mm": float(done.residual_mm[number]),
+        "residual_mrad": float(done.residual_mrad[number]),
+        "moved_mm": _number(done.moved_mm[number]),
     }
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)
 
 
 def _line(program: Program, one: Listed) -> dict[str, Any]:

@@ -13,12 +13,13 @@ from truearm.errors import Notice, WorkError
 from truearm.files import make_directory
 from truearm.inverse import Inverse
 from truearm.kinds import check_values, required
-from truearm.programs.densify import Densifier, Inserted, Spacing
+from truearm.programs.densify import Densifier, Deviating, Inserted, Spacing, deviation_notices
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
 from truearm.programs.environment import Frame, Transform, author_of
 from truearm.programs.frames import Frames
 from truearm.programs.left_open import left_open_mm
+from truearm.programs.listing import describe, listed_target
 from truearm.programs.marks import refuse_marked
 from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.program import Language, Listed, Program, StepTexts
@@ -45,7 +46,6 @@ ALLOWING: Final = {
     FRAMES_UNSURE: "--largest-std-mm",
 }
 """The option that allows more, by the code of a refusal."""
-NAMED: Final = 10
 KEEP_NOMINAL: Final = "keep-nominal"
 ON_REFUSAL: Final = ("stop", KEEP_NOMINAL)
 Tell = Callable[[str, int, int], None]
@@ -77,6 +77,7 @@ class Corrected(Protocol):
     correction_mm: Floats
     correction_mrad: Floats
     residual_mm: Floats
+    residual_mrad: Floats
     std_mm: Floats
     refused: Bools
     refusals: tuple[Any, ...]
@@ -156,9 +157,15 @@ class Rewritten:
         correction_mrad: How far it turned, (t,).
         std_mm: Standard deviation of the tool's place there, (t,): of the calibration, of the tool and, for
             Cartesian targets, of the work object, as far as the frames file tells theirs.
+        residual_mm: How far from its place the tool stays, (t,): more than rounding where fewer joints may
+            move than the task needs.
+        residual_mrad: How far turned from it, (t,).
+        moved_mm: How far the position moved that the program says, (t,): that of a Cartesian target in its
+            work object, as the controller computes it; NaN for joint targets.
         kept: Targets that were refused and kept as they were, with the reason.
         listed: What was left as it was because it cannot be changed with certainty.
         inserted: How many waypoints were inserted.
+        deviating: Linear moves that deviate by more than was allowed, and got no waypoints.
         notices: What the user should know.
         facts: With what it was rewritten, for the report.
     """
@@ -171,9 +178,13 @@ class Rewritten:
     correction_mm: Floats
     correction_mrad: Floats
     std_mm: Floats
+    residual_mm: Floats
+    residual_mrad: Floats
+    moved_mm: Floats
     kept: tuple[Listed, ...]
     listed: tuple[Listed, ...]
     inserted: int = 0
+    deviating: tuple[Deviating, ...] = ()
     notices: tuple[Notice, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
 
@@ -272,9 +283,9 @@ class _State:
 
     def __post_init__(self) -> None:
         self.corrected = np.broadcast_to(self.nominal, self.nominal.shape)
-        self.correction_mm, self.correction_mrad, self.std_mm = (
-            np.broadcast_to(np.nan, len(self.nominal)) for _ in range(3)
-        )
+        unknown = np.broadcast_to(np.nan, len(self.nominal))
+        self.correction_mm = self.correction_mrad = self.std_mm = unknown
+        self.residual_mm = self.residual_mrad = unknown
 
     def compensate(self) -> None:
         """Corrected readings of all known targets, tool by tool, in the order of the moves."""
@@ -303,6 +314,8 @@ class _State:
         self.corrected = placed(self.corrected, rows, found.q)
         self.correction_mm = placed(self.correction_mm, rows, found.correction_mm)
         self.correction_mrad = placed(self.correction_mrad, rows, found.correction_mrad)
+        self.residual_mm = placed(self.residual_mm, rows, found.residual_mm)
+        self.residual_mrad = placed(self.residual_mrad, rows, found.residual_mrad)
         for refusal in found.refusals:
             self.refused[int(which[refusal.number - 1])] = refusal.reason
         self.codes |= {refusal.code for refusal in found.refusals}
@@ -412,10 +425,14 @@ class _State:
             self.correction_mm,
             self.correction_mrad,
             self.std_mm,
+            self.residual_mm,
+            self.residual_mrad,
+            written.moved_mm,
             kept,
             tuple(listed),
             steps.texts.waypoints,
-            (*self._notices(changed), *self._deviating(steps)),
+            steps.deviating,
+            (*self._notices(changed), *deviation_notices(self.program, steps.deviating, choices.spacing)),
         )
 
     def _inserted(self, changed: Bools, spacing: Spacing | None) -> Inserted:
@@ -426,20 +443,6 @@ class _State:
         of_models = (models.programming, models.inverse, models.compensator)
         return Densifier(self.program, of_models, encoder, spacing).insert(self.nominal, changed)
 
-    def _deviating(self, steps: Inserted) -> tuple[Notice, ...]:
-        if not steps.impossible:
-            return ()
-        targets = self.program.moves.target[list(steps.impossible)]
-        lines = sorted({self._listed(int(target), "").line for target in targets})
-        return (
-            Notice(
-                "deviation",
-                f"{len(steps.impossible)} linear moves deviate by more than was allowed, and waypoints could "
-                "not be inserted there: the statement is not a plain one, or the least spacing is too wide",
-                tuple(lines),
-            ),
-        )
-
     def _forget(self, unchanged: Bools) -> None:
         if not unchanged.any():
             return
@@ -448,6 +451,8 @@ class _State:
         self.correction_mm = placed(self.correction_mm, rows, nothing)
         self.correction_mrad = placed(self.correction_mrad, rows, nothing)
         self.std_mm = placed(self.std_mm, rows, nothing)
+        self.residual_mm = placed(self.residual_mm, rows, nothing)
+        self.residual_mrad = placed(self.residual_mrad, rows, nothing)
 
     def _notices(self, changed: Bools) -> tuple[Notice, ...]:
         along = self.uses.moved & (self.uses.straight | self.uses.blended)
@@ -466,28 +471,3 @@ class _State:
 
     def _listed(self, target: int, reason: str) -> Listed:
         return listed_target(self.program, target, reason)
-
-
-def listed_target(program: Program, target: int, reason: str) -> Listed:
-    """A target in a listing."""
-    file = int(program.targets.source[target])
-    source = program.sources[file]
-    line, column = source.place(int(program.targets.at[target]))
-    name = program.targets.names.get(target) or source.line_text(line).strip()
-    return Listed(file, line, column, name, reason)
-
-
-def describe(program: Program, listed: list[Listed], most: int = NAMED) -> str:
-    """Lines of text about the first of `listed`."""
-    lines = [
-        f"  {program.sources[one.file].path.name}, line {one.line}, {shortened(one.name)}: {one.reason}"
-        for one in listed[:most]
-    ]
-    if len(listed) > most:
-        lines.append(f"  and {len(listed) - most} more")
-    return "\n".join(lines)
-
-
-def shortened(name: str, most: int = 40) -> str:
-    """A name or statement in at most `most` characters."""
-    return name if len(name) <= most else f"{name[: most - 3]}..."

@@ -12,8 +12,10 @@ from truearm.doubts import (
     HIDING,
     SAME,
     STATED_TOO_LARGE,
+    UNLIKELY,
     WOULD_FIT,
     constants_do_better,
+    judged_means_mm,
     to_check,
 )
 from truearm.errors import count_of
@@ -121,7 +123,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
-        if facts.grids or any(map(facts.noticed, HIDING)):
+        if mean < UNLIKELY * floor or facts.grids or any(map(facts.noticed, HIDING)):
             return
         words = (
             f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm. More poses will "
@@ -280,6 +282,7 @@ def _intervals(facts: Facts) -> Iterator[Advice]:
 
 def _what_varies(facts: Facts) -> Iterator[Advice]:
     mean, constant = facts.mean_mm(), facts.mean_mm(CONSTANT)
+    without = judged_means_mm(facts.calibration.validation, facts.outliers)
     if facts.best == CONSTANT and not facts.calibration.selection.distances:
         words = "Here they are constant; --model variable shows how much they vary over the workspace."
         yield Advice("try_variable", "Let the parameters vary.", words, 0.5 * mean)
@@ -289,7 +292,7 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
             "deviations."
         )
         yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
-    elif facts.best == VARIABLE and constants_do_better(mean, constant):
+    elif facts.best == VARIABLE and constants_do_better(without[VARIABLE], without[CONSTANT]):
         words = (
             f"The {facts.mean_error} is {mean:.4g} mm with the variable model and {constant:.4g} mm with "
             "constant parameters: what it learnt does not help where it was judged. Measure poses there, or "

@@ -1,8 +1,10 @@
 """Chapter: the same models judged on other measurements."""
 
+import numpy as np
+
 from truearm.doubts import OF_NO_USE
 from truearm.errors import count_of
-from truearm.evaluation import Evaluation
+from truearm.reporting.advice import Advice
 from truearm.reporting.facts import Facts
 from truearm.reporting.held_errors import cumulative, histogram
 from truearm.reporting.numbers import fixed, short
@@ -11,11 +13,14 @@ from truearm.reporting.verdict import HEADINGS, STATISTICS
 from truearm.units import MM_PER_METRE
 
 
-def _no_help(found: Evaluation) -> str:
-    """A warning where the calibration is of no use there."""
-    if all(notice.kind not in OF_NO_USE for notice in found.notices):
-        return ""
-    return " On these measurements the calibration does not help."
+def not_met(facts: Facts) -> list[Advice]:
+    """What to do first where the calibration is of no use on the other measurements; empty elsewhere."""
+    notices = () if facts.other is None else facts.other.notices
+    why = [notice.message for notice in notices if notice.kind in OF_NO_USE]
+    words = f"Of {', '.join(facts.other_names)}: {' '.join(why)}"
+    return (
+        [Advice("other_measurements", "Look at the other measurements first.", words, np.inf)] if why else []
+    )
 
 
 def other_data(facts: Facts) -> Section:
@@ -34,12 +39,13 @@ def other_data(facts: Facts) -> Section:
         if found.n_frame
         else "Frame and tool were kept"
     )
+    no_help = " On these measurements the calibration does not help." if not_met(facts) else ""
     table = Table(
         f"{', '.join(facts.other_names)}: {count_of(found.n_judged, 'row')} judged, mm",
         ["model", *HEADINGS],
         rows,
         says=f"{how}. The mean error of the {facts.best} model is {here} mm here, and {there} mm on the "
-        f"{facts.judged} poses of its own data.{_no_help(found)}",
+        f"{facts.judged} poses of its own data.{no_help}",
         strong=[list(errors).index(facts.best)],
     )
     parts: list[Part] = [table]

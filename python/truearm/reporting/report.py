@@ -1,18 +1,18 @@
 """The report of a calibration: what its chapters are, and the page."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from truearm.calibration import Calibration
 from truearm.evaluation import Evaluation
 from truearm.fitting import Stages, no_stages
-from truearm.reporting.advice import Advice, advise
+from truearm.reporting.advice import MOST, Advice, advise
 from truearm.reporting.corrections import compensation
 from truearm.reporting.facts import Facts
 from truearm.reporting.held_errors import held_errors
 from truearm.reporting.known import Known, known
-from truearm.reporting.other_data import other_data
+from truearm.reporting.other_data import not_met, other_data
 from truearm.reporting.page import page
 from truearm.reporting.parameters_chapter import parameters
 from truearm.reporting.parts import Figure, Section
@@ -36,12 +36,14 @@ class Report:
         verdict: Its first sentence.
         advice: What would help most next.
         figures: Title and sentence of each figure.
+        other: Errors on the other measurements, with their "files"; None without any.
     """
 
     html: str
     verdict: str
     advice: tuple[Advice, ...]
     figures: tuple[tuple[str, str], ...]
+    other: Mapping[str, Any] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values of all but the page."""
@@ -51,6 +53,7 @@ class Report:
                 {"kind": advice.kind, "words": f"{advice.name} {advice.words}"} for advice in self.advice
             ],
             "figures": [{"title": title, "says": says} for title, says in self.figures],
+            "other": None if self.other is None else dict(self.other),
         }
 
 
@@ -72,7 +75,7 @@ def report(
     facts = Facts(calibration, other, other_names)
     with stages("working out standard deviations"):
         certain = known(facts)
-    advice = tuple(advise(facts, certain))
+    advice = (*not_met(facts), *advise(facts, certain))[:MOST]
     sections: list[Section] = []
     for name, chapter in _chapters(certain):
         with stages(f"writing the report: {name}"):
@@ -81,7 +84,9 @@ def report(
         first = head(facts, [(entry.name, entry.words) for entry in advice])
         html = page(first, sections, foot=f"Made by truearm {calibration.version}.")
     figures = [part for section in sections for part in section.parts if isinstance(part, Figure)]
-    return Report(html, verdict(facts), advice, tuple((figure.title, figure.says) for figure in figures))
+    says = tuple((figure.title, figure.says) for figure in figures)
+    told = None if other is None else {"files": list(other_names), **other.to_dict()}
+    return Report(html, verdict(facts), advice, says, told)
 
 
 def _chapters(certain: Known | None) -> list[Chapter]:

@@ -45,7 +45,8 @@ def _overall(told: Mapping[str, Any]) -> str:
         f"{words} From {count_of(told['n_poses'], 'pose')}{left} the update estimated "
         f"{listed(told['estimated'])}; all other parameters, constant and variable, are those of the "
         f"calibration before. Test for a change of {' or '.join(told['tested'])}: p {change}. Test of the "
-        f"residuals that remain: p {rest}. The level of significance is {100.0 * told['level']:g} %."
+        f"residuals that remain: p {rest}. The two share the level of significance, "
+        f"{100.0 * told['level']:g} %: each counts where p is below {told['level'] / 2.0:g}."
     )
 
 

@@ -46,7 +46,7 @@ class Update:
         calibration: With offsets, frames and tools estimated again; the old one is kept in it.
         verdict: "holds": the old calibration still does. "moved": offsets or tool changed, and the field
             still fits. "field": what is left is more than field and noise may leave.
-        level: Share of unchanged arms that are not said to hold.
+        level: Share of unchanged arms that are not said to hold. `changed` and `rest` share it.
         offsets: Of the joints.
         frames: Motions of the set-ups' frames, where the calibration knows them.
         tools: Motions of the targets, where the calibration knows them.
@@ -74,6 +74,11 @@ class Update:
     notices: tuple[Notice, ...] = ()
 
     @property
+    def threshold(self) -> float:
+        """Below which the p of each of the two tests counts: half the level."""
+        return _threshold(self.level)
+
+    @property
     def estimated(self) -> tuple[str, ...]:
         """What was estimated: "offsets", and unless kept "frame" (in a known world "base") and "tool"."""
         frame = "base" if self.calibration.arm.world_is_known else "frame"
@@ -96,6 +101,7 @@ class Update:
         return {
             "verdict": self.verdict,
             "level": self.level,
+            "threshold": self.threshold,
             "n_poses": self.n_poses,
             "outliers": list(self.outliers),
             "estimated": list(self.estimated),
@@ -219,11 +225,16 @@ class _Found:
         return replace(told, calibration=updated(self.calibration, scene, found, judged, told.to_dict()))
 
 
+def _threshold(level: float) -> float:
+    """The level of each of the two tests, which share it."""
+    return level / 2.0
+
+
 def _verdict(changed: SquaresTest, rest: SquaresTest, level: float) -> Verdict:
     """What two tests, which share the level, say together."""
-    if rest.p < level / 2.0:
+    if rest.p < _threshold(level):
         return "field"
-    return "moved" if changed.p < level / 2.0 else "holds"
+    return "moved" if changed.p < _threshold(level) else "holds"
 
 
 def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, stages: Stages) -> Task:
