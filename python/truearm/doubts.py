@@ -153,9 +153,11 @@ def constant_is_better(validation: Validation, best: str, outliers: Outliers | N
         return []
     if not constants_do_better(means[best], means[CONSTANT]):
         return []
+    apart = ", outliers left out" if outliers is not None and outliers.means_mm else ""
     text = (
-        f"Constant parameters do better on {validation.judged} rows: a mean error of {means[CONSTANT]:.4g} "
-        f"mm against {means[best]:.4g} mm. Give --model constant, or measure more poses."
+        f"Constant parameters do better on {validation.judged} rows{apart}: a mean error of "
+        f"{means[CONSTANT]:.4g} mm against {means[best]:.4g} mm. Give --model constant, or measure "
+        "more poses."
     )
     return [Notice("constant_better", text)]
 

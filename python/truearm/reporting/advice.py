@@ -293,10 +293,11 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
         )
         yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
     elif facts.best == VARIABLE and constants_do_better(without[VARIABLE], without[CONSTANT]):
+        apart = ", outliers left out," if facts.outliers.means_mm else ""
         words = (
-            f"The {facts.mean_error} is {mean:.4g} mm with the variable model and {constant:.4g} mm with "
-            "constant parameters: what it learnt does not help where it was judged. Measure poses there, or "
-            "stay with --model constant."
+            f"The {facts.mean_error}{apart} is {without[VARIABLE]:.4g} mm with the variable model and "
+            f"{without[CONSTANT]:.4g} mm with constant parameters: what it learnt does not help where "
+            "it was judged. Measure poses there, or stay with --model constant."
         )
         yield Advice("constant_better", "Constant parameters do better.", words, mean)
     elif facts.best == VARIABLE and mean > SAME * constant:
