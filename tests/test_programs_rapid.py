@@ -421,9 +421,8 @@ NOT_TWICE = [
 def test_waypoints_copy_what_holds_for_a_part_of_the_way(motion):
     text = module(motion)
     line = text.split("\r\n").index(motion) + 1
-    step = LinearStep(
-        line, 0, 7, (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0, 0, 0, 0), (3,) * 3 + (7,) * 4 + (0,) * 4
-    )
+    values, decimals = (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0, 0, 0, 0), (3,) * 3 + (7,) * 4 + (0,) * 4
+    step = LinearStep(line, 0, 7, values, decimals, 0.01)
     program = read("a.mod", text, ABB)
     found = program.language.linear_steps(program, [[step]])
     assert found.impossible == (() if motion in PLAIN else (7,))

@@ -329,13 +329,14 @@ def test_a_step_is_a_copy_of_its_motion(robot, sample):
     values, decimals = (0.1, -0.2, 0.3, 1.0, -0.5, 0.25), (6,) * 6
 
     def step(line, program=program):
-        return UR.linear_steps(program, [[LinearStep(line, 0, 0, values, decimals)]])
+        move = int(np.searchsorted(program.moves.at, program.sources[0].line_starts[line - 1]))
+        return UR.linear_steps(program, [[LinearStep(line, 0, move, values, decimals, 0.01)]])
 
     numbers = "p[0.100000, -0.200000, 0.300000, 1.000000, -0.500000, 0.250000]"
     (only,) = step(16).insertions
-    assert only.text == f"  movel({numbers}, a=1.2, v=0.25)\n"
+    assert only.text == f"  movel({numbers}, a=1.2, v=0.25, r=0.00900)\n"
     assert only.start == only.end == program.sources[0].line_starts[15]
-    assert step(11).impossible == (0,)
+    assert len(step(11).impossible) == 1
     timed = read(UR, "movel(p[0.1, 0.2, 0.3, 0, 0, 0], t=2)\n", robot)
     assert step(1, timed).insertions == ()
     assert step(1, timed).impossible == (0,)
@@ -343,8 +344,8 @@ def test_a_step_is_a_copy_of_its_motion(robot, sample):
 
 def test_a_step_before_a_last_line_without_an_end(robot):
     program = read(UR, "movel(p[0.1, 0.2, 0.3, 0, 0, 0], a=1)", robot)
-    (only,) = UR.linear_steps(program, [[LinearStep(1, 0, 0, (0.5,) * 6, (1,) * 6)]]).insertions
-    assert only.text == "movel(p[0.5, 0.5, 0.5, 0.5, 0.5, 0.5], a=1)\n"
+    (only,) = UR.linear_steps(program, [[LinearStep(1, 0, 0, (0.5,) * 6, (1,) * 6, 0.01)]]).insertions
+    assert only.text == "movel(p[0.5, 0.5, 0.5, 0.5, 0.5, 0.5], a=1, r=0.00900)\n"
 
 
 @pytest.mark.parametrize("start", ["", "\xef\xbb\xbf"])

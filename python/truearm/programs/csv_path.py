@@ -19,7 +19,7 @@ from truearm.columns import JOINT, QUATERNION, TARGET
 from truearm.programs.environment import IDENTITY, Environment, Environments, Frame
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
-from truearm.programs.program import LinearStep, Program, StepTexts
+from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.scanning import Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
@@ -43,7 +43,7 @@ class _Part:
     required: bool
 
 
-class CsvPath:
+class CsvPath(BlendsShortened):
     """Waypoints in a table."""
 
     name = "CSV path"

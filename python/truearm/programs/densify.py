@@ -29,6 +29,8 @@ MOST_SAMPLES: Final = 4000
 WITHIN: Final = 4
 MOVES_NAMED: Final = 5
 UNREACHED: Final = "the nominal arm does not reach all of the line"
+BLENDED: Final = "how far it is blended with its neighbours is not written as a number"
+NO_ROOM: Final = "what blends it with its neighbours leaves no room for waypoints"
 OFFSET: Final = "its target has an offset, which a waypoint would not have"
 
 
@@ -176,11 +178,30 @@ class Densifier:
         if np.asarray(found.refused).any():
             return f"waypoints between are refused: {found.refusals[0].reason}"
         points = self._written(found.q, environment)
-        self._deviation_mm[move] = MM_PER_METRE * _deviation(points)
-        chosen, enough = _needed(points, self._spacing.deviation_m)
-        if not enough:
+        deviation_m = _deviation(points)
+        self._deviation_mm[move] = MM_PER_METRE * deviation_m
+        if deviation_m <= self._spacing.deviation_m:
+            return []
+        chosen = self._chosen(move, points)
+        if isinstance(chosen, str):
+            return chosen
+        return self._steps(move, environment, found.q[list(chosen)], tuple(chosen.values()))
+
+    def _chosen(self, move: int, points: Floats) -> dict[int, float] | str:
+        """Which of the points (n, 3) become waypoints of a move, and the room in m that each of them has; or
+        why they cannot.
+        """
+        blends = self._program.language.blends(self._program, move)
+        if blends is None:
+            return BLENDED
+        clear = _clear_of(blends, points, self._spacing.least_m / 2.0)
+        if not clear:
+            return NO_ROOM
+        chosen = _needed(points, self._spacing.deviation_m, clear)
+        if chosen is None:
             return f"the least spacing of {MM_PER_METRE * self._spacing.least_m:g} mm is too wide"
-        return self._steps(move, environment, found.q[chosen]) if chosen else []
+        rooms = _rooms(points[[0, *chosen, len(points) - 1]], blends)
+        return dict(zip(chosen, rooms, strict=True))
 
     def _written(self, q: Floats, environment: Environment) -> Floats:
         """Where the controller believes the tool, (n, 3)."""
@@ -189,8 +210,10 @@ class Densifier:
         points: Floats = (poses @ environment.tool.controller)[:, :3, 3]
         return points
 
-    def _steps(self, move: int, environment: Environment, q: Floats) -> list[LinearStep] | str:
-        """Waypoints that say readings (n, N), or why one cannot be said with certainty.
+    def _steps(
+        self, move: int, environment: Environment, q: Floats, rooms: Sequence[float]
+    ) -> list[LinearStep] | str:
+        """Waypoints that say readings (n, N), with their rooms, or why one cannot be said with certainty.
 
         A waypoint is written out in numbers, without the offsets that the move's own target has.
         """
@@ -209,8 +232,8 @@ class Densifier:
             return f"waypoints between cannot be written: {reason}"
         line, _ = program.sources[file].place(int(moves.at[move]))
         return [
-            LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()))
-            for row, digits in zip(values, decimals, strict=True)
+            LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()), room)
+            for row, digits, room in zip(values, decimals, rooms, strict=True)
         ]
 
 
@@ -231,22 +254,51 @@ def _line(ends: Floats, least_m: float) -> Floats | None:
     return poses
 
 
-def _needed(points: Floats, deviation_m: float) -> tuple[list[int], bool]:
-    """Which of the points (n, 3), the ends apart, a chain of straight lines needs, and whether they suffice.
+def _clear_of(blends: tuple[float, float], points: Floats, margin_m: float) -> range:
+    """Which of the points (n, 3) lie a margin outside of where the ends are blended; all do at an end that
+    is not.
+    """
+    clear = np.ones(len(points), dtype=bool)
+    for radius, end in zip(blends, (points[0], points[-1]), strict=True):
+        if radius > 0.0:
+            clear &= np.linalg.norm(points - end, axis=1) >= radius + margin_m
+    found = np.flatnonzero(clear)
+    return range(int(found[0]), int(found[-1]) + 1) if len(found) else range(0)
+
+
+def _rooms(points: Floats, blends: tuple[float, float]) -> list[float]:
+    """How far, in m, the arm may leave the line around each of the points (n, 3) but the first and the last.
+
+    Half the way to a neighbouring point, and no farther than to where the ends are blended.
+    """
+    ways = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    before, behind = ways[:-1] / 2.0, ways[1:] / 2.0
+    if blends[0] > 0.0:
+        before[0] = ways[0] - blends[0]
+    if blends[1] > 0.0:
+        behind[-1] = ways[-1] - blends[1]
+    rooms: list[float] = np.minimum(before, behind).tolist()
+    return rooms
+
+
+def _needed(points: Floats, deviation_m: float, clear: range) -> list[int] | None:
+    """Which of the points (n, 3), ends apart, a chain of straight lines needs; None if they do not suffice.
 
     Equal steps lie between the points, WITHIN of them in the least spacing, so a line from point i to point j
-    passes each point between at an equal share of its way.
+    passes each point between at an equal share of its way. Points that are not `clear` are not used: there
+    the arm leaves the lines anyway, for it is blended.
     """
     chosen: list[int] = []
     start, last = 0, len(points) - 1
-    while True:
+    while not chosen or clear.stop - start > WITHIN:
         end = _farthest(points, start, deviation_m)
         if end is None:
-            return chosen, False
+            return None
         if end == last:
-            return chosen, True
-        chosen.append(end)
-        start = end
+            break
+        start = min(max(end, clear.start), clear.stop - 1)
+        chosen.append(start)
+    return chosen
 
 
 def _farthest(points: Floats, start: int, deviation_m: float) -> int | None:

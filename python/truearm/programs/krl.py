@@ -9,7 +9,7 @@ from truearm.programs.frames import Frames
 from truearm.programs.krl_reading import KrlReading
 from truearm.programs.krl_steps import inserted
 from truearm.programs.krl_storage import lines
-from truearm.programs.program import LinearStep, Program, StepTexts
+from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.robot import Robot
 
@@ -17,7 +17,7 @@ ENDINGS: Final = (".src", ".dat")
 MODULE: Final = re.compile(r"(?:global[ \t]+)?(?:def|deffct|defdat)[ \t]")
 
 
-class KRL:
+class KRL(BlendsShortened):
     """KUKA Robot Language, KSS 5 and later."""
 
     name = "KRL"

@@ -16,14 +16,14 @@ from truearm.programs.layouts import Joints
 from truearm.programs.melfa_reader import Reader
 from truearm.programs.melfa_steps import inserted
 from truearm.programs.melfa_variables import FLAGGED
-from truearm.programs.program import LinearStep, Program, StepTexts
+from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.robot import Robot
 
 _NUMBERED: Final = re.compile(r"[ \t]*\d+[ \t]+[^\r\n]*")
 
 
-class MelfaBasic:
+class MelfaBasic(BlendsShortened):
     """The language of Mitsubishi's controllers."""
 
     name = "MELFA BASIC"

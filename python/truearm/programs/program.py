@@ -74,6 +74,7 @@ class LinearStep:
         move: Number of the move.
         values: Numbers in the layout of the move's target, (width,), configuration included.
         decimals: Digits behind the point of each, (width,).
+        room_m: Within which distance the arm may leave the line without reaching what blends its neighbours.
     """
 
     line: int
@@ -81,6 +82,7 @@ class LinearStep:
     move: int
     values: tuple[float, ...]
     decimals: tuple[int, ...]
+    room_m: float
 
 
 @dataclass(frozen=True)
@@ -158,9 +160,25 @@ class Language(Protocol):
         """Where a comment with `text` goes, and the whole line(s) to insert there, line end included."""
         ...
 
+    def blends(self, program: Program, move: int) -> tuple[float, float] | None:
+        """Radii in m within which a move is blended with the one before and the one behind it, where its
+        controllers drop a target whose blending reaches another's; none where they make it smaller.
+
+        None if they are not known.
+        """
+        ...
+
     def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
         """What to insert so that linear moves pass waypoints: one or more for each move, in their order."""
         ...
+
+
+class BlendsShortened:
+    """A language whose controllers blend within less where two targets are near each other."""
+
+    def blends(self, program: Program, move: int) -> tuple[float, float]:
+        """No radii: waypoints may lie anywhere."""
+        return (0.0, 0.0)
 
 
 def motion_is_straight(motion: int) -> bool:

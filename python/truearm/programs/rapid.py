@@ -7,7 +7,7 @@ from typing import Final
 
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import DECIMALS_MM, DECIMALS_QUATERNION
-from truearm.programs.program import LinearStep, Program, StepTexts
+from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.rapid_reading import RapidReading
 from truearm.programs.rapid_values import arguments, statement_reader
 from truearm.programs.source import Source
@@ -23,7 +23,7 @@ UNUSED_AXES: Final = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 FLY_BY: Final = "z1"
 
 
-class RAPID:
+class RAPID(BlendsShortened):
     """RAPID of IRC5 and OmniCore controllers, and of older ones where they agree."""
 
     name = "RAPID"

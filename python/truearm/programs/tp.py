@@ -12,7 +12,7 @@ from textwrap import wrap
 
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints
-from truearm.programs.program import LinearStep, Program, StepTexts
+from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.tp_configuration import ConfiguredPose
 from truearm.programs.tp_positions import section
@@ -23,7 +23,7 @@ from truearm.robot import Robot
 LONGEST_REMARK = 30
 
 
-class FanucTp:
+class FanucTp(BlendsShortened):
     """The language of FANUC's teach pendants."""
 
     name = "FANUC TP"

@@ -13,11 +13,9 @@ from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, RotationVectorPose
 from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
-from truearm.programs.stepping import lines_before, written
 from truearm.programs.urscript_constants import AXES
-from truearm.programs.urscript_places import argument
 from truearm.programs.urscript_reader import Reader
-from truearm.programs.urscript_syntax import NotReadable, expression, statements
+from truearm.programs.urscript_steps import blends, inserted
 from truearm.robot import Robot
 
 
@@ -59,22 +57,10 @@ class UrScript:
         """A comment before the first line."""
         return source.first, f"# {text}{source.newline}"
 
+    def blends(self, program: Program, move: int) -> tuple[float, float] | None:
+        """The blend radii that the motions state."""
+        return blends(program, move)
+
     def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
         """The motion's own line with the step in place of its target; none if it states a time."""
-        return lines_before(program, moves, self._step)
-
-    @staticmethod
-    def _step(program: Program, step: LinearStep) -> str | None:
-        source = program.sources[step.file]
-        start = source.line_starts[step.line - 1]
-        found = list(statements(source, start, start + len(source.line_text(step.line))))
-        try:
-            call = expression(found[0].tokens) if len(found) == 1 else None
-        except NotReadable:
-            return None
-        target = argument(call, 0, "pose") if call is not None and call.text == "movel" else None
-        if call is None or target is None or argument(call, 3, "t") is not None:
-            return None
-        numbers = ", ".join(map(written, step.values, step.decimals))
-        line = source.text[start : target.start] + f"p[{numbers}]" + source.text[target.end : call.end]
-        return line + source.newline
+        return inserted(program, moves)
