@@ -12,7 +12,6 @@ import pytest
 import truearm as ta
 from tests.report_support import words_of
 from truearm.cli import main
-from truearm.conventions import Convention
 from truearm.doubts import no_help, poses_aside
 from truearm.grids import grid_steps, grid_words
 from truearm.identified import IdentifiedArm
@@ -107,16 +106,6 @@ def test_points_that_a_controller_computed_are_doubted():
     assert not notice_of(found, "no_help")
 
 
-def measured_otherwise(name, turned=(), coupled=None, mirrored=False):
-    """An arm whose controller counts joints otherwise than its file says, and what is measured of it."""
-    robot = ta.Robot.load(name)
-    own = Convention(turned, coupled, mirrored).robot(robot)
-    arm = VirtualArm(own, seed=4)
-    table = arm.measure_table(arm.poses(60))
-    table["y"] *= -1.0 if mirrored else 1.0
-    return robot, ta.Measurements.from_dataframe(table, joints=robot.joints)
-
-
 @pytest.mark.parametrize(
     ("lag", "words"), [(1, "1 row before it"), (-1, "1 row after it"), (2, "2 rows before it")]
 )
@@ -197,73 +186,6 @@ def test_single_rows_that_are_far_off_are_not_taken_for_shifted_ones(seed):
     table.loc[off, ["x", "y"]] += 0.5
     found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), refit=False)
     assert notice_of(found, "rows_shifted") == ""
-
-
-@pytest.mark.parametrize(
-    ("name", "otherwise", "words"),
-    [
-        ("ur10", {"turned": (0,)}, "if joint 1 is counted the other way (direction = -1 in its link). Put"),
-        ("kuka-kr-6-r900", {"turned": (0,)}, "joint 1 is counted the other way (direction = 1 in its link)"),
-        ("ur10", {"turned": (2, 4)}, "joint 3 is counted the other way .*, and joint 5 is counted the other"),
-        ("ur10", {"mirrored": True}, "if the device's frame is left-handed"),
-        (
-            "fanuc-lr-mate-200id",
-            {"coupled": 0.0},
-            r"joint 3 is counted against link 2 .* is [0, 0, 1, 0, 0, 0])",
-        ),
-        ("ur10", {"coupled": 1.0}, "joint 3 is counted against the horizontal .* is [0, 1, 1, 0, 0, 0])"),
-    ],
-)
-def test_what_the_controller_counts_otherwise_is_named(name, otherwise, words):
-    found = ta.calibrate(*measured_otherwise(name, **otherwise), model="constant", refit=False)
-    checks = notice_of(found, "no_help")
-    assert "direction = -1" in checks
-    assert "[coupling]" in checks
-    said = notice_of(found, "fits_otherwise")
-    assert re.search(re.escape(words).replace(r"\.\*", ".*"), said), said
-
-
-def named_otherwise(name, **otherwise):
-    robot, data = measured_otherwise(name, **otherwise)
-    return notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
-
-
-@pytest.mark.parametrize("name", ["ur10", "abb-irb-120"])
-@pytest.mark.parametrize("turned", [(3, 5), (1, 3, 4), (0, 1, 3, 5)])
-def test_joints_counted_otherwise_are_not_put_down_to_a_left_handed_frame(name, turned):
-    told, _, others = named_otherwise(name, turned=turned).partition(" They fit as well if ")
-    named = [int(joint) - 1 for joint in re.findall(r"joint (\d) is counted the other way", told)]
-    assert named == list(turned)
-    assert "left-handed" not in told
-    assert ("left-handed" in others) == (name != "ur10")
-
-
-def test_of_joints_that_fit_as_well_the_fewest_are_named():
-    told, _, others = named_otherwise("kuka-iiwa-7", turned=(1, 3, 4)).partition(" They fit as well if ")
-    assert 1 <= told.count("counted the other way") <= 3
-    assert "left-handed" not in told
-    assert re.search(r"or in \d+ other ways: measurements alone do not tell which is true", others)
-
-
-@pytest.mark.parametrize(
-    ("name", "mirror_image"),
-    [("ur10", []), ("abb-irb-120", ["1", "4", "6"]), ("kuka-kr-6-r900", ["1", "4", "6"])],
-)
-def test_a_left_handed_frame_is_told_with_the_joints_that_look_like_it(name, mirror_image):
-    told, _, others = named_otherwise(name, mirrored=True).partition(" They fit as well if ")
-    assert "if the device's frame is left-handed (one axis reversed, or two exchanged). Put" in told
-    assert re.findall(r"joint (\d) is counted the other way", others) == mirror_image
-    assert ("measurements alone do not tell" in others) == bool(mirror_image)
-
-
-def test_nothing_is_named_where_no_convention_fits():
-    robot, data = measured_otherwise("ur10")
-    assert not notice_of(ta.calibrate(robot, data, model="constant", refit=False), "fits_otherwise")
-    points = np.random.default_rng(0).permutation(len(data))
-    mixed = replace(data, targets=data.targets[points])
-    found = ta.calibrate(robot, mixed, model="constant", refit=False)
-    assert notice_of(found, "no_help")
-    assert not notice_of(found, "fits_otherwise")
 
 
 def test_another_robot_is_doubted():

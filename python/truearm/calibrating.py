@@ -14,6 +14,7 @@ from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.doubts import (
+    FAR_FROM_NOMINAL,
     NO_HELP,
     SINGLE_ROWS,
     Outliers,
@@ -143,7 +144,9 @@ def _over_time(task: Task, data: Measurements, drift: Drift, judged: Validation)
 
 
 def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) -> list[Notice]:
-    """What makes a calibration doubtful; where it does not help, with what would fit instead."""
+    """What makes a calibration doubtful; where it does not help, or found another arm, with what would
+    fit instead.
+    """
     doubted, shifted = _of_errors(task, found, data, Outliers.of(found)), list[Notice]()
     if _many_are_off(found, doubted):
         with stages("looking for lost rows"):
@@ -151,7 +154,7 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     if shifted:
         doubted = _of_errors(task, found, data, None)
         doubted[1:1] = shifted
-    elif any(notice.kind == NO_HELP for notice in doubted):
+    elif any(notice.kind in (NO_HELP, FAR_FROM_NOMINAL) for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
     return doubted

@@ -1,4 +1,4 @@
-"""Readings that would fit the nominal arm in another convention: directions, joint 3, a mirrored frame."""
+"""Readings that would fit the nominal arm in another convention: directions, zeros, joint 3, the frame."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -13,6 +13,7 @@ from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.measurements import Measurements
 from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
+from truearm.parameters import THETA
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
 
@@ -28,6 +29,11 @@ EXACT_M: Final = 1e-4
 ALL_OF_JOINTS: Final = 7
 """With as many joints all combinations of them are tried, with more those of MOST_TURNED."""
 MOST_TURNED: Final = 3
+MOST_BESIDE: Final = 2
+"""Of joints that are turned and of zeros that are elsewhere so many are tried together."""
+QUARTERS: Final = (1, -1, 2)
+"""Where another zero may be, in quarter turns."""
+QUARTER_DEG: Final = 90.0
 SHOULDER, ELBOW = 1, 2
 MIRROR: Final = np.array([1.0, -1.0, 1.0])
 
@@ -40,29 +46,33 @@ class Convention:
         turned: Joints, from 0, that the controller counts the other way.
         coupled: How much joint 2's reading turns joint 3; None as the robot file has it.
         mirrored: Whether the device's frame is left-handed.
+        zeros: Joints, from 0, whose theta is more by so many quarter turns.
     """
 
     turned: tuple[int, ...] = ()
     coupled: float | None = None
     mirrored: bool = False
+    zeros: tuple[tuple[int, int], ...] = ()
 
     @property
     def changes(self) -> int:
         """In how much it differs from what robot file and measurements say."""
-        return len(self.turned) + (self.coupled is not None) + self.mirrored
+        return len(self.turned) + (self.coupled is not None) + self.mirrored + len(self.zeros)
 
     @property
-    def order(self) -> tuple[bool, int, bool]:
+    def order(self) -> tuple[bool, int, bool, int]:
         """The least comes first: a left-handed frame beside other changes last, then few changes."""
-        return self.mirrored and self.changes > 1, self.changes, self.mirrored
+        return self.mirrored and self.changes > 1, self.changes, self.mirrored, len(self.zeros)
 
     def robot(self, robot: Robot) -> Robot:
-        """A robot with directions and coupling of this convention."""
-        coupling = robot.coupling.copy()
+        """A robot with directions, coupling and zeros of this convention."""
+        coupling, table = robot.coupling.copy(), robot.table.copy()
         if self.coupled is not None:
             coupling[ELBOW, SHOULDER] = self.coupled
         coupling[:, self.turned] *= -1.0
-        return replace(robot, coupling=coupling)
+        for joint, quarters in self.zeros:
+            table[joint, THETA] = np.deg2rad(_theta_deg(robot, joint, quarters))
+        return replace(robot, coupling=coupling, table=table)
 
     def points(self, data: Measurements) -> Measurements:
         """Measurements with the points of this convention."""
@@ -80,9 +90,21 @@ class Convention:
             row = ", ".join(f"{entry + 0.0:g}" for entry in own.coupling[ELBOW] * signs)
             against = "the horizontal" if self.coupled else "link 2"
             parts.append(f"joint 3 is counted against {against} (row 3 of [coupling] is [{row}])")
+        parts += [
+            f"the zero of joint {joint + 1} is elsewhere "
+            f"(theta = {_theta_deg(robot, joint, quarters):.7g} deg in its link, "
+            f"and not {_theta_deg(robot, joint, 0):.7g})"
+            for joint, quarters in self.zeros
+        ]
         if self.mirrored:
             parts.append("the device's frame is left-handed (one axis reversed, or two exchanged)")
         return ", and ".join(parts)
+
+
+def _theta_deg(robot: Robot, joint: int, quarters: int) -> float:
+    """The theta of a joint with so many quarter turns more, above -180 and up to 180 deg."""
+    more = np.rad2deg(robot.table[joint, THETA]) + QUARTER_DEG * quarters
+    return float(180.0 - (180.0 - np.round(more, 9)) % 360.0)
 
 
 def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
@@ -126,13 +148,16 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
 
 
 def _words_of_others(robot: Robot, others: list[Convention]) -> str:
-    """That, and what, fits as well as what was named."""
+    """That, and what, fits as well as what was named: the first, and the first left-handed frame."""
     if not others:
         return ""
-    rest = f", or in {count_of(len(others) - 1, 'other way')}" if len(others) > 1 else ""
+    named = [others[0], *[other for other in others[1:] if other.mirrored][: not others[0].mirrored]]
+    ways = ", or if ".join(other.words(robot) for other in named)
+    more = len(others) - len(named)
+    rest = f", or in {count_of(more, 'other way')}" if more else ""
     return (
-        f" They fit as well if {others[0].words(robot)}{rest}: measurements alone do not tell which is true. "
-        "Jog each joint that is named, and look which way it turns."
+        f" They fit as well if {ways}{rest}: measurements alone do not tell which is true. "
+        "Jog each joint that is named, and look which way it turns and where it is at zero."
     )
 
 
@@ -144,12 +169,26 @@ def _some_rows(task: Task, data: Measurements, target: int) -> Measurements:
 
 
 def _conventions(robot: Robot) -> Iterator[Convention]:
-    """All conventions of a robot; with many joints those that turn few of them."""
+    """All conventions of a robot, of zeros and of joints that are turned few together."""
     count = robot.joint_count
     most = count if count <= ALL_OF_JOINTS else MOST_TURNED
-    turned = chain.from_iterable(combinations(range(count), turning) for turning in range(most + 1))
+    turned = list(chain.from_iterable(combinations(range(count), turning) for turning in range(most + 1)))
     coupled: list[float | None] = [None]
     if robot.joints[:3] == ("revolute",) * 3:
         known = float(robot.coupling[ELBOW, SHOULDER])
         coupled += [value for value in (0.0, 1.0, -1.0) if value != known]
     yield from (Convention(*parts) for parts in product(turned, coupled, (False, True)))
+    for zeros in _zeros(robot):
+        beside = MOST_BESIDE if len(zeros) <= MOST_BESIDE else 0
+        yield from (Convention(some, zeros=zeros) for some in turned if len(some) <= beside)
+
+
+def _zeros(robot: Robot) -> Iterator[tuple[tuple[int, int], ...]]:
+    """Zeros that may be elsewhere, of one joint or more.
+
+    Not of the first and the last joint: the frame and the target, which are fitted, take these over.
+    """
+    inner = [joint for joint in range(1, robot.joint_count - 1) if robot.joints[joint] == "revolute"]
+    for count in range(1, len(inner) + 1):
+        for joints, quarters in product(combinations(inner, count), product(QUARTERS, repeat=count)):
+            yield tuple(zip(joints, quarters, strict=True))

@@ -52,6 +52,7 @@ NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 ROWS_SHIFTED: Final = "rows_shifted"
+FAR_FROM_NOMINAL: Final = "far_from_nominal"
 FITS_OTHERWISE: Final = "fits_otherwise"
 WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE)
 """What the measurements would fit, where a calibration does not help."""
@@ -62,9 +63,9 @@ HIDING: Final = (FEW_VALUES, HELD_TOOL)
 """What leaves a part of the errors out of held-out poses too; grids do as well."""
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
-    "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1) and "
-    "whether joint 3 is counted against link 2 or against the horizontal ([coupling]). Rows of different "
-    "stations need a column group"
+    "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1), "
+    "its zero (theta) and whether joint 3 is counted against link 2 or against the horizontal ([coupling]). "
+    "Rows of different stations need a column group"
 )
 
 
@@ -355,7 +356,7 @@ def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
         f"{', '.join(texts)}{rest}: no {arm.robot.name} deviates so far from its table. It is another robot, "
         "or the table or the data are wrong."
     )
-    return [Notice("far_from_nominal", text)]
+    return [Notice(FAR_FROM_NOMINAL, text)]
 
 
 def _from_to(name: str, place: int, nominal: Floats, found: Floats) -> str:
