@@ -8,7 +8,7 @@ import pytest
 
 import truearm as ta
 from tests.test_doubts import notice_of
-from truearm.conventions import Convention
+from truearm.conventions import Convention, conventions_of
 from truearm.simulation import VirtualArm
 
 
@@ -119,3 +119,19 @@ def test_nothing_is_named_where_no_convention_fits():
     found = ta.calibrate(robot, mixed, model="constant", refit=False)
     assert notice_of(found, "no_help")
     assert not notice_of(found, "fits_otherwise")
+
+
+def test_of_many_joints_few_zeros_and_directions_are_tried_together():
+    """An arm of ten joints would have a quarter of a million ways otherwise."""
+    robot = ta.Robot.load("kuka-iiwa-7")
+    longer = replace(
+        robot,
+        joints=robot.joints + robot.joints[:3],
+        table=np.concatenate([robot.table, robot.table[:3]]),
+        coupling=np.eye(10),
+        limits=np.concatenate([robot.limits, robot.limits[:3]]),
+    )
+    tried = list(conventions_of(longer))
+    assert max(one.changes for one in tried if not one.mirrored) <= 5
+    assert max(len(one.zeros) for one in tried) == 3
+    assert len(tried) == len(set(tried)) < 30_000

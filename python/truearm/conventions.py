@@ -27,8 +27,8 @@ AS_WELL: Final = 1.5
 EXACT_M: Final = 1e-4
 """Conventions fit as well whose misfits are within this factor of the least, or are none to speak of."""
 ALL_OF_JOINTS: Final = 7
-"""With as many joints all combinations of them are tried, with more those of MOST_TURNED."""
-MOST_TURNED: Final = 3
+"""With as many joints all combinations of them are tried, with more those of SOME_OF_MANY."""
+SOME_OF_MANY: Final = 3
 MOST_BESIDE: Final = 2
 """Of joints that are turned and of zeros that are elsewhere so many are tried together."""
 QUARTERS: Final = (1, -1, 2)
@@ -131,7 +131,7 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
         return misfit_m(convention.robot(robot), convention.points(rows), target, task.threads)
 
     before = misfit(Convention())
-    found = {convention: misfit(convention) for convention in _conventions(robot) if convention.changes}
+    found = {convention: misfit(convention) for convention in conventions_of(robot) if convention.changes}
     best = min(found.values())
     if best >= min(before / BETTER, NEAR_M):
         return []
@@ -168,27 +168,27 @@ def _some_rows(task: Task, data: Measurements, target: int) -> Measurements:
     return data.select(some_rows(max(groups, key=len)))
 
 
-def _conventions(robot: Robot) -> Iterator[Convention]:
+def conventions_of(robot: Robot) -> Iterator[Convention]:
     """All conventions of a robot, of zeros and of joints that are turned few together."""
     count = robot.joint_count
-    most = count if count <= ALL_OF_JOINTS else MOST_TURNED
+    most = count if count <= ALL_OF_JOINTS else SOME_OF_MANY
     turned = list(chain.from_iterable(combinations(range(count), turning) for turning in range(most + 1)))
     coupled: list[float | None] = [None]
     if robot.joints[:3] == ("revolute",) * 3:
         known = float(robot.coupling[ELBOW, SHOULDER])
         coupled += [value for value in (0.0, 1.0, -1.0) if value != known]
     yield from (Convention(*parts) for parts in product(turned, coupled, (False, True)))
-    for zeros in _zeros(robot):
+    for zeros in _zeros(robot, most):
         beside = MOST_BESIDE if len(zeros) <= MOST_BESIDE else 0
         yield from (Convention(some, zeros=zeros) for some in turned if len(some) <= beside)
 
 
-def _zeros(robot: Robot) -> Iterator[tuple[tuple[int, int], ...]]:
-    """Zeros that may be elsewhere, of one joint or more.
+def _zeros(robot: Robot, most: int) -> Iterator[tuple[tuple[int, int], ...]]:
+    """Zeros that may be elsewhere, of one joint or more, `most` at the most.
 
     Not of the first and the last joint: the frame and the target, which are fitted, take these over.
     """
     inner = [joint for joint in range(1, robot.joint_count - 1) if robot.joints[joint] == "revolute"]
-    for count in range(1, len(inner) + 1):
+    for count in range(1, min(len(inner), most) + 1):
         for joints, quarters in product(combinations(inner, count), product(QUARTERS, repeat=count)):
             yield tuple(zip(joints, quarters, strict=True))
