@@ -354,6 +354,10 @@ class FieldFit:
         """Weight of each pose in the fit, (n,): one, or next to nothing for outliers."""
 
     @property
+    def constant_covariance(self) -> NDArray[np.float64]:
+        """Covariance (P, P) of the constants of the problem's columns, whatever varies beside them."""
+
+    @property
     def stood_aside(self) -> int:
         """Poses, shots of one counted once, that were judged but not fitted: others stood for them."""
 

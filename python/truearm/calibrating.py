@@ -55,6 +55,7 @@ from truearm.robot import Robot
 from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
 from truearm.splitting import Split, split_rows
+from truearm.standard_errors import standard_errors
 from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
@@ -118,7 +119,7 @@ def calibrate(
         selection=task.selection,
         models=final.models(task.arm),
         identifiability=final.identifiability,
-        constant=ConstantDetails.of(final.identifiability.determined, final.constant),
+        constant=_constant_details(task, final),
         variable=variable,
         validation=validation,
         held=held,
@@ -337,6 +338,13 @@ def _astray(task: Task, fits: tuple[Fits, Fits], held: Measurements, judged: Hel
         "file stays that of the training rows. Look at the table of the robot, and for rows that are wrong."
     )
     return [Notice("refit_astray", text)]
+
+
+def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
+    names = fits.identifiability.determined
+    return ConstantDetails.of(
+        names, fits.constant, standard_errors(task.arm, names, fits.constant, fits.variable)
+    )
 
 
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:

@@ -22,6 +22,7 @@ from truearm.models import ArmModel
 from truearm.options import Options
 from truearm.robot import Robot
 from truearm.scheme_fitting import SchemeDetails
+from truearm.standard_errors import of_covariance
 from truearm.validation import Validation
 
 if TYPE_CHECKING:
@@ -38,7 +39,10 @@ VARIABLE_KEYS: Final = ("evidence", "evaluations", "inflation", "unexplained_m")
 
 def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and JSON values of a calibration."""
-    arrays: Arrays = {"constant.covariance": calibration.constant.covariance}
+    arrays: Arrays = {
+        "constant.covariance": calibration.constant.covariance,
+        "constant.standard_errors": calibration.constant.standard_errors,
+    }
     content: dict[str, Any] = {
         "version": calibration.version,
         "robot": calibration.robot.to_dict(),
@@ -112,11 +116,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "selection": Selection(**{**selection, "targets": tuple(selection["targets"])}),
         "models": models,
         "identifiability": Identifiability.from_dict(content["identifiability"]),
-        "constant": ConstantDetails(
-            names=tuple(constant["names"]),
-            covariance=arrays["constant.covariance"],
-            **{key: constant[key] for key in CONSTANT_KEYS},
-        ),
+        "constant": _read_constant(constant, arrays),
         "variable": _read_variable(content["variable"]),
         "scheme": SchemeDetails(**content["scheme"]) if content.get("scheme") else None,
         "validation": Validation.from_dict(content["validation"]),
@@ -162,6 +162,18 @@ def _notice(content: Mapping[str, Any]) -> Notice:
 
 def _constant(details: ConstantDetails) -> dict[str, Any]:
     return {"names": list(details.names), **{key: getattr(details, key) for key in CONSTANT_KEYS}}
+
+
+def _read_constant(content: Mapping[str, Any], arrays: Arrays) -> ConstantDetails:
+    """Details of the constants; files of earlier versions hold no standard errors beside the covariance."""
+    names, covariance = tuple(content["names"]), arrays["constant.covariance"]
+    errors = arrays.get("constant.standard_errors")
+    return ConstantDetails(
+        names=names,
+        covariance=covariance,
+        standard_errors=of_covariance(covariance, len(names)) if errors is None else errors,
+        **{key: content[key] for key in CONSTANT_KEYS},
+    )
 
 
 def _variable(details: VariableDetails | None) -> dict[str, Any] | None:

@@ -18,7 +18,9 @@ class ConstantDetails:
 
     Attributes:
         names: Names of the constants that were fitted, in the order of the covariance.
-        covariance: Of these constants, then of the set-up's unknowns, (u, u), SI.
+        covariance: Of these constants, then of the set-up's unknowns, (u, u), SI, as if what constants leave
+            were noise.
+        standard_errors: Of these constants, (k,), SI, with what they imitate of a fitted field.
         noise_m: Noise of positions (or distances) beside the rows' own sigma, what is not modelled included.
         noise_rad: The same of orientations.
         prior_scale: Factor on the priors' standard deviations that the evidence chose.
@@ -28,6 +30,7 @@ class ConstantDetails:
 
     names: tuple[str, ...]
     covariance: Floats
+    standard_errors: Floats
     noise_m: float
     noise_rad: float
     prior_scale: float
@@ -35,11 +38,18 @@ class ConstantDetails:
     reason: str
 
     @classmethod
-    def of(cls, names: tuple[str, ...], fit: ConstantFit) -> "ConstantDetails":
+    def of(cls, names: tuple[str, ...], fit: ConstantFit, standard_errors: Floats) -> "ConstantDetails":
         """Those of a fit."""
         noise_m, noise_rad = fit.noise
         return cls(
-            names, fit.covariance, noise_m, noise_rad, fit.prior_scale, fit.iterations, str(fit.reason)
+            names=names,
+            covariance=fit.covariance,
+            standard_errors=standard_errors,
+            noise_m=noise_m,
+            noise_rad=noise_rad,
+            prior_scale=fit.prior_scale,
+            iterations=fit.iterations,
+            reason=str(fit.reason),
         )
 
 

@@ -242,6 +242,17 @@ impl DataSpace {
         joint
     }
 
+    /// Covariance (P, P) of the columns' constants alone, whatever varies beside them.
+    pub fn constants(&self) -> Mat<f64> {
+        let training = &self.model.training;
+        let columns = training.columns.len();
+        let variance = |p: usize| self.model.constant_deviation(p).powi(2);
+        let entry = |row: usize, p: usize| training.jacobian_row(row)[p] * variance(p);
+        let (learned, lost) = self.solved(Mat::from_fn(training.row_count(), columns, entry), None);
+        let prior = Mat::from_fn(columns, columns, |i, j| if i == j { variance(i) } else { 0.0 });
+        prior - product(learned.transpose(), learned.as_ref()) + product(lost.transpose(), lost.as_ref())
+    }
+
     /// What the rows of some configurations have in common with the training rows (R, k), and with the set-up's
     /// unknowns (s, k): learned^T learned is taken from their prior covariance, lost^T lost added to it.
     fn reduced(&self, query: &Query, poses: Range<usize>) -> (Mat<f64>, Mat<f64>) {
@@ -252,14 +263,17 @@ impl DataSpace {
             let excited = self.model.cells.excite(query.values_of(pose));
             self.cross(&excited, query.jacobian_of(pose), cross.as_mut().subcols_mut(index * rows, rows));
         }
+        let setup = query.setup.map(|setup| &setup[poses.start * rows * width..poses.end * rows * width]);
+        self.solved(cross, setup)
+    }
+
+    /// The same for what has prior covariances (R, k) with the training rows, and set-up columns (k, s).
+    fn solved(&self, mut cross: Mat<f64>, setup: Option<&[f64]>) -> (Mat<f64>, Mat<f64>) {
+        let width = self.model.training.setup_width;
         let mut lost = product(self.projection.spread.transpose(), cross.as_ref()) * faer::Scale(-1.0);
-        if let Some(setup) = query.setup {
-            for (index, pose) in poses.enumerate() {
-                for (i, line) in
-                    setup[pose * rows * width..(pose + 1) * rows * width].chunks_exact(width).enumerate()
-                {
-                    (0..width).for_each(|k| lost[(k, index * rows + i)] += line[k]);
-                }
+        if let Some(setup) = setup {
+            for (k, line) in setup.chunks_exact(width).enumerate() {
+                (0..width).for_each(|i| lost[(i, k)] += line[i]);
             }
         }
         self.projection.factor.solve_lower(cross.as_mut());

@@ -260,6 +260,16 @@ impl Posterior {
         Ok((0..size * size).map(|k| scale * joint[(k / size, k % size)]).collect())
     }
 
+    /// Covariance (P, P) of the columns' constants alone, whatever varies beside them, row-major.
+    pub fn constants(&self) -> Vec<f64> {
+        let covariance = match self {
+            Self::Data(space) => space.constants(),
+            Self::Weight(space) => space.constants(),
+        };
+        let size = covariance.nrows();
+        (0..size * size).map(|k| covariance[(k / size, k % size)]).collect()
+    }
+
     fn query<'a>(
         &self,
         values: &'a [f64],

@@ -264,6 +264,17 @@ impl WeightSpace {
         product(reduced.transpose(), reduced.as_ref())
     }
 
+    /// Covariance (P, P) of the columns' constants alone, whatever varies beside them.
+    pub fn constants(&self) -> Mat<f64> {
+        let columns = self.model.training.columns.len();
+        let mut reduced = Mat::zeros(self.width, columns);
+        for (k, &(p, _)) in self.model.by_column.constant.iter().enumerate() {
+            reduced[(k, p)] = self.model.constant_deviation(p);
+        }
+        self.factor.solve_lower(reduced.as_mut());
+        product(reduced.transpose(), reduced.as_ref())
+    }
+
     /// Rows of some configurations by unknowns of unit variance, (u, k).
     fn reduced(&self, query: &Query, poses: std::ops::Range<usize>) -> Mat<f64> {
         let mut reduced = self.rows().of(query, poses);

@@ -13,8 +13,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
-    Bank, Compiled, FieldFit as CoreFit, FieldOptions, Input, Levers, Posterior as CorePosterior, UPRIGHT,
-    fit_field as fit, measurement_covariance, restore,
+    Bank, Compiled, FieldError, FieldFit as CoreFit, FieldOptions, Input, Levers, Posterior as CorePosterior,
+    UPRIGHT, fit_field as fit, measurement_covariance, restore,
 };
 
 use crate::blocks::{block_from, block_into, sag_into, up_of};
@@ -146,6 +146,14 @@ impl FieldFit {
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         vector(py, &self.core.weights)
+    }
+
+    /// Covariance (P, P) of the constants of the problem's columns alone.
+    #[getter]
+    fn constant_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let posterior = &self.core.posterior;
+        let values = quick(py, || Ok::<_, FieldError>(posterior.constants()))?;
+        Ok(matrix(py, &values, posterior.training().columns.len()))
     }
 
     /// Poses that were judged but not fitted.

@@ -99,7 +99,7 @@ def _moved(previous: Calibration, now: Calibration) -> Iterator[dict[str, Any]]:
         return
     old, new = _constants(previous), _constants(now)
     errors = {
-        name: abs(new[name][0] - old[name][0]) / math.sqrt(new[name][1] + old[name][1])
+        name: abs(new[name][0] - old[name][0]) / math.hypot(new[name][1], old[name][1])
         for name in new
         if name in old
     }
@@ -113,11 +113,11 @@ def _moved(previous: Calibration, now: Calibration) -> Iterator[dict[str, Any]]:
 
 
 def _constants(calibration: Calibration) -> dict[str, tuple[float, float, bool]]:
-    """Value, variance and whether it is a length, of the constants that were fitted, by name."""
+    """Value, standard error and whether it is a length, of the constants that were fitted, by name."""
     columns = dict(zip(calibration.arm.candidates.names, calibration.arm.candidates.columns, strict=True))
     values = np.ravel(calibration.models[CONSTANT].constants)
-    variances = np.diag(calibration.constant.covariance)
+    errors = calibration.constant.standard_errors
     return {
-        name: (float(values[columns[name]]), float(variances[k]), bool(are_lengths([columns[name]])[0]))
+        name: (float(values[columns[name]]), float(errors[k]), bool(are_lengths([columns[name]])[0]))
         for k, name in enumerate(calibration.constant.names)
     }

@@ -72,9 +72,19 @@ def table(facts: Facts) -> Table:
         ["", "unit", "nominal", "correction", "standard error", "at the point, mm", "determined?"],
         rows,
         says=f"{largest[0]} has the largest effect: its correction moves the {facts.point_name} by "
-        f"{largest[1]:.3f} mm (root mean square over the poses).",
+        f"{largest[1]:.3f} mm (root mean square over the poses). {_of_errors(facts)}",
         left=(0, 1, 6),
     )
+
+
+def _of_errors(facts: Facts) -> str:
+    """What standard errors hold."""
+    if facts.calibration.variable is None:
+        return (
+            "Standard errors take all that the constants leave for noise: where the arm varies with the "
+            "pose, constants may be off by several of them."
+        )
+    return "Standard errors hold what the constants may have taken over of what varies with the pose."
 
 
 def _purpose(facts: Facts) -> str:
@@ -89,8 +99,7 @@ def _remark(name: str, words: str) -> str:
 def standard_errors(facts: Facts) -> dict[str, float]:
     """Standard error of each determined constant, SI."""
     details = facts.calibration.constant
-    variances = np.diagonal(details.covariance)[: len(details.names)]
-    return dict(zip(details.names, np.sqrt(variances).tolist(), strict=True))
+    return dict(zip(details.names, details.standard_errors.tolist(), strict=True))
 
 
 def effect_mm(facts: Facts) -> Floats:

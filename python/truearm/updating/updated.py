@@ -15,6 +15,7 @@ from truearm.held_rows import HeldRows
 from truearm.judging import judge
 from truearm.models import NOMINAL, ArmModel
 from truearm.revision import Revision
+from truearm.standard_errors import of_covariance
 from truearm.uncertainty import UpdatedSpread
 from truearm.updating.estimating import Estimate
 from truearm.updating.scene import Scene
@@ -104,8 +105,15 @@ def _constant(calibration: Calibration, scene: Scene, found: Estimate) -> Consta
     carry = np.zeros((len(whole), len(found.covariance)))
     carry[: len(columns), :count] = directions[columns]
     carry[len(columns) :, count:] = np.eye(len(found.covariance) - count)
-    whole += carry @ found.covariance @ carry.T
-    return replace(old, names=tuple(asked[c] for c in columns), covariance=whole)
+    carried = carry @ found.covariance @ carry.T
+    errors = np.zeros(len(columns))
+    errors[places] = old.standard_errors
+    return replace(
+        old,
+        names=tuple(asked[c] for c in columns),
+        covariance=whole + carried,
+        standard_errors=np.hypot(errors, of_covariance(carried, len(columns))),
+    )
 
 
 def _rows(scene: Scene, found: Estimate) -> FittedRows:

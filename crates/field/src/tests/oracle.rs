@@ -268,6 +268,24 @@ impl<'a, K: Kernels> Oracle<'a, K> {
         (constant, setup, varying)
     }
 
+    /// Posterior covariance (P, P) of the constants, row-major: the prior without what a unit residual of every row tells.
+    pub fn constants(&self) -> Vec<f64> {
+        let training = self.training;
+        let (rows, columns) = (training.row_count(), training.columns.len());
+        let prior = self.variances(training.values_of(0), training.values_of(0)).constant;
+        let told: Vec<Vec<f64>> = (0..rows)
+            .map(|row| {
+                let unit: Vec<f64> = (0..rows).map(|other| f64::from(u8::from(other == row))).collect();
+                self.solution(&unit, training.values_of(0)).0
+            })
+            .collect();
+        let entry = |i: usize, j: usize| {
+            let own = if i == j { prior[i] } else { 0.0 };
+            own - (0..rows).map(|row| told[row][i] * training.jacobian_row(row)[j] * prior[j]).sum::<f64>()
+        };
+        (0..columns * columns).map(|k| entry(k / columns, k % columns)).collect()
+    }
+
     /// Posterior covariance (m, m) of rows of a Jacobian (m, P) at a configuration, with set-up columns (m, s).
     pub fn posterior(&self, values: &[f64], jacobian: &[f64], setup: &[f64]) -> Mat<f64> {
         let training = self.training;

@@ -104,6 +104,17 @@ fn covariance_is_that_of_the_covariance_written_out() {
     }
 }
 
+#[test]
+fn constants_are_known_as_by_the_covariance_written_out() {
+    for (training, joints) in sets() {
+        for (posterior, share) in spaces(&training, joints).iter().zip([1e-5, 2e-3]) {
+            let model = posterior.model();
+            let oracle = Oracle::new(&training, &model.hyper, OfCells(model));
+            close(&posterior.constants(), &oracle.constants(), share, "covariance of constants");
+        }
+    }
+}
+
 /// The same prior, cells included, on fewer poses.
 pub fn space_without(model: &Model, pose: usize) -> Posterior {
     let kept: Vec<usize> = (0..model.training.pose_count()).filter(|&other| other != pose).collect();
