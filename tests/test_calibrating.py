@@ -195,6 +195,13 @@ def test_standard_deviation_carries_to_another_tool(variable):
     assert (np.linalg.norm(long, axis=1) > np.linalg.norm(near, axis=1)).mean() > 0.9
 
 
+def test_many_poses_are_as_uncertain_as_some(variable):
+    calibration, arm = variable
+    q = arm.poses(1100, seed=3)
+    parts = np.concatenate([calibration.position_std(part) for part in np.split(q, [300, 512, 800])])
+    np.testing.assert_allclose(calibration.position_std(q), parts, rtol=1e-9)
+
+
 def test_an_arm_on_a_wall_is_recognised_by_how_it_gives_way():
     calibration, data = on_a_wall()
     assert calibration.variable.hyper["up"] == [1.0, 0.0, 0.0]

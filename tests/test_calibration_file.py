@@ -200,6 +200,45 @@ def test_odd_values_under_a_valid_digest_are_refused_by_name(written, tmp_path, 
     assert raised.value.__cause__ is not None
 
 
+def _nan(values):
+    changed = values.copy()
+    changed.flat[-1] = np.nan
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("variable.constants", _nan, "'variable.constants' holds NaN or infinite numbers"),
+        ("variable.frames", _nan, "'variable.frames' holds NaN or infinite numbers"),
+        ("variable.block7.weights", _nan, "'variable.block7.weights' holds NaN or infinite numbers"),
+        ("variable.block0.weights", lambda values: values * 1e45, "weights of a block"),
+        (
+            "variable.constants",
+            lambda values: values[:2],
+            r"'variable.constants' has shape \(2, 5\). It",
+        ),
+        ("variable.targets", lambda values: values[..., :2], "'variable.targets' has shape"),
+        ("constant.constants", lambda values: values.astype(np.float32), "holds float32 numbers. It holds f"),
+        ("constant.covariance", lambda values: values[:-1], "'constant.covariance' has shape"),
+        ("constant.standard_errors", lambda values: values[:-1], "'constant.standard_errors' has shape"),
+        ("rows.targets", None, "the calibration has no 'rows.targets'"),
+        ("rows.readings", lambda values: values[:, :-1], "'rows.readings' has shape"),
+        ("outcome.weight", lambda values: values.astype(np.float32), "'outcome.weight' holds float32"),
+        ("outcome.score", lambda values: values[:-1], r"'outcome.score' has shape .* There are \d+ rows"),
+        ("held.readings", lambda values: values[:, :-1], "'held.readings' has shape"),
+    ],
+)
+def test_odd_arrays_under_a_valid_digest_are_refused_by_name(written, tmp_path, name, change, words):
+    arrays, content = read_calibration_file(written)
+    values = arrays.pop(name)
+    if change is not None:
+        arrays[name] = np.ascontiguousarray(change(values))
+    write_calibration_file(tmp_path / "odd.calib", arrays, {**content, "sha256": NO_DIGEST})
+    with pytest.raises(ta.InputError, match=f"odd.calib.*{words}"):
+        ta.Calibration.load(tmp_path / "odd.calib")
+
+
 def test_numbers_of_another_kind_are_taken_where_they_are_equal(written, tmp_path):
     arrays, content = read_calibration_file(written)
     kept = content["options"]

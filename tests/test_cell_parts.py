@@ -20,7 +20,13 @@ from truearm.cell import ur_packets
 from truearm.cell.cell_file import ClearanceSection
 from truearm.cell.clearance import TOOL_MARGIN_M, Clearance
 from truearm.cell.crew import Crew
-from truearm.cell.device_errors import DeviceError, DeviceGoneError, DeviceSilentError, EmergencyStopError
+from truearm.cell.device_errors import (
+    DeviceError,
+    DeviceGoneError,
+    DeviceSilentError,
+    EmergencyStopError,
+    StoppedError,
+)
 from truearm.cell.framing import framed, unframed
 from truearm.cell.judge import Rules, judge
 from truearm.cell.line_port import LinePort
@@ -37,6 +43,34 @@ from truearm.robot import Robot
 # More than a socket takes that nobody reads.
 LONG = "x" * 12_000_000
 TEXTS = st.text("ABCXYZ 0123456789.-", min_size=1).map(str.strip).filter(bool)
+
+
+def test_no_motion_is_begun_behind_what_stops_the_device(monkeypatch):
+    port = LinePort("device", "tcp://host:1", 0.1)
+    sent: list[str] = []
+    sending, go_on = threading.Event(), threading.Event()
+
+    def slowly(*texts):
+        sending.set()
+        go_on.wait(5.0)
+        sent.extend(texts)
+
+    monkeypatch.setattr(port, "send", slowly)
+    with ThreadPoolExecutor(2) as crew:
+        begun = crew.submit(port.begin, "GO 1")
+        assert sending.wait(5.0)
+        stopping = crew.submit(port.interrupt)
+        time.sleep(0.05)
+        assert not stopping.done(), "a motion that is being sent comes before what stops it"
+        go_on.set()
+        begun.result(5.0)
+        stopping.result(5.0)
+    with pytest.raises(StoppedError):
+        port.begin("GO 2")
+    port.send("HALT")
+    port.resume()
+    port.begin("GO 3")
+    assert sent == ["GO 1", "HALT", "GO 3"]
 
 
 @given(st.integers(0, 10**8), TEXTS)

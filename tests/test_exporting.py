@@ -23,6 +23,7 @@ from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.exporting import FORMATS, Options, constant_robot, export
 from truearm.exporting.origins import joint_origins, roll_pitch_yaw
+from truearm.exporting.urdf_file import comment
 from truearm.library import library_names
 from truearm.simulation import VirtualArm
 from truearm.ur_kinematics import has_ur_structure, robot_from_yaml
@@ -383,6 +384,13 @@ def test_samples_say_where_they_were_taken_and_what_their_columns_are(variable):
         assert name in comments
     assert "Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta)" in comments
     assert "std_mm" not in export(variable, "field-csv", options=Options(grid="q1=3")).text
+
+
+@pytest.mark.parametrize("text", ["a--b", "a---b", "----", "the end-", "well-formed"])
+def test_any_text_can_be_a_comment_of_xml(text):
+    root = ET.fromstring(f"<robot><!--{comment(text)}--></robot>")
+    assert root.tag == "robot"
+    assert comment(text).replace(" ", "") == text.replace(" ", "")
 
 
 def comments_of(text):

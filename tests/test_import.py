@@ -239,6 +239,14 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         {"columns": COLUMNS | {"z": "pz (cm)"}},
         'column "pz \\(cm\\)" says cm, --length-unit says mm.*if its name is wrong\\.$',
     ),
+    "another unit of a rotation": (
+        PLAIN.replace("px", "A (deg)"),
+        {
+            "columns": {"q1": "J1", "q2": "J2"},
+            "rotation": RotationColumns.parse("euler:ZYX:rad=A (deg),py,pz"),
+        },
+        'column "A \\(deg\\)" says deg, --rotation says rad.*must agree',
+    ),
     "no joint unit": (
         PLAIN,
         {"joint_unit": None},

@@ -1,5 +1,7 @@
 """All inverse kinematics of the library's arms, of factory-calibrated arms and of arms nobody knows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -143,6 +145,28 @@ def test_branch_names_say_where_shoulder_elbow_and_wrist_are():
 def test_arms_without_such_sides_have_no_names():
     assert SOLVERS["franka-panda"].branch_names(np.zeros((1, 7))) == [""]
     assert len(SOLVERS["rv-m2"].branch_names(np.zeros((1, 5)))[0].split()) == 2
+
+
+def test_many_poses_are_solved_as_some():
+    solver = SOLVERS["ur10"]
+    q = random_readings(solver.robot, 600, seed=4)
+    poses, seeds = poses_of(solver.robot, q), q + 0.01
+    parts = [
+        solver.near(p, s)
+        for p, s in zip(np.split(poses, [100, 400]), np.split(seeds, [100, 400]), strict=True)
+    ]
+    np.testing.assert_array_equal(solver.near(poses, seeds), np.concatenate(parts))
+    found = solver.branches(poses)
+    for k in (0, 255, 256, 599):
+        own = found[k][np.isfinite(found[k]).all(axis=1)]
+        np.testing.assert_array_equal(own, solver.solutions(poses[k]))
+
+
+@pytest.mark.parametrize("limit", [125.0, 1e300])
+def test_turns_beyond_counting_are_refused(limit):
+    robot = replace(Robot.load("ur10"), limits=np.tile([-limit, limit], (6, 1)))
+    with pytest.raises(ValueError, match="differ by whole turns, at the most 100000 are listed"):
+        Inverse(robot).solutions(robot.pose(np.full(6, 0.3)), turns=True)
 
 
 def test_turns_are_all_whole_turns_within_limits():

@@ -75,6 +75,11 @@ TABLES = {
         ["0,1,2,3,0.1", "0,1,2,3,0"],
         '"sigma_mm" is empty, zero or negative in row 2',
     ),
+    "sigma of no instrument": (
+        "q1,x,y,z,sigma",
+        ["0,1,2,3,0.0001", "0,1,2,3,1e300"],
+        '"sigma" is larger than 10 m in row 2.*sigma is in m, sigma_mm in mm',
+    ),
     "sigma empty": ("q1,x,y,z,sigma_mm", ["0,1,2,3,"], "empty, zero or negative in row 1"),
     "group empty": ("q1,x,y,z,group", ["0,1,2,3,a", "0,1,2,3,"], '"group" is empty in row 2'),
     "distance to nowhere": ("q1,distance", ["0,1"], "the distance leads nowhere in row 1.*anchor.*pair"),

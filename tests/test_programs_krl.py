@@ -196,6 +196,8 @@ def test_what_cannot_be_changed_is_listed_with_line_and_reason():
         ("IF $IN[1] THEN\n$BASE={X 1,Y 0,Z 0,A 0,B 0,C 0}\nENDIF", "not the same on all ways"),
         ("$IPO_MODE=#TCP", "tool stands still"),
         ("$TOOL=TOOL_DATA[7]", "TOOL_DATA[7]"),
+        ("$TOOL=TOOL_DATA[1e400]", "TOOL_DATA"),
+        ("$TOOL=TOOL_DATA[1.5]", "TOOL_DATA"),
         ("$TOOL=MYTOOL", "MYTOOL"),
         ("$BASE.X=100", "run time"),
     ],

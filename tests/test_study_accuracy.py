@@ -89,6 +89,19 @@ def test_an_interrupted_study_goes_on(file, tmp_path, here, capsys):
     assert here[-4:] == ["grid"] * 4
 
 
+def test_what_an_interruption_leaves_is_told(file, tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(running, "conduct", interrupted)
+    given = [*FAST, "--splits", "random"]
+    assert study(file, tmp_path / "out", *given) == 130
+    assert "There is no result yet" in capsys.readouterr().err
+    (tmp_path / "out" / "results.jsonl").touch()
+    assert study(file, tmp_path / "out", *given) == 130
+    assert f"Results so far are in {tmp_path / 'out'}" in " ".join(capsys.readouterr().err.split())
+
+
 def _but_times(record):
     return json.dumps({key: record[key] for key in record if key not in ("fit_s", "predict_us")})
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm import conservative, revision, rows_content, schemes
 from truearm._core import Field, Setup
+from truearm.calibration_arrays import check_arrays
 from truearm.calibration_checks import check_plain, check_set_ups
 from truearm.calibration_file import AGAIN
 from truearm.core_set import Selection
@@ -103,6 +104,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     selection = content["selection"]
     constant, rows, held = content["constant"], content["rows"], content.get("held")
     bounds = content.get("conservative")
+    check_arrays(arrays, content, arm.table.shape, robot.joint_count)
     inputs = robot.joint_count + len(options.features)
     models = {
         name: _read_model(name, stored, arrays, (inputs, arm)) for name, stored in content["models"].items()

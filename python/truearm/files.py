@@ -113,12 +113,13 @@ def write_whole(path: Path, content: str | bytes) -> None:
 def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
     """Write files, each completely or not at all: neighbours of all are written, then renamed in this order.
 
-    A link is followed, and a file that is replaced keeps its permissions. What is no file, such as a pipe or
+    What is renamed is on the disk, so that after a loss of power each file is the old one or the new one. A
+    link is followed, and a file that is replaced keeps its permissions. What is no file, such as a pipe or
     /dev/stdout, is written to at the end and not replaced.
 
     Raises:
         InputError: If a directory does not exist or may not be written to, or is what a path names, or a
-            file cannot be written; nothing is written then.
+            file cannot be written. Nothing is written then, unless a rename or a stream fails behind others.
     """
     streams: list[tuple[Path, bytes]] = []
     neighbours: list[tuple[Path, Path]] = []
@@ -200,6 +201,8 @@ def _beside(path: Path, data: bytes) -> Path:
             if mode is not None:
                 os.fchmod(file.fileno(), mode)
             file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
     except BaseException:
         neighbour.unlink(missing_ok=True)
         raise

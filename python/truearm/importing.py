@@ -276,6 +276,20 @@ def _stated_unit(ours: str, plan: ImportPlan) -> str:
 
 
 def _orientation(table: RawTable, rotation: RotationColumns) -> dict[str, Floats]:
+    """Quaternions of the columns that hold them, or what they are found from.
+
+    Raises:
+        UsageError: If there is no such column, or its own name says another unit than the option.
+    """
+    for name in map(table.existing, rotation.columns):
+        said = unit_in_header(table.parts[name].name)
+        if rotation.unit and said not in ("", rotation.unit):
+            raise UsageError(
+                f'column "{name}" says {said}, --rotation says {rotation.unit}',
+                where=table.where,
+                rule="The name of a column and the unit that is stated for it must agree",
+                way_out="Give the unit in which the angles are; a wrong name has to be mended in the file",
+            )
     values = np.column_stack([table.numbers(table.existing(name)) for name in rotation.columns])
     quaternions = rotation.quaternions(values)
     return {name: quaternions[:, k] for k, name in enumerate(QUATERNION)}

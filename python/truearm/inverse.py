@@ -54,6 +54,7 @@ class Inverse:
 
         Raises:
             InputError: If the pose is not a rigid transform, or they are several.
+            CoreError: If a pose of the arm's has more than 100,000 readings that differ by whole turns.
         """
         poses, single = as_transforms(base_from_flange, what="the pose")
         if not single:

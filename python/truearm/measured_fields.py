@@ -1,6 +1,6 @@
 """From the columns of a table to the fields of Measurements: SI units, every row checked."""
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,9 @@ from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+LARGEST_SIGMA_M: Final = 10.0
+"""No instrument is less sure of a point that it has seen."""
 
 
 def read_fields(
@@ -114,6 +117,13 @@ def _sigma(table: Table, column: Column) -> Floats:
     sigma = _si(table, column)
     bad = ~(sigma > 0.0)
     _refuse(table, bad, f'column "{column.name}" is empty, zero or negative in', "A sigma is positive")
+    _refuse(
+        table,
+        sigma > LARGEST_SIGMA_M,
+        f'column "{column.name}" is larger than {LARGEST_SIGMA_M:g} m in',
+        "A sigma is the standard deviation of a measured coordinate",
+        "Leave out rows in which nothing was measured, or check its unit: sigma is in m, sigma_mm in mm",
+    )
     return sigma
 
 

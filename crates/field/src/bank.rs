@@ -89,6 +89,7 @@ impl Bank {
                     expected,
                 });
             }
+            check_weights(&block.weights, "weights of a block")?;
             let input = inputs.iter().copied().max().unwrap_or(0);
             if input >= self.input_count {
                 let expected = self.input_count;
@@ -124,7 +125,7 @@ impl Bank {
                 return Err(FieldError::Length { what, found, expected });
             }
         }
-        Ok(())
+        check_weights(&sag.weights, "weights of the sag")
     }
 
     /// Adds the CEPs of the given inputs (n, I) to `out` (n, 5 L).
@@ -144,4 +145,10 @@ impl Bank {
     pub fn cell_count(&self) -> usize {
         self.blocks.iter().map(|block| block.grid.cell_count()).sum()
     }
+}
+
+/// Refuses weights that are not finite, or that the tables' single precision does not hold.
+fn check_weights(weights: &[f64], what: &'static str) -> Result<(), FieldError> {
+    let held = weights.iter().all(|weight| weight.abs() <= f64::from(f32::MAX));
+    if held { Ok(()) } else { Err(FieldError::NotFinite { what }) }
 }

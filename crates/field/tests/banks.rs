@@ -302,6 +302,17 @@ fn a_sag_that_no_fit_makes_is_refused() {
         let refused = restored(inputs, &outputs).unwrap_err();
         assert!(matches!(refused, FieldError::Block { .. }), "{inputs:?}: {refused}");
     }
+    for weight in [f64::NAN, f64::INFINITY, 1e39] {
+        let mut block = Block {
+            name: "sag".to_owned(),
+            grid: Grid { inputs: (0..6).collect(), axes: Vec::new() },
+            outputs: outputs.clone(),
+            weights: vec![1e-4; outputs.len()],
+        };
+        block.weights[2] = weight;
+        let refused = Bank::restored(8, parameters, vec![block], levers.clone()).unwrap_err();
+        assert!(matches!(refused, FieldError::NotFinite { .. }), "{weight}: {refused}");
+    }
     let mut elsewhere = outputs.clone();
     elsewhere[1] = 5;
     assert!(matches!(restored(&[0, 1, 2, 3, 4, 5], &elsewhere), Err(FieldError::Block { .. })));

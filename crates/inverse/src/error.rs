@@ -19,6 +19,17 @@ pub enum InverseError {
         /// What it should be.
         wanted: usize,
     },
+    /// More solutions than anybody can go through.
+    #[error(
+        "there are {count:.0} readings that differ by whole turns, at the most {most} are listed: leave turns out, or give the \
+         joints narrower limits"
+    )]
+    Turns {
+        /// How many.
+        count: f64,
+        /// The most.
+        most: usize,
+    },
     /// A seed that is NaN or infinite.
     #[error("the seed holds {value}, all its numbers must be finite")]
     SeedNotFinite {

@@ -8,6 +8,8 @@ use crate::error::InverseError;
 const SLACK: f64 = 1e-9;
 /// Turns each way that are listed of a joint without limits.
 const TURNS_WITHOUT_LIMITS: f64 = 1.0;
+/// Readings of one branch that are listed with all their turns.
+const MOST_TURNS: usize = 100_000;
 /// How far two readings may differ and still be one solution, rad or m.
 const SAME: f64 = 1e-6;
 
@@ -96,28 +98,44 @@ impl Readings {
     }
 
     /// All readings within limits that differ from these by whole turns; none if these cannot be turned in.
-    pub(crate) fn all_turns(&self, readings: &[f64]) -> Vec<Vec<f64>> {
+    ///
+    /// # Errors
+    /// [`InverseError::Turns`] where there are too many.
+    pub(crate) fn all_turns(&self, readings: &[f64]) -> Result<Vec<Vec<f64>>, InverseError> {
+        let turns: Vec<Option<[f64; 2]>> = (0..self.count()).map(|j| self.choices(j, readings[j])).collect();
+        let counts = || turns.iter().flatten().map(|[first, last]| last - first + 1.0);
+        if counts().any(|count| count < 1.0) {
+            return Ok(Vec::new());
+        }
+        let count: f64 = counts().product();
+        if count > MOST_TURNS as f64 {
+            return Err(InverseError::Turns { count, most: MOST_TURNS });
+        }
         let mut found = vec![Vec::new()];
-        for (j, &reading) in readings.iter().enumerate() {
-            let choices = self.choices(j, reading);
+        for ((j, &reading), turns) in readings.iter().enumerate().zip(turns) {
+            let choices: Vec<f64> = match turns {
+                None => self.within(j, reading).into_iter().collect(),
+                Some([first, last]) => {
+                    (first as i64..=last as i64).map(|k| reading + TAU * k as f64).collect()
+                }
+            };
             found = found
                 .iter()
                 .flat_map(|start| choices.iter().map(|&choice| [start.as_slice(), &[choice]].concat()))
                 .collect();
         }
-        found
+        Ok(found)
     }
 
-    fn choices(&self, j: usize, reading: f64) -> Vec<f64> {
+    /// First and last number of turns that keep a joint within its limits; `None` if it cannot be turned.
+    fn choices(&self, j: usize, reading: f64) -> Option<[f64; 2]> {
         if !self.turns[j] {
-            return self.within(j, reading).into_iter().collect();
+            return None;
         }
         let bound = TAU * TURNS_WITHOUT_LIMITS;
         let [low, high] = self.limits[j];
         let (low, high) = (finite_or(low, -bound), finite_or(high, bound));
-        let first = ((low - SLACK - reading) / TAU).ceil() as i64;
-        let last = ((high + SLACK - reading) / TAU).floor() as i64;
-        (first..=last).map(|k| reading + TAU * k as f64).collect()
+        Some([((low - SLACK - reading) / TAU).ceil(), ((high + SLACK - reading) / TAU).floor()])
     }
 
     fn within(&self, j: usize, reading: f64) -> Option<f64> {

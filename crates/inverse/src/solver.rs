@@ -87,12 +87,13 @@ impl Inverse {
     /// that differ from them by whole turns. An arm with more than six joints has infinitely many: a sample.
     ///
     /// # Errors
-    /// As of the chain.
+    /// As of the chain, and [`InverseError::Turns`].
     pub fn solutions(&self, target: &Transform, turns: bool) -> Result<Vec<Vec<f64>>, InverseError> {
         let middle = self.readings.middle();
         let distinct = self.distinct(target, &middle)?;
         let mut found: Vec<Vec<f64>> = if turns {
-            distinct.iter().flat_map(|readings| self.readings.all_turns(readings)).collect()
+            let turned = distinct.iter().map(|readings| self.readings.all_turns(readings));
+            turned.collect::<Result<Vec<_>, _>>()?.concat()
         } else {
             distinct.iter().filter_map(|readings| self.readings.turned(readings, &middle)).collect()
         };

@@ -1,6 +1,7 @@
 //! The one door into the core: it lets other Python threads run, honours Ctrl-C and translates errors.
 
 use std::fmt::Display;
+use std::ops::Range;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
@@ -57,6 +58,21 @@ where
     F: FnOnce() -> Result<T, E> + Send,
 {
     py.detach(work).map_err(Failure::into_exception)
+}
+
+/// Quick work on `count` poses, so many at once: in between signals are looked at, and what their handlers raise is raised.
+pub fn in_parts<T, E, F>(py: Python<'_>, count: usize, at_once: usize, work: F) -> PyResult<Vec<T>>
+where
+    T: Send,
+    E: Failure + Send,
+    F: Fn(Range<usize>) -> Result<Vec<T>, E> + Send + Sync,
+{
+    let mut all = quick(py, || work(0..count.min(at_once)))?;
+    for first in (at_once..count).step_by(at_once) {
+        py.check_signals()?;
+        all.extend(quick(py, || work(first..(first + at_once).min(count)))?);
+    }
+    Ok(all)
 }
 
 /// Long work on a thread of its own, while this one looks for signals.

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use numpy::ndarray::Array3;
@@ -19,7 +20,7 @@ use truearm_field::{
 
 use crate::blocks::{block_from, block_into, sag_into, up_of};
 use crate::chain::{Chain, contiguous};
-use crate::door::{CoreError, Failure, long, quick, with_threads};
+use crate::door::{CoreError, Failure, in_parts, long, quick, with_threads};
 use crate::estimate::{ConstantFit, IdentificationProblem, PriorTuple, prior};
 use crate::hyper::{hyper_from, hyper_into};
 use crate::measured::{Setup, matrix, vector};
@@ -306,6 +307,34 @@ impl Posterior {
     }
 }
 
+/// Configurations whose covariances are found between two looks at the signals; a multiple of the core's own batches.
+const AT_ONCE: usize = 512;
+
+/// What is asked of a posterior: inputs (n, I), Jacobians (n, m, P), set-up columns (n, m, s).
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    inputs: &'a [f64],
+    jacobian: &'a [f64],
+    setup: Option<&'a [f64]>,
+}
+
+impl<'a> Asked<'a> {
+    /// Configurations, n; one where the arrays are not of as many, so that the core sees them whole and refuses them.
+    fn poses(&self, core: &CorePosterior) -> usize {
+        let count = self.inputs.len() / core.training().inputs.len();
+        let even = |array: &[f64]| array.len().is_multiple_of(count) && count > 0;
+        if even(self.inputs) && even(self.jacobian) && self.setup.is_none_or(even) { count } else { 1 }
+    }
+
+    fn part(&self, part: &Range<usize>, whole: usize) -> Asked<'a> {
+        let of = |array: &'a [f64]| {
+            let each = array.len() / whole;
+            &array[part.start * each..part.end * each]
+        };
+        Asked { inputs: of(self.inputs), jacobian: of(self.jacobian), setup: self.setup.map(of) }
+    }
+}
+
 #[pymethods]
 impl Posterior {
     #[new]
@@ -358,7 +387,12 @@ impl Posterior {
         let rows = jacobian.shape()[1];
         let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
         let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
-        let values = quick(py, || self.core().prior(&inputs, &jacobian, rows))?;
+        let asked = Asked { inputs: &inputs, jacobian: &jacobian, setup: None };
+        let poses = asked.poses(self.core());
+        let values = in_parts(py, poses, AT_ONCE, |part| {
+            let Asked { inputs, jacobian, .. } = asked.part(&part, poses);
+            self.core().prior(inputs, jacobian, rows)
+        })?;
         Ok(matrix(py, &values, rows))
     }
 
@@ -375,8 +409,12 @@ impl Posterior {
         let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
         let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
         let setup_columns: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
-        let values =
-            quick(py, || self.core().covariance(&inputs, &jacobian, setup_columns.as_deref(), rows))?;
+        let asked = Asked { inputs: &inputs, jacobian: &jacobian, setup: setup_columns.as_deref() };
+        let whole = asked.poses(self.core());
+        let values = in_parts(py, whole, AT_ONCE, |part| {
+            let Asked { inputs, jacobian, setup } = asked.part(&part, whole);
+            self.core().covariance(inputs, jacobian, setup, rows)
+        })?;
         array3(py, values, (poses, rows, rows))
     }
 

@@ -6,7 +6,7 @@ use truearm_inverse::{Arm, Inverse as Core, Method, Readings};
 use truearm_kinematics::{Joint, Transform};
 
 use crate::chain::Chain;
-use crate::door::{CoreError, Failure, quick};
+use crate::door::{CoreError, Failure, in_parts, quick};
 
 type Rows<'py> = PyReadonlyArray2<'py, f64>;
 /// Whether the wrist is in front, the elbow up, and the wrist flipped.
@@ -59,7 +59,7 @@ impl Inverse {
         targets: PyReadonlyArray3<'py, f64>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Vec<usize>)> {
         let targets = transforms(&targets)?;
-        let found = quick(py, || self.core.all(&targets))?;
+        let found = in_parts(py, targets.len(), AT_ONCE, |part| self.core.all(&targets[part]))?;
         let counts = found.iter().map(Vec::len).collect();
         Ok((array(py, &found.concat(), self.joints)?, counts))
     }
@@ -72,7 +72,15 @@ impl Inverse {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let targets = transforms(&targets)?;
         let seeds = values(&seeds);
-        let found = quick(py, || self.core.near(&targets, &seeds))?;
+        let whole = targets.len();
+        let found = if seeds.len() == whole * self.joints {
+            in_parts(py, whole, AT_ONCE, |part| {
+                let seeds = &seeds[part.start * self.joints..part.end * self.joints];
+                self.core.near(&targets[part], seeds)
+            })
+        } else {
+            quick(py, || self.core.near(&targets, &seeds))
+        }?;
         let none = vec![f64::NAN; self.joints];
         let rows: Vec<Vec<f64>> = found.into_iter().map(|row| row.unwrap_or_else(|| none.clone())).collect();
         array(py, &rows, self.joints)
@@ -89,6 +97,9 @@ impl Inverse {
         Ok(rows.chunks_exact(self.joints).map(sides).collect())
     }
 }
+
+/// Targets that are solved between two looks at the signals.
+const AT_ONCE: usize = 256;
 
 fn values(rows: &Rows<'_>) -> Vec<f64> {
     rows.as_array().iter().copied().collect()

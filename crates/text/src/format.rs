@@ -120,13 +120,12 @@ fn write_digits(digits: &mut [u8; ROOM], mut rest: u64) -> usize {
 /// The same for numbers that no machine integer holds.
 fn write_slowly(out: &mut Vec<u8>, value: f64, decimals: u32, plus: bool) {
     let start = out.len();
-    if plus && value >= 0.0 {
-        out.push(b'+');
-    }
     // Writing to memory cannot fail.
-    let _ = write!(out, "{value:.*}", decimals as usize);
-    let nothing = out[start..].iter().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
-    if nothing && out.get(start) == Some(&b'-') {
-        out.remove(start);
+    let _ = write!(out, "{:.*}", decimals as usize, value.abs());
+    let nothing = out[start..].iter().all(|byte| matches!(byte, b'0' | b'.'));
+    if value < 0.0 && !nothing {
+        out.insert(start, b'-');
+    } else if plus {
+        out.insert(start, b'+');
     }
 }

@@ -120,6 +120,11 @@ fn zeros_and_signs() {
     assert_eq!(fixed(12.0, 0, false), "12");
     assert_eq!(fixed(0.0, 0, false), "0");
     assert_eq!(fixed(-1e-30, 20, false), "0.00000000000000000000");
+    for value in [0.0, -0.0, -1e-30] {
+        assert_eq!(fixed(value, 3, true), "+0.000");
+        assert_eq!(fixed(value, 17, true), "+0.00000000000000000");
+    }
+    assert_eq!(fixed(-1e30, 2, true), "-1000000000000000019884624838656.00");
 }
 
 #[test]

@@ -76,6 +76,7 @@ class LinePort:
         self._lines: deque[str] = deque()
         self._interrupted = threading.Event()
         self._writing = threading.Lock()
+        self._starting = threading.Lock()
 
     @classmethod
     def of(cls, device: str, keys: PortSection, *, terminator: bytes = b"\n") -> Self:
@@ -134,9 +135,20 @@ class LinePort:
         if channel is not None:
             channel.close()
 
+    @property
+    def is_interrupted(self) -> bool:
+        """Whether another thread is to end its waits."""
+        return self._interrupted.is_set()
+
     def interrupt(self) -> None:
-        """End the wait of another thread, which then raises StoppedError."""
+        """End the wait of another thread, which then raises StoppedError.
+
+        No motion is begun from then on, and one that was being begun has been sent: what stops the device
+        comes behind it.
+        """
         self._interrupted.set()
+        with self._starting:
+            pass
 
     def resume(self) -> None:
         """Let waits be waits again."""
@@ -162,6 +174,18 @@ class LinePort:
         except ConnectionEndedError as error:
             raise gone(self.device, self.address, str(error)) from None
 
+    def begin(self, *texts: str) -> None:
+        """Send lines that begin a motion, in one piece.
+
+        Raises:
+            DeviceGoneError: If the connection has ended, or there is none.
+            StoppedError: If another thread interrupted; nothing is sent then.
+        """
+        with self._starting:
+            if self.is_interrupted:
+                raise stopped(self.device, self.address)
+            self.send(*texts)
+
     def receive(self, limit_s: float | None = None, *, doing: str = "") -> str:
         """The next line without its end.
 
@@ -177,7 +201,7 @@ class LinePort:
         limit = self.limit_s if limit_s is None else limit_s
         until = time.monotonic() + limit
         while not self._lines:
-            if self._interrupted.is_set():
+            if self.is_interrupted:
                 raise stopped(self.device, self.address)
             self._take()
             if not self._lines and time.monotonic() >= until:

@@ -166,7 +166,7 @@ class LineRobot(Managed):
         self._port.drain()
         self._refusal = ""
         for _ in range(SENDINGS):
-            self._port.send(command)
+            self._port.begin(command)
             if self._arrives(target):
                 return
         raise DeviceError(

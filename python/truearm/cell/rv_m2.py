@@ -138,7 +138,7 @@ class RvM2(Managed):
         self._check_error()
         origin = tenths(np.array(self._settings.origin_deg) * RADIANS_PER_DEGREE)
         for _ in range(TRIES):
-            self._port.send("NT", f"SP {self._settings.speed}")
+            self._port.begin("NT", f"SP {self._settings.speed}")
             if self._locate([origin], self._settings.origin_timeout_s, strict=False):
                 return
         raise DeviceError(
@@ -221,7 +221,8 @@ class RvM2(Managed):
     def _where(self, limit_s: float, *first: str) -> Tenths | None:
         """What WH answers, in tenths, after what is sent first; None if nothing readable came."""
         self._port.drain()
-        self._port.send(*first, "WH")
+        send = self._port.begin if first else self._port.send
+        send(*first, "WH")
         try:
             return movemaster.parse_numbers(self._port.receive(limit_s, doing="say where it is"))
         except DeviceSilentError:

@@ -64,7 +64,6 @@ class UniversalRobots(Managed):
         address = tcp_address(settings.host, settings.script_port)
         self._script = LinePort(self.name, address, settings.timeout_s)
         self._stream: _Stream | None = None
-        self._interrupted = threading.Event()
         self._busy = threading.RLock()
 
     @property
@@ -114,13 +113,13 @@ class UniversalRobots(Managed):
 
     def stop(self) -> None:
         """See Device."""
-        self._interrupted.set()
+        self._script.interrupt()
         try:
             if self._script.is_open:
                 self._script.send(f"stopj({STOP_RAD_S2:g})")
         finally:
             with self._busy:
-                self._interrupted.clear()
+                self._script.resume()
 
     def close(self) -> None:
         """See Device."""
@@ -135,9 +134,7 @@ class UniversalRobots(Managed):
         with self._busy:
             for _ in range(SENDINGS):
                 self._check_ready()
-                if self._interrupted.is_set():
-                    raise stopped(self.name, self.address)
-                self._script.send(f"movej({place}, {options})")
+                self._script.begin(f"movej({place}, {options})")
                 if self._arrives(target):
                     return
             self._check_ready()
@@ -188,12 +185,12 @@ class UniversalRobots(Managed):
         stream = self._connected()
         until = time.monotonic() + self._settings.timeout_s
         while stream.newest(self._settings.timeout_s) is state:
-            if self._interrupted.is_set():
+            if self._script.is_interrupted:
                 raise stopped(self.name, self.address)
             if time.monotonic() > until:
                 raise silent(self.name, self.address, self._settings.timeout_s, doing="send its state")
             stream.wait()
-        if self._interrupted.is_set():
+        if self._script.is_interrupted:
             raise stopped(self.name, self.address)
 
     def _state(self) -> ur_packets.State:

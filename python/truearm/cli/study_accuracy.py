@@ -88,7 +88,7 @@ def command(
     study = _study(data, robot, (length_unit, angle_unit), asked, quick=quick)
     where = Where(scheduler, workers, _again(again))
     check_directory(output)
-    with ends_promptly(lambda: f"Results so far are in {output}; the same command goes on with the others."):
+    with ends_promptly(lambda: _left_behind(output)):
         _warn_of(study)
         make_directory(output)
         outcome = gather(study, output) if so_far else conduct(study, output, where, told_progress())
@@ -135,6 +135,15 @@ def _study(
         check_methods(_words(asked["methods"])),
         quick,
     )
+
+
+def _left_behind(output: Path) -> str:
+    """What an interrupted study leaves."""
+    from truearm.studies.accuracy.results import LINES_NAME
+
+    if not (output / LINES_NAME).exists():
+        return "There is no result yet; the same command begins anew."
+    return f"Results so far are in {output}; the same command goes on with the others."
 
 
 def _again(given: str | None) -> tuple[str, ...]:

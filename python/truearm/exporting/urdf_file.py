@@ -1,5 +1,6 @@
 """The constant part as a URDF."""
 
+import re
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as ET
@@ -16,6 +17,11 @@ from truearm.robot import Robot
 from truearm.urdf_names import UrdfNames
 
 NOMINAL_WITHIN_M: Final = 1e-4
+
+
+def comment(text: str) -> str:
+    """A text as XML allows it in a comment: no two hyphens side by side, none at the end."""
+    return re.sub("-(?=-|$)", "- ", text)
 
 
 def urdf_text(
@@ -40,7 +46,7 @@ def urdf_text(
         names = _checked_names(original, nominal)
         root = patched_urdf(read_text(Path(original.partition("#")[0])), names, robot)
     if notes:
-        root.insert(0, ET.Comment(f"\n{as_comments(notes, '').replace('--', '- -')}"))
+        root.insert(0, ET.Comment(f"\n{comment(as_comments(notes, ''))}"))
     if original is None:
         ET.indent(root)
     text = f'<?xml version="1.0"?>\n{ET.tostring(root, encoding="unicode")}\n'

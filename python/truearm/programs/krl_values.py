@@ -153,7 +153,8 @@ def named(reader: Reader) -> Named | None:
     reader.expect("[")
     index: int | str = "?"
     if reader.kind() == "number" and reader.peek(1) == "]":
-        index = int(float(reader.take().text))
+        value = float(reader.take().text)
+        index = int(value) if value.is_integer() else "?"
     _skip_to(reader, "]")
     reader.expect("]")
     return Named(name.text.lower(), index, name.start)
