@@ -196,7 +196,7 @@ def test_standard_deviation_carries_to_another_tool(variable):
 
 
 def test_many_poses_are_as_uncertain_as_some(variable):
-    calibration, arm = variable
+    arm, _, calibration = variable
     q = arm.poses(1100, seed=3)
     parts = np.concatenate([calibration.position_std(part) for part in np.split(q, [300, 512, 800])])
     np.testing.assert_allclose(calibration.position_std(q), parts, rtol=1e-9)

@@ -101,6 +101,27 @@ def test_kept_frames_judge_every_row(known):
     other = moved(arm)
     elsewhere = ta.evaluate(calibration, other.measure(other.poses(40, seed=3)), keep_frames=True)
     assert elsewhere.errors["variable"].position.mean > 100.0
+    (notice,) = elsewhere.notices
+    assert notice.kind == "setup_moved"
+    assert "Leave --keep-frames out" in notice.message
+
+
+def test_a_tool_that_was_moved_is_not_blamed_on_the_calibration(known):
+    arm, calibration = known
+    other = moved(arm)
+    other.target_in_flange = arm.target_in_flange + np.array([0.04, 0.0, 0.03])
+    found = ta.evaluate(calibration, other.measure(other.poses(40, seed=3)), keep_tool=True)
+    (notice,) = found.notices
+    assert notice.kind == "setup_moved"
+    assert "Leave --keep-tool out" in notice.message
+
+
+def test_a_calibration_of_another_arm_is_blamed_with_kept_frames_too(known):
+    _, calibration = known
+    odd = VirtualArm.paper(seed=9, imperfections=Imperfections(angle_deg=3.0))
+    found = ta.evaluate(calibration, odd.measure(odd.poses(40, seed=3)), keep_frames=True)
+    assert {"no_help", "far_rows", "gross_rows"} & {notice.kind for notice in found.notices}
+    assert "setup_moved" not in {notice.kind for notice in found.notices}
 
 
 def test_kept_frames_are_chosen_by_name():

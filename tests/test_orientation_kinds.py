@@ -156,3 +156,19 @@ def test_what_is_not_turned_can_be_read_otherwise():
     still = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
     for _, _, other in otherwise_read(still):
         np.testing.assert_allclose(np.linalg.norm(other, axis=1), 1.0)
+
+
+def test_orientations_beside_several_targets_are_told_to_be_left_out():
+    robot, table = posed(count=40)
+    arm = VirtualArm(robot, seed=4)
+    arm.target_in_flange = arm.target_in_flange + np.array([0.05, 0.08, -0.03])
+    other = arm.measure_table(arm.poses(40), seed=1)
+    both = ta.Measurements.from_dataframe(table.assign(**{f"{axis}2": other[axis] for axis in "xyz"}))
+
+    def told(**more):
+        found = ta.calibrate(robot, both, model="constant", **more)
+        return [n.message for n in found.notices if n.kind == "orientations_left_out"]
+
+    (message,) = told()
+    assert message.startswith("Orientations of 40 rows are left out")
+    assert told(use="targets") == told(use="pose") == []

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from truearm.errors import InputError, UsageError, WorkError
+from truearm.library import library_names
 from truearm.planning.accessibility import (
+    STEPS_ALONG_LINK,
     AboveFloor,
     InBox,
     InCone,
@@ -12,9 +14,11 @@ from truearm.planning.accessibility import (
     JointLimits,
     KeepOut,
     LeastContactAngle,
+    Places,
     accessible,
     either,
     lowest,
+    standing_links,
 )
 from truearm.planning.configurations import Configuration
 from truearm.planning.pool import PoolOptions, draw_pool, needed_pool
@@ -103,6 +107,34 @@ def test_a_floor_holds_for_all_parts_that_move():
     assert (tools[allowed] >= height).all()
     assert lowest(RV_M2, readings[allowed], tool=RV_M2.tool) >= height
     assert all(lowest(RV_M2, each[None], tool=RV_M2.tool) < height for each in readings[~allowed])
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_only_what_joints_lift_is_held_above_the_floor(name):
+    robot = Robot.load(name)
+    low, high = np.clip(robot.limits.T, -np.pi, np.pi)
+    drawn = np.random.default_rng(5).uniform(low, high, (50, robot.joint_count))
+    points = Places(robot, drawn, robot.tool).arm_points[:, : STEPS_ALONG_LINK * standing_links(robot)]
+    np.testing.assert_allclose(np.ptp(points[:, :, 2], axis=0), 0.0, atol=1e-9)
+
+
+def test_a_carriage_stands_on_its_rail(tmp_path):
+    links = "\n".join(
+        f'[[link]]\njoint = "{joint}"\nd = {d}\na = {a}\nalpha = {alpha}\nlimits = [{low}, {high}]'
+        for joint, d, a, alpha, low, high in [
+            ("prismatic", 0.0, 0.0, 90.0, 0.0, 3.0),
+            ("revolute", 0.4, 0.0, 90.0, -180.0, 180.0),
+            ("revolute", 0.0, 0.5, 0.0, 10.0, 170.0),
+        ]
+    )
+    head = 'name = "rail"\nconvention = "standard"\nlength_unit = "m"\nangle_unit = "deg"\n'
+    head += "[base]\nalpha = -90.0\n"
+    (tmp_path / "rail.toml").write_text(head + links + "\n")
+    rail = Robot.load(tmp_path / "rail.toml")
+    assert standing_links(rail) == 2
+    readings = np.array([[1.0, 0.3, 1.0], [1.0, 0.3, 0.2], [2.5, -1.0, 0.2]])
+    np.testing.assert_array_equal(accessible(rail, readings, [AboveFloor(0.6)]), [False, False, False])
+    np.testing.assert_array_equal(accessible(rail, readings, [AboveFloor(0.3)]), [True, True, True])
 
 
 def test_rules_of_the_volume():

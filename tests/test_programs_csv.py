@@ -56,6 +56,27 @@ def test_poses_are_corrected_on_the_branch_of_their_seed(robot, seeds):
     assert np.abs(again - Q - SHIFT).max() < 1e-7
 
 
+@pytest.mark.parametrize("seeds", [True, False])
+def test_seeds_tell_of_the_elbow_of_an_arm_with_seven_joints(seeds):
+    robot = Robot.load("kuka-iiwa-7")
+    low, high = np.deg2rad([[-40, 30, 20, -60, 10, 50, -30], [50, 60, -30, -90, 40, 20, 60]])
+    q = low + (high - low) * np.linspace(0.0, 1.0, 12)[:, None]
+    head = ",".join(["x", "y", "z", "qw", "qx", "qy", "qz", *(f"q{k + 1}" for k in range(7))])
+    rows = [head]
+    for number, (row, pose) in enumerate(zip(q, robot.pose(q), strict=True)):
+        values = [*pose[:3, 3], *quaternion_from_matrix(pose[:3, :3])]
+        seed = [f"{value:.9f}" for value in row] if seeds or number == 0 else [""] * 7
+        rows.append(",".join([*(f"{value:.9f}" for value in values), *seed]))
+    result = rewritten(CSV, "\n".join(rows) + "\n", robot, by=np.full(7, 1e-3))
+    assert reasons(result) == []
+    posed = result.program.targets.layout == 1
+    found = result.nominal[posed]
+    np.testing.assert_allclose(robot.pose(found), robot.pose(q), atol=1e-7)
+    if seeds:
+        np.testing.assert_allclose(found, q, atol=1e-6)
+    assert np.abs(np.diff(found, axis=0)).max() < 0.3, "without seeds the elbow goes on from where it was"
+
+
 def test_a_byte_order_mark_stays_first_and_what_was_written_is_read_again(robot):
     text = "\ufeff".encode().decode("latin-1") + joints(Q)
     result = rewritten(CSV, text, robot, by=SHIFT, mark="compensated")

@@ -174,7 +174,7 @@ def notices_of(path, calibration, frames="", kinds=("frames", "tool")):
     return [notice for notice in done.notices if notice.kind in kinds]
 
 
-def test_tools_that_positions_alone_do_not_place_are_told(tmp_path, positions_alone):
+def test_tools_that_no_measurement_of_a_target_places_are_told(tmp_path, positions_alone):
     path = tmp_path / "a.mod"
     path.write_bytes(RAPID.encode("latin-1"))
     entry = "[tool.tG]\nxyz = [0, 0, 120.4]\n"
@@ -187,7 +187,8 @@ def test_tools_that_positions_alone_do_not_place_are_told(tmp_path, positions_al
     assert notices_of(path, positions_alone, entry + "identified = {residual_mm = 0.03}\n") == []
     arm = VirtualArm(ABB, seed=3)
     poses = arm.measure(arm.poses(60, seed=1), orientation=True)
-    assert notices_of(path, ta.calibrate(ABB, poses, ta.Options.of(model="constant"))) == []
+    (found,) = notices_of(path, ta.calibrate(ABB, poses, ta.Options.of(model="constant")))
+    assert "positions and orientations of its target alone" in found.message
 
 
 TABLE = "[object.wT]\nxyz = [300, 0, 110]\n"

@@ -21,6 +21,7 @@ from truearm.doubts import (
     constant_is_better,
     doubts,
     mounting,
+    orientations_left_out,
     poses_aside,
     seen_at_values,
     stated_too_large,
@@ -28,6 +29,7 @@ from truearm.doubts import (
 )
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.errors import InputError, Notice, UsageError, count_of
+from truearm.exchanged import exchanged_notices
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
     ENOUGH_FOR_HYPER,
@@ -100,6 +102,7 @@ def calibrate(
     given = given.deduplicated()
     notices += stood_still(robot, given.readings) + seen_at_values(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
+    notices += orientations_left_out(given, task.selection, chosen.use)
     split = split_rows(given, chosen.split)
     notices += check_judged(given.select(split.train), given.select(split.holdout), task.selection)
     task = replace(task, sizes=() if split.planned else given.sizes)
@@ -158,7 +161,7 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     elif any(notice.kind in (NO_HELP, FAR_FROM_NOMINAL) for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
-    return doubted
+    return doubted if shifted else [*exchanged_notices(found), *doubted]
 
 
 def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Outliers | None) -> list[Notice]:

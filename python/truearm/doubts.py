@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.core_set import Selection
 from truearm.details import ANOTHER_PLACE, VariableDetails
-from truearm.errors import Notice, list_outliers
+from truearm.errors import Notice, count_of, list_outliers
 from truearm.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.grids import BETWEEN, grid_steps, grid_words
 from truearm.held_tool import TURN_MORE, held_tool, held_words
 from truearm.identified import IdentifiedArm
+from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
@@ -161,6 +163,18 @@ def constant_is_better(validation: Validation, best: str, outliers: Outliers | N
         "more poses."
     )
     return [Notice("constant_better", text)]
+
+
+def orientations_left_out(data: Measurements, selection: Selection, use: str | None) -> list[Notice]:
+    """A warning where orientations were measured and several targets are fitted in their place."""
+    if use is not None or selection.orientation or data.orientations is None:
+        return []
+    count = int(np.isfinite(data.orientations).all(axis=1).sum())
+    text = (
+        f"Orientations of {count_of(count, 'row')} are left out: where rows hold several targets these are "
+        "fitted, and tell of orientation as well. For orientations, and the first target alone: --use pose."
+    )
+    return [Notice("orientations_left_out", text)]
 
 
 def mounting(variable: VariableDetails | None) -> list[Notice]:

@@ -12,8 +12,8 @@ from truearm._core import Setup, fit_constant
 from truearm.calibration import Calibration
 from truearm.core_set import Use, core_set, rotations, select
 from truearm.defaults import FIRST_TARGET, SEED
-from truearm.doubts import no_help
-from truearm.errors import InputError, Notice, UsageError, count_of, list_names
+from truearm.doubts import NO_HELP, no_help
+from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
 from truearm.fitted_rows import known_rows
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.gross_rows import Expected, gross_frame_rows, gross_judged_rows
@@ -147,7 +147,10 @@ def evaluate(
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
         spoiled, outliers = _gross(task, calibration, models[best], found_by, rows, chosen)
-    notices = [*notices, *(spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration))), *outliers]
+    of_no_use = spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration))
+    if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
+        of_no_use = _moved(calibration, data, chosen, errors[best]) or of_no_use
+    notices = [*notices, *of_no_use, *outliers]
     statistics = {name: found.statistics() for name, found in errors.items()}
     return Evaluation(len(frame), len(judged), statistics, tuple(notices), held)
 
@@ -193,6 +196,32 @@ def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> l
     """A warning where the calibration does not help; medians, since single rows may be wrong."""
     before, after = (MM_PER_METRE * float(np.nanmedian(errors[name].distance_m)) for name in (NOMINAL, best))
     return no_help(before, after, "median error on the rows that were judged", floor_mm)
+
+
+def _moved(
+    calibration: Calibration, data: Measurements, options: EvaluationOptions, kept: RowErrors
+) -> list[Notice]:
+    """A warning that the instrument or the tool is elsewhere, where the calibration helps with both found
+    anew; none where that cannot be, or does not help either.
+    """
+    try:
+        anew = evaluate(calibration, data, replace(options, keep_frames=False, keep_tool=False))
+    except (InputError, WorkError):
+        return []
+    if anew.rows is None or any(notice.kind == NO_HELP for notice in anew.notices):
+        return []
+    option = "--keep-frames" if options.keep_frames else "--keep-tool"
+    what = "frame and tool" if options.keep_frames else "tool"
+    before, after = (
+        MM_PER_METRE * float(np.nanmedian(errors.distance_m))
+        for errors in (kept, anew.rows.errors[calibration.model_name])
+    )
+    text = (
+        f"With the {what} of the calibration the median error is {before:.4g} mm, with frame and tool found "
+        f"anew {after:.4g} mm: the instrument or the target stands elsewhere than then, and the calibration "
+        f"itself fits. Leave {option} out."
+    )
+    return [Notice("setup_moved", text)]
 
 
 def _gross(

@@ -44,6 +44,7 @@ LEAST_POOL: Final = 400
 MOST_TOLD: Final = 1000
 """Poses of which the expected accuracy is told in a second; of more it takes as long as the choice itself."""
 MOST_DRAWS: Final = 200_000
+OF_CELL: Final = "[world], [target] and the sensor's range in the cell file, at "
 UNLIMITED_RAD: Final = np.pi
 JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
 JOINT_SPEED_RAD_S: Final = 1.0
@@ -228,8 +229,8 @@ def measurable_pool(
     raise WorkError(
         f"{len(found)} of {drawn} random poses can be measured",
         rule=f"A pool of {size} is needed",
-        way_out="Look at [world], [target] and the sensor's range in the cell file and at --floor-mm and "
-        "--box-mm, or ask for fewer poses",
+        way_out=f"Look at {'' if cell is None else OF_CELL}--floor-mm, --box-mm and the joints' limits, or "
+        "ask for fewer poses",
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.errors import InputError
+from truearm.joint_axes import axes_at_zero
 from truearm.planning.configurations import link_frames
 from truearm.robot import Robot
 
@@ -17,6 +18,9 @@ Mask = NDArray[np.bool_]
 
 LEAST_CONTACT_DEG: Final = 15.0
 STEPS_ALONG_LINK: Final = 8
+UPRIGHT: Final = np.cos(np.deg2rad(1.0))
+LEVEL: Final = np.sin(np.deg2rad(1.0))
+"""Cosines to the vertical of axes that are taken for vertical and for level."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +50,8 @@ class Places:
 
     @property
     def moving_points(self) -> Floats:
-        """Those of `arm_points` (n, k, 3) beyond the first link, which stands on the floor itself."""
-        return self.arm_points[:, STEPS_ALONG_LINK:]
+        """Those of `arm_points` (n, k, 3) beyond the links that stand on the floor themselves."""
+        return self.arm_points[:, STEPS_ALONG_LINK * standing_links(self.robot) :]
 
     @cached_property
     def arm_points(self) -> Floats:
@@ -60,6 +64,21 @@ class Places:
         part = np.linspace(0.0, 1.0, STEPS_ALONG_LINK)[:, None]
         pieces = line[:, :-1, None] * (1.0 - part) + line[:, 1:, None] * part
         return np.asarray(pieces.reshape(len(line), -1, 3))
+
+
+def standing_links(robot: Robot) -> int:
+    """Links from the base on that no joint lifts, the first one always among them.
+
+    A column turns about the vertical, and the carriage under it slides along a level rail.
+    """
+    axes, _ = axes_at_zero(robot)
+    count = 0
+    for axis in axes:
+        up = abs(float(axis.direction_in_base[2]))
+        if not (up > UPRIGHT if axis.kind == "revolute" else up < LEVEL):
+            break
+        count += 1
+    return max(1, count)
 
 
 Rule = Callable[[Places], Mask]

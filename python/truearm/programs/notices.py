@@ -91,13 +91,13 @@ def still_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
 
 
 def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
-    """Tools of changed targets of which a calibration of positions alone does not know where they are.
+    """Tools of changed targets of which a calibration does not know where they are.
 
-    Positions tell of a point that the flange carries, not of the flange, from which a drawing or a
-    controller measures a tool. A tool taught through the calibration is measured from the same point.
+    Positions tell of a point that the flange carries, and orientations how it is turned, not of the flange,
+    from which a drawing or a controller measures a tool. A tool taught through the calibration is measured
+    from the same point.
     """
-    if calibration.selection.orientation:
-        return []
+    known = "positions and orientations of its target" if calibration.selection.orientation else "positions"
     doubtful = [tool for tool in _tools_of(done) if not (tool.taught or _is_measured(tool, calibration))]
     names = list(dict.fromkeys(tool.name for tool in doubtful if tool.name))
     if not doubtful:
@@ -107,7 +107,7 @@ def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
     return [
         Notice(
             "tool",
-            "the calibration knows positions alone, which do not tell where the flange is, and from there "
+            f"the calibration knows {known} alone, which do not tell where the flange is, and from there "
             f"{tools} is measured: all targets may be off by more than std_mm says. "
             f"Teach it again through the calibration: truearm frame CALIB touches.csv --tool {name}",
         )

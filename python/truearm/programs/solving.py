@@ -30,6 +30,8 @@ CONTRADICTS: Final = "its configuration data is another than a line from the tar
 SINGULAR: Final = "it lies at a singularity, where a pose does not determine the joints"
 DIFFERENT: Final = "it is reached in several configurations of the arm, and one change cannot suit them all"
 
+DETERMINED: Final = 6
+"""With more joints than this infinitely many readings reach a pose."""
 SAME_RAD: Final = 1e-6
 NEARER: Final = 0.8
 LEAST_GAIN: Final = 2e-3
@@ -84,11 +86,14 @@ class _Possible:
         branches: One turn of each branch, (b, N).
         named: Those that its configuration data names, (k, N); None where it has none.
         singular: Whether these lie at a singularity, (k,).
+        flange: Pose (4, 4) of the flange where infinitely many readings reach it, so that no list holds those
+            that are meant; else None.
     """
 
     branches: Floats
     named: Floats | None
     singular: Bools | None
+    flange: Floats | None = None
 
 
 class _Solver:
@@ -144,6 +149,9 @@ class _Solver:
         poses = self._flange_poses()
         numbers = np.array(list(poses), dtype=np.int64)
         found: dict[int, _Possible] = {}
+        if self.robot.joint_count > DETERMINED and self.program.configuration is None:
+            nothing = np.empty((0, self.robot.joint_count))
+            return {number: _Possible(nothing, None, None, pose) for number, pose in poses.items()}
         for start in range(0, len(numbers), AT_ONCE):
             tell(start, len(numbers))
             some = numbers[start : start + AT_ONCE]
@@ -210,7 +218,10 @@ class _Solver:
         known = None if np.isnan(self.q[target, 0]) else self.q[target]
         if known is not None and possible.named is not None:
             return
-        found = self._chosen(possible, before, straight=straight)
+        if possible.flange is not None:
+            found = self._from_seed(possible.flange, before)
+        else:
+            found = self._chosen(possible, before, straight=straight)
         if isinstance(found, str):
             self.reasons[target] = found
             self.q[target] = np.nan
@@ -236,6 +247,15 @@ class _Solver:
             if not is_nearest(found, every, before):
                 return CONTRADICTS
         return SINGULAR if possible.singular is not None and possible.singular.any() else found
+
+    def _from_seed(self, flange: Floats, before: Floats | None) -> Floats | str:
+        """The readings that a search from those before arrives at."""
+        if before is None:
+            return AMBIGUOUS
+        found = self.inverse.near(flange, before)
+        if np.isnan(found).any():
+            return OUT_OF_REACH
+        return SINGULAR if are_singular(self.robot, found[None])[0] else found
 
     def _unnamed(self, possible: _Possible, before: Floats | None) -> Floats | str:
         """The readings nearest to those before, where the text does not tell."""
