@@ -9,17 +9,16 @@ import pytest
 import truearm as ta
 from tests.test_doubts import notice_of
 from truearm.conventions import Convention, conventions_of
+from truearm.parameters import ALPHA, A, D
 from truearm.simulation import VirtualArm
 
 
-def measured_otherwise(name, turned=(), coupled=None, mirrored=False, zeros=()):
-    """An arm whose controller counts joints otherwise than its file says, and what is measured of it."""
-    robot = ta.Robot.load(name)
-    own = Convention(turned, coupled, mirrored, zeros).robot(robot)
-    arm = VirtualArm(own, seed=4)
+def measured_otherwise(name, **otherwise):
+    """An arm that is otherwise than its file says, and what is measured of it."""
+    robot, convention = ta.Robot.load(name), Convention(**otherwise)
+    arm = VirtualArm(convention.robot(robot), seed=4)
     table = arm.measure_table(arm.poses(60))
-    table["y"] *= -1.0 if mirrored else 1.0
-    return robot, ta.Measurements.from_dataframe(table, joints=robot.joints)
+    return robot, convention.measured(ta.Measurements.from_dataframe(table, joints=robot.joints))
 
 
 @pytest.mark.parametrize(
@@ -67,6 +66,34 @@ def test_zeros_that_are_elsewhere_are_named(name, zeros, words):
     assert told.count("the zero of joint") == len(words)
     assert all(f"the zero of joint {part}" in told for part in words)
     assert "counted the other way" not in told
+
+
+@pytest.mark.parametrize(
+    ("name", "otherwise", "words"),
+    [
+        ("ur10", {"other_rows": True}, 'its rows are of the other convention (convention = "modified"). Put'),
+        ("franka-panda", {"other_rows": True}, 'the other convention (convention = "standard"). Put'),
+        ("ur10", {"signs": ((1, A),)}, "a of link 2 has the other sign (a = 612 mm, and not -612 mm). Put"),
+        (
+            "abb-irb-120",
+            {"signs": ((3, D),)},
+            "d of link 4 has the other sign (d = -302 mm, and not 302",
+        ),
+        ("abb-irb-120", {"signs": ((2, ALPHA),)}, "alpha of link 3 has the other sign (alpha = 90 deg, and"),
+        (
+            "kuka-kr-6-r900",
+            {"signs": ((0, A),)},
+            "a of link 1 has the other sign (a = -25 mm, and not 25",
+        ),
+        ("kuka-iiwa-7", {"signs": ((2, D), (4, D))}, "d of link 3 has the other sign (d = -400 mm, and not"),
+        ("abb-irb-120", {"exchanged": (3, 4)}, "if the columns of joints 4 and 5 are exchanged. Put"),
+        ("kuka-iiwa-7", {"exchanged": (0, 1)}, "if the columns of joints 1 and 2 are exchanged. Put"),
+    ],
+)
+def test_what_is_written_otherwise_in_rows_and_columns_is_named(name, otherwise, words):
+    told = named_otherwise(name, **otherwise)
+    assert words in told
+    assert "link 7 has the other sign" not in told, "the target takes that over"
 
 
 @pytest.mark.parametrize("name", ["ur10", "abb-irb-120", "kuka-iiwa-7"])

@@ -1,6 +1,6 @@
-"""Readings that would fit the nominal arm in another convention: directions, zeros, joint 3, the frame."""
+"""Readings that would fit the nominal arm in another convention: directions, zeros, signs, the frame."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, product
 from typing import Final
@@ -13,8 +13,9 @@ from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.measurements import Measurements
 from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
-from truearm.parameters import THETA
+from truearm.parameters import ALPHA, KINDS, THETA, A, D
 from truearm.robot import Robot
+from truearm.robot_data import Convention as Rows
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -34,6 +35,9 @@ MOST_BESIDE: Final = 2
 QUARTERS: Final = (1, -1, 2)
 """Where another zero may be, in quarter turns."""
 QUARTER_DEG: Final = 90.0
+SIGNED: Final = 1e-3
+"""Parameters that are larger have a sign to be wrong, m or sine of an angle."""
+OTHER_ROWS: Final[Mapping[Rows, Rows]] = {"standard": "modified", "modified": "standard"}
 SHOULDER, ELBOW = 1, 2
 MIRROR: Final = np.array([1.0, -1.0, 1.0])
 
@@ -47,22 +51,30 @@ class Convention:
         coupled: How much joint 2's reading turns joint 3; None as the robot file has it.
         mirrored: Whether the device's frame is left-handed.
         zeros: Joints, from 0, whose theta is more by so many quarter turns.
+        signs: Links, from 0, with the place of a parameter in their row that has the other sign.
+        other_rows: Whether the rows are of the other one of the two Denavit-Hartenberg conventions.
+        exchanged: Two joints, from 0, whose readings stand in each other's column.
     """
 
     turned: tuple[int, ...] = ()
     coupled: float | None = None
     mirrored: bool = False
     zeros: tuple[tuple[int, int], ...] = ()
+    signs: tuple[tuple[int, int], ...] = ()
+    other_rows: bool = False
+    exchanged: tuple[int, ...] = ()
 
     @property
     def changes(self) -> int:
         """In how much it differs from what robot file and measurements say."""
-        return len(self.turned) + (self.coupled is not None) + self.mirrored + len(self.zeros)
+        of_rows = len(self.signs) + self.other_rows + bool(self.exchanged)
+        return len(self.turned) + (self.coupled is not None) + self.mirrored + len(self.zeros) + of_rows
 
     @property
-    def order(self) -> tuple[bool, int, bool, int]:
+    def order(self) -> tuple[bool, int, bool, int, int]:
         """The least comes first: a left-handed frame beside other changes last, then few changes."""
-        return self.mirrored and self.changes > 1, self.changes, self.mirrored, len(self.zeros)
+        beside = self.mirrored and self.changes > 1
+        return beside, self.changes, self.mirrored, len(self.signs), len(self.zeros)
 
     def robot(self, robot: Robot) -> Robot:
         """A robot with directions, coupling and zeros of this convention."""
@@ -72,11 +84,20 @@ class Convention:
         coupling[:, self.turned] *= -1.0
         for joint, quarters in self.zeros:
             table[joint, THETA] = np.deg2rad(_theta_deg(robot, joint, quarters))
-        return replace(robot, coupling=coupling, table=table)
+        for link, place in self.signs:
+            table[link, place] *= -1.0
+        convention = OTHER_ROWS[robot.convention] if self.other_rows else robot.convention
+        return replace(robot, coupling=coupling, table=table, convention=convention)
 
-    def points(self, data: Measurements) -> Measurements:
-        """Measurements with the points of this convention."""
-        return replace(data, targets=data.targets * MIRROR) if self.mirrored else data
+    def measured(self, data: Measurements) -> Measurements:
+        """Measurements with the points and the columns of this convention."""
+        if self.mirrored:
+            data = replace(data, targets=data.targets * MIRROR)
+        if self.exchanged:
+            readings = data.readings.copy()
+            readings[:, self.exchanged] = data.readings[:, self.exchanged[::-1]]
+            data = replace(data, readings=readings)
+        return data
 
     def words(self, robot: Robot) -> str:
         """What is otherwise, and what the robot file then says."""
@@ -96,6 +117,16 @@ class Convention:
             f"and not {_theta_deg(robot, joint, 0):.7g})"
             for joint, quarters in self.zeros
         ]
+        parts += [
+            f"{KINDS[place]} of link {link + 1} has the other sign ({_value(own, link, place)}, and not "
+            f"{_value(robot, link, place).rpartition(' = ')[2]})"
+            for link, place in self.signs
+        ]
+        if self.other_rows:
+            parts.append(f'its rows are of the other convention (convention = "{own.convention}")')
+        if self.exchanged:
+            one, other = (joint + 1 for joint in self.exchanged)
+            parts.append(f"the columns of joints {one} and {other} are exchanged")
         if self.mirrored:
             parts.append("the device's frame is left-handed (one axis reversed, or two exchanged)")
         return ", and ".join(parts)
@@ -105,6 +136,13 @@ def _theta_deg(robot: Robot, joint: int, quarters: int) -> float:
     """The theta of a joint with so many quarter turns more, above -180 and up to 180 deg."""
     more = np.rad2deg(robot.table[joint, THETA]) + QUARTER_DEG * quarters
     return float(180.0 - (180.0 - np.round(more, 9)) % 360.0)
+
+
+def _value(robot: Robot, link: int, place: int) -> str:
+    """A parameter with its value, as in "a = -35 mm"."""
+    value = float(robot.table[link, place])
+    shown = f"{value * MM_PER_METRE:.7g} mm" if place in (D, A) else f"{np.rad2deg(value):.7g} deg"
+    return f"{KINDS[place]} = {shown}"
 
 
 def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
@@ -128,7 +166,7 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
         return []
 
     def misfit(convention: Convention) -> float:
-        return misfit_m(convention.robot(robot), convention.points(rows), target, task.threads)
+        return misfit_m(convention.robot(robot), convention.measured(rows), target, task.threads)
 
     before = misfit(Convention())
     found = {convention: misfit(convention) for convention in conventions_of(robot) if convention.changes}
@@ -136,6 +174,7 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     if best >= min(before / BETTER, NEAR_M):
         return []
     fitting = [convention for convention, off in found.items() if off <= max(AS_WELL * best, EXACT_M)]
+    fitting = [convention for convention in fitting if not _needs_less(convention, fitting)]
     named, *others = sorted(fitting, key=lambda convention: (convention.order, found[convention]))
     off, instead = (f"{value * MM_PER_METRE:.3g} mm" for value in (found[named], before))
     instead = f" in place of {instead}" if np.isfinite(before) else ""
@@ -147,6 +186,14 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     return [Notice(FITS_OTHERWISE, text)]
 
 
+def _needs_less(convention: Convention, fitting: Sequence[Convention]) -> bool:
+    """Whether a part of its signs alone fits: frame and target take over those of first and last link."""
+    return any(
+        set(other.signs) < set(convention.signs) and replace(other, signs=()) == replace(convention, signs=())
+        for other in fitting
+    )
+
+
 def _words_of_others(robot: Robot, others: list[Convention]) -> str:
     """That, and what, fits as well as what was named: the first, and the first left-handed frame."""
     if not others:
@@ -154,7 +201,7 @@ def _words_of_others(robot: Robot, others: list[Convention]) -> str:
     named = [others[0], *[other for other in others[1:] if other.mirrored][: not others[0].mirrored]]
     ways = ", or if ".join(other.words(robot) for other in named)
     more = len(others) - len(named)
-    rest = f", or in {count_of(more, 'other way')}" if more else ""
+    rest = f", or in {'another way' if more == 1 else count_of(more, 'other way')}" if more else ""
     return (
         f" They fit as well if {ways}{rest}: measurements alone do not tell which is true. "
         "Jog each joint that is named, and look which way it turns and where it is at zero."
@@ -178,9 +225,26 @@ def conventions_of(robot: Robot) -> Iterator[Convention]:
         known = float(robot.coupling[ELBOW, SHOULDER])
         coupled += [value for value in (0.0, 1.0, -1.0) if value != known]
     yield from (Convention(*parts) for parts in product(turned, coupled, (False, True)))
+    yield from _of_rows(robot)
     for zeros in _zeros(robot, most):
         beside = MOST_BESIDE if len(zeros) <= MOST_BESIDE else 0
         yield from (Convention(some, zeros=zeros) for some in turned if len(some) <= beside)
+
+
+def _of_rows(robot: Robot) -> Iterator[Convention]:
+    """What may be written otherwise in the rows of the table, or in the columns of the readings."""
+    yield Convention(other_rows=True)
+    signed = [
+        (link, place)
+        for link, row in enumerate(robot.table)
+        for place in (D, A, ALPHA)
+        if abs(np.sin(row[place]) if place == ALPHA else row[place]) > SIGNED
+    ]
+    for count in range(1, MOST_BESIDE + 1):
+        yield from (Convention(signs=signs) for signs in combinations(signed, count))
+    for joints in combinations(range(robot.joint_count), 2):
+        if robot.joints[joints[0]] == robot.joints[joints[1]]:
+            yield Convention(exchanged=joints)
 
 
 def _zeros(robot: Robot, most: int) -> Iterator[tuple[tuple[int, int], ...]]:

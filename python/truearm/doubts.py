@@ -65,9 +65,9 @@ HIDING: Final = (FEW_VALUES, HELD_TOOL)
 """What leaves a part of the errors out of held-out poses too; grids do as well."""
 CHECKS: Final = (
     "Check that readings and points belong together row by row, the order of the columns, units, a device "
-    "frame that is right-handed, the robot, and in its file the direction of each joint (direction = -1), "
-    "its zero (theta) and whether joint 3 is counted against link 2 or against the horizontal ([coupling]). "
-    "Rows of different stations need a column group"
+    "frame that is right-handed, the robot, and in its file the convention, the signs of d, a and alpha, "
+    "the direction of each joint (direction = -1), its zero (theta) and whether joint 3 is counted against "
+    "link 2 or against the horizontal ([coupling]). Rows of different stations need a column group"
 )
 
 

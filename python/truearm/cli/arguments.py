@@ -60,7 +60,7 @@ AngleUnit: TypeAlias = Annotated[
 ]
 Use: TypeAlias = Annotated[
     str | None,
-    typer.Option(metavar="position|pose|targets", help="What to use.  [default: all that was measured]"),
+    typer.Option(metavar="position|pose|targets", help="What to use.  [default: several targets, else poses, as measured]"),
 ]
 
 Feature: TypeAlias = Annotated[

@@ -47,7 +47,7 @@ SCHEMES: Final[Mapping[str, str]] = {
 }
 UNSET: Final[Mapping[str, str]] = {
     "train_size": "all that are not held out",
-    "use": "all that was measured",
+    "use": "several targets, else poses, else positions, as measured",
     "repeatability_mm": "not stated",
     "cells": "by the number of joints",
     "table": "one for each association cell",
