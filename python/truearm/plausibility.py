@@ -11,6 +11,7 @@ from truearm.measurements import Measurements
 from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
 from truearm.robot import Robot
 from truearm.turning_sense import FIT, MISFIT
+from truearm.unit_change import check_one_unit
 from truearm.units import MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
@@ -84,7 +85,8 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
 
 
 def check_points(measurements: Measurements, robot: Robot) -> None:
-    """Raise InputError where measured points lie too far apart, too close together, or in inches."""
+    """Raise InputError where points lie too far apart, too close together, in inches, or in two units."""
+    check_one_unit(measurements)
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
     _check_distances(measurements, robot)

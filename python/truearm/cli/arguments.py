@@ -60,7 +60,10 @@ AngleUnit: TypeAlias = Annotated[
 ]
 Use: TypeAlias = Annotated[
     str | None,
-    typer.Option(metavar="position|pose|targets", help="What to use.  [default: several targets, else poses, as measured]"),
+    typer.Option(
+        metavar="position|pose|targets",
+        help="What to use.  [default: several targets, else poses, as measured]",
+    ),
 ]
 
 Feature: TypeAlias = Annotated[

@@ -1,0 +1,80 @@
+"""Points whose unit changes from some row on: a log that was continued after the instrument's units were switched."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError
+from truearm.measurements import Measurements
+from truearm.units import MM_PER_INCH, MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+FACTORS: Final = (
+    (MM_PER_INCH, "millimetres and inches"),
+    (MM_PER_METRE / MM_PER_INCH, "inches and metres"),
+    (MM_PER_METRE, "millimetres and metres"),
+)
+"""How many times larger numbers are in the first of two units than in the second."""
+FEWEST: Final = 5
+"""Rows before the change and after it, at the least."""
+APART: Final = 3.0
+"""All points on one side are this many times farther from the origin than all on the other."""
+FAR_ALIKE: Final = 1.3
+SPREAD_ALIKE: Final = 1.6
+"""Within this factor distances from the origin, and of points from one another, change by that of two units."""
+
+
+def check_one_unit(measurements: Measurements) -> None:
+    """Raise InputError where the points of a set-up change their unit from some row on.
+
+    Where an instrument was moved its points lie elsewhere, and spread as far as before: both have to change
+    by the factor of two units.
+    """
+    for group in measurements.groups if measurements.target_count else []:
+        own = measurements.select(measurements.group == group)
+        seen = np.flatnonzero(np.isfinite(own.targets[:, 0]).all(axis=1))
+        points = own.targets[seen, 0]
+        first = _first_behind(np.linalg.norm(points, axis=1))
+        units = None if first is None else _units(points[:first], points[first:])
+        if first is not None and units is not None:
+            behind = np.zeros(len(own), dtype=bool)
+            behind[seen[first:]] = True
+            raise InputError(
+                f"from {own.row_names(np.arange(len(own)) == seen[first])} on points look like another unit "
+                f"than those before: {units}",
+                where=", ".join(own.files),
+                rule="All rows of a column have one unit",
+                way_out="Convert these rows, or give them in a file of their own with its unit",
+            )
+
+
+def _first_behind(far: Floats) -> int | None:
+    """The first of rows that are all nearer, or all farther, than those before (n,); None where there is none."""
+    if len(far) < 2 * FEWEST or far.min() <= 0.0:
+        return None
+    logs = np.log(far)
+    lowest, highest = np.minimum.accumulate(logs), np.maximum.accumulate(logs)
+    least, most = np.minimum.accumulate(logs[::-1])[::-1], np.maximum.accumulate(logs[::-1])[::-1]
+    gap = np.maximum(least[1:] - highest[:-1], lowest[:-1] - most[1:])[FEWEST - 1 : len(far) - FEWEST]
+    place = int(np.argmax(gap))
+    return None if gap[place] < np.log(APART) else FEWEST + place
+
+
+def _units(before: Floats, behind: Floats) -> str | None:
+    """The two units whose factor is between points (n, 3) before and behind, in words; None if there are none."""
+    far = abs(np.log(_typical(behind) / _typical(before)))
+    spread = [_typical(points - np.median(points, axis=0)) for points in (before, behind)]
+    if min(spread) <= 0.0:
+        return None
+    wide = abs(np.log(spread[1] / spread[0]))
+    for factor, words in FACTORS:
+        known = np.log(factor)
+        if abs(far - known) < np.log(FAR_ALIKE) and abs(wide - known) < np.log(SPREAD_ALIKE):
+            return words
+    return None
+
+
+def _typical(points: Floats) -> float:
+    return float(np.median(np.linalg.norm(points, axis=1)))

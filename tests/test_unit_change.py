@@ -1,0 +1,53 @@
+"""A column whose unit changes from some row on is told; an instrument that was moved is not taken for it."""
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.errors import InputError
+from truearm.simulation import VirtualArm
+from truearm.unit_change import check_one_unit
+
+ROWS = 60
+
+
+def table_of(name="ur10", seed=3):
+    arm = VirtualArm(ta.Robot.load(name), seed=seed)
+    return arm.measure_table(arm.poses(ROWS))
+
+
+def changed(table, first, factor):
+    other = table.copy()
+    other.loc[first:, ["x", "y", "z"]] *= factor
+    return ta.Measurements.from_dataframe(other)
+
+
+@pytest.mark.parametrize("name", ["ur10", "rv-m2", "kuka-iiwa-7"])
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (1.0 / 25.4, "millimetres and inches"),
+        (25.4, "millimetres and inches"),
+        (1e-3, "millimetres and metres"),
+        (39.37, "inches and metres"),
+    ],
+)
+@pytest.mark.parametrize("first", [5, 30, ROWS - 5])
+def test_a_unit_that_changes_is_told_with_the_row(name, factor, words, first):
+    with pytest.raises(InputError, match=rf"from row {first + 1} on points look like another unit.*{words}"):
+        check_one_unit(changed(table_of(name), first, factor))
+
+
+def test_a_calibration_is_not_begun():
+    data = changed(table_of(), 40, 1.0 / 25.4)
+    with pytest.raises(InputError, match="from row 41 on .* own with its unit"):
+        ta.calibrate(ta.Robot.load("ur10"), data)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_instrument_that_was_moved_is_no_unit(seed):
+    table = table_of(seed=seed)
+    away = np.random.default_rng(seed).normal(size=3)
+    table.loc[30:, ["x", "y", "z"]] += 60.0 * away / np.linalg.norm(away)
+    check_one_unit(ta.Measurements.from_dataframe(table))
+    check_one_unit(ta.Measurements.from_dataframe(table_of(seed=seed)))
