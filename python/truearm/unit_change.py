@@ -1,4 +1,4 @@
-"""Points whose unit changes from some row on: a log that was continued after the instrument's units were switched."""
+"""Points whose unit changes from some row on: a log that went on with the instrument's units switched."""
 
 from typing import Final
 
@@ -23,7 +23,7 @@ APART: Final = 3.0
 """All points on one side are this many times farther from the origin than all on the other."""
 FAR_ALIKE: Final = 1.3
 SPREAD_ALIKE: Final = 1.6
-"""Within this factor distances from the origin, and of points from one another, change by that of two units."""
+"""Within these factors distances from the origin, and spreads, change by that of two units."""
 
 
 def check_one_unit(measurements: Measurements) -> None:
@@ -51,7 +51,7 @@ def check_one_unit(measurements: Measurements) -> None:
 
 
 def _first_behind(far: Floats) -> int | None:
-    """The first of rows that are all nearer, or all farther, than those before (n,); None where there is none."""
+    """The first of rows that are all nearer, or all farther, than those before (n,); None without any."""
     if len(far) < 2 * FEWEST or far.min() <= 0.0:
         return None
     logs = np.log(far)
@@ -63,7 +63,7 @@ def _first_behind(far: Floats) -> int | None:
 
 
 def _units(before: Floats, behind: Floats) -> str | None:
-    """The two units whose factor is between points (n, 3) before and behind, in words; None if there are none."""
+    """The two units whose factor is between points (n, 3) before and behind, in words; else None."""
     far = abs(np.log(_typical(behind) / _typical(before)))
     spread = [_typical(points - np.median(points, axis=0)) for points in (before, behind)]
     if min(spread) <= 0.0:
