@@ -1,6 +1,7 @@
 """Orientations that are noted in another way than stated: order and sense of quaternions, kinds of angles."""
 
 from itertools import permutations, product
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -8,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import truearm as ta
+from truearm.cli.calibrate import suggest_next
 from truearm.euler_orders import VECTOR, otherwise_read, twin
 from truearm.rotations import quaternion_from_euler
 from truearm.simulation import VirtualArm
@@ -97,7 +99,7 @@ def test_angles_in_the_opposite_order_are_those_of_the_twin(order):
     assert quaternion_from_euler(angles, order) == pytest.approx(twins)
 
 
-def test_orientations_in_an_unknown_convention_are_doubted():
+def test_orientations_in_an_unknown_convention_are_doubted(capsys):
     """They do not spoil the positions."""
     robot, table = posed()
     random = np.random.default_rng(1).normal(size=(len(table), 4))
@@ -106,6 +108,10 @@ def test_orientations_in_an_unknown_convention_are_doubted():
     assert "convention of Euler angles" in str(
         next(notice for notice in found.notices if notice.kind == "orientation_misfit")
     )
+    suggest_next(found, Path("found.calib"))
+    suggested = capsys.readouterr().out
+    assert "truearm report found.calib" in suggested
+    assert "compensate" not in suggested
     alone = ta.calibrate(robot, ta.Measurements.from_dataframe(table), use="position")
     both = (calibration.validation.holdout["variable"].position.mean for calibration in (found, alone))
     assert next(both) < 1.2 * next(both)

@@ -52,6 +52,7 @@ STATED_TOO_LARGE: Final = "stated_too_large"
 NO_HELP: Final = "no_help"
 NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
+ORIENTATION_MISFIT: Final = "orientation_misfit"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 ROWS_SHIFTED: Final = "rows_shifted"
 FAR_FROM_NOMINAL: Final = "far_from_nominal"
@@ -349,7 +350,7 @@ def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:
         "Check how they were noted (order of the quaternion, convention of Euler angles, into which frame "
         "they turn), or calibrate with positions alone: --use position."
     )
-    return [Notice("orientation_misfit", text)]
+    return [Notice(ORIENTATION_MISFIT, text)]
 
 
 def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:

@@ -299,7 +299,12 @@ def _check_names(names: Mapping[int, str], where: str, nameless: str) -> None:
     header = list(names.values())
     repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
     if repeated:
-        raise InputError(f'column "{repeated[0]}" occurs more than once', where=where)
+        raise InputError(
+            f'column "{repeated[0]}" occurs more than once',
+            where=where,
+            rule="Columns are told apart by their names",
+            way_out="Give each a name of its own in the first line",
+        )
 
 
 def _in_words(number: float) -> str:

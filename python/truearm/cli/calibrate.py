@@ -139,9 +139,9 @@ def _calibrated(arm: "Robot", data: "Measurements", options: "Options", threads:
 
 def suggest_next(calibration: "Calibration", file: Path) -> None:
     """Name the commands that come next: none that uses a calibration that does not help."""
-    from truearm.doubts import OF_NO_USE
+    from truearm.doubts import OF_NO_USE, ORIENTATION_MISFIT
 
-    if any(notice.kind in OF_NO_USE for notice in calibration.notices):
+    if any(notice.kind in (*OF_NO_USE, ORIENTATION_MISFIT) for notice in calibration.notices):
         suggest(f"truearm report {typed(file)}")
     else:
         suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate_commands(calibration, file))
