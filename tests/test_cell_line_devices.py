@@ -201,7 +201,7 @@ class Controller:
     def __init__(self, robot, mode=ur_packets.RUNNING, noise=1e-5):
         self.target, self.told_at, self.sent = np.zeros(6), np.inf, 0
         self._mode, self._noise, self._rng = mode, noise, np.random.default_rng(0)
-        robot._script, robot._state = Mock(send=self.send, where="UR"), self.state
+        robot._script, robot._state = Mock(begin=self.send, where="UR"), self.state
         robot._wait_for_next = lambda _: time.sleep(0.005)
 
     def send(self, _):
