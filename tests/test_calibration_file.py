@@ -3,6 +3,7 @@
 import hashlib
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -198,6 +199,18 @@ def test_odd_values_under_a_valid_digest_are_refused_by_name(written, tmp_path, 
     with pytest.raises(ta.InputError, match=f"odd.calib.*{words}") as raised:
         ta.Calibration.load(tmp_path / "odd.calib")
     assert raised.value.__cause__ is not None
+
+
+def test_numbers_of_other_kinds_in_memory_are_stored_as_ours(tmp_path):
+    arm = VirtualArm.paper(seed=2)
+    data = arm.measure(arm.poses(40), orientation=True)
+    assert data.orientations is not None
+    odd = replace(data, rows=data.rows.astype(np.int32), orientations=data.orientations.astype(np.float32))
+    ta.calibrate(arm.robot, odd, model="constant").save(tmp_path / "odd.calib")
+    arrays, _ = read_calibration_file(tmp_path / "odd.calib")
+    assert arrays["rows.rows"].dtype == "int64"
+    assert arrays["rows.orientations"].dtype == "float64"
+    assert ta.Calibration.load(tmp_path / "odd.calib").rows is not None
 
 
 def _nan(values):

@@ -52,6 +52,14 @@ def test_outliers_that_fit_nowhere_are_no_exchange(arm, table):
     assert not {"rows_exchanged", "targets_exchanged"} & set(found)
 
 
+def test_a_point_noted_twice_is_no_exchange(arm, table):
+    """Row 21 holds the point of row 22, which is lost itself: nothing can be put right."""
+    spoilt = with_points_of(table, {20: 21})
+    spoilt.loc[[21], POINT] += np.array([[0.2, -0.1, 0.3]])
+    found = notices_of(arm, spoilt)
+    assert not {"rows_exchanged", "targets_exchanged"} & set(found)
+
+
 def test_exchanged_targets_of_a_row_are_named(arm, table):
     second = VirtualArm(arm.robot, seed=5)
     second.target_in_flange = arm.target_in_flange + np.array([0.05, 0.08, -0.03])

@@ -56,18 +56,36 @@ def test_poses_are_corrected_on_the_branch_of_their_seed(robot, seeds):
     assert np.abs(again - Q - SHIFT).max() < 1e-7
 
 
+def seven(poses, q, seeds):
+    """A path of an arm with seven joints: poses (n, 4, 4), with joints beside all of them or the first."""
+    rows = [",".join(["x", "y", "z", "qw", "qx", "qy", "qz", *(f"q{k + 1}" for k in range(7))])]
+    for number, (row, pose) in enumerate(zip(q, poses, strict=True)):
+        values = [*pose[:3, 3], *quaternion_from_matrix(pose[:3, :3])]
+        seed = [f"{value:.9f}" for value in row] if seeds or number == 0 else [""] * 7
+        rows.append(",".join([*(f"{value:.9f}" for value in values), *seed]))
+    return "\n".join(rows) + "\n"
+
+
+def test_poses_far_from_their_seed_or_out_of_reach_are_listed():
+    robot = Robot.load("kuka-iiwa-7")
+    q = np.tile(np.deg2rad([-40.0, 30.0, 20.0, -60.0, 10.0, 50.0, -30.0]), (3, 1))
+    poses, seeds = robot.pose(q), q.copy()
+    poses[1, :3, 3] *= 5.0
+    seeds[2, [0, 3]] += np.deg2rad([120.0, -40.0])
+    result = rewritten(CSV, seven(poses, seeds, True), robot, by=np.full(7, 1e-3))
+    assert np.isfinite(result.nominal[result.changed]).all()
+    why = [reason for _, _, reason in reasons(result)]
+    assert len(why) == 2
+    assert any("does not reach it" in each for each in why)
+    assert any("infinitely many ways" in each for each in why)
+
+
 @pytest.mark.parametrize("seeds", [True, False])
 def test_seeds_tell_of_the_elbow_of_an_arm_with_seven_joints(seeds):
     robot = Robot.load("kuka-iiwa-7")
     low, high = np.deg2rad([[-40, 30, 20, -60, 10, 50, -30], [50, 60, -30, -90, 40, 20, 60]])
     q = low + (high - low) * np.linspace(0.0, 1.0, 12)[:, None]
-    head = ",".join(["x", "y", "z", "qw", "qx", "qy", "qz", *(f"q{k + 1}" for k in range(7))])
-    rows = [head]
-    for number, (row, pose) in enumerate(zip(q, robot.pose(q), strict=True)):
-        values = [*pose[:3, 3], *quaternion_from_matrix(pose[:3, :3])]
-        seed = [f"{value:.9f}" for value in row] if seeds or number == 0 else [""] * 7
-        rows.append(",".join([*(f"{value:.9f}" for value in values), *seed]))
-    result = rewritten(CSV, "\n".join(rows) + "\n", robot, by=np.full(7, 1e-3))
+    result = rewritten(CSV, seven(robot.pose(q), q, seeds), robot, by=np.full(7, 1e-3))
     assert reasons(result) == []
     posed = result.program.targets.layout == 1
     found = result.nominal[posed]

@@ -35,7 +35,7 @@ def changed(table, first, factor):
 @pytest.mark.parametrize("first", [5, 30, ROWS - 5])
 def test_a_unit_that_changes_is_told_with_the_row(name, factor, words, first):
     with pytest.raises(InputError, match=rf"from row {first + 1} on points look like another unit.*{words}"):
-        check_one_unit(changed(table_of(name), first, factor))
+        check_one_unit(changed(table_of(name), first, factor), ta.Robot.load(name))
 
 
 def test_a_calibration_is_not_begun():
@@ -49,5 +49,15 @@ def test_an_instrument_that_was_moved_is_no_unit(seed):
     table = table_of(seed=seed)
     away = np.random.default_rng(seed).normal(size=3)
     table.loc[30:, ["x", "y", "z"]] += 60.0 * away / np.linalg.norm(away)
-    check_one_unit(ta.Measurements.from_dataframe(table))
-    check_one_unit(ta.Measurements.from_dataframe(table_of(seed=seed)))
+    for each in (table, table_of(seed=seed)):
+        check_one_unit(ta.Measurements.from_dataframe(each), ta.Robot.load("ur10"))
+
+
+def test_an_arm_that_stays_near_by_is_no_unit():
+    """Points about the origin of the device, wide ones and then some in one place."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
+    wide = arm.poses(30)
+    near = wide[0] + 0.03 * np.random.default_rng(1).normal(size=(30, 6))
+    table = arm.measure_table(np.concatenate([wide, near]))
+    table[["x", "y", "z"]] -= table.loc[30:, ["x", "y", "z"]].mean()
+    check_one_unit(ta.Measurements.from_dataframe(table), arm.robot)

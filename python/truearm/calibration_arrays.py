@@ -58,12 +58,19 @@ def check_arrays(arrays: Arrays, content: Mapping[str, Any], table: tuple[int, i
         _check_shape(arrays, "held.readings", ("any", joints))
 
 
-def _check_numbers(name: str, values: NDArray[Any]) -> None:
-    kind = "float64"
+def as_stored(arrays: Arrays) -> dict[str, NDArray[Any]]:
+    """The arrays as numbers of the kinds that a file holds."""
+    return {name: values.astype(_kind(name), copy=False) for name, values in arrays.items()}
+
+
+def _kind(name: str) -> str:
     if name in INDICES or name.endswith(OF_REGIONS):
-        kind = "int64"
-    elif name == FILE_BEFORE:
-        kind = "uint8"
+        return "int64"
+    return "uint8" if name == FILE_BEFORE else "float64"
+
+
+def _check_numbers(name: str, values: NDArray[Any]) -> None:
+    kind = _kind(name)
     if values.dtype != kind:
         raise InputError(f"'{name}' holds {values.dtype} numbers", rule=f"It holds {kind} ones")
     if name.partition(".")[0] not in MEASURED and not np.isfinite(values).all():

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm import conservative, revision, rows_content, schemes
 from truearm._core import Field, Setup
-from truearm.calibration_arrays import check_arrays
+from truearm.calibration_arrays import as_stored, check_arrays
 from truearm.calibration_checks import check_plain, check_set_ups
 from truearm.calibration_file import AGAIN
 from truearm.core_set import Selection
@@ -72,7 +72,7 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         content["update"] = revision.pack(calibration.revision, arrays, whole=with_rows)
     if with_rows and calibration.held is not None:
         content["held"] = calibration.held.pack(arrays)
-    return arrays, content
+    return as_stored(arrays), content
 
 
 def unpack(arrays: Arrays, content: Mapping[str, Any], *, where: str) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from truearm.doubts import NO_HELP, no_help
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
 from truearm.fitted_rows import known_rows
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
-from truearm.gross_rows import Expected, gross_frame_rows, gross_judged_rows
+from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
 from truearm.judging import check_judged, judge, model_inputs
 from truearm.measurements import Measurements
@@ -33,6 +33,8 @@ Rows = NDArray[np.int64]
 
 MOST_FRAME_ROWS: Final = 400
 FEWEST_FRAME_ROWS: Final = 3
+AS_KNOWN: Final = 2.0
+"""A calibration whose error is within this factor of that on its own held-out rows fits."""
 
 
 @dataclass(frozen=True)
@@ -208,18 +210,23 @@ def _moved(
         anew = evaluate(calibration, data, replace(options, keep_frames=False, keep_tool=False))
     except (InputError, WorkError):
         return []
-    if anew.rows is None or any(notice.kind == NO_HELP for notice in anew.notices):
+    best = calibration.model_name
+    known = calibration.validation.holdout.get(best)
+    if anew.rows is None or known is None or {NO_HELP, FAR_ROWS} & {notice.kind for notice in anew.notices}:
         return []
-    option = "--keep-frames" if options.keep_frames else "--keep-tool"
-    what = "frame and tool" if options.keep_frames else "tool"
     before, after = (
-        MM_PER_METRE * float(np.nanmedian(errors.distance_m))
-        for errors in (kept, anew.rows.errors[calibration.model_name])
+        MM_PER_METRE * float(np.nanmedian(errors.distance_m)) for errors in (kept, anew.rows.errors[best])
     )
+    if after > min(before, AS_KNOWN * known.position.mean):
+        return []
+    given = {"--keep-frames": options.keep_frames, "--keep-tool": options.keep_tool}
+    with_frame = options.keep_frames and not calibration.arm.world_is_known
+    what = "frame and tool" if with_frame else "tool"
+    where = "instrument or the target stands" if with_frame else "target sits"
     text = (
-        f"With the {what} of the calibration the median error is {before:.4g} mm, with frame and tool found "
-        f"anew {after:.4g} mm: the instrument or the target stands elsewhere than then, and the calibration "
-        f"itself fits. Leave {option} out."
+        f"With the {what} of the calibration the median error is {before:.4g} mm, with what can be found "
+        f"anew {after:.4g} mm: the {where} elsewhere than then, and the calibration itself fits. Leave "
+        f"{' and '.join(option for option, is_given in given.items() if is_given)} out."
     )
     return [Notice("setup_moved", text)]
 

@@ -76,4 +76,11 @@ def _fitting_elsewhere(
     far = np.isfinite(np.diagonal(apart)) & (np.diagonal(apart) > FARTHER * near_m)
     np.fill_diagonal(apart, np.inf)
     other = apart.argmin(axis=1)
-    return [(k, int(other[k])) for k in np.flatnonzero(far & (apart.min(axis=1) < near_m)).tolist()]
+    fitting = {k: int(other[k]) for k in np.flatnonzero(far & (apart.min(axis=1) < near_m)).tolist()}
+    # In an exchange every place that a point leaves is taken by another one.
+    while True:
+        taken = set(fitting.values())
+        kept = {k: at for k, at in fitting.items() if at in fitting and k in taken}
+        if len(kept) == len(fitting):
+            return list(kept.items())
+        fitting = kept

@@ -86,7 +86,7 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
 
 def check_points(measurements: Measurements, robot: Robot) -> None:
     """Raise InputError where points lie too far apart, too close together, in inches, or in two units."""
-    check_one_unit(measurements)
+    check_one_unit(measurements, robot)
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
     _check_distances(measurements, robot)

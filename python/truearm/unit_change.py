@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError
 from truearm.measurements import Measurements
+from truearm.robot import Robot
 from truearm.units import MM_PER_INCH, MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -26,18 +27,20 @@ SPREAD_ALIKE: Final = 1.6
 """Within these factors distances from the origin, and spreads, change by that of two units."""
 
 
-def check_one_unit(measurements: Measurements) -> None:
+def check_one_unit(measurements: Measurements, robot: Robot) -> None:
     """Raise InputError where the points of a set-up change their unit from some row on.
 
     Where an instrument was moved its points lie elsewhere, and spread as far as before: both have to change
-    by the factor of two units.
+    by the factor of two units, and not because the arm itself went less far.
     """
     for group in measurements.groups if measurements.target_count else []:
         own = measurements.select(measurements.group == group)
         seen = np.flatnonzero(np.isfinite(own.targets[:, 0]).all(axis=1))
         points = own.targets[seen, 0]
         first = _first_behind(np.linalg.norm(points, axis=1))
-        units = None if first is None else _units(points[:first], points[first:])
+        units = None
+        if first is not None:
+            units = _units(points, robot.position(own.readings[seen]), first)
         if first is not None and units is not None:
             behind = np.zeros(len(own), dtype=bool)
             behind[seen[first:]] = True
@@ -62,18 +65,21 @@ def _first_behind(far: Floats) -> int | None:
     return None if gap[place] < np.log(APART) else FEWEST + place
 
 
-def _units(before: Floats, behind: Floats) -> str | None:
-    """The two units whose factor is between points (n, 3) before and behind, in words; else None."""
-    far = abs(np.log(_typical(behind) / _typical(before)))
-    spread = [_typical(points - np.median(points, axis=0)) for points in (before, behind)]
-    if min(spread) <= 0.0:
-        return None
-    wide = abs(np.log(spread[1] / spread[0]))
+def _units(points: Floats, nominal: Floats, first: int) -> str | None:
+    """The two units whose factor is between points (n, 3) before and from `first` on, in words; else None."""
+    far = np.log(_typical(points[first:]) / _typical(points[:first]))
+    wide, by_arm = (_wider(each[:first], each[first:]) for each in (points, nominal))
     for factor, words in FACTORS:
-        known = np.log(factor)
-        if abs(far - known) < np.log(FAR_ALIKE) and abs(wide - known) < np.log(SPREAD_ALIKE):
+        known = np.copysign(np.log(factor), far)
+        if abs(far - known) < np.log(FAR_ALIKE) and abs(wide - by_arm - known) < np.log(SPREAD_ALIKE):
             return words
     return None
+
+
+def _wider(before: Floats, behind: Floats) -> float:
+    """Logarithm of how much farther points spread behind than before; NaN where they do not spread."""
+    spread = [_typical(points - np.median(points, axis=0)) for points in (before, behind)]
+    return float(np.log(spread[1] / spread[0])) if min(spread) > 0.0 else np.nan
 
 
 def _typical(points: Floats) -> float:

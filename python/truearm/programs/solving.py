@@ -30,8 +30,15 @@ CONTRADICTS: Final = "its configuration data is another than a line from the tar
 SINGULAR: Final = "it lies at a singularity, where a pose does not determine the joints"
 DIFFERENT: Final = "it is reached in several configurations of the arm, and one change cannot suit them all"
 
+FAR_SEED: Final = (
+    "the arm reaches it in infinitely many ways, and none was found near the seed or the target before: give "
+    "joints beside it"
+)
+
 DETERMINED: Final = 6
 """With more joints than this infinitely many readings reach a pose."""
+NEAR_SEED: Final = 0.5
+"""Farther away, rad or m, a search may have ended in another posture than was meant."""
 SAME_RAD: Final = 1e-6
 NEARER: Final = 0.8
 LEAST_GAIN: Final = 2e-3
@@ -249,12 +256,14 @@ class _Solver:
         return SINGULAR if possible.singular is not None and possible.singular.any() else found
 
     def _from_seed(self, flange: Floats, before: Floats | None) -> Floats | str:
-        """The readings that a search from those before arrives at."""
+        """The readings that a search from those before arrives at, where it arrives near by."""
         if before is None:
             return AMBIGUOUS
-        found = self.inverse.near(flange, before)
+        (found,) = self.inverse.near_or_nan(flange[None], before[None])
         if np.isnan(found).any():
             return OUT_OF_REACH
+        if np.abs(found - before).max() > NEAR_SEED:
+            return FAR_SEED
         return SINGULAR if are_singular(self.robot, found[None])[0] else found
 
     def _unnamed(self, possible: _Possible, before: Floats | None) -> Floats | str:
