@@ -27,6 +27,7 @@ from truearm.reporting.script import licence_notice
 from truearm.reporting.waves import strongest_wave
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.simulation.imperfections import Deflection, Mass
+from truearm.standard_errors import of_covariance
 
 STATISTICS = ("mean_mm", "rms_mm", "p95_mm", "p99_mm", "max_mm")
 MODELS = ("variable", "constant", "regions", "fcmac", "cmac")
@@ -336,7 +337,15 @@ def test_a_variable_calibration_shows_its_own_constants(calibrations, reports):
         change = (calibration.model.constants - calibration.arm.table).ravel()[place[name]]
         assert cells[name][2] == f"{1e3 * change:+.4f}"
     assert "Parameters of the constant model" in reports["variable"].html
+    assert "hold what the constants may have taken over" in reports["variable"].html
+    assert "for noise: where the arm varies" in reports["constant"].html
     assert "Parameters of the variable model" not in reports["constant"].html
+
+
+def test_standard_errors_of_a_file_of_an_earlier_version_promise_no_more_than_they_hold(calibrations):
+    details = calibrations["variable"].constant
+    old = replace(details, standard_errors=of_covariance(details.covariance, len(details.names)))
+    assert "for noise: where the arm varies" in report(replace(calibrations["variable"], constant=old)).html
 
 
 def test_every_option_has_words():

@@ -13,6 +13,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import lean, signed
 from truearm.reporting.parts import Cell, Figure, Table
 from truearm.reporting.style import DIVERGING
+from truearm.standard_errors import of_covariance
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
@@ -78,8 +79,9 @@ def table(facts: Facts) -> Table:
 
 
 def _of_errors(facts: Facts) -> str:
-    """What standard errors hold."""
-    if facts.calibration.variable is None:
+    """What standard errors hold; those of earlier versions were of the covariance alone."""
+    details = facts.calibration.constant
+    if np.array_equal(details.standard_errors, of_covariance(details.covariance, len(details.names))):
         return (
             "Standard errors take all that the constants leave for noise: where the arm varies with the "
             "pose, constants may be off by several of them."
