@@ -1,5 +1,7 @@
 """Updating a calibration after re-mastering, a crash or a change of motor, on virtual arms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.solving import beyond_learnt
+from truearm.updating.some_poses import MOST_POSES, some_poses
 from truearm.updating.squares import SquaresTest
 
 SHIFT = np.array([0.0, 0.6, -0.2, 0.9, 0.0])
@@ -447,3 +450,18 @@ def test_a_sum_of_squares_says_how_rare_it_is():
     np.testing.assert_allclose(found.p, np.exp(-12.5), rtol=1e-5)
     assert SquaresTest.of(np.array([3.0, 4.0]), 2, 20).p > 10.0 * found.p
     assert SquaresTest.of(np.empty(0), 0, 20).p == 1.0
+
+
+def test_of_thousands_of_poses_some_are_used_of_every_setup(known):
+    arm, _ = known
+    many = remastered(arm, arm.poses(1500, seed=9), SHIFT, seed=9)
+    few = remastered(arm, arm.poses(30, seed=10), SHIFT, seed=10)
+    both = ta.Measurements.concatenate(
+        [replace(many, group=np.full(1500, "a")), replace(few, group=np.full(30, "b"))]
+    )
+    used, notices = some_poses(both)
+    assert (used.group == "a").sum() == MOST_POSES // 2
+    assert (used.group == "b").sum() == 30
+    assert set(used.rows[used.group == "a"]) >= {1, 1500}
+    assert str(notices[0]).startswith(f"{MOST_POSES // 2 + 30} of 1530 poses are used")
+    assert some_poses(few) == (few, [])

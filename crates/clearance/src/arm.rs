@@ -57,11 +57,12 @@ impl Arm {
     /// Where it is on a way of joint values, when its base stands at `table_from_base`.
     ///
     /// # Errors
-    /// If rows of the way have another width than there are joints.
+    /// If rows of the way have another width than there are joints, or `table_from_base` is no rigid motion.
     pub fn along(&self, way: &Way, table_from_base: &Transform) -> Result<Vec<Place>, ClearanceError> {
         if way.width != self.joints {
             return Err(ClearanceError::Width { got: way.width, wanted: self.joints });
         }
+        table_from_base.check("table_from_base")?;
         let count = way.values.len() / way.width;
         let base = Place { links: vec![table_from_base.apply(self.base)], tool: Vec::new() };
         let mut places = vec![base; count];

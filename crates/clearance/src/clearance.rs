@@ -1,6 +1,7 @@
 //! Gaps between the arm and what the table carries.
 
 use crate::arm::Place;
+use crate::error::ClearanceError;
 use crate::table::{Column, Plate};
 
 /// Distances to the nearest things, metres; negative where they meet.
@@ -24,13 +25,23 @@ impl Gaps {
 /// What the table carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clearance {
-    /// Behind the panel.
-    pub column: Column,
-    /// Around the panel.
-    pub plate: Plate,
+    column: Column,
+    plate: Plate,
 }
 
 impl Clearance {
+    /// The column behind the panel, and the plate around it.
+    ///
+    /// # Errors
+    /// [`ClearanceError::Value`] if a number is not finite, or a size is negative.
+    pub fn new(column: Column, plate: Plate) -> Result<Clearance, ClearanceError> {
+        finite("the column", &[column.top, column.down].concat())?;
+        finite("the plate", &[plate.corner.as_slice(), plate.axes.as_flattened()].concat())?;
+        size("the column's radius", &[column.radius])?;
+        size("the plate", &[plate.area.as_slice(), &[plate.rim]].concat())?;
+        Ok(Clearance { column, plate })
+    }
+
     /// The least gaps with the arm and the carriage at their places.
     pub fn gaps(&self, arm: &Place, carriage: [f64; 3]) -> Gaps {
         let links = arm.links.windows(2).map(|link| self.column.gap([link[0], link[1]], carriage));
@@ -42,5 +53,19 @@ impl Clearance {
     pub fn least(&self, arm: &[Place], carriages: &[[f64; 3]]) -> Gaps {
         let all = arm.iter().flat_map(|place| carriages.iter().map(|&carriage| self.gaps(place, carriage)));
         all.fold(Gaps::NONE, Gaps::or_less)
+    }
+}
+
+fn finite(what: &'static str, values: &[f64]) -> Result<(), ClearanceError> {
+    match values.iter().find(|value| !value.is_finite()) {
+        Some(&value) => Err(ClearanceError::Value { what, value, rule: "finite" }),
+        None => Ok(()),
+    }
+}
+
+fn size(what: &'static str, values: &[f64]) -> Result<(), ClearanceError> {
+    match values.iter().find(|value| !value.is_finite() || **value < 0.0) {
+        Some(&value) => Err(ClearanceError::Value { what, value, rule: "0 or more, and finite" }),
+        None => Ok(()),
     }
 }

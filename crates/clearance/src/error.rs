@@ -39,6 +39,24 @@ pub enum ClearanceError {
         /// The number.
         value: f64,
     },
+    /// A number of what the table carries, or of where the base stands, that says nothing.
+    #[error("{what} holds {value}, it must be {rule}")]
+    Value {
+        /// What holds it.
+        what: &'static str,
+        /// The number.
+        value: f64,
+        /// What it should be.
+        rule: &'static str,
+    },
+    /// A way with more places than are looked at.
+    #[error("a way of {count:.0} places was asked for, it may have {most}: take a larger step")]
+    TooLong {
+        /// How many.
+        count: f64,
+        /// How many it may have.
+        most: usize,
+    },
     /// A step of a way.
     #[error("the step is {value}, it must be above 0")]
     Step {

@@ -5,7 +5,7 @@ const PARALLEL: f64 = 1e-12;
 /// Square of a length, m^2; of less a segment counts as a point.
 const POINT: f64 = 1e-12;
 
-/// Distance between the segments from `begin` along `along`, and from `top` along `down`, which has a length.
+/// Distance between the segments from `begin` along `along`, and from `top` along `down`; without a length they are points.
 ///
 /// Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
 pub fn distance(begin: [f64; 3], along: [f64; 3], top: [f64; 3], down: [f64; 3]) -> f64 {
@@ -15,7 +15,7 @@ pub fn distance(begin: [f64; 3], along: [f64; 3], top: [f64; 3], down: [f64; 3])
     let crossing = aa * bb - ab * ab;
     // Of segments that are parallel any place of the first one will do to begin with.
     let s = ((ab * to_b - to_a * bb) / crossing.max(PARALLEL)).clamp(0.0, 1.0);
-    let t = ((ab * s + to_b) / bb).clamp(0.0, 1.0);
+    let t = ((ab * s + to_b) / bb.max(POINT)).clamp(0.0, 1.0);
     let s = ((ab * t - to_a) / aa.max(POINT)).clamp(0.0, 1.0);
     let nearest = [0, 1, 2].map(|i| apart[i] + s * along[i] - t * down[i]);
     dot(nearest, nearest).sqrt()

@@ -7,7 +7,7 @@ use crate::segment::{distance, dot, minus, plus};
 pub struct Column {
     /// Where it begins, from the carriage.
     pub top: [f64; 3],
-    /// From there to its end; it has a length.
+    /// From there to its end.
     pub down: [f64; 3],
     /// Its radius and that of a link together.
     pub radius: f64,

@@ -2,6 +2,9 @@
 
 use crate::error::ClearanceError;
 
+/// Places of a way at the most.
+const MOST_PLACES: usize = 1_000_000;
+
 /// Places one after another: of an arm its joint values, of a carriage its three coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Way {
@@ -15,7 +18,8 @@ impl Way {
     /// Along straight lines through stops of `width` numbers, no number changing by more than `step` at once.
     ///
     /// # Errors
-    /// If there is no stop, a number is not finite, or the step is not above 0.
+    /// If there is no stop, a number is not finite, the step is not above 0, or so small that a million places
+    /// do not reach.
     pub fn through(stops: &[f64], width: usize, step: f64) -> Result<Way, ClearanceError> {
         check(stops, width)?;
         if step.is_nan() || step <= 0.0 {
@@ -26,6 +30,10 @@ impl Way {
         for (a, b) in rows.clone().zip(rows.skip(1)) {
             let longest = a.iter().zip(b).fold(0.0, |most: f64, (x, y)| most.max((y - x).abs()));
             let count = (longest / step).ceil() + 1.0;
+            let places = (values.len() / width) as f64 + count;
+            if places > MOST_PLACES as f64 {
+                return Err(ClearanceError::TooLong { count: places, most: MOST_PLACES });
+            }
             for k in 1..=count as usize {
                 let share = k as f64 / count;
                 values.extend(a.iter().zip(b).map(|(x, y)| x + share * (y - x)));

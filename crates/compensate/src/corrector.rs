@@ -25,8 +25,9 @@ const HOPELESS: f64 = 0.999;
 const UNSTEADY: f64 = 0.1;
 /// Those of constant parameters fall by what the last step tells: still below 1e-12 m, with so much more foreseen.
 const STEADILY: f64 = 5.0;
-/// With fewer joints than the task has numbers, turns weigh so much less that the position is met first.
-const POSITION_FIRST: f64 = 1e-4;
+/// With fewer joints than the task has numbers, turns weigh so much less that the position is met first: little enough for
+/// what the position alone then asks for to turn the tool by next to nothing, and enough to be told from rounding.
+const POSITION_FIRST: f64 = 1e-2;
 
 /// What is corrected, and how far.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -91,7 +92,7 @@ impl Corrector {
     /// A corrector for a tool.
     ///
     /// # Errors
-    /// [`CompensateError`] if the models have different joints, the tool is no rigid motion, or an option breaks a rule.
+    /// [`CompensateError`] if the models have different joints, the programming one varies with features, the tool is no rigid motion, or an option breaks a rule.
     pub fn new(
         calibrated: Arc<Model>,
         programming: Arc<Model>,
@@ -102,6 +103,14 @@ impl Corrector {
         if programming.joint_count() != joints {
             let programming = programming.joint_count();
             return Err(CompensateError::Joints { programming, calibrated: joints });
+        }
+        if programming.feature_count() > 0 {
+            let found = programming.feature_count();
+            return Err(CompensateError::Length {
+                what: "the programming model's features",
+                found,
+                expected: 0,
+            });
         }
         options.limits.check(joints)?;
         let plan = plan(&calibrated, &options)?;
@@ -300,7 +309,9 @@ impl Plan {
             return Err(CompensateError::Moving { moving, joints });
         }
         let unit = |k: &usize| if model.chain.slides(*k) { ANGLE_ARM } else { 1.0 };
-        let position_first = task != Task::Position && moving.len() < Task::Pose.rows();
+        // The last of five axes mostly is that of the tool, and then moves nothing that an axis task asks for.
+        let few = moving.len() < task.rows() || joints < Task::Pose.rows();
+        let position_first = task != Task::Position && few;
         let turn_weight = if position_first { ANGLE_ARM * POSITION_FIRST } else { ANGLE_ARM };
         let unit = moving.iter().map(unit).collect();
         let (varied, hopeless, foreseen) = (model.field.is_some(), f64::INFINITY, 0.0);

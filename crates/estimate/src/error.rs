@@ -40,6 +40,9 @@ pub enum EstimateError {
         /// Measured values.
         rows: usize,
     },
+    /// Distances where points are needed.
+    #[error("distances were measured where points are needed: measure points, or fit constants alone")]
+    Distances,
     /// A value that must be finite is not.
     #[error("{what} is not finite at pose {pose} (counted from 0): remove the row or mend the value")]
     NotFinite {

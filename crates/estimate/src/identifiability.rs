@@ -97,7 +97,7 @@ fn dense_rows(problem: &Problem, layout: &Layout, rows: &Linearised, poses: &[us
     let set = problem.measurements;
     let (width, own) = (layout.len(), layout.len() - layout.arm);
     let mut dense = Mat::zeros(poses.len() * rows.rows, width);
-    for (index, &pose) in poses.iter().enumerate() {
+    for (index, &pose) in poses.iter().enumerate().filter(|(_, pose)| set.weight[**pose] > 0.0) {
         let group = layout.group(set.group[pose]).start - layout.arm;
         for row in 0..rows.rows {
             let at = pose * rows.rows + row;
@@ -118,7 +118,11 @@ fn dense_rows(problem: &Problem, layout: &Layout, rows: &Linearised, poses: &[us
 fn dense_distances(problem: &Problem, layout: &Layout, point: Point) -> Result<Mat<f64>, EstimateError> {
     let (width, own) = (layout.len(), layout.len() - layout.arm);
     let rows = distance::derivatives(problem, point)?;
+    let set = problem.measurements;
     Ok(Mat::from_fn(rows.len() / width, width, |row, column| {
+        if set.weight[set.distances[row].pose] == 0.0 {
+            return 0.0;
+        }
         let source = if column < own { layout.arm + column } else { column - own };
         rows[row * width + source] * scale(problem, layout, source)
     }))

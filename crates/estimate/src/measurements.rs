@@ -1,5 +1,7 @@
 //! What was measured, as plain arrays over the poses.
 
+use truearm_kinematics::Transform;
+
 use crate::EstimateError;
 use crate::distance::{Distance, DistanceTo};
 
@@ -110,7 +112,7 @@ impl MeasurementSet {
     ///
     /// # Errors
     /// [`EstimateError::Length`], [`EstimateError::NotFinite`] (also of a target or orientation of which only a part
-    /// is missing) and [`EstimateError::Option`].
+    /// is missing), [`EstimateError::Kinematics`] of a rotation that is none, and [`EstimateError::Option`].
     pub fn check(&self) -> Result<(), EstimateError> {
         let n = self.pose_count();
         let length = |what, found, expected| {
@@ -126,6 +128,9 @@ impl MeasurementSet {
         whole_or_missing("rotation", &self.rotations, 9, 1)?;
         finite("sigma", &self.sigma, 1)?;
         finite("weight", &self.weight, 1)?;
+        for rotation in self.rotations.as_chunks::<9>().0.iter().filter(|values| values[0].is_finite()) {
+            Transform { rotation: *rotation, translation: [0.0; 3] }.check("measured rotation")?;
+        }
         self.check_ranges()?;
         self.check_distances()
     }
@@ -167,6 +172,10 @@ impl MeasurementSet {
             }
             if !distance.value.is_finite() {
                 return Err(EstimateError::NotFinite { what: "distance", pose: distance.pose });
+            }
+            if distance.value < 0.0 {
+                let (what, value, rule) = ("a distance", distance.value, "a distance is zero or more");
+                return Err(EstimateError::Option { what, value, rule });
             }
         }
         Ok(())

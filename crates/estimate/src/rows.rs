@@ -359,6 +359,9 @@ impl Kernel for Unpack<'_> {
 /// [`EstimateError::Parameters`], [`EstimateError::Setup`] where the point is another problem's.
 pub fn linearise(problem: &Problem, point: Point) -> Result<Linearised, EstimateError> {
     point.check(problem)?;
+    if problem.measurements.is_distances() {
+        return Err(EstimateError::Distances);
+    }
     let layout = Layout::new(problem);
     let (n, rows) = (problem.measurements.pose_count(), problem.measurements.rows_per_pose());
     let mut out = Linearised {

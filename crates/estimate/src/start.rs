@@ -219,7 +219,9 @@ fn distance_start(problem: &Problem, parameters: &[f64]) -> Result<Setup, Estima
     let flanges = flange_poses(problem, parameters, &all)?;
     for (anchor, point) in setup.anchors.iter_mut().enumerate() {
         let mut normal = (Mat::<f64>::zeros(4, 4), vec![0.0; 4]);
-        for distance in set.distances.iter().filter(|d| d.to == crate::DistanceTo::Anchor(anchor)) {
+        let to_anchor = crate::DistanceTo::Anchor(anchor);
+        let counts = |d: &&crate::Distance| d.to == to_anchor && set.weight[d.pose] > 0.0;
+        for distance in set.distances.iter().filter(counts) {
             let p = flanges[distance.pose].translation;
             let row = [2.0 * p[0], 2.0 * p[1], 2.0 * p[2], -1.0];
             let value = p.iter().map(|x| x * x).sum::<f64>() - distance.value.powi(2);

@@ -95,6 +95,11 @@ impl Bank {
                 let expected = self.input_count;
                 return Err(FieldError::Length { what: "inputs of a block", found: input + 1, expected });
             }
+            let mut outputs = block.outputs.clone();
+            outputs.sort_unstable();
+            if !outputs.is_sorted_by(|a, b| a < b) {
+                return Err(FieldError::Block { what: "a block drives a parameter twice" });
+            }
             let output = block.outputs.iter().copied().max().unwrap_or(0);
             if output >= self.parameter_count {
                 let expected = self.parameter_count;

@@ -46,6 +46,8 @@ const MARGIN: f64 = 3.0;
 const WIDEST: f64 = 0.6;
 /// More cells than this along one input are no calibration of ours.
 const MOST_CELLS: usize = 100_000;
+/// Part of a turn by which the cells of a closed axis may miss it.
+const CLOSES: f64 = 1e-9;
 /// Cells of one cycle of a wave: they bend a thousandth of it at most.
 const CELLS_OF_CYCLE: usize = 16;
 /// Finest spacing: more cells than this on a turn are beyond any data set.
@@ -72,7 +74,8 @@ impl Axis {
             let count = ((TAU / spacing).ceil() as usize).max(2 * MOST_ACTIVE);
             return Self { input, origin: low, spacing: TAU / count as f64, count, closed: true, degree };
         }
-        let count = (open / spacing).ceil() as usize + 1;
+        // Values that need more are of a file that was altered; they lie beyond the cells.
+        let count = ((open / spacing).ceil() as usize).min(MOST_CELLS - 1) + 1;
         let middle = 0.5 * (low + high);
         let origin = middle - 0.5 * spacing * (count - 1) as f64;
         Self { input, origin, spacing, count, closed: false, degree }
@@ -102,7 +105,9 @@ impl Axis {
         let fewest = if self.closed { MOST_ACTIVE } else { 1 };
         let positive = [self.spacing, self.input.scale].iter().all(|x| x.is_finite() && *x > 0.0);
         let cells = (fewest..=MOST_CELLS).contains(&self.count);
-        positive && self.origin.is_finite() && cells && matches!(self.degree, 2 | 3)
+        let turn = self.spacing * self.count as f64;
+        let closes = !self.closed || (turn - TAU).abs() < TAU * CLOSES;
+        positive && closes && self.origin.is_finite() && cells && matches!(self.degree, 2 | 3)
     }
 
     /// First cell, beyond the axis where it may be, and grades of the cells that a raw value excites.

@@ -324,7 +324,9 @@ impl Search<'_> {
 
     /// Hyper-parameters with how far they are trusted where nothing was measured.
     fn trusted_beyond(&self, training: &Training, mut hyper: Hyper) -> Result<Hyper, FieldError> {
-        let large = part_of(&training.trusted(), ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
+        let trusted = training.trusted();
+        let told = if trusted.pose_count() == 0 { training } else { &trusted };
+        let large = part_of(told, ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
         hyper.extrapolation =
             extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         Ok(hyper)

@@ -8,6 +8,7 @@ use crate::kernel::Input;
 /// Beyond, a file holds no hyper-parameters of an arm.
 const MOST_WAVES: usize = 100;
 const MOST_CYCLES: f64 = 1e4;
+const LONGEST_SCALE: f64 = 1e3;
 
 impl Hyper {
     /// Checks what a file may say of an arm of so many joints: joints that there are, and waves that some drive may leave.
@@ -34,6 +35,10 @@ impl Hyper {
         ]);
         if !scales.into_iter().all(|scale| *scale > 0.0 && scale.is_finite()) {
             return refuse("a length scale or a factor is not positive");
+        }
+        let lengths = self.products.iter().flat_map(|product| &product.lengths);
+        if lengths.chain([&self.own_length, &self.smooth_length, &self.smooth_line_length]).any(is_too_long) {
+            return refuse("a length scale is a thousand times what an arm has");
         }
         if !(0.0..=MOST_CYCLES).contains(&self.own_cycles) {
             return refuse("curves of joints ripple as no drive does");
@@ -78,6 +83,10 @@ impl Hyper {
     }
 }
 
+fn is_too_long(scale: &f64) -> bool {
+    *scale > LONGEST_SCALE
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may stop")]
 mod tests {
@@ -106,6 +115,11 @@ mod tests {
         }
         for own_cycles in [-1.0, 1e17, f64::NAN] {
             assert!(Hyper { own_cycles, ..good.clone() }.check(&inputs, 6).is_err(), "{own_cycles}");
+        }
+        for wrong in [1e13, 1e300] {
+            let own = Hyper { own_length: wrong, ..good.clone() };
+            let line = Hyper { smooth_line_length: wrong, ..good.clone() };
+            assert!(own.check(&inputs, 6).is_err() && line.check(&inputs, 6).is_err(), "{wrong}");
         }
         for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let constant = [1.0, wrong, 1.0];

@@ -40,6 +40,16 @@ impl Input {
         self.distance_of(self.scale * (a - b))
     }
 
+    /// Coordinates of a raw value, half of whose squared distance is D.
+    pub fn place(&self, value: f64) -> impl ExactSizeIterator<Item = f64> + use<> {
+        let scaled = self.scale * value;
+        let (coordinates, count) = match self.kind {
+            InputKind::Angle => ([scaled.cos(), scaled.sin()], 2),
+            InputKind::Line => ([scaled, 0.0], 1),
+        };
+        coordinates.into_iter().take(count)
+    }
+
     /// Distance D of a scaled difference.
     pub fn distance_of(&self, difference: f64) -> f64 {
         match self.kind {

@@ -132,7 +132,7 @@ impl Posterior {
             return Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)));
         }
         let per_pose = rows.div_ceil(model.training.pose_count());
-        let kept = model.training.fill_space(SPACE_FILLING.min(AFFORDABLE / per_pose));
+        let kept = model.training.fill_space(SPACE_FILLING.min(AFFORDABLE / per_pose), cancel)?;
         let model = Model::new(model.training.only(&kept), model.hyper, degree);
         Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)))
     }

@@ -1,8 +1,13 @@
 //! Linearised measurements that a field is inferred from.
 
+use truearm_estimate::Cancel;
+
 use crate::FieldError;
 use crate::kernel::Input;
 use crate::sag::Levers;
+
+/// Poses that are chosen between two looks at whether the work was cancelled.
+const BETWEEN_LOOKS: usize = 16;
 
 /// What a driven parameter is; each class has amplitudes of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -205,23 +210,34 @@ impl Training {
     }
 
     /// At most `count` poses that fill the space of inputs: each the farthest from those before it.
-    pub fn fill_space(&self, count: usize) -> Vec<usize> {
-        let distance = |a: usize, b: usize| -> f64 {
-            let pairs = self.values_of(a).iter().zip(self.values_of(b));
-            self.inputs.iter().zip(pairs).map(|(input, (x, y))| input.distance(*x, *y)).sum()
-        };
-        let mut nearest: Vec<f64> = (0..self.pose_count()).map(|pose| distance(pose, 0)).collect();
-        let mut kept = vec![0];
-        nearest[0] = -1.0;
+    ///
+    /// # Errors
+    /// [`FieldError::Estimate`] where it is cancelled.
+    pub fn fill_space(&self, count: usize, cancel: &Cancel) -> Result<Vec<usize>, FieldError> {
+        let width: usize = self.inputs.iter().map(|input| input.place(0.0).len()).sum();
+        let places: Vec<f64> = (0..self.pose_count())
+            .flat_map(|pose| {
+                self.inputs.iter().zip(self.values_of(pose)).flat_map(|(input, x)| input.place(*x))
+            })
+            .collect();
+        let mut nearest = vec![f64::INFINITY; self.pose_count()];
+        let (mut kept, mut farthest) = (Vec::new(), 0);
         while kept.len() < count.min(self.pose_count()) {
-            let farthest = (0..nearest.len())
-                .fold(0, |best, pose| if nearest[pose] > nearest[best] { pose } else { best });
+            if kept.len().is_multiple_of(BETWEEN_LOOKS) {
+                cancel.check()?;
+            }
             kept.push(farthest);
-            nearest.iter_mut().enumerate().for_each(|(pose, d)| *d = d.min(distance(pose, farthest)));
-            nearest[farthest] = -1.0;
+            let here = places[farthest * width..][..width].to_vec();
+            nearest[farthest] = f64::NEG_INFINITY;
+            for (least, place) in nearest.iter_mut().zip(places.chunks_exact(width)) {
+                let squared: f64 = place.iter().zip(&here).map(|(x, y)| (x - y) * (x - y)).sum();
+                *least = least.min(squared);
+            }
+            farthest = (0..nearest.len())
+                .fold(0, |best, pose| if nearest[pose] > nearest[best] { pose } else { best });
         }
         kept.sort_unstable();
-        kept
+        Ok(kept)
     }
 
     /// Checks lengths once.

@@ -15,8 +15,9 @@ const LONGEST: f64 = 0.6;
 /// Damping relative to the squared error, so that it vanishes as the error does (Sugihara, Solvability-unconcerned
 /// inverse kinematics by the Levenberg-Marquardt method, 2011).
 const DAMPING: f64 = 0.1;
-/// Damping that stays, so that a singular configuration asks for no long step.
-const LEAST_DAMPING: f64 = 1e-18;
+/// Damping that stays, as a part of the sum of squares of the Jacobian: above what its normal equations lose to
+/// rounding, so that a stretched arm asks for no long step and for no impossible one.
+const LEAST_DAMPING: f64 = 1e-15;
 
 /// Weight of a position against a rotation, rad/m, where an arm has fewer than six axes and may have to choose:
 /// what a program's rounded numbers ask of such an arm is never quite within its reach.
@@ -133,7 +134,8 @@ impl Newton {
 }
 
 fn advance(start: &mut [f64], error: &[f64; 6], jacobian: &[f64]) {
-    let damping = DAMPING * dot6(error, error) + LEAST_DAMPING;
+    let squares: f64 = jacobian.iter().map(|x| x * x).sum();
+    let damping = DAMPING * dot6(error, error) + LEAST_DAMPING * squares;
     let Some(change) = least_squares(jacobian, start.len(), error, damping) else {
         return;
     };

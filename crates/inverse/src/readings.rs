@@ -1,6 +1,6 @@
 //! Between joint values and the readings a controller shows: coupling, limits and whole turns.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use crate::error::InverseError;
 
@@ -59,9 +59,15 @@ impl Readings {
         self.limits.len()
     }
 
-    /// Lowest and highest reading of a joint, infinite where there is none.
-    pub(crate) fn limits(&self, joint: usize) -> [f64; 2] {
-        self.limits[joint]
+    /// Lowest and highest reading of a joint that a search begins between: its limits; a turn of them, about zero as
+    /// far as they allow, where the joint turns farther; as much where they are open.
+    pub(crate) fn span(&self, joint: usize) -> [f64; 2] {
+        let [low, high] = self.limits[joint];
+        if self.turns[joint] && high - low > TAU || low.is_infinite() || high.is_infinite() {
+            let first = (-PI).max(low).min(high - TAU);
+            return [first, first + TAU];
+        }
+        [low, high]
     }
 
     /// Joint values of readings.

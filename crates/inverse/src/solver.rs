@@ -1,7 +1,6 @@
 //! The solver: candidates of a closed form or of many starts, polished, told apart and brought within limits.
 
 use std::cmp::Ordering;
-use std::f64::consts::PI;
 
 use rayon::prelude::*;
 use truearm_kinematics::{KinematicsError, Transform};
@@ -26,6 +25,9 @@ const TRIALS: usize = 6;
 const NEARBY: f64 = 0.2;
 /// How far beside a target the plain arm is asked for branches that it may lack at the target, metres.
 const BESIDE_M: [f64; 4] = [-0.02, -0.003, 0.003, 0.02];
+/// How far beside a target the closed form is asked once more, metres: at the border of its reach, where the arm
+/// is stretched or its wrist lies on the first axis, roundings decide whether it has a branch.
+const HAIR_M: [f64; 2] = [-1e-7, 1e-7];
 /// Solutions of an arm with a closed form when none is lacking.
 const BRANCHES: usize = 8;
 
@@ -110,7 +112,8 @@ impl Inverse {
     }
 
     /// For each target the solution within limits that is nearest to its seed of J readings, or none; of arms without a
-    /// closed form near by, the one that a search from the seed arrives at.
+    /// closed form near by, the one that a search from the seed arrives at. Where a target has infinitely many,
+    /// as with the wrist on the first axis, one that is near to the seed.
     ///
     /// # Errors
     /// If there is not a seed for each target, or it is not finite.
@@ -135,7 +138,10 @@ impl Inverse {
                 return Ok(found);
             }
         }
-        let distinct = self.distinct(target, seed)?;
+        let mut distinct = self.distinct(target, seed)?;
+        if self.exact {
+            self.collect(target, self.readings.joints(seed), POLISHING, &mut distinct)?;
+        }
         let turned = distinct.iter().filter_map(|readings| self.readings.turned(readings, seed));
         Ok(turned.min_by(|a, b| distance(a, seed).total_cmp(&distance(b, seed))))
     }
@@ -148,7 +154,9 @@ impl Inverse {
         let mut found = Vec::new();
         if self.method() != Method::Numeric {
             let joints = self.readings.joints(seed);
-            self.collect(target, self.shape.candidates(target, &joints).concat(), POLISHING, &mut found)?;
+            let (at, lacking) = self.closed_form(target, &joints);
+            self.collect(target, at, POLISHING, &mut found)?;
+            self.collect(target, lacking, POLISHING, &mut found)?;
             if !self.exact && found.len() < BRANCHES {
                 self.collect(target, self.around(target, &joints), POLISHING, &mut found)?;
             }
@@ -159,12 +167,25 @@ impl Inverse {
         Ok(found)
     }
 
+    /// The plain arm's candidates for the target, and those for targets a hair beside it that have more of them.
+    fn closed_form(&self, target: &Transform, seed: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let at = self.shape.candidates(target, seed);
+        let mut lacking = Vec::new();
+        if at.len() < BRANCHES {
+            for beside in beside(target, &HAIR_M) {
+                let found = self.shape.candidates(&beside, seed);
+                if found.len() > at.len() {
+                    lacking.extend(found.concat());
+                }
+            }
+        }
+        (at.concat(), lacking)
+    }
+
     /// The seed, and the plain arm's candidates for targets beside this one.
     fn around(&self, target: &Transform, seed: &[f64]) -> Vec<f64> {
         let mut candidates = seed.to_vec();
-        for (axis, step) in (0..3).flat_map(|axis| BESIDE_M.map(|step| (axis, step))) {
-            let mut beside = *target;
-            beside.translation[axis] += step;
+        for beside in beside(target, &BESIDE_M) {
             candidates.extend(self.shape.candidates(&beside, seed).concat());
         }
         candidates
@@ -199,14 +220,24 @@ fn spread(readings: &Readings) -> Vec<f64> {
             let start: Vec<f64> = (0..count)
                 .map(|j| {
                     let share = (0.5 + (k as f64 + 1.0) * root.powi(-(j as i32 + 1))).fract();
-                    let [low, high] = readings.limits(j);
-                    let (low, high) = (low.max(-PI), high.min(PI));
+                    let [low, high] = readings.span(j);
                     low + share * (high - low)
                 })
                 .collect();
             readings.joints(&start)
         })
         .collect()
+}
+
+/// Targets that stand so far beside one, along each axis.
+fn beside<'a>(target: &'a Transform, steps: &'a [f64]) -> impl Iterator<Item = Transform> + 'a {
+    (0..3).flat_map(move |axis| {
+        steps.iter().map(move |step| {
+            let mut beside = *target;
+            beside.translation[axis] += step;
+            beside
+        })
+    })
 }
 
 fn order(a: &[f64], b: &[f64]) -> Ordering {

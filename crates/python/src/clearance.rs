@@ -30,8 +30,8 @@ impl Clearance {
         let arm = Arm::new(cores(links), cores(tool)).map_err(Failure::into_exception)?;
         let (top, down, radius) = column;
         let (corner, axes, area, rim) = plate;
-        let core = Core { column: Column { top, down, radius }, plate: Plate { corner, axes, area, rim } };
-        Ok(Self { arm, core })
+        let core = Core::new(Column { top, down, radius }, Plate { corner, axes, area, rim });
+        Ok(Self { arm, core: core.map_err(Failure::into_exception)? })
     }
 
     fn gaps<'py>(

@@ -1,6 +1,7 @@
 //! The one door into the core: it lets other Python threads run, honours Ctrl-C and translates errors.
 
 use std::fmt::Display;
+use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
@@ -120,7 +121,8 @@ pub fn check_environment() -> PyResult<()> {
 
 /// Work on a pool of its own with so many threads, or on the common one; results do not depend on it.
 pub fn with_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
-    let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build());
+    let useful = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count.min(useful)).build());
     match pool {
         Some(Ok(pool)) => pool.install(work),
         // A pool that cannot be made costs time, not the result.

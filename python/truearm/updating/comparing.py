@@ -21,6 +21,7 @@ from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, unto
 from truearm.updating.options import UpdateOptions
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
+from truearm.updating.some_poses import some_poses
 from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
 from truearm.updating.unknowns import Unknowns
 from truearm.updating.untested import way_out_of_keeping
@@ -54,7 +55,7 @@ class Update:
         rest: The test of what is left.
         before: Errors of the old calibration at each pose, its frame found from the others.
         after: The same with offsets and tool found from the others too.
-        n_poses: Poses that were measured.
+        n_poses: Poses that were used, outliers among them.
         outliers: Data rows that were left out.
         notices: What the user should know.
     """
@@ -131,7 +132,8 @@ def update(
 
     Args:
         calibration: With its measurements.
-        data: New measurements of the same arm, of 10 to 20 poses all over the workspace.
+        data: New measurements of the same arm, of 10 to 20 poses all over the workspace. Of more than 500 so
+            many are used, spread evenly.
         options: What may have moved; defaults without them.
         stages: Called with the name of each stage; gives a context manager that surrounds it.
         **more: The same options as keywords, such as keep_frame=True.
@@ -146,7 +148,8 @@ def update(
     notices = check_against(data, calibration.robot)
     data = data.deduplicated()
     notices += known_rows(calibration.learned_from, data)
-    data = one_row_a_visit(data)
+    data, unused = some_poses(one_row_a_visit(data))
+    notices += unused
     task = _task(calibration, data, chosen, stages)
     if task.selection.orientation:
         check_turns(data, calibration.robot)

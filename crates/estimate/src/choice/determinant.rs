@@ -85,9 +85,13 @@ impl<'a, const M: usize> Present<'a, M> {
     /// Adds candidates until there are `count`.
     ///
     /// # Errors
-    /// [`EstimateError::NotFinite`].
-    pub fn fill(&mut self, count: usize) -> Result<(), EstimateError> {
+    /// [`EstimateError::NotFinite`], [`EstimateError::Cancelled`].
+    pub fn fill(&mut self, count: usize, cancel: &Cancel) -> Result<(), EstimateError> {
         while self.chosen.len() < count {
+            cancel.check()?;
+            if self.changes > RENEWAL {
+                self.renew()?;
+            }
             self.add()?;
         }
         Ok(())
@@ -140,7 +144,7 @@ mod tests {
         let jacobian: Vec<f64> = (0..50 * 18).map(|_| stream.normal()).collect();
         let mut pool = Pool::<3>::new(&jacobian, 3, 6);
         let mut present = Present::new(&mut pool, &Mat::zeros(6, 6), &[1, 7, 9]).unwrap();
-        present.fill(12).unwrap();
+        present.fill(12, &Cancel::default()).unwrap();
         present.settle(60, &Cancel::default()).unwrap();
         let (kept, gains) = (present.inverse.clone(), present.pool.gains.clone());
         present.renew().unwrap();

@@ -85,7 +85,7 @@ fn choose<const M: usize>(
     let evenly: Vec<usize> = (0..options.count).map(|k| k * pool.count / options.count).collect();
     let before = indices(options.start.unwrap_or(&evenly))?;
     let mut present = Present::new(&mut pool, &normal, options.start.unwrap_or_default())?;
-    present.fill(options.count)?;
+    present.fill(options.count, &options.cancel)?;
     let mut exchanges = present.settle(options.passes * options.count, &options.cancel)?;
     let mut chosen = present.chosen;
     if !options.criterion.is_determinant() {

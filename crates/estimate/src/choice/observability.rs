@@ -95,14 +95,15 @@ pub fn observability(matrix: &Mat<f64>, poses: usize) -> Result<Observability, E
     let least = if least <= ROUNDING * largest { 0.0 } else { least };
     let logs: f64 = singular.iter().map(|s| s.ln()).sum();
     let logs = if least == 0.0 { f64::NEG_INFINITY } else { logs };
-    let kappa = largest / least;
+    let kappa = if least == 0.0 { f64::INFINITY } else { largest / least };
+    let share = if least == 0.0 { 0.0 } else { least / largest };
     Ok(Observability {
         kappa,
         kappa_normal: kappa * kappa,
         o1: (logs / singular.len() as f64).exp() / (poses.max(1) as f64).sqrt(),
-        o2: least / largest,
+        o2: share,
         o3: least,
-        o4: least * least / largest,
+        o4: least * share,
         o5: if least == 0.0 { 0.0 } else { singular.iter().map(|s| s.recip()).sum::<f64>().recip() },
         log_determinant: 2.0 * logs,
     })

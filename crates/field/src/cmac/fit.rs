@@ -51,6 +51,8 @@ pub struct NetworkFit {
 const MOST_ROWS: usize = 12_000;
 /// Association cells at most: each pose excites all modes of their penalty.
 const MOST_CELLS: u64 = 20_000;
+/// Cells along one input of a fit at the most: their penalty's eigenvectors take seconds.
+const MOST_CELLS_ALONG: usize = 1000;
 /// Poses that the scales are found from; more take the cube of their number and hardly change the scales.
 const SCALE_POSES: usize = 300;
 /// Natural logarithms of roughness and level over noise. Beyond the upper end rounding would make the equations
@@ -104,6 +106,10 @@ impl Network {
         if self.cell_count() > MOST_CELLS {
             let rule = "a fit takes 20000 at most: lower the sensors' cells, or train by the update rule";
             return refuse("the number of association cells", self.cell_count() as f64, rule);
+        }
+        if let Some(sensor) = self.sensors().iter().find(|sensor| sensor.cells > MOST_CELLS_ALONG) {
+            let rule = "a fit takes 1000 at most: lower the sensor's cells, or train by the update rule";
+            return refuse("the number of cells along one input", sensor.cells as f64, rule);
         }
         if rows > MOST_ROWS {
             let rule = "a fit takes 12000 at most: thin the measurements, or train by the update rule";

@@ -10,6 +10,9 @@ pub const MOST_ACTIVE: usize = 8;
 /// Cells that B-spline memberships may have active: linear to cubic.
 const SPLINES: std::ops::RangeInclusive<usize> = 2..=4;
 
+/// Narrowest Gaussian membership, in cells: between two of narrower ones squares of grades are too small for a number.
+const NARROWEST: f64 = 0.05;
+
 /// How strongly a value excites a cell, by its distance from the cell's centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Membership {
@@ -68,9 +71,11 @@ impl Sensor {
             );
         }
         match membership {
-            Membership::Gaussian { sigma } if !(sigma > 0.0 && sigma.is_finite()) => {
-                refuse("sigma", sigma, "it must be a positive number of cells")
-            }
+            Membership::Gaussian { sigma } if !(sigma >= NARROWEST && sigma.is_finite()) => refuse(
+                "sigma",
+                sigma,
+                "it must be a number of cells, 0.05 or more: narrower cells excite nothing",
+            ),
             Membership::BSpline if !SPLINES.contains(&self.active) => refuse(
                 "the number of active cells of a B-spline",
                 self.active as f64,

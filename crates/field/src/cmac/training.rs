@@ -94,7 +94,7 @@ impl Measure {
     pub fn add(&mut self, difference: Lane) {
         for i in 0..LANES {
             let size = difference.0[i].abs();
-            self.largest.0[i] = if size > self.largest.0[i] { size } else { self.largest.0[i] };
+            self.largest.0[i] = if size <= self.largest.0[i] { self.largest.0[i] } else { size };
         }
         self.squares += difference * difference;
     }
@@ -106,7 +106,7 @@ impl Measure {
     }
 
     fn largest(&self) -> f64 {
-        self.largest.0.into_iter().fold(0.0, f64::max)
+        self.largest.0.into_iter().fold(0.0, |most, size| if size <= most { most } else { size })
     }
 
     fn rms(&self) -> f64 {

@@ -1,5 +1,8 @@
 //! The tree of regions: boxes, each either a leaf or halved along one axis.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use truearm_estimate::EstimateError;
 
 /// What a look-up needs of a region: 16 bytes.
@@ -136,11 +139,13 @@ impl Regions {
 
     /// Halved to so many leaves, the largest first along their longest side.
     pub fn evenly(mut self, leaves: usize) -> Regions {
-        for _ in self.leaves().len()..leaves {
-            let share = |&region: &usize| self.depth(region);
-            let largest = self.leaves().into_iter().min_by_key(share).unwrap_or(0);
+        let mut waiting: BinaryHeap<Reverse<(usize, usize)>> =
+            self.leaves().into_iter().map(|leaf| Reverse((self.depth(leaf), leaf))).collect();
+        while waiting.len() < leaves {
+            let Some(Reverse((depth, largest))) = waiting.pop() else { break };
             let axis = self.longest_first(largest)[0];
-            self.halve(largest, axis);
+            let lower = self.halve(largest, axis);
+            waiting.extend([lower, lower + 1].map(|half| Reverse((depth + 1, half))));
         }
         self
     }

@@ -145,7 +145,7 @@ fn judged(posterior: &Posterior, all: &Training) -> Judgement {
 #[test]
 fn poses_that_others_stand_for_are_judged_by_them() {
     let (mut training, hyper) = of_scara(300);
-    let kept = training.fill_space(200);
+    let kept = training.fill_space(200, &Cancel::default()).unwrap();
     let aside: Vec<usize> = (0..300).filter(|pose| !kept.contains(pose)).collect();
     let mut wrong = vec![aside[10], aside[70], kept[50]];
     wrong.sort_unstable();
@@ -185,11 +185,14 @@ fn poses_that_fill_the_space_are_far_apart() {
     let width = training.inputs.len();
     let first = training.values[..width].to_vec();
     training.values[5 * width..6 * width].copy_from_slice(&first);
-    let kept = training.fill_space(39);
+    let kept = training.fill_space(39, &Cancel::default()).unwrap();
     let alike = kept.iter().filter(|&&pose| pose == 0 || pose == 5).count();
     assert_eq!((kept.len(), alike), (39, 1), "of two poses that are the same one is enough");
     assert!(kept.windows(2).all(|pair| pair[0] < pair[1]));
-    assert_eq!(training.fill_space(100).len(), 40);
+    assert_eq!(training.fill_space(100, &Cancel::default()).unwrap().len(), 40);
     training.values = first.repeat(40);
-    assert!(training.fill_space(30).windows(2).all(|pair| pair[0] < pair[1]), "no pose stands twice");
+    assert!(
+        training.fill_space(30, &Cancel::default()).unwrap().windows(2).all(|pair| pair[0] < pair[1]),
+        "no pose stands twice"
+    );
 }
