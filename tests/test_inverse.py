@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from truearm import Robot
 from truearm.errors import InputError, WorkError
@@ -268,3 +269,49 @@ def test_what_is_out_of_reach_is_said_by_number():
 def test_bad_poses_and_seeds_are_refused(pose, seed, message):
     with pytest.raises(InputError, match=message):
         SOLVERS["ur5"].near(pose, seed)
+
+
+STRETCHED = {"staubli-tx2-90l": 0.0, "abb-irb-120": -np.arctan2(0.302, 0.07)}
+"""Joint 3 where the arm is stretched: its forearm in line with its upper arm."""
+
+
+@pytest.mark.parametrize("name", STRETCHED)
+def test_a_stretched_arm_is_solved_at_the_border_of_its_reach(name):
+    solver = SOLVERS[name]
+    q = random_readings(solver.robot, 400, seed=3)
+    q[:, 2] = STRETCHED[name]
+    poses = poses_of(solver.robot, q)
+    assert np.abs(poses_of(solver.robot, solver.near(poses, q)) - poses).max() < 1e-9
+    assert all(len(solver.solutions(pose)) for pose in poses)
+
+
+def test_a_wrist_on_the_first_axis_stays_at_its_seed():
+    """Infinitely many readings reach such a pose: the seed is one of them."""
+    solver = SOLVERS["abb-irb-120"]
+    q = random_readings(solver.robot, 200, seed=4)
+
+    def beside(joint_three, row):
+        """How far the wrist is from the first axis, in the plane of the arm."""
+        pose = poses_of(solver.robot, [*row[:2], joint_three, *row[3:]])[0]
+        wrist = pose[:3, 3] - solver.robot.table[5, 1] * pose[:3, 2]
+        return wrist[0] * np.cos(row[0]) + wrist[1] * np.sin(row[0])
+
+    low, high = solver.robot.limits[2]
+    crossing = [row for row in q if beside(low, row) * beside(high, row) < 0.0]
+    assert len(crossing) > 20
+    seeds = np.array([[*row[:2], brentq(beside, low, high, (row,), 1e-15), *row[3:]] for row in crossing])
+    found = solver.near(poses_of(solver.robot, seeds), seeds)
+    assert np.abs(found - seeds).max() < 1e-6
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 360.0), (90.0, 360.0), (190.0, 355.0)])
+def test_limits_beyond_half_a_turn_are_searched(low, high):
+    """Of an arm without a closed form, whose solutions a search from starts within the limits finds."""
+    arm = bent(SOLVERS["abb-irb-120"].robot, seed=1, size=0.2)
+    limits = np.tile(np.radians([low, high]), (6, 1))
+    robot = Robot.from_dict({**arm.to_dict(), "limits": limits.tolist()})
+    solver = Inverse(robot)
+    assert solver.method == "numeric"
+    q = np.random.default_rng(5).uniform(*np.radians((low, high)), (60, 6))
+    found = [is_among(own, solver.solutions(pose)) for own, pose in zip(q, poses_of(robot, q), strict=True)]
+    assert np.mean(found) > 0.9

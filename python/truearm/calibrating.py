@@ -53,6 +53,7 @@ from truearm.measurements import Measurements
 from truearm.models import VARIABLE
 from truearm.options import Options
 from truearm.plausibility import check_against
+from truearm.points_together import points_together
 from truearm.robot import Robot
 from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
@@ -99,7 +100,8 @@ def calibrate(
     chosen = kinds.chosen(Options, options, more, Options.of)
     robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
-    given = given.deduplicated()
+    given, together = points_together(given.deduplicated())
+    notices += together
     notices += stood_still(robot, given.readings) + seen_at_values(robot, given.readings)
     task = _task(robot, given, chosen, threads, stages)
     notices += orientations_left_out(given, task.selection, chosen.use)

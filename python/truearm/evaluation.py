@@ -22,6 +22,7 @@ from truearm.judging import check_judged, judge, model_inputs
 from truearm.measurements import Measurements
 from truearm.models import NOMINAL, ArmModel
 from truearm.plausibility import check_against
+from truearm.points_together import points_together
 from truearm.registration import register
 from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
@@ -118,7 +119,8 @@ def evaluate(
     chosen = kinds.chosen(EvaluationOptions, options, more)
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
-    data = data.deduplicated()
+    data, together = points_together(data.deduplicated())
+    notices += together
     notices += known_rows(calibration.learned_from, data)
     selection = select(data, chosen.use, chosen.judge_target)
     if selection.distances:

@@ -61,10 +61,32 @@ fn arm() -> Arm {
 /// A column of 1 m below the carriage, and a plate of 0.2 by 0.4 m at it, with a rim of 0.1 m, that faces up.
 fn clearance() -> Clearance {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    Clearance {
-        column: Column { top: [0.0; 3], down: [0.0, 0.0, -1.0], radius: 0.1 },
-        plate: Plate { corner: [0.0; 3], axes, area: [0.2, 0.4], rim: 0.1 },
+    Clearance::new(
+        Column { top: [0.0; 3], down: [0.0, 0.0, -1.0], radius: 0.1 },
+        Plate { corner: [0.0; 3], axes, area: [0.2, 0.4], rim: 0.1 },
+    )
+    .expect("sound")
+}
+
+#[test]
+fn what_is_no_number_or_no_size_is_refused_and_not_taken_for_far_away() {
+    let column = Column { top: [0.0; 3], down: [0.0; 3], radius: 0.1 };
+    let plate = Plate { corner: [0.0; 3], axes: [[0.0; 3]; 3], area: [0.2, 0.4], rim: 0.1 };
+    for radius in [f64::NAN, f64::INFINITY, -0.1] {
+        assert!(Clearance::new(Column { radius, ..column }, plate).is_err(), "{radius}");
     }
+    assert!(Clearance::new(column, Plate { corner: [f64::NAN; 3], ..plate }).is_err());
+    let moved = Transform { translation: [f64::NAN; 3], ..Transform::IDENTITY };
+    let way = Way::places(&[0.0], 1).expect("sound");
+    assert!(arm().along(&way, &moved).is_err());
+    let tiny = Way::through(&[0.0, 1.0], 1, 1e-9).expect_err("too many places");
+    assert!(tiny.to_string().contains("larger step"), "{tiny}");
+}
+
+#[test]
+fn a_column_without_a_length_is_a_ball() {
+    let column = Column { top: [0.0; 3], down: [0.0; 3], radius: 0.1 };
+    assert!((column.gap([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]], [0.0; 3]) - 0.9).abs() < 1e-12);
 }
 
 #[test]

@@ -25,9 +25,9 @@ const HOPELESS: f64 = 0.999;
 const UNSTEADY: f64 = 0.1;
 /// Those of constant parameters fall by what the last step tells: still below 1e-12 m, with so much more foreseen.
 const STEADILY: f64 = 5.0;
-/// With fewer joints than the task has numbers, turns weigh so much less that the position is met first: little enough for
-/// what the position alone then asks for to turn the tool by next to nothing, and enough to be told from rounding.
-const POSITION_FIRST: f64 = 1e-2;
+/// With fewer joints than the task has numbers, turns weigh so much less that the position is met first, and no joint turns
+/// far for what little of the orientation it would mend.
+const POSITION_FIRST: f64 = 1e-4;
 
 /// What is corrected, and how far.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -74,6 +74,18 @@ fn a_turn_about_the_tool_that_is_free_does_not_count() {
 }
 
 #[test]
+fn five_of_six_joints_meet_the_direction_of_the_tool() {
+    let scene = Scene::new(six_axis(), 1e-3);
+    accepted(&scene, options(Task::Axis, Some(vec![0, 1, 2, 3, 4])), |i, from, to| {
+        let (meant, real) = (scene.meant(from)[0], scene.real(to)[0]);
+        let (a, b) = (axis(&meant), axis(&real));
+        let tilt = norm([a[0] - b[0], a[1] - b[1], a[2] - b[2]]);
+        assert!(distance(&meant, &real) < MET && tilt < 1e-7, "waypoint {i}: {tilt:e}");
+        assert_eq!(from[5], to[5], "waypoint {i}");
+    });
+}
+
+#[test]
 fn position_with_the_first_three_joints() {
     let scene = Scene::new(six_axis(), 1e-3);
     accepted(&scene, options(Task::Position, Some(vec![0, 1, 2])), |i, from, to| {

@@ -9,6 +9,7 @@ use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
 use crate::optimise::Limits;
+use crate::sag::UPRIGHT;
 use crate::select::{Found, refine};
 use crate::training::Training;
 
@@ -28,6 +29,9 @@ const DIRECTIONS: [[f64; 3]; 8] = [
 const AMPLITUDES: [f64; 3] = [3e-4, 1.5e-3, 8e-3];
 /// So many nats the best of all directions may be ahead of z by chance.
 const CHANCE: f64 = 6.0;
+/// Levers that are shorter than this, m, are none: axes that stand upright have nothing to bear, and any other direction
+/// could only gain.
+const NO_LEVER: f64 = 1e-6;
 const REFIT: Limits = Limits { evaluations: 16, gain: 0.2 };
 
 /// The best of `found`, whose up is the z axis, and of the other directions, on the rows it was found on.
@@ -35,6 +39,9 @@ const REFIT: Limits = Limits { evaluations: 16, gain: 0.2 };
 /// # Errors
 /// [`FieldError`] of the evidence.
 pub fn contest_up(training: &Training, found: Found, cancel: &Cancel) -> Result<Found, FieldError> {
+    if training.clone().lifted(UPRIGHT)?.levers.iter().all(|lever| lever.abs() < NO_LEVER) {
+        return Ok(found);
+    }
     let mut evaluations = found.evaluations;
     let mut best: Option<(f64, Hyper)> = None;
     for up in DIRECTIONS {

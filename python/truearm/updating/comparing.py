@@ -15,6 +15,7 @@ from truearm.fitted_rows import OVERWHELMING, known_rows
 from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
+from truearm.points_together import points_together
 from truearm.turning_sense import check_turns
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
@@ -146,7 +147,8 @@ def update(
     chosen = kinds.chosen(UpdateOptions, options, more)
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
-    data = data.deduplicated()
+    data, together = points_together(data.deduplicated())
+    notices += together
     notices += known_rows(calibration.learned_from, data)
     data, unused = some_poses(one_row_a_visit(data))
     notices += unused

@@ -14,7 +14,7 @@ FEWEST_OF_A_GROUP: Final = 20
 
 
 def some_poses(data: Measurements) -> tuple[Measurements, list[Notice]]:
-    """At most 500 poses, spread evenly over each set-up in the order of measuring, and that others are unused.
+    """At most 500 poses, spread evenly over each set-up in the order of measuring; and that so few are used.
 
     Each set-up has the same share at the most, and never less than twenty of its poses.
     """
@@ -26,8 +26,8 @@ def some_poses(data: Measurements) -> tuple[Measurements, list[Notice]]:
     if len(rows) == len(data):
         return data, []
     text = (
-        f"{len(rows)} of {len(data)} poses are used, spread evenly: more of them tell offsets, frame and tool "
-        "hardly better. So many poses are enough to calibrate anew, which finds another field as well: "
+        f"{len(rows)} of {len(data)} poses are used, spread evenly: more of them tell offsets, frame and "
+        "tool hardly better. So many poses are enough to calibrate anew, which finds another field as well: "
         "truearm calibrate."
     )
     return data.select(rows), [Notice("some_poses", text)]

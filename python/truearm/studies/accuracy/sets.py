@@ -10,6 +10,7 @@ from pathlib import Path
 from truearm.errors import InputError, Notice, UsageError
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
+from truearm.points_together import points_together
 from truearm.robot import Robot
 
 
@@ -98,7 +99,7 @@ def read_set(data_set: DataSet) -> Read:
             "distances were measured, not points", where=data_set.file, rule="Methods are judged at points"
         )
     notices = check_against(data, robot)
-    data = data.deduplicated()
+    data, _ = points_together(data.deduplicated())
     described = json.dumps(robot.to_dict(), sort_keys=True) + data.hash()
     short = hashlib.sha256(described.encode()).hexdigest()[:12]
     return Read(robot, data, short, tuple(notices))

@@ -1,0 +1,125 @@
+"""What the core does with measurements that no reader of files lets through."""
+
+import numpy as np
+import pytest
+
+from truearm._core import (
+    Chain,
+    CoreError,
+    MeasurementSet,
+    Problem,
+    Setup,
+    fit_constant,
+    fit_field,
+    identifiability,
+    linearise,
+)
+
+LINKS = np.array(
+    [
+        [0.0, 0.4, 0.025, -np.pi / 2, 0.0],
+        [0.0, 0.0, 0.455, 0.0, 0.0],
+        [0.0, 0.0, 0.035, -np.pi / 2, 0.0],
+        [0.0, 0.42, 0.0, np.pi / 2, 0.0],
+        [0.0, 0.0, 0.0, -np.pi / 2, 0.0],
+        [0.0, 0.08, 0.0, 0.0, 0.0],
+    ]
+)
+COLUMNS = [k for k in range(30) if k % 5 != 4]
+TARGET = np.array([0.05, 0.02, 0.1])
+CHAIN = Chain("standard", ["revolute"] * 6, LINKS, np.eye(4), np.eye(4))
+SETUP = Setup(np.eye(4)[None], TARGET[None, None], np.eye(3)[None], np.zeros((1, 3)))
+PRIOR = (2e-3, 2e-3, True)
+
+
+def measured(q, **more):
+    """A set of points at readings `q` (n, 6), or of what `more` says."""
+    pose = CHAIN.pose(np.ascontiguousarray(q), LINKS + 2e-4)
+    count = len(q)
+    points = pose[:, :3, :3] @ TARGET + pose[:, :3, 3]
+    points += np.random.default_rng(1).normal(scale=1e-5, size=points.shape)
+    content = {
+        "joints": np.ascontiguousarray(q),
+        "group": np.zeros(count, dtype=np.int64),
+        "targets": points[:, None],
+        "rotations": None,
+        "sigma": np.zeros(count),
+        "weight": np.ones(count),
+        "distances": [],
+    }
+    return MeasurementSet({**content, **more})
+
+
+def drawn(count):
+    return np.random.default_rng(0).uniform(-2.0, 2.0, (count, 6))
+
+
+def constants(problem):
+    options = {
+        "prior": PRIOR,
+        "noise": None,
+        "robust": None,
+        "start": None,
+        "parameters": None,
+        "threads": None,
+    }
+    return fit_constant(problem, options)
+
+
+def field(problem, count):
+    options = {
+        "determined": list(range(len(COLUMNS))),
+        "driven": list(range(len(COLUMNS))),
+        "features": np.zeros((count, 0)),
+        "feature_ranges": [],
+        "payloads": [],
+        "degree": 3,
+        "prior": PRIOR,
+        "hyper": None,
+        "near": None,
+        "contested": False,
+        "rough": False,
+        "threads": None,
+    }
+    return fit_field(problem, constants(problem), options)
+
+
+@pytest.mark.parametrize("part", [np.zeros((3, 3)), 2.0 * np.eye(3), np.diag([1.0, 1.0, -1.0])])
+def test_a_rotation_that_is_none_is_refused(part):
+    q = drawn(40)
+    with pytest.raises(CoreError, match="not rigid"):
+        measured(q, rotations=np.tile(part, (40, 1, 1)))
+
+
+def test_a_negative_distance_is_refused():
+    q = drawn(40)
+    with pytest.raises(CoreError, match="zero or more"):
+        measured(q, targets=np.zeros((40, 0, 3)), distances=[(k, True, 0, -0.5) for k in range(40)])
+
+
+def test_a_field_is_not_fitted_to_distances():
+    q = drawn(40)
+    distances = [(k, True, 0, 1.0) for k in range(40)]
+    problem = Problem(CHAIN, measured(q, targets=np.zeros((40, 0, 3)), distances=distances), COLUMNS)
+    with pytest.raises(CoreError, match="points are needed"):
+        field(problem, 40)
+    several = measured(q, targets=np.full((40, 2, 3), np.nan), distances=distances)
+    with pytest.raises(CoreError, match="points are needed"):
+        linearise(Problem(CHAIN, several, COLUMNS), LINKS, SETUP)
+
+
+def test_a_field_of_poses_that_nobody_trusts_is_fitted_all_the_same():
+    problem = Problem(CHAIN, measured(drawn(80), weight=np.full(80, 1e-3)), COLUMNS)
+    assert np.isfinite(field(problem, 80).evidence)
+
+
+def test_poses_without_weight_determine_nothing():
+    q = drawn(40)
+    q[:12, 1:] = q[0, 1:]
+    weight = np.zeros(40)
+    weight[:12] = 1.0
+    setup = Setup(np.eye(4)[None], TARGET[None, None], np.eye(3)[None], np.zeros((0, 3)))
+    found = identifiability(Problem(CHAIN, measured(q, weight=weight), COLUMNS), LINKS, setup)
+    alone = identifiability(Problem(CHAIN, measured(q[:12]), COLUMNS), LINKS, setup)
+    assert found[0] == alone[0]
+    assert found[2] == alone[2]
