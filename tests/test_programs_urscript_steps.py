@@ -37,13 +37,23 @@ def densified(lines, deviation_mm=0.1, least_mm=10.0):
     return rewrite(program, models, Choices(spacing=Spacing.of(deviation_mm, least_mm)))
 
 
+def in_degrees(target):
+    """A target whose angles are degrees within d2r( )."""
+    opening, _, numbers = target.partition("[")
+    values = [float(value) for value in numbers.rstrip("]").split(",")]
+    lengths = 3 if opening else 0
+    angles = [f"d2r({np.rad2deg(value):.7f})" for value in values[lengths:]]
+    return f"{opening}[{', '.join([*map(str, values[:lengths]), *angles])}]"
+
+
 def motions_of(content):
     """Point and blend radius of each motion of a text, (n, 3) and (n,), in m; joints as poses of the TCP."""
     program = read(UR, content, ROBOT)
     targets, moves = program.targets, program.moves
     points = []
     for target in moves.target:
-        values = targets.values[6 * target : 6 * target + 6]
+        places = slice(6 * target, 6 * target + 6)
+        values = targets.values[places] * targets.factors[places]
         if targets.layout[target] == 0:
             pose = ROBOT.flange_chain.pose(ROBOT.joints_from_readings(values[None]))[0]
             values = pose[:3, 3] + 0.1 * pose[:3, 2]
@@ -108,6 +118,22 @@ def test_a_straight_move_to_joints_gets_joints():
     lines = [line for line in done.contents[0].decode().splitlines() if line.startswith("movel(")]
     assert len(lines) == done.inserted + 1 > 2
     assert all(line.startswith("movel([") for line in lines)
+
+
+@pytest.mark.parametrize("written", ["{}", "there = {}"])
+@pytest.mark.parametrize("away", [str(AWAY), pose_text(AWAY)])
+def test_waypoints_before_a_target_in_degrees_are_in_degrees(written, away):
+    def lines(away):
+        name = written.format("").partition(" ")[0]
+        declared = f"{written.format(away)}\n" if name else ""
+        return f"{declared}movej({HOME})\nmovel({name or away})"
+
+    radians, degrees = densified(lines(away)), densified(lines(in_degrees(away)))
+    assert degrees.inserted == radians.inserted >= 3
+    points = [motions_of(done.contents[0])[0] for done in (radians, degrees)]
+    assert np.abs(points[0] - points[1]).max() < 3e-6
+    text = degrees.contents[0].decode()
+    assert text.count("d2r(") == in_degrees(away).count("d2r(") * (1 + degrees.inserted)
 
 
 def test_a_move_that_is_straight_enough_is_not_asked_for_its_blending():

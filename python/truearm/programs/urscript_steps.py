@@ -12,6 +12,7 @@ from truearm.programs.layouts import of_joints
 from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.stepping import lines_before, target_of, written
+from truearm.programs.urscript_constants import DEGREE
 from truearm.programs.urscript_lines import STREAMED, blend_radius
 from truearm.programs.urscript_places import argument
 from truearm.programs.urscript_syntax import Node, NotReadable, expression, statements
@@ -71,18 +72,27 @@ def _line(program: Program, step: LinearStep) -> str | None:
     target = argument(call, 0, "pose") if call is not None and call.text == "movel" else None
     if call is None or target is None or _states_time(call):
         return None
-    layout = program.layouts[int(program.targets.layout[target_of(program, step)])]
-    opening = "[" if of_joints(layout) else "p["
-    numbers = ", ".join(map(written, step.values, step.decimals))
     scale = 10.0**DECIMALS_RADIUS
     radius = written(math.floor(FILLED * step.room_m * scale) / scale, DECIMALS_RADIUS)
     own = blend_radius(call)
-    head = source.text[start : target.start] + f"{opening}{numbers}]"
+    head = source.text[start : target.start] + _target(program, step)
     if own is None:
         rest = f"{source.text[target.end : call.end - 1].rstrip()}, r={radius})"
     else:
         rest = source.text[target.end : own.start] + radius + source.text[own.end : call.end]
     return head + rest + source.newline
+
+
+def _target(program: Program, step: LinearStep) -> str:
+    """The numbers of a step in its target's manner: degrees within d2r( ) where that has them."""
+    targets, target = program.targets, target_of(program, step)
+    layout = program.layouts[int(targets.layout[target])]
+    numbers = list(map(written, step.values, step.decimals))
+    first = int(targets.first[target])
+    for place, factor in enumerate(targets.factors[first : first + len(numbers)].tolist()):
+        if factor == DEGREE:
+            numbers[place] = f"d2r({numbers[place]})"
+    return f"{'[' if of_joints(layout) else 'p['}{', '.join(numbers)}]"
 
 
 def _states_time(call: Node) -> bool:
