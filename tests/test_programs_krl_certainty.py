@@ -56,6 +56,13 @@ def test_no_waypoints_where_they_would_not_be_executed_as_their_motion_is(line):
     assert " mm; its statement is not a plain one, or belongs to others)" in told
 
 
+def test_no_waypoints_before_a_line_to_axes():
+    done, told = densified(f"PTP {HERE}\nLIN {{A1 30,A2 -90,A3 100,A4 20,A5 45,A6 30}}")
+    assert done.changed.all()
+    assert done.inserted == 0
+    assert " mm; its statement is not a plain one" in told
+
+
 @pytest.mark.parametrize("word", ["SPLINE", "PTP_SPLINE"])
 def test_no_waypoints_within_a_spline(word):
     done, told = densified(f"PTP {HERE}\n{word}\nSLIN {THERE}\nSLIN {HERE}\nENDSPLINE")

@@ -343,6 +343,22 @@ def test_lines_without_numbers_get_none(robot):
     assert done.inserted >= 2
 
 
+@pytest.mark.parametrize("name", ["J2", "HOME"])
+def test_waypoints_before_joints_are_joints_in_joint_variables(robot, name):
+    joints = ",".join(f"{angle:.2f}" for angle in np.rad2deg(LONG[1]))
+    lines = ["Def Jnt HOME", "Mov P1", f"Mvs {name}", "Mvs P1", "End", f"{name}=({joints})"]
+    text = long_line(robot, [*lines, "J5=(0,0,90,0,90,0)"])
+    done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)
+    again = read(MELFA, done.contents[0], robot, FLANGE)
+    names = [again.targets.names[target] for target in again.moves.target.tolist()]
+    way = names[1 : names.index(name)]
+    assert way[:2] == (["J1", "J3"] if name == "J2" else ["J1", "J2"])
+    assert "J5" not in way
+    assert names[names.index(name) + 1 :][:2] == ["P2", "P4"]
+    said = says(MELFA, done.contents[0], robot, FLANGE)[again.moves.target]
+    assert (np.diff(said[: len(way) + 2, 0]) > 0.0).all(), "in the order of the way"
+
+
 def test_numbers_out_of_order_stay(robot):
     text = long_line(robot, ["20 Mov P1", "10 Ovrd 50", "Mvs P3", "End"])
     done = rewritten(MELFA, text, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS)

@@ -419,11 +419,19 @@ NOT_TWICE = [
 
 @pytest.mark.parametrize("motion", PLAIN + NOT_TWICE)
 def test_waypoints_copy_what_holds_for_a_part_of_the_way(motion):
-    text = module(motion)
+    text = module(motion, points())
     line = text.split("\r\n").index(motion) + 1
     values, decimals = (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 0, 0, 0, 0), (3,) * 3 + (7,) * 4 + (0,) * 4
-    step = LinearStep(line, 0, 7, values, decimals, 0.01)
+    step = LinearStep(line, 0, 0, values, decimals, 0.01)
     program = read("a.mod", text, ABB)
     found = program.language.linear_steps(program, [[step]])
-    assert found.impossible == (() if motion in PLAIN else (7,))
+    assert found.impossible == (() if motion in PLAIN else (0,))
     assert found.waypoints == len(found.insertions) == (motion in PLAIN)
+
+
+def test_a_line_to_joints_gets_no_waypoints():
+    text = module("MoveL jHome,v100,fine,tG;", points())
+    line = text.split("\r\n").index("MoveL jHome,v100,fine,tG;") + 1
+    program = read("a.mod", text, ABB)
+    found = program.language.linear_steps(program, [[LinearStep(line, 0, 0, (1.0,) * 6, (3,) * 6, 0.01)]])
+    assert (found.impossible, found.insertions) == ((0,), ())

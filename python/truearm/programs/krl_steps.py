@@ -6,10 +6,10 @@ from typing import Final
 
 from truearm.programs.krl_storage import HEADER, lines
 from truearm.programs.krl_values import line_reader, operands
-from truearm.programs.layouts import DECIMALS_DEG, DECIMALS_MM
+from truearm.programs.layouts import DECIMALS_DEG, DECIMALS_MM, of_pose
 from truearm.programs.program import LinearStep, Program, StepTexts
 from truearm.programs.source import Source
-from truearm.programs.stepping import lines_before
+from truearm.programs.stepping import lines_before, target_of
 
 PASSED: Final = {"lin": "C_DIS", "slin": "C_SPL"}
 """How the arm passes a waypoint, by the word of the motion."""
@@ -26,8 +26,9 @@ def inserted(program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTex
     files = {steps[0].file for steps in moves}
     plain = {file: _plain(program.sources[file], _wanted(moves, file)) for file in files}
 
-    def line_of(_: Program, step: LinearStep) -> str | None:
-        return _line(program.sources[step.file], step) if step.line in plain[step.file] else None
+    def line_of(program: Program, step: LinearStep) -> str | None:
+        posed = of_pose(program.layouts[int(program.targets.layout[target_of(program, step)])])
+        return _line(program.sources[step.file], step) if posed and step.line in plain[step.file] else None
 
     return lines_before(program, moves, line_of)
 

@@ -1,10 +1,11 @@
-"""Waypoints in a MELFA BASIC program: a Mvs each, and a position variable each behind the program."""
+"""Waypoints in a MELFA BASIC program: a Mvs each, and a variable each behind the program."""
 
 import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Final
 
+from truearm.programs.layouts import of_joints
 from truearm.programs.melfa_text import NAME, lines, without_remark
 from truearm.programs.program import Insertion, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
@@ -13,7 +14,11 @@ from truearm.programs.stepping import copied, free_numbers, line_start, target_o
 _PLAIN: Final = re.compile(rf"([ \t]*\d+(?=[ \t]))?([ \t]*Mvs[ \t]+){NAME}[ \t]*", re.IGNORECASE)
 _LINE_NUMBER: Final = re.compile(r"[ \t]*(\d+)(?=[ \t*])")
 _JUMP_TO_NUMBER: Final = re.compile(r"\b(?:GoTo|GoSub|Then|Else)[ \t]*\d", re.IGNORECASE)
-_POSITION: Final = re.compile(r"(?<!\w)P(\d+)\b", re.IGNORECASE)
+OF_JOINTS, OF_POSE = "J", "P"
+"""What the names of variables begin with: whether one holds joints or a position follows from its name."""
+_NAMING: Final = {
+    letter: re.compile(rf"(?<!\w){letter}(\d+)\b", re.IGNORECASE) for letter in (OF_JOINTS, OF_POSE)
+}
 LAST_LINE: Final = 32767
 
 
@@ -23,7 +28,7 @@ def inserted(program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTex
     plain = [_PLAIN.fullmatch(without_remark(source.line_text(steps[0].line))) for steps in moves]
     numbered = zip(moves, plain, strict=True)
     numbering = _Numbering(source, {m[0].line: len(m) for m, found in numbered if found and found.group(1)})
-    free = (f"P{number}" for number in free_numbers(source, _POSITION))
+    free = {letter: _names(source, letter) for letter in _NAMING}
     lines: list[Insertion] = []
     positions: list[str] = []
     impossible = []
@@ -33,13 +38,25 @@ def inserted(program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTex
             impossible.append(steps[0].move)
             continue
         start, stored, at = line_start(program, steps[0]), *_definition(program, source, steps[0])
-        for place, (step, name) in enumerate(zip(steps, free, strict=False)):
+        names = free[_letter(program, steps[0])]
+        for place, (step, name) in enumerate(zip(steps, names, strict=False)):
             number = str(numbers[place]) if numbers else ""
             lines.append(Insertion(0, start, start, f"{number}{found.group(2)}{name}{source.newline}"))
             value = copied(program, step, stored, at).partition("=")[2]
             positions.append(f"{name}={value.strip()}{source.newline}")
     anew = numbering.anew() if lines else ()
     return StepTexts((*lines, *anew, *_behind(source, positions)), len(lines), tuple(impossible))
+
+
+def _names(source: Source, letter: str) -> Iterator[str]:
+    """Names that begin with a letter and that the program does not have."""
+    return (f"{letter}{number}" for number in free_numbers(source, _NAMING[letter]))
+
+
+def _letter(program: Program, step: LinearStep) -> str:
+    """What the name of a variable begins with that holds what a move's target does."""
+    layout = program.layouts[int(program.targets.layout[target_of(program, step)])]
+    return OF_JOINTS if of_joints(layout) else OF_POSE
 
 
 def _definition(program: Program, source: Source, step: LinearStep) -> tuple[str, int]:

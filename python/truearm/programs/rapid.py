@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Final
 
 from truearm.programs.frames import Frames
-from truearm.programs.layouts import DECIMALS_MM, DECIMALS_QUATERNION
+from truearm.programs.layouts import DECIMALS_MM, DECIMALS_QUATERNION, of_pose
 from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.rapid_reading import RapidReading
 from truearm.programs.rapid_values import arguments, statement_reader
 from truearm.programs.source import Source
-from truearm.programs.stepping import lines_before
+from truearm.programs.stepping import lines_before, target_of
 from truearm.robot import Robot
 
 MODULE: Final = re.compile(
@@ -66,6 +66,8 @@ class RAPID(BlendsShortened):
         given = arguments(reader.rest())
         options = {name for argument in given for name in argument.options}
         if len(given) != 4 or given[0].options or not options <= REPEATED:
+            return None
+        if not of_pose(program.layouts[int(program.targets.layout[target_of(program, step)])]):
             return None
         target, zone = given[0].tokens, given[2].tokens
         cut = [target[0].start - start, target[-1].end - start, zone[0].start - start, zone[-1].end - start]
