@@ -48,6 +48,8 @@ class Program:
         configuration: How poses tell their branch; None in a language that does not.
         fixed: Why targets cannot be changed with certainty whatever they are used for, by number.
         unsure: Numbers of those of them that may be others when the program runs: they tell no place.
+        nearest: Moves to the configuration nearest to where the arm stands, whatever the data of the target
+            says, by number; False where that is not certain.
         accurate: Why the controller is known to compute with a model of its own, where the program says so.
     """
 
@@ -62,6 +64,7 @@ class Program:
     accurate: str = ""
     fixed: Mapping[int, str] = field(default_factory=dict)
     unsure: Set[int] = frozenset()
+    nearest: Mapping[int, bool] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from truearm.programs.layouts import Joints, QuaternionPose
 from truearm.programs.lexing import Reader, Token
 from truearm.programs.program import Listed, Program
 from truearm.programs.rapid_configuration import Confdata
+from truearm.programs.rapid_confs import KINDS, Confs
 from truearm.programs.rapid_data import MODULE, TARGETS, TWICE, Declarations
 from truearm.programs.rapid_frames import RapidFrames
 from truearm.programs.rapid_routines import BEGINNINGS, ENDINGS, given, is_variable
@@ -102,8 +103,10 @@ HARMLESS: Final = frozenset(
 )
 COUNTING: Final = frozenset({"incr", "decr", "add", "clear"})
 """Harmless but for what they are given."""
+HANDLERS: Final = frozenset({"error", "undo", "backward"})
 BEGINS: Final = BEGINNINGS | {"module"}
-ENDS: Final = ENDINGS | {"endmodule", "error", "undo", "backward", "goto"}
+ENDS: Final = ENDINGS | HANDLERS | {"endmodule", "goto"}
+LEAVING: Final = frozenset({"return", "raise", "exit", "exitcycle", "goto"})
 JUMPS: Final = frozenset({"return", "raise", "exit", "exitcycle", "stop", "retry", "trynext", "goto"})
 CLOSING: Final = frozenset({"endif", "endfor", "endwhile", "endtest"})
 READ: Final = "the program computes with it"
@@ -159,6 +162,8 @@ class RapidReading:
         )
         start = _Modal(np.eye(4), DISPLACED if self._displaces else "")
         self._flow = Flow(start, _joined, _same)
+        self._confs = Confs()
+        self._nearest: dict[int, bool] = {}
         self._used: list[int] = []
         self._uses: list[_Use] = []
         self._gifts: set[tuple[str, str]] = set()
@@ -188,6 +193,7 @@ class RapidReading:
             configuration,
             fixed=self._fixed,
             unsure=self._unsure,
+            nearest=self._nearest,
         )
 
     # Blocks.
@@ -206,11 +212,13 @@ class RapidReading:
         elif word in ENDS:
             reader.take()
             flow.jump()
+            self._confs.note("handler" if word in HANDLERS else "leave")
             if word in ENDINGS:
                 self._declarations.enter(MODULE)
         elif word in CLOSING:
             reader.take()
             flow.close()
+            self._confs.note("close")
         elif word in {"if", "elseif", "while", "for", "test", "case", "default", "else"}:
             return self._branch(reader, word)
         elif word == "%" or (word in {"version", "language"} and reader.peek(1) == ":"):
@@ -219,6 +227,7 @@ class RapidReading:
             reader.take()
             reader.take()
             flow.jump()
+            self._confs.note("label")
         else:
             return False
         return True
@@ -237,6 +246,7 @@ class RapidReading:
             if word in {"proc", "trap", "module"}:
                 break
         self._declarations.enter(MODULE if word == "module" else name)
+        self._confs.begin(word, name)
         if reader.peek() == "(":
             _skip(reader, "(", ")")
 
@@ -258,8 +268,10 @@ class RapidReading:
         self._mention(condition, READ)
         if word in {"elseif", "else", "case", "default"}:
             flow.otherwise(last=word in {"else", "default"})
+            self._confs.note("last" if word in {"else", "default"} else "else")
         else:
             flow.open(loop=word in {"while", "for"})
+            self._confs.note("loop" if word in {"while", "for"} else "if")
         return True
 
     def _short_if(self, reader: Reader) -> None:
@@ -268,10 +280,12 @@ class RapidReading:
         self._mention([reader.take() for _ in range(behind)], READ)
         state = self._flow.state
         self._flow.jump()
+        self._confs.note("if")
         if reader.peek() == "if":
             self._short_if(reader)
         elif not reader.done:
             self._statement(reader)
+        self._confs.note("close")
         self._flow.state = _joined(state, self._flow.state)
         self._flow.jump()
         while not reader.done:
@@ -299,11 +313,17 @@ class RapidReading:
 
     def _call(self, at: int, word: str, found: Sequence[Token]) -> None:
         self._mention(found[1:], PASSED, "" if word in JUMPS | HARMLESS else word)
-        if word in JUMPS:
+        if word in KINDS:
+            self._confs.set(word, {token.text.lower() for token in found[1:]})
+        elif word in JUMPS:
             self._flow.jump()
+            if word in LEAVING:
+                self._confs.note("leave")
         elif word not in HARMLESS | COUNTING:
             if word.startswith(("move", "search", "trigg", "arc", "spot", "disp", "paint")):
                 self._list(at, "an instruction that is not known here")
+            else:
+                self._confs.note("call", word)
             self._flow.jump()
             if self._displaces:
                 self._flow.state = replace(self._flow.state, problem=DISPLACED)
@@ -365,6 +385,7 @@ class RapidReading:
             return
         flow = self._flow
         follows = flow.certain and len(meant.targets) == 1
+        self._confs.motion(KINDS[motion != Motion.JOINT], len(self._uses))
         self._uses.append(_Use(at, motion, meant, tool, flow.state, passed, follows))
         for number in meant.targets:
             self._used.append(number)
@@ -380,9 +401,12 @@ class RapidReading:
 
     def _move(self) -> None:
         """The moves, once it is known which tools and work objects stay what they are."""
-        for use in self._uses:
+        nearest = self._confs.nearest()
+        for number, use in enumerate(self._uses):
             environment = self._environments.number(self._environment(use))
             for target in use.meant.targets:
+                if number in nearest:
+                    self._nearest[len(self._moves)] = nearest[number]
                 self._moves.add(
                     target,
                     (0, use.at),

@@ -6,7 +6,7 @@ and work objects as the controller has them, wherever these truly are.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,14 @@ OUT_OF_REACH: Final = "the nominal arm does not reach it"
 NO_BRANCH: Final = "the nominal arm does not reach it in the configuration that it states"
 AMBIGUOUS: Final = "several configurations of the arm reach it, and the program does not tell which is meant"
 CONTRADICTS: Final = "its configuration data is another than a line from the target before arrives in"
+UNHEEDED: Final = (
+    "the controller does not heed its configuration data there (ConfJ or ConfL is off), and the target "
+    "before does not tell which configuration is meant"
+)
+PERHAPS_HEEDED: Final = (
+    "whether the controller heeds its configuration data there (ConfJ, ConfL) depends on how the program "
+    "runs, and that may decide which configuration is meant"
+)
 SINGULAR: Final = "it lies at a singularity, where a pose does not determine the joints"
 DIFFERENT: Final = "it is reached in several configurations of the arm, and one change cannot suit them all"
 
@@ -103,6 +111,20 @@ class _Possible:
     flange: Floats | None = None
 
 
+class _Came(NamedTuple):
+    """How the arm comes to a target.
+
+    Attributes:
+        before: The readings that it comes from; None where they are not known.
+        straight: Whether it comes on a line or an arc.
+        nearest: As in Program, of the move; None where configuration data counts.
+    """
+
+    before: Floats | None
+    straight: bool
+    nearest: bool | None
+
+
 class _Solver:
     """Gathers readings and reasons."""
 
@@ -110,6 +132,7 @@ class _Solver:
         self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
         self.q: Floats = np.broadcast_to(np.nan, (len(program.targets), robot.joint_count))
         self.reasons: dict[int, str] = {}
+        self._unheeded = {int(program.moves.target[move]) for move in program.nearest}
 
     def take_joints(self) -> None:
         """Joint targets say their readings; all that cannot be changed whatever they say are named."""
@@ -140,11 +163,12 @@ class _Solver:
             return
         self.q = np.require(self.q, requirements="W")
         moves = self.program.moves
-        moved = moves.moving
-        columns = (moves.target[moved].tolist(), moves.near[moved].tolist(), moves.motion[moved].tolist())
-        for target, near, motion in zip(*columns, strict=True):
+        moved = np.flatnonzero(moves.moving)
+        columns = (column[moved].tolist() for column in (moves.target, moves.near, moves.motion))
+        for move, target, near, motion in zip(moved.tolist(), *columns, strict=True):
             if target in possible:
-                self._take(target, possible[target], self._known(near), straight=motion_is_straight(motion))
+                came = _Came(self._known(near), motion_is_straight(motion), self.program.nearest.get(move))
+                self._take(target, possible[target], came)
 
     def _known(self, target: int) -> Floats | None:
         """The readings of a target; None where they are not known."""
@@ -219,16 +243,16 @@ class _Solver:
                 found.update(zip(which.tolist(), poses, strict=True))
         return found
 
-    def _take(self, target: int, possible: _Possible, before: Floats | None, *, straight: bool) -> None:
+    def _take(self, target: int, possible: _Possible, came: _Came) -> None:
         if target in self.reasons:
             return
         known = None if np.isnan(self.q[target, 0]) else self.q[target]
-        if known is not None and possible.named is not None:
+        if known is not None and possible.named is not None and target not in self._unheeded:
             return
         if possible.flange is not None:
-            found = self._from_seed(possible.flange, before)
+            found = self._from_seed(possible.flange, came.before)
         else:
-            found = self._chosen(possible, before, straight=straight)
+            found = self._chosen(possible, came)
         if isinstance(found, str):
             self.reasons[target] = found
             self.q[target] = np.nan
@@ -238,18 +262,32 @@ class _Solver:
         else:
             self.q[target] = found
 
-    def _chosen(self, possible: _Possible, before: Floats | None, *, straight: bool) -> Floats | str:
+    def _chosen(self, possible: _Possible, came: _Came) -> Floats | str:
         """The readings that are meant, or why they are not known."""
         if len(possible.branches) == 0:
             return OUT_OF_REACH
         if possible.named is None:
-            return self._unnamed(possible, before)
-        if len(possible.named) == 0:
+            return self._unnamed(possible, came.before)
+        if came.nearest is None:
+            return self._stated(possible, possible.named, came)
+        found = self._unnamed(possible, came.before)
+        if isinstance(found, str):
+            if found == AMBIGUOUS:
+                return UNHEEDED if came.nearest else PERHAPS_HEEDED
+            return found
+        stated = found if came.nearest else self._stated(possible, possible.named, came)
+        agree = not isinstance(stated, str) and np.abs(stated - found).max() <= SAME_RAD
+        return found if agree else PERHAPS_HEEDED
+
+    def _stated(self, possible: _Possible, named: Floats, came: _Came) -> Floats | str:
+        """The readings among those `named` that configuration data means, or why they are not known."""
+        if len(named) == 0:
             return NO_BRANCH
-        found = the_nearest(possible.named, before)
+        before = came.before
+        found = the_nearest(named, before)
         if found is None:
             return AMBIGUOUS
-        if straight and before is not None and np.abs(found - before).max() > CLOSE_RAD:
+        if came.straight and before is not None and np.abs(found - before).max() > CLOSE_RAD:
             every = nearest_turns(possible.branches, self.robot, before)
             if not is_nearest(found, every, before):
                 return CONTRADICTS
