@@ -58,7 +58,7 @@ from truearm.programs.krl_values import (
 )
 from truearm.programs.layouts import EulerPose, Joints
 from truearm.programs.lexing import Reader, Token
-from truearm.programs.program import Listed, Program
+from truearm.programs.program import Listed, Program, Unplaced
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
 from truearm.robot import Robot
@@ -123,6 +123,7 @@ class KrlReading:
         self._language, self._sources, self._robot = language, sources, robot
         self._targets, self._moves, self._environments = TargetTable(), MoveTable(), Environments()
         self._listed: list[Listed] = []
+        self._unplaced: list[Unplaced] = []
         self._fixed: dict[int, str] = {}
         self._unsure: set[int] = set()
         self._storage = KrlStorage()
@@ -156,6 +157,7 @@ class KrlReading:
             self._configuration(),
             fixed=self._fixed,
             unsure=self._unsure,
+            unplaced=self._unplaced,
             accurate=TAUGHT_ACCURATE if self._accurate else "",
         )
 
@@ -370,6 +372,7 @@ class KrlReading:
         found = RUN_TIME if chain is None else self._target_among(place[0], chain)
         if isinstance(found, str) or chain is None:
             self._list(*place, found if isinstance(found, str) else RUN_TIME)
+            self._unplaced.append(Unplaced(*place, motion, blended))
             self._flow.jump()
             return False
         numbers, which = found

@@ -49,6 +49,7 @@ class MelfaBasic(BlendsShortened):
             configuration=configuration,
             fixed=reader.fixed,
             unsure=reader.unsure,
+            unplaced=reader.unplaced,
         )
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:

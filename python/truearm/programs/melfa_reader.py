@@ -25,7 +25,7 @@ from truearm.programs.melfa_text import (
     statements,
 )
 from truearm.programs.melfa_variables import COMBINED, FLAGS, SETTING, Variable, Variables
-from truearm.programs.program import Listed
+from truearm.programs.program import Listed, Unplaced
 from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Motion, MoveTable, TargetTable
 from truearm.robot import Robot
@@ -63,6 +63,7 @@ _NUMBERED: Final = "M_Tool="
 _SKIPPED: Final = re.compile(r"(?<![\w.])Skip\b", re.IGNORECASE)
 LONGEST_NAME: Final = 48
 COMPUTED: Final = "its target is computed when the program runs"
+RELATIVE: Final = "it is a relative move"
 NOT_CONSTANT: Final = "its target is not a constant of this file"
 
 
@@ -75,6 +76,7 @@ class Reader:
         environments: Tools, bases and offsets of the motions.
         listed: What is left as it is.
         fixed: Why variables cannot be changed whatever uses them, by target.
+        unplaced: Motions to places that are not constants of the program.
         unsure: Targets of variables that may hold something else when the program runs.
     """
 
@@ -84,6 +86,7 @@ class Reader:
         self.listed: list[Listed] = []
         self.fixed: dict[int, str] = {}
         self.unsure: set[int] = set()
+        self.unplaced: list[Unplaced] = []
         self._source, self._robot, self._frames = source, robot, frames
         self._statements = list(statements(source))
         self._moves = {place: found for place, one in enumerate(self._statements) if (found := moves(one))}
@@ -246,6 +249,8 @@ class Reader:
             found = places[number] if number < len(places) else COMPUTED
             if isinstance(found, str):
                 self._follows = False
+                if found != RELATIVE:
+                    self.unplaced.append(Unplaced(0, move.at, kind, self._blended or kind == Motion.VIA))
                 continue
             target, before, after = found
             environment = self._environment(place, before, after @ offset, problem)
@@ -284,7 +289,7 @@ class Reader:
     def _place(self, piece: str) -> tuple[int, Transform, Transform] | str:
         """Target and what is before and after it; or why it is not known."""
         if not piece.strip():
-            return "it is a relative move"
+            return RELATIVE
         plain, combined = _VARIABLE.match(piece), COMBINED.match(piece)
         if plain is not None and name_of(plain.group(1)) in self._variables.offsets:
             return "its target is also a tool, a base or an offset"

@@ -33,6 +33,23 @@ class Listed:
     reason: str
 
 
+@dataclass(frozen=True)
+class Unplaced:
+    """A motion to a place without numbers of its own, such as one that is computed at run time.
+
+    Attributes:
+        file: Number of its file.
+        at: Offset of the statement.
+        motion: A Motion.
+        blended: Whether the arm does not stop there.
+    """
+
+    file: int
+    at: int
+    motion: int
+    blended: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """What a reader found.
@@ -50,6 +67,7 @@ class Program:
         unsure: Numbers of those of them that may be others when the program runs: they tell no place.
         nearest: Moves to the configuration nearest to where the arm stands, whatever the data of the target
             says, by number; False where that is not certain.
+        unplaced: Motions that are listed as they lead to no numbers of the program.
         accurate: Why the controller is known to compute with a model of its own, where the program says so.
     """
 
@@ -65,6 +83,7 @@ class Program:
     fixed: Mapping[int, str] = field(default_factory=dict)
     unsure: Set[int] = frozenset()
     nearest: Mapping[int, bool] = field(default_factory=dict)
+    unplaced: Sequence[Unplaced] = ()
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, QuaternionPose
 from truearm.programs.lexing import Reader, Token
-from truearm.programs.program import Listed, Program
+from truearm.programs.program import Listed, Program, Unplaced
 from truearm.programs.rapid_configuration import Confdata
 from truearm.programs.rapid_confs import KINDS, Confs
 from truearm.programs.rapid_data import MODULE, TARGETS, TWICE, Declarations
@@ -155,6 +155,7 @@ class RapidReading:
         self._listed: list[Listed] = []
         self._fixed: dict[int, str] = {}
         self._unsure: set[int] = set()
+        self._unplaced: list[Unplaced] = []
         self._read: dict[str, str] = {}
         self._displaces = DISPLACEMENT.search(self._source.text) is not None
         self._displaced_anytime = any(
@@ -194,6 +195,7 @@ class RapidReading:
             fixed=self._fixed,
             unsure=self._unsure,
             nearest=self._nearest,
+            unplaced=self._unplaced,
         )
 
     # Blocks.
@@ -381,6 +383,7 @@ class RapidReading:
     def _go(self, at: int, motion: Motion, meant: Meant | str, tool: Argument, *, passed: bool) -> None:
         if isinstance(meant, str):
             self._list(at, meant)
+            self._unplaced.append(Unplaced(0, at, motion, passed))
             self._flow.jump()
             return
         flow = self._flow

@@ -22,6 +22,7 @@ from truearm.programs.left_open import left_open_mm
 from truearm.programs.listing import describe, listed_target
 from truearm.programs.marks import refuse_marked
 from truearm.programs.outputs import output_paths, write_outputs
+from truearm.programs.path_steps import step_notices
 from truearm.programs.program import Language, Listed, Program, StepTexts
 from truearm.programs.solving import solve_targets
 from truearm.programs.source import Source
@@ -432,7 +433,10 @@ class _State:
             tuple(listed),
             steps.texts.waypoints,
             steps.deviating,
-            (*self._notices(changed), *deviation_notices(self.program, steps.deviating, choices.spacing)),
+            (
+                *step_notices(self.program, self.uses, changed),
+                *deviation_notices(self.program, steps.deviating, choices.spacing),
+            ),
         )
 
     def _inserted(self, changed: Bools, spacing: Spacing | None) -> Inserted:
@@ -453,21 +457,6 @@ class _State:
         self.std_mm = placed(self.std_mm, rows, nothing)
         self.residual_mm = placed(self.residual_mm, rows, nothing)
         self.residual_mrad = placed(self.residual_mrad, rows, nothing)
-
-    def _notices(self, changed: Bools) -> tuple[Notice, ...]:
-        along = self.uses.moved & (self.uses.straight | self.uses.blended)
-        left = np.flatnonzero(along & ~changed)
-        if len(left) == 0 or not changed.any():
-            return ()
-        lines = sorted({self._listed(int(target), "").line for target in left})
-        return (
-            Notice(
-                "steps",
-                f"{len(left)} targets of linear, circular or blended motion are left as they are between "
-                "corrected ones: the path steps there by the correction, see the listing",
-                tuple(lines),
-            ),
-        )
 
     def _listed(self, target: int, reason: str) -> Listed:
         return listed_target(self.program, target, reason)

@@ -50,6 +50,7 @@ class FanucTp(BlendsShortened):
             configuration=reader.configuration(),
             fixed=reader.fixed,
             unsure=reader.unsure,
+            unplaced=reader.unplaced,
         )
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:

@@ -11,7 +11,7 @@ from truearm.errors import InputError
 from truearm.programs.branches import Branches
 from truearm.programs.environment import Environment, Environments, Frame
 from truearm.programs.frames import Frames
-from truearm.programs.program import Listed
+from truearm.programs.program import Listed, Unplaced
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, Number, TargetTable
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
@@ -55,6 +55,7 @@ class Reader:
         environments: Frames, tools and problems of the uses.
         listed: What is left as it is.
         fixed: Why positions cannot be changed whatever uses them, by target.
+        unplaced: Motions to no position of the listing.
         unsure: Positions that may be others when the program runs, by target.
         orders: Joints that turn numbers may be of.
     """
@@ -65,6 +66,7 @@ class Reader:
         self.listed: list[Listed] = []
         self.fixed: dict[int, str] = {}
         self.unsure: set[int] = set()
+        self.unplaced: list[Unplaced] = []
         self._source, self._robot, self._frames = source, robot, frames
         self._main = section(source, "MN")
         start, end = section(source, "POS")
@@ -178,6 +180,7 @@ class Reader:
                 self._choose(at, target.group(), problem)
             elif number is None or reason:
                 self._list(at, target.group(), reason)
+                self.unplaced.append(Unplaced(0, at, motion, blended or via))
             if number is None or reason:
                 follows = known = False
                 continue

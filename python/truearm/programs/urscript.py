@@ -51,6 +51,7 @@ class UrScript:
             moves=moves,
             environments=tuple(reader.environments.all),
             listed=tuple(sorted(reader.listed)),
+            unplaced=reader.unplaced,
         )
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.programs.environment import Environment, Environments
 from truearm.programs.frames import Frames
-from truearm.programs.program import Listed
+from truearm.programs.program import Listed, Unplaced
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, Moves, Number, Targets
 from truearm.programs.urscript_collect import Collected, MotionCall
@@ -71,6 +71,7 @@ class Reader:
     Attributes:
         environments: TCPs, payloads and offsets that motions have.
         listed: What is left as it is.
+        unplaced: Motions whose targets are computed when the program runs.
     """
 
     def __init__(self, source: Source, frames: Frames) -> None:
@@ -84,6 +85,7 @@ class Reader:
         self._states = [flow[int(at)] for at in self._offsets]
         self._leaves = _Leaves()
         self._rows = _Rows()
+        self.unplaced: list[Unplaced] = []
         self._slow()
 
     @property
@@ -184,12 +186,16 @@ class Reader:
         try:
             found = list(places.every(motion.target))
         except RunTime as unknown:
-            self._found.leave(motion.at, "", unknown.reason)
+            self._leave(motion, "", unknown)
             self._found.compute(motion.target, motion.at)
             return []
         for place in found:
             self._found.compute(place.leaf, motion.at)
         return found
+
+    def _leave(self, motion: MotionCall, name: str, unknown: RunTime) -> None:
+        self._found.leave(motion.at, name, unknown.reason)
+        self.unplaced.append(Unplaced(0, motion.at, motion.motion, motion.blended))
 
     def _use(self, motion: MotionCall, place: Place, frames: Iterable[int], *, alone: bool) -> None:
         state = self._states[int(self._state(np.array(motion.at)))]
@@ -197,7 +203,7 @@ class Reader:
             target = self._leaves.number(place)
             seed = None if place.seed is None else self._leaves.number(place.seed)
         except RunTime as unknown:
-            self._found.leave(motion.at, place.name, unknown.reason)
+            self._leave(motion, place.name, unknown)
             return
         if seed is not None and place.seed is not None:
             environment = self._environment(state, None, self._problem(place.seed, frames))
