@@ -19,6 +19,7 @@ from truearm.errors import InputError
 from truearm.programs.branches import Branches
 from truearm.programs.densify import Spacing
 from truearm.programs.layouts import EulerPose
+from truearm.programs.marks import mark_text
 from truearm.programs.melfa import MelfaBasic
 from truearm.programs.melfa_configuration import StructureFlags
 from truearm.programs.tables import Motion
@@ -275,8 +276,28 @@ def test_the_mark_keeps_line_numbers(robot, sample):
     assert marked.splitlines()[0] == f"1 ' Mov P1 is a remark ' {text}"
     with pytest.raises(InputError, match="compensated already"):
         rewritten(MELFA, marked, robot)
+    later = sample.replace("1 ' Mov P1 is a remark\n", "")
+    marked = rewritten(MELFA, later, robot, by=SHIFT, mark=text).contents[0].decode()
+    assert marked.splitlines()[:2] == [f"1 ' {text}", "2 Ovrd 50 ' Mvs P9"]
     plain = f"Tool P_NTool\nMov P1\nP1={position(robot, Q[0])}\n"
     assert rewritten(MELFA, plain, robot, mark=text).contents[0].decode().startswith(f"' {text}\nTool")
+
+
+def test_the_mark_makes_no_line_too_long(robot):
+    text, long = mark_text("0.1.0", "0" * 64), f"1 ' {'*' * 80}"
+    lines = [long, "2 Tool P_NTool", "3 Mov P1", f"P1={position(robot, Q[0])}", ""]
+    marked = rewritten(MELFA, "\n".join(lines), robot, mark=text).contents[0].decode().splitlines()
+    assert marked[:3] == [long, f"2 Tool P_NTool ' {text}", "3 Mov P1"]
+    assert max(map(len, marked)) <= 127
+
+
+def test_variables_are_named_as_they_are_written_behind_a_line_number(robot):
+    value = position(robot, Q[0])
+    lines = [f"10 P12={value}", f"20   Pa( 2 ) ={value}", "30 Mov P12", "40 P12.Z=0", "50 Mov PA(2)", ""]
+    result = rewritten(MELFA, "\n".join(lines), robot, by=SHIFT, frames=FLANGE)
+    assert [one.name for one in result.listed] == ["P12"]
+    assert [(one.line, one.column) for one in result.listed] == [(1, 4)]
+    assert names_changed(result) == ["Pa( 2 )"]
 
 
 FINE_STEPS = Spacing.of(0.05, 20.0)

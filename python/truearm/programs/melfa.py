@@ -15,12 +15,17 @@ from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints
 from truearm.programs.melfa_reader import Reader
 from truearm.programs.melfa_steps import inserted
+from truearm.programs.melfa_text import lines
 from truearm.programs.melfa_variables import FLAGGED
 from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.robot import Robot
 
-_NUMBERED: Final = re.compile(r"[ \t]*\d+[ \t]+[^\r\n]*")
+_NUMBERED: Final = re.compile(r"[ \t]*(\d+)[ \t]+.*")
+LONGEST: Final = 127
+"""Characters of a line that controllers take."""
+LONGER_NUMBER: Final = 4
+"""By how many digits a line grows at the most that is numbered anew."""
 
 
 class MelfaBasic(BlendsShortened):
@@ -53,11 +58,20 @@ class MelfaBasic(BlendsShortened):
         )
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:
-        """A remark: behind the first line where lines are numbered, else a line of its own before it."""
-        numbered = _NUMBERED.match(source.text, source.first)
-        if numbered is not None:
-            return numbered.end(), f" ' {text}"
-        return source.first, f"' {text}{source.newline}"
+        """A remark: a line of its own before the first one; where lines are numbered and there is no number
+        for it, behind the first line that does not become too long.
+        """
+        found = [(at, one) for at, line in lines(source) if (one := _NUMBERED.fullmatch(line)) is not None]
+        if not found or found[0][0] != source.first:
+            return source.first, f"' {text}{source.newline}"
+        numbers = [int(one.group(1)) for _, one in found]
+        if numbers[0] > 1 and numbers[0] - 1 not in numbers:
+            return source.first, f"{numbers[0] - 1} ' {text}{source.newline}"
+        added = f" ' {text}"
+        room = LONGEST - LONGER_NUMBER - len(added)
+        ends = [(len(one.group()), at) for at, one in found]
+        length, at = next((end for end in ends if end[0] <= room), min(ends))
+        return at + length, added
 
     def linear_steps(self, program: Program, moves: Sequence[Sequence[LinearStep]]) -> StepTexts:
         """A Mvs to a variable of its own for each; lines are numbered anew where there is no number left."""

@@ -125,7 +125,8 @@ class Reader:
             layout = held.layout
             width = self._robot.joint_count if layout == JOINTS else SLOTS + FLAGS
             numbers = held.numbers if not held.problem else (ABSENT,) * width
-            shown = self._source.text[at : at + len(name)].strip() or name
+            text = self._source.text
+            shown = text[at : text.index("=", at)].strip()
             number = self.targets.add(0, at, layout, numbers, shown)
             if held.problem or why_not:
                 self.fixed[number] = held.problem or why_not

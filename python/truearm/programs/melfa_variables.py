@@ -161,7 +161,8 @@ class Variables:
             return
         if variable.constants:
             variable.why_not = variable.why_not or "it is assigned more than once"
-        variable.constants.append((statement.at, held))
+        blanks = len(statement.text) - len(statement.text.lstrip())
+        variable.constants.append((statement.at + blanks, held))
 
     def _use(self, statement: Statement, text: str, *, changes: bool) -> None:
         """Variables in `text` are used for something else than a motion."""
