@@ -180,6 +180,19 @@ def test_arrays_indexed_at_run_time():
     assert len(done.changed) == 2
 
 
+def test_an_array_of_more_dimensions_is_not_read():
+    one, other = numbers(SEEN["pA"]), numbers(SEEN["pB"])
+    found = reasons(f"MoveJ pts{{1,2}},{GO}", f"CONST robtarget pts{{1,2}}:=[[{one},{other}]];")
+    assert set(found.values()) == {"arrays of more dimensions than one are not read"}
+    assert any(name.startswith("MoveJ pts") for name in found)
+
+
+def test_a_copy_of_a_target_is_called_one():
+    found = reasons(f"MoveJ pCopy,{GO}\nMoveJ pA,{GO}", f"{points()}\nCONST robtarget pCopy:=pA;")
+    copied = next(why for name, why in found.items() if name.startswith("MoveJ pCopy"))
+    assert copied == "it is a copy of pA, without numbers of its own"
+
+
 def test_frames_from_outside_and_frames_that_were_taught_wrongly():
     """A tool of the frames file is where the tool is; what the program states is what the controller has."""
     q_deg = np.array(SEEN["pA"])

@@ -3,7 +3,7 @@
 import re
 from collections import ChainMap
 from collections.abc import Mapping, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from truearm.programs.folding import constant
@@ -36,11 +36,13 @@ class Datum:
         kind: Its type, in small letters.
         value: What it is; None where it has no value or one that is computed.
         fixed: Whether it is a constant.
+        dimensions: Of the array that it is an element or a part of; 0 for what is in none.
     """
 
     kind: str
     value: Value | None
     fixed: bool
+    dimensions: int = 0
 
 
 @dataclass
@@ -142,25 +144,25 @@ class Declarations:
     def _declare(self, reader: Reader) -> None:
         fixed = reader.take().text.lower() == "const"
         kind, name = reader.take().text.lower(), reader.take().text.lower()
-        array = reader.accept("{")
-        while array and not reader.accept("}"):
-            reader.take()
+        dimensions = int(reader.accept("{"))
+        while dimensions and not reader.accept("}"):
+            dimensions += reader.take().text == ","
         known = kind in KINDS and reader.accept(":=")
-        datum = Datum(kind, self._value(reader) if known else None, fixed)
+        datum = Datum(kind, self._value(reader) if known else None, fixed, dimensions)
         self._note(name, datum)
         if kind in TARGETS or (kind in KINDS and self._kinds.get(name) not in TARGETS):
             self._kinds[name] = kind
-            self._keep(name, datum, array=array)
+            self._keep(name, datum)
 
     def _value(self, reader: Reader) -> Value:
         if reader.peek() == "[":
             return aggregate(reader)
         return tuple(reader.rest())
 
-    def _keep(self, name: str, datum: Datum, *, array: bool) -> None:
-        if array and isinstance(datum.value, Aggregate):
+    def _keep(self, name: str, datum: Datum) -> None:
+        if datum.dimensions and isinstance(datum.value, Aggregate):
             for index, element in enumerate(datum.value.values, start=1):
-                self.data[f"{name}{{{index}}}"] = Datum(datum.kind, element, datum.fixed)
+                self.data[f"{name}{{{index}}}"] = replace(datum, value=element)
             return
         self.data[name] = datum
 

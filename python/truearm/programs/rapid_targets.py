@@ -29,6 +29,7 @@ OFFSETS: Final = frozenset({"offs", "reltool"})
 NOT_HERE: Final = "it is not declared in this module"
 OTHER_ROUTINE: Final = "it is declared in another routine alone"
 COMPUTED: Final = "its target is computed at run time"
+DIMENSIONS: Final = "arrays of more dimensions than one are not read"
 EXTERNAL: Final = "external axes"
 DEEPEST: Final = 10
 
@@ -93,6 +94,8 @@ class RapidTargets:
         datum = self._declarations.data.get(name)
         if datum is None or datum.kind not in TARGET_KINDS:
             return NOT_HERE
+        if datum.dimensions > 1:
+            return DIMENSIONS
         if datum.value is None:
             return COMPUTED
         return self._add(datum.kind, datum.value, name)
@@ -161,6 +164,8 @@ def _is_offset(found: Sequence[Token]) -> bool:
 
 def _parts(value: Value, counts: tuple[int, ...]) -> list[list[Number]] | str:
     """Lists of numbers of an aggregate of aggregates, or why it has none."""
+    if not isinstance(value, Number | Aggregate) and [token.kind for token in value] == ["name"]:
+        return f"it is a copy of {value[0].text}, without numbers of its own"
     if not isinstance(value, Aggregate) or len(value.values) != len(counts):
         return "it is not written out"
     found = []
