@@ -32,7 +32,7 @@ SUMMARY = [
     "n_planned",
     "drift",
 ]
-SUMMARY += ["identifiability", "noise_mm"]
+SUMMARY += ["identifiability", "noise_mm", "noise_floor_mm"]
 
 
 @pytest.fixture(scope="module")

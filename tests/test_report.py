@@ -226,7 +226,7 @@ def test_a_few_rows_with_a_large_sigma_do_not_raise_the_floor():
         table = data.assign(sigma_mm=np.where(data.index % 20 == 3, few, 0.015))
         found = ta.calibrate(robot.robot, ta.Measurements.from_dataframe(table), model="constant")
         floors.append(floor_of(found, sigmas=table["sigma_mm"]))
-        assert "with what rows state as their sigma" in words_of(report(found).html)
+        assert "beyond what rows state as their sigma" in words_of(report(found).html)
     assert floors[1] - floors[0] < 0.2
 
 

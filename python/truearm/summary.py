@@ -38,6 +38,7 @@ def summarise(calibration: "Calibration") -> dict[str, Any]:
         **calibration.validation.to_dict(),
         "identifiability": calibration.identifiability.to_dict(),
         "noise_mm": noise_mm(calibration),
+        "noise_floor_mm": distance_at_floor_mm(calibration),
         "scheme": None if calibration.scheme is None else calibration.scheme.to_dict(),
         "error_to_repeatability": error_to_repeatability(calibration),
         "outliers": [] if calibration.rows is None else calibration.rows.outliers(),
@@ -80,10 +81,19 @@ def _held_out_mm(calibration: "Calibration") -> float:
     return math.sqrt(max(square - stated, 0.0))
 
 
+def whole_noise_mm(calibration: "Calibration") -> float:
+    """Standard deviation of a coordinate's noise, the rows' own sigma and what is left beside it, mm."""
+    return float(np.mean(np.hypot(noise_mm(calibration), stated_sigma_mm(calibration))))
+
+
 def distance_at_floor_mm(calibration: "Calibration") -> float:
     """Mean position error that the unexplained part, and the rows' own sigma, alone would leave, mm."""
-    noise = float(np.mean(np.hypot(noise_mm(calibration), stated_sigma_mm(calibration))))
-    return mean_distance(noise, distances=calibration.selection.distances)
+    return mean_distance(whole_noise_mm(calibration), distances=calibration.selection.distances)
+
+
+def states_sigma(calibration: "Calibration") -> bool:
+    """Whether rows say something of their own noise."""
+    return bool(np.any(stated_sigma_mm(calibration)))
 
 
 def stated_sigma_mm(calibration: "Calibration") -> Floats | float:

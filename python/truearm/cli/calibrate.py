@@ -218,8 +218,7 @@ def print_results(calibration: "Calibration") -> None:
         say_wrapped(validation.drift.words)
     if validation.few:
         say_wrapped(validation.few)
-    per = "distance" if calibration.selection.distances else "coordinate"
-    say(f"Standard deviation of what the model does not explain: {summary['noise_mm']:.3f} mm per {per}.")
+    _print_noise(calibration, summary)
     if validation.coverage_95 is not None:
         inside = f"{100 * validation.coverage_95:.1f} %"
         say(f"The variable model's 95 % intervals hold {inside} of the held-out coordinates.")
@@ -227,6 +226,18 @@ def print_results(calibration: "Calibration") -> None:
     _print_outliers(summary["outliers"], calibration)
     if calibration.options.refit and calibration.rows is not None:
         say(f"The calibration in the file is fitted to all {len(calibration.rows.data)} rows.")
+
+
+def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
+    """Say what the model leaves unexplained, and the mean error that noise alone would leave."""
+    from truearm.summary import states_sigma
+
+    per = "distance" if calibration.selection.distances else "coordinate"
+    beyond = ", beyond the stated sigma" if states_sigma(calibration) else ""
+    say_wrapped(
+        f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "
+        f"{per}. Mean error that noise alone would leave: {summary['noise_floor_mm']:.3f} mm."
+    )
 
 
 def print_determined(calibration: "Calibration") -> None:

@@ -16,7 +16,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, lean, listed, short
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 from truearm.simulation import approach_in_sequence
-from truearm.summary import stated_sigma_mm
+from truearm.summary import states_sigma, whole_noise_mm
 from truearm.units import MM_PER_METRE
 from truearm.visits import pose_numbers, visit_numbers
 
@@ -107,14 +107,16 @@ def repeats(facts: Facts) -> Section:
     """What repeated poses say."""
     title = "Repeatability and noise"
     per = "per distance" if facts.calibration.selection.distances else "per coordinate"
-    floor, noise = short(facts.floor_mm, facts.summary["noise_mm"])
-    alone = (
-        "with what rows state as their sigma it" if np.any(stated_sigma_mm(facts.calibration)) else "alone it"
+    floor, whole, noise = short(facts.floor_mm, whole_noise_mm(facts.calibration), facts.summary["noise_mm"])
+    beyond = (
+        f"{noise} mm {per} beyond what rows state as their sigma, {whole} mm with it"
+        if states_sigma(facts.calibration)
+        else f"{noise} mm {per}"
     )
     parts: list[Part] = [
         Text(
-            f"The residual that the {facts.best} model does not explain has a standard deviation of {noise} "
-            f"mm {per}; {alone} would make a mean error of {floor} mm. It comprises noise of the measuring "
+            f"The residual that the {facts.best} model does not explain has a standard deviation of {beyond}; "
+            f"alone it would make a mean error of {floor} mm. It comprises noise of the measuring "
             "device, what the arm does not repeat, and what the model cannot represent."
         )
     ]
@@ -191,7 +193,7 @@ def _standing(found: Repeats) -> str:
 def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
     """How far poses lie apart that a joint reached from both sides, in the order of the rows."""
     rows, beyond = [], []
-    noise = float(np.mean(np.hypot(facts.summary["noise_mm"], stated_sigma_mm(facts.calibration))))
+    noise = whole_noise_mm(facts.calibration)
     for joint in range(len(facts.joints)):
         apart, alone = found.both_sides_mm(joint, noise)
         if len(apart) < FEWEST_GROUPS:

@@ -1,0 +1,47 @@
+"""What is said of noise: beyond the sigma that rows state, with it, and the mean error that it alone leaves."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.report_support import words_of
+from truearm.cli import main
+from truearm.reporting.report import report
+from truearm.simulation import Imperfections, VirtualArm
+
+STATED_MM = 0.05
+
+
+@pytest.fixture
+def said(tmp_path, monkeypatch, capsys):
+    """What `truearm calibrate` prints of rows with the noise that they state, or that state none."""
+
+    def calibrated(*, stated):
+        monkeypatch.chdir(tmp_path)
+        arm = VirtualArm.paper(seed=2, imperfections=Imperfections(share=0.0, noise_mm=STATED_MM))
+        table = arm.measure_table(arm.poses(100)).drop(columns="sigma_mm", errors="ignore")
+        (table.assign(sigma_mm=STATED_MM) if stated else table).to_csv("m.csv", index=False)
+        assert main(["calibrate", "rv-m2", "m.csv", "--model", "constant", "-o", "out"]) == 0
+        return " ".join(capsys.readouterr().out.split())
+
+    return calibrated
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_what_is_not_explained_is_beyond_a_stated_sigma_and_the_floor_holds_both(said, stated):
+    printed = said(stated=stated)
+    summary = json.loads(Path("out/summary.json").read_text())
+    noise, floor = summary["noise_mm"], summary["noise_floor_mm"]
+    whole = float(np.hypot(noise, STATED_MM)) if stated else noise
+    assert floor == pytest.approx(np.sqrt(8.0 / np.pi) * whole)
+    assert floor == pytest.approx(np.sqrt(8.0 / np.pi) * STATED_MM, rel=0.3)
+    assert (
+        f"does not explain{', beyond the stated sigma' * stated}: {noise:.3f} mm per coordinate." in printed
+    )
+    assert f"Mean error that noise alone would leave: {floor:.3f} mm." in printed
+    text = words_of(report(ta.Calibration.load("out/calibration.calib")).html)
+    related = f"mm per coordinate beyond what rows state as their sigma, {whole:.3f} mm with it; alone"
+    assert (related in text) == stated
