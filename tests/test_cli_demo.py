@@ -23,7 +23,8 @@ def test_the_demonstration_shows_the_whole_way_and_goes_on_where_it_was(tmp_path
     for name in (*WRITTEN, "summary.json", "report.html"):
         assert (tmp_path / "demo" / name).exists()
         assert f"demo/{name}" in done.stdout
-    errors = json.loads((tmp_path / "demo" / "summary.json").read_text())["holdout"]
+    summary = json.loads((tmp_path / "demo" / "summary.json").read_text())
+    errors = summary["holdout"]
     assert errors["constant"]["mean_mm"] < 0.5 * errors["nominal"]["mean_mm"]
     with Session(tmp_path / "demo" / "session.db", writing=False) as session:
         before = session.rows("SELECT count(*) FROM readings")
@@ -33,6 +34,10 @@ def test_the_demonstration_shows_the_whole_way_and_goes_on_where_it_was(tmp_path
     assert path["after"]["mean"] < 0.3 * path["before"]["mean"]
     with Session(tmp_path / "demo" / "session.db", writing=False) as session:
         assert session.rows("SELECT count(*) FROM readings") == before
+    assert main(["session", "export", "demo/session.db", "-o", "exported.csv"]) == 0
+    measured = (tmp_path / "demo" / "measurements.csv").read_text()
+    assert measured == (tmp_path / "exported.csv").read_text()
+    assert 0 < summary["n_holdout"] == summary["n_planned"] == measured.count("validate")
     lines = done.stdout.splitlines()
     commands = [line.split()[1:] for line in lines if line.startswith("  truearm ")]
     assert [command[0] for command in commands] == ["session", "plan", "compensate"]

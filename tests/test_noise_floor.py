@@ -1,4 +1,4 @@
-"""What is said of noise: beyond the sigma that rows state, with it, and the mean error that it alone leaves."""
+"""What is said of noise: beyond the sigma that rows state, with it, and what mean error it alone leaves."""
 
 import json
 from pathlib import Path

@@ -348,6 +348,16 @@ def test_standard_errors_of_a_file_of_an_earlier_version_promise_no_more_than_th
     assert "for noise: where the arm varies" in report(replace(calibrations["variable"], constant=old)).html
 
 
+def test_where_no_pose_was_planned_to_validate_the_options_do_not_say_that_some_are_held_out(reports):
+    planned = "poses planned to validate are held out"
+    assert f"{planned} none was" in words_of(reports["constant"].html)
+    arm = VirtualArm.paper(seed=2)
+    table = arm.measure_table(arm.poses(POSES))
+    table["purpose"] = np.where(table.index % 3 == 0, "validate", "train")
+    found = report(ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant"))
+    assert f"{planned} yes" in words_of(found.html)
+
+
 def test_every_option_has_words():
     assert set(Options().to_dict()) == {*GENERAL, *VARIABLE, *SCHEMES}
     for model in MODELS:

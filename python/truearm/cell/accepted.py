@@ -57,6 +57,11 @@ def accepted_table(session: Session, kind: str = "pose", *, most: int | None = N
     return table
 
 
+def exported(table: pd.DataFrame) -> str:
+    """The text of an accepted table as a file of measurements."""
+    return table.drop(columns="step").to_csv(index=False, lineterminator="\n")
+
+
 def measurements_of(session: Session, *, most: int | None = None, where: str = "session") -> Measurements:
     """The accepted poses as Measurements of one set-up: without those while something moved."""
     table = accepted_table(session, most=most)

@@ -90,7 +90,7 @@ def _planned(text: str, count: int, output: Path, *, quiet: bool) -> "Plan":
 
 
 def _measured(text: str, plan: "Plan", output: Path, *, quiet: bool) -> "Measurements":
-    from truearm.cell.accepted import accepted_table
+    from truearm.cell.accepted import accepted_table, exported
     from truearm.cell.session import Session
     from truearm.cell.summary import summary_of
     from truearm.cell.virtual.measuring import measure_virtually
@@ -104,9 +104,7 @@ def _measured(text: str, plan: "Plan", output: Path, *, quiet: bool) -> "Measure
         end_at_once()
     with Session(output / SESSION, writing=False) as session:
         table, found = accepted_table(session), summary_of(session)
-    write_whole(
-        output / MEASURED, table.drop(columns=["step", "purpose"]).to_csv(index=False, lineterminator="\n")
-    )
+    write_whole(output / MEASURED, exported(table))
     if not quiet:
         say_wrapped(
             f"Measured: {found['measured']} poses, {found['readings']} readings, after the frame was "

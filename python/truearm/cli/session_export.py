@@ -27,7 +27,7 @@ def command(
     Examples:
       truearm session export session.db -o measurements.csv
     """
-    from truearm.cell.accepted import accepted_table, moved_poses
+    from truearm.cell.accepted import accepted_table, exported, moved_poses
     from truearm.cell.checks import told_unchecked, unchecked_poses
     from truearm.cell.session import Session
     from truearm.cli.naming import name_of
@@ -44,7 +44,7 @@ def command(
         moved, unchecked = moved_poses(known, table), unchecked_poses(known)
     if table.empty:
         raise WorkError("no pose is measured yet", where=str(session))
-    write_whole(target, table.drop(columns="step").to_csv(index=False, lineterminator="\n"))
+    write_whole(target, exported(table))
     warn([*([_told_of(moved)] if moved else []), *told_unchecked(unchecked)])
     if as_json:
         rows = {"rows": len(table), "moved": moved, "unchecked": unchecked}

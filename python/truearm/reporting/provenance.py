@@ -3,6 +3,7 @@
 import os
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from truearm.errors import count_of
 from truearm.options import Options
@@ -15,7 +16,7 @@ from truearm.reporting.parts import Part, Section, Table, Text
 def provenance(facts: Facts) -> Section:
     """Data, options, version, seed and time."""
     calibration = facts.calibration
-    parts: list[Part] = [_origin(facts), _options(calibration.options), *_outliers(facts)]
+    parts: list[Part] = [_origin(facts), _options(facts), *_outliers(facts)]
     parts += [Text(f"Notice: {notice}") for notice in facts.summary["notices"]]
     return Section("Provenance", parts)
 
@@ -55,8 +56,9 @@ def _now() -> str:
     return f"{moment:%Y-%m-%d %H:%M} UTC"
 
 
-def _options(options: Options) -> Table:
+def _options(facts: Facts) -> Table:
     """The options that bear on the model, those that are not the defaults first."""
+    options = facts.calibration.options
     used, usual = options.to_dict(), Options().to_dict()
     words = shown_options(options.model)
     changed = [name for name in words if used[name] != usual[name]]
@@ -67,11 +69,19 @@ def _options(options: Options) -> Table:
     return Table(
         "Options",
         ["option", "value"],
-        [[words[name], in_words(name, used[name])] for name in names],
+        [[words[name], _value(facts, name, used[name])] for name in names],
         says=says,
         left=(0, 1),
         strong=range(len(changed)),
     )
+
+
+def _value(facts: Facts, name: str, value: Any) -> str:  # noqa: ANN401
+    """The value of an option; of poses planned to validate, whether there were any."""
+    former = facts.calibration.validation.to_dict() if facts.update is None else facts.update["former"]
+    if name == "by_purpose" and value and not former.get("n_planned"):
+        return "none was"
+    return in_words(name, value)
 
 
 def _outliers(facts: Facts) -> list[Table]:

@@ -115,8 +115,8 @@ def repeats(facts: Facts) -> Section:
     )
     parts: list[Part] = [
         Text(
-            f"The residual that the {facts.best} model does not explain has a standard deviation of {beyond}; "
-            f"alone it would make a mean error of {floor} mm. It comprises noise of the measuring "
+            f"The residual that the {facts.best} model does not explain has a standard deviation of {beyond}"
+            f"; alone it would make a mean error of {floor} mm. It comprises noise of the measuring "
             "device, what the arm does not repeat, and what the model cannot represent."
         )
     ]
