@@ -335,8 +335,12 @@ def test_constants_that_do_better_are_told():
     ahead = []
     for calibration in found:
         errors = calibration.validation.holdout
-        ahead.append(0.97 * errors["variable"].position.mean > errors["constant"].position.mean)
+        lead, error = calibration.held.lead_mm("constant", "variable", [])
+        nearer = 0.97 * errors["variable"].position.mean > errors["constant"].position.mean
+        ahead.append(nearer and lead > 2.0 * error)
         said = notice_of(calibration, "constant_better")
+        told = [advice.kind for advice in report(calibration).advice]
+        assert ("constant_better" in told) == ahead[-1]
         assert bool(said) == ahead[-1]
         assert ("Give --model constant" in said) == ahead[-1]
     assert any(ahead)

@@ -1,10 +1,15 @@
 """Outliers of a calibration: which they are, and that nothing of them stays in it."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import truearm as ta
+from tests.report_support import words_of
 from truearm.cli import main
+from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
 
@@ -59,6 +64,43 @@ def test_one_row_far_out_spoils_no_model():
         rows = [entry["row"] - 1 for entry in calibration.summary["outliers"]]
         assert rows == [trained] * (len(each) == len(table))
     assert np.max(np.divide(found[1:], found[0])) < 1.3, found
+
+
+def test_what_is_fitted_is_said_to_be_without_outliers_that_were_taken_out(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arm = VirtualArm.paper(seed=2)
+    table = arm.measure_table(arm.poses(60))
+    table.loc[[11], "x"] += 0.05
+    table.to_csv("m.csv", index=False)
+    assert main(["calibrate", "rv-m2", "m.csv", "-o", "out"]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "fitted to all 60 rows but 1 outlier." in printed
+    assert "Outliers, taken out of the fits: row 12 (" in printed
+    assert "Constants, frame and tool are without them where they bend these." in printed
+    text = words_of(report(ta.Calibration.load("out/calibration.calib")).html)
+    assert "the calibration in the file is fitted to 60 but 1 outlier" in text
+    assert "Outliers were taken out of the fit of what varies, and of constants" in text
+    assert "They were taken out of the fits;" in text
+    assert main(["calibrate", "rv-m2", "m.csv", "-o", "constant", "--model", "constant"]) == 0
+    assert "fitted to all 60 rows." in capsys.readouterr().out
+
+
+def test_of_the_outliers_the_advice_has_the_largest_distance():
+    """The row with the worst score need not be the farthest: far from the base a joint's scatter is larger."""
+    arm = VirtualArm.paper(seed=2)
+    table = arm.measure_table(arm.poses(90))
+    for row, shift in ((11, 0.02), (30, 0.03), (52, 0.05)):
+        table.loc[[row], "x"] += shift
+    calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table))
+    rows = calibration.rows
+    assert rows is not None
+    raised = replace(rows, score=np.where(rows.data.rows == 12, 1e9, rows.score))
+    made = report(replace(calibration, rows=raised))
+    words = next(advice.words for advice in made.advice if advice.kind == "outliers")
+    assert "rows 12, " in words
+    largest = max(entry["distance_mm"] for entry in raised.outliers())
+    assert float(re.findall(r"up to ([\d.]+) mm", words)[0]) == pytest.approx(largest, abs=0.05)
+    assert largest > 40.0
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,8 @@ from tests.report_support import (
     small_calibration,
     words_of,
 )
+from truearm.doubts import CONSTANT_BETTER
+from truearm.errors import Notice
 from truearm.options import Options
 from truearm.reporting.facts import Facts
 from truearm.reporting.gravity import sag
@@ -245,8 +247,11 @@ def test_a_variable_model_that_does_worse_is_not_said_to_gain(calibrations):
     swapped = {**errors, "variable": errors["constant"], "constant": errors["variable"]}
     worse = replace(whole, validation=replace(whole.validation, holdout=swapped))
     told = {advice.kind: advice.words for advice in report(worse).advice}
-    assert "does not help where it was judged" in told["constant_better"]
-    assert "constant_suffices" not in told
+    assert "gains little or nothing" in told["constant_suffices"]
+    notice = Notice(CONSTANT_BETTER, "Constant parameters do better: give --model constant.")
+    surely = {advice.kind: advice.words for advice in report(replace(worse, notices=(notice,))).advice}
+    assert surely[CONSTANT_BETTER] == str(notice)
+    assert "constant_suffices" not in surely
 
 
 @pytest.mark.parametrize(("step_deg", "wanted"), [(10.0, "between_the_grid"), (0.01, "noise_floor")])
@@ -352,7 +357,7 @@ def test_where_no_pose_was_planned_to_validate_the_options_do_not_say_that_some_
     planned = "poses planned to validate are held out"
     assert f"{planned} none was" in words_of(reports["constant"].html)
     arm = VirtualArm.paper(seed=2)
-    table = arm.measure_table(arm.poses(POSES))
+    table = arm.measure_table(arm.poses(60))
     table["purpose"] = np.where(table.index % 3 == 0, "validate", "train")
     found = report(ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant"))
     assert f"{planned} yes" in words_of(found.html)

@@ -7,10 +7,12 @@ import pytest
 
 import truearm as ta
 from truearm import calibrating
-from truearm.doubts import Outliers, constant_is_better
+from truearm.doubts import SURE, Outliers, constant_is_better
 from truearm.fitting import fit_rows
+from truearm.held_rows import HeldRows
 from truearm.models import CONSTANT, NOMINAL, VARIABLE
 from truearm.simulation import VirtualArm
+from truearm.validation import RowErrors
 
 FRESH = 99
 
@@ -76,13 +78,51 @@ def test_many_outliers_among_few_rows_are_named(name, seed):
 
 def test_constants_are_compared_without_outliers():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
-    validation = ta.calibrate(arm.robot, arm.measure(arm.poses(60))).validation
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
+    validation, held = calibration.validation, calibration.held
+    errors = {**held.errors, CONSTANT: held.errors[VARIABLE], VARIABLE: held.errors[CONSTANT]}
+    swapped = replace(held, errors=errors)
     bent = {NOMINAL: 2.0, CONSTANT: 0.1, VARIABLE: 0.2}
-    assert "0.1 mm against 0.2 mm" in str(
-        constant_is_better(validation, VARIABLE, Outliers("row 1", bent))[0]
-    )
-    assert constant_is_better(validation, VARIABLE, Outliers("row 1", bent | {CONSTANT: 0.3})) == []
-    assert constant_is_better(validation, VARIABLE, Outliers("", {})) == []
+    entry = {"file": str(held.sources[0]), "row": int(held.rows[0]), "distance_mm": 9.0}
+
+    def said(outliers, rows=swapped):
+        return "".join(map(str, constant_is_better(validation, VARIABLE, rows, outliers)))
+
+    told = said(Outliers("row 1", bent, entries=[entry]))
+    assert "0.1 mm against 0.2 mm. Give --model constant --robust cauchy, or" in told
+    assert "Give --model constant, or" in said(Outliers("row 1", bent))
+    assert said(Outliers("row 1", bent | {CONSTANT: 0.3})) == ""
+    assert said(Outliers("", {})) == ""
+    assert said(Outliers("row 1", bent), held) == ""
+    assert said(Outliers("row 1", bent), None) == ""
+
+
+def test_constants_that_are_nearer_by_chance_are_not_called_better():
+    """One pose of twenty makes the difference, or every pose does."""
+    rows = np.arange(20)
+    readings = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 6))
+    near = np.full((20, 3), 1e-4)
+    chance = near + np.where(rows == 7, 1e-3, 0.0)[:, None]
+    sure = near + 3e-5 * (1.0 + 0.5 * np.sin(rows))[:, None]
+    found = []
+    for far in (chance, sure):
+        errors = {CONSTANT: RowErrors(near), VARIABLE: RowErrors(far)}
+        held = HeldRows(readings, rows + 1, np.repeat("m.csv", 20), errors)
+        found.append(held.lead_mm(CONSTANT, VARIABLE, []))
+        assert found[-1][0] == pytest.approx(1e3 * np.sqrt(3.0) * (far - near)[:, 0].mean())
+    assert [lead > SURE * error for lead, error in found] == [False, True]
+    seven = {"file": "m.csv", "row": 8}
+    held = replace(held, errors={CONSTANT: RowErrors(near), VARIABLE: RowErrors(chance)})
+    assert held.lead_mm(CONSTANT, VARIABLE, [seven])[0] == pytest.approx(0.0)
+
+
+def test_shots_of_a_pose_count_once_where_models_are_compared():
+    readings = np.repeat(np.random.default_rng(0).uniform(-1.0, 1.0, (2, 6)), (9, 1), axis=0)
+    far = np.repeat([[3e-4, 0.0, 0.0], [1e-4, 0.0, 0.0]], (9, 1), axis=0)
+    errors = {CONSTANT: RowErrors(np.zeros((10, 3))), VARIABLE: RowErrors(far)}
+    held = HeldRows(readings, np.arange(10), np.repeat("m.csv", 10), errors)
+    lead, error = held.lead_mm(CONSTANT, VARIABLE, [])
+    assert (lead, error) == (pytest.approx(0.2), pytest.approx(0.1))
 
 
 def test_a_coupling_of_four_joints_is_no_transform():

@@ -169,10 +169,11 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
 def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Outliers | None) -> list[Notice]:
     """What the errors of a calibration say against it, and which outliers may be to blame."""
     judged, best = found.validation, found.model_name
+    points = None if found.selection.distances else found.held
     return [
         *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
-        *constant_is_better(judged, best, outliers),
+        *constant_is_better(judged, best, points, outliers),
     ]
 
 

@@ -1,8 +1,8 @@
 """Whether what a calibration found can be true: signs of wrong data or of another robot."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,11 @@ from truearm.details import ANOTHER_PLACE, VariableDetails
 from truearm.errors import Notice, count_of, list_outliers
 from truearm.few_values import BETWEEN_THEM, few_values, values_words
 from truearm.grids import BETWEEN, grid_steps, grid_words
+from truearm.held_rows import HeldRows
 from truearm.held_tool import TURN_MORE, held_tool, held_words
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT, NOMINAL, ArmModel
+from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
 from truearm.stillness import still_warning
@@ -48,12 +49,15 @@ SAME: Final = 0.97
 """Mean errors whose ratio is between it and one are as good as the same."""
 UNLIKELY: Final = 0.5
 """Noise leaves no mean error of so small a part of its own."""
+SURE: Final = 2.0
+"""Standard errors of the mean difference over poses beyond which one model does better than another."""
 STATED_TOO_LARGE: Final = "stated_too_large"
 NO_HELP: Final = "no_help"
 NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
 ORIENTATION_MISFIT: Final = "orientation_misfit"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
+CONSTANT_BETTER: Final = "constant_better"
 ROWS_SHIFTED: Final = "rows_shifted"
 FAR_FROM_NOMINAL: Final = "far_from_nominal"
 FITS_OTHERWISE: Final = "fits_otherwise"
@@ -80,11 +84,13 @@ class Outliers:
         named: Which they are, in words.
         means_mm: Mean errors of the models on the judged rows without them; empty where none is judged.
         judged: Which of them are judged, in words.
+        entries: Each with file, row and distance_mm.
     """
 
     named: str
     means_mm: Mapping[str, float]
     judged: str = ""
+    entries: Sequence[Mapping[str, Any]] = ()
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "Outliers":
@@ -95,8 +101,9 @@ class Outliers:
         found, several = rows.outliers(), len(rows.data.files) > 1
         held = None if calibration.selection.distances else calibration.held
         means = {} if held is None else held.means_without_mm(found)
-        judged = held.among(found) if held is not None and means else []
-        return cls(list_outliers(found, several=several), means, list_outliers(judged, several=several))
+        judged = held.among(found, calibration.model_name) if held is not None and means else []
+        named, among = (list_outliers(each, several=several) for each in (found, judged))
+        return cls(named, means, among, found)
 
 
 def doubts(
@@ -150,20 +157,24 @@ def judged_means_mm(validation: Validation, outliers: Outliers | None) -> dict[s
     return {name: found.position.mean for name, found in validation.holdout.items()}
 
 
-def constant_is_better(validation: Validation, best: str, outliers: Outliers | None = None) -> list[Notice]:
-    """A notice where what varies was learnt and the constants alone are nearer, outliers left out."""
+def constant_is_better(
+    validation: Validation, best: str, held: HeldRows | None, outliers: Outliers | None = None
+) -> list[Notice]:
+    """A notice where what varies was learnt and the constants alone are surely nearer, outliers left out."""
     means = judged_means_mm(validation, outliers)
-    if best in {NOMINAL, CONSTANT} or not helps(means[NOMINAL], means[best]):
+    if best in {NOMINAL, CONSTANT} or held is None or not helps(means[NOMINAL], means[best]):
         return []
-    if not constants_do_better(means[best], means[CONSTANT]):
+    ahead, error = held.lead_mm(CONSTANT, best, () if outliers is None else outliers.entries)
+    if not constants_do_better(means[best], means[CONSTANT]) or ahead <= SURE * error:
         return []
     apart = ", outliers left out" if outliers is not None and outliers.means_mm else ""
+    robust = " --robust cauchy" if best == VARIABLE and outliers is not None and outliers.entries else ""
     text = (
         f"Constant parameters do better on {validation.judged} rows{apart}: a mean error of "
-        f"{means[CONSTANT]:.4g} mm against {means[best]:.4g} mm. Give --model constant, or measure "
+        f"{means[CONSTANT]:.4g} mm against {means[best]:.4g} mm. Give --model constant{robust}, or measure "
         "more poses."
     )
-    return [Notice("constant_better", text)]
+    return [Notice(CONSTANT_BETTER, text)]
 
 
 def orientations_left_out(data: Measurements, selection: Selection, use: str | None) -> list[Notice]:

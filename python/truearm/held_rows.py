@@ -1,8 +1,9 @@
 """Rows that a model was judged on and took no part in, each with its errors."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,13 @@ from numpy.typing import NDArray
 from truearm.measurements import Measurements
 from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
+from truearm.visits import pose_numbers
 
 Floats = NDArray[np.float64]
 Arrays = dict[str, NDArray[Any]]
+
+FEWEST_POSES: Final = 2
+"""That tell how much poses differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +50,19 @@ class HeldRows:
         own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
         return np.array([row not in named for row in own], dtype=bool)
 
-    def among(self, outliers: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-        """Those of the outliers, given with file and row, that are among these rows."""
-        own = set(zip(self.sources.tolist(), self.rows.tolist(), strict=True))
-        return [entry for entry in outliers if (entry["file"], entry["row"]) in own]
+    def among(self, outliers: Sequence[Mapping[str, Any]], model: str) -> list[Mapping[str, Any]]:
+        """Those of the outliers, given with file and row, that are among these rows.
+
+        Their distance_mm is what the model missed there before it saw them, where that is known.
+        """
+        rows = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
+        own = dict(zip(rows, (MM_PER_METRE * self.errors[model].distance_m).tolist(), strict=True))
+        found = [(entry, own.get((entry["file"], entry["row"]))) for entry in outliers]
+        return [
+            {**entry, "distance_mm": missed} if math.isfinite(missed) else entry
+            for entry, missed in found
+            if missed is not None
+        ]
 
     def means_without_mm(self, outliers: Sequence[Mapping[str, Any]]) -> dict[str, float]:
         """Mean position error of each model at the other rows, mm; empty without an outlier here."""
@@ -59,6 +73,23 @@ class HeldRows:
             name: float(MM_PER_METRE * np.nanmean(found.distance_m[kept]))
             for name, found in self.errors.items()
         }
+
+    def lead_mm(self, ahead: str, behind: str, outliers: Sequence[Mapping[str, Any]]) -> tuple[float, float]:
+        """How much smaller the errors of the model `ahead` are, mm: the mean over poses, its standard error.
+
+        Outliers, given with file and row, are left out; shots of a pose count once. Nothing is told by less
+        than two poses: the standard error is infinite then.
+        """
+        kept = self.without(outliers)
+        near, far = (MM_PER_METRE * self.errors[name].distance_m[kept] for name in (ahead, behind))
+        apart = far - near
+        _, place = np.unique(pose_numbers(self.readings[kept], self.sources[kept]), return_inverse=True)
+        seen = np.isfinite(apart)
+        counts = np.bincount(place[seen])
+        means = np.bincount(place[seen], apart[seen])[counts > 0] / counts[counts > 0]
+        if len(means) < FEWEST_POSES:
+            return 0.0, math.inf
+        return float(means.mean()), float(means.std(ddof=1) / math.sqrt(len(means)))
 
     def pack(self, arrays: Arrays) -> dict[str, Any]:
         """JSON values; arrays are added to `arrays`."""

@@ -91,6 +91,12 @@ def distance_at_floor_mm(calibration: "Calibration") -> float:
     return mean_distance(whole_noise_mm(calibration), distances=calibration.selection.distances)
 
 
+def taken_out(calibration: "Calibration") -> int:
+    """How many outliers the fits of the variable model are without; none of models that keep them."""
+    rows = calibration.rows
+    return 0 if calibration.variable is None or rows is None else len(rows.outliers())
+
+
 def states_sigma(calibration: "Calibration") -> bool:
     """Whether rows say something of their own noise."""
     return bool(np.any(stated_sigma_mm(calibration)))

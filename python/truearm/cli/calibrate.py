@@ -200,6 +200,7 @@ def print_places(output: Path) -> None:
 def print_results(calibration: "Calibration") -> None:
     """Print what was determined, the errors, and what stands out."""
     from truearm.cli.error_tables import print_errors
+    from truearm.summary import taken_out
 
     validation, summary = calibration.validation, calibration.summary
     others = count_of(validation.n_holdout, "other")
@@ -225,7 +226,9 @@ def print_results(calibration: "Calibration") -> None:
     _print_scheme(calibration, summary["error_to_repeatability"])
     _print_outliers(summary["outliers"], calibration)
     if calibration.options.refit and calibration.rows is not None:
-        say(f"The calibration in the file is fitted to all {len(calibration.rows.data)} rows.")
+        without = taken_out(calibration)
+        but = f" but {count_of(without, 'outlier')}" if without else ""
+        say(f"The calibration in the file is fitted to all {len(calibration.rows.data)} rows{but}.")
 
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
@@ -286,7 +289,10 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
     fate = "given less weight in the fit" if robust else "not taken out of the fit"
     hint = "" if robust else " --robust huber gives them less weight."
     if calibration.variable is not None:
-        fate, hint = "taken out of the variable fit", ""
+        fate, hint = (
+            "taken out of the fits",
+            " Constants, frame and tool are without them where they bend these.",
+        )
     say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, several=several)}.{hint}")
     if means := Outliers.of(calibration).means_mm:
         said = ", ".join(f"{name} {mean:.3f}" for name, mean in means.items())

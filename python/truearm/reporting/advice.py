@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from truearm.doubts import (
+    CONSTANT_BETTER,
     FEW_VALUES,
     HELD_TOOL,
     HIDING,
@@ -14,8 +15,6 @@ from truearm.doubts import (
     STATED_TOO_LARGE,
     UNLIKELY,
     WOULD_FIT,
-    constants_do_better,
-    judged_means_mm,
     to_check,
 )
 from truearm.errors import count_of
@@ -83,7 +82,7 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     named = [f"{entry['row']}" for entry in outliers[:ROWS_NAMED]]
     named += [f"{len(outliers) - ROWS_NAMED} more"] if len(outliers) > ROWS_NAMED else []
     rows = "row" if len(outliers) == 1 else "rows"
-    largest = short(outliers[0]["distance_mm"])[0]
+    largest = short(max(entry["distance_mm"] for entry in outliers))[0]
     share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
     words = (
         f"{count_of(len(outliers), 'measurement')} cannot be of the arm that the others show: {rows} "
@@ -282,7 +281,6 @@ def _intervals(facts: Facts) -> Iterator[Advice]:
 
 def _what_varies(facts: Facts) -> Iterator[Advice]:
     mean, constant = facts.mean_mm(), facts.mean_mm(CONSTANT)
-    without = judged_means_mm(facts.calibration.validation, facts.outliers)
     if facts.best == CONSTANT and not facts.calibration.selection.distances:
         words = "Here they are constant; --model variable shows how much they vary over the workspace."
         yield Advice("try_variable", "Let the parameters vary.", words, 0.5 * mean)
@@ -292,19 +290,13 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
             "deviations."
         )
         yield Advice("try_variable", "Try the variable model.", words, 0.5 * mean)
-    elif facts.best == VARIABLE and constants_do_better(without[VARIABLE], without[CONSTANT]):
-        apart = ", outliers left out," if facts.outliers.means_mm else ""
-        words = (
-            f"The {facts.mean_error}{apart} is {without[VARIABLE]:.4g} mm with the variable model and "
-            f"{without[CONSTANT]:.4g} mm with constant parameters: what it learnt does not help where "
-            "it was judged. Measure poses there, or stay with --model constant."
-        )
-        yield Advice("constant_better", "Constant parameters do better.", words, mean)
+    elif words := facts.noticed(CONSTANT_BETTER):
+        yield Advice(CONSTANT_BETTER, "Constant parameters do better.", words, mean)
     elif facts.best == VARIABLE and mean > SAME * constant:
         left, before = short(mean, constant)
         words = (
-            f"The variable model gains little: a {facts.mean_error} of {left} mm against {before} mm with "
-            "constant parameters. They hardly vary, or the poses are too few to show it."
+            f"The variable model gains little or nothing: a {facts.mean_error} of {left} mm against {before} "
+            "mm with constant parameters. They hardly vary, or the poses are too few to show it."
         )
         yield Advice("constant_suffices", "Constant parameters do as well.", words, 0.2 * mean)
 

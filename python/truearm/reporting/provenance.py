@@ -11,11 +11,11 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed
 from truearm.reporting.option_words import in_words, shown_options
 from truearm.reporting.parts import Part, Section, Table, Text
+from truearm.summary import taken_out
 
 
 def provenance(facts: Facts) -> Section:
     """Data, options, version, seed and time."""
-    calibration = facts.calibration
     parts: list[Part] = [_origin(facts), _options(facts), *_outliers(facts)]
     parts += [Text(f"Notice: {notice}") for notice in facts.summary["notices"]]
     return Section("Provenance", parts)
@@ -46,7 +46,11 @@ def _rows(facts: Facts, fitted: int | None) -> str:
     if facts.update is not None:
         return f"updated with {validation.n_train}; learned from those of the calibration before the update"
     said = f"{count_of(validation.n_train, 'training row')}, {validation.n_holdout} held out"
-    return said if fitted is None else f"{said}; the calibration in the file is fitted to {fitted}"
+    if fitted is None:
+        return said
+    without = taken_out(facts.calibration)
+    but = f" but {count_of(without, 'outlier')}" if without else ""
+    return f"{said}; the calibration in the file is fitted to {fitted}{but}"
 
 
 def _now() -> str:
@@ -93,12 +97,12 @@ def _outliers(facts: Facts) -> list[Table]:
         [str(entry["row"]), Path(entry["file"]).name, fixed(entry["distance_mm"]), f"{entry['score']:.1f}"]
         for entry in found
     ]
-    fate = "taken out of" if facts.calibration.variable is not None else "kept in"
+    fate = "taken out of the fits" if taken_out(facts.calibration) else "kept in the fit"
     table = Table(
         "Outliers",
         ["row", "file", "distance, mm", "score"],
         rows,
-        says=f"They were {fate} the fit; the held-out errors include them. Scores are squared standardised "
+        says=f"They were {fate}; the held-out errors include them. Scores are squared standardised "
         "residuals over the limit: above one is an outlier.",
         left=(0, 1),
     )

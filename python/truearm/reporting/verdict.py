@@ -10,6 +10,7 @@ from truearm.models import NOMINAL
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
+from truearm.summary import taken_out
 from truearm.validation import Statistics
 
 GOOD: Final = 0.6
@@ -167,8 +168,18 @@ def _found_from(facts: Facts) -> str:
             "joint offsets of all but the nominal one."
         )
     drift = facts.calibration.validation.drift
-    taken_out = "" if drift is None else f" {drift.words}"
-    return f"Frame and target of each model were fitted to the same training poses.{taken_out}"
+    moved = "" if drift is None else f" {drift.words}"
+    return f"Frame and target of each model were fitted to the same training poses.{moved}{_outliers(facts)}"
+
+
+def _outliers(facts: Facts) -> str:
+    """Which fits are without the outliers; empty where none was taken out."""
+    if not taken_out(facts.calibration):
+        return ""
+    return (
+        " Outliers were taken out of the fit of what varies, and of constants, frame and target where they "
+        "bend these; the errors hold those that were held out."
+    )
 
 
 def _cells(found: Statistics) -> list[str]:
