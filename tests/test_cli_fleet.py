@@ -55,6 +55,7 @@ def test_a_fleet_as_people_run_it(folder):
     done = run(folder, "fleet.toml", "-o", "out", "--workers", "1")
     assert done.returncode == 1
     assert max(map(len, done.stdout.splitlines())) <= 80
+    assert " nominal " in done.stdout
     for words in ("R2: R2.csv: there is no such file.", "1 of 2 arms are good", "out/fleet.html"):
         assert words in done.stdout
     assert "truearm fleet fleet.toml -o out" in done.stdout

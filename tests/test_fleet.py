@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 from contextlib import contextmanager
@@ -278,6 +279,17 @@ def test_what_noise_alone_would_leave_holds_the_sigma_of_rows(tmp_path):
     found = by_name(run_fleet(Fleet.from_toml(text, folder=tmp_path), tmp_path / "out", workers=1))
     assert found["silent"].row["floor_mm"] < 1.0
     assert found["stated"].row["floor_mm"] > 3.0
+
+
+def test_outliers_are_named_on_the_page_which_may_have_no_report_to_look_into(tmp_path):
+    rows = table(1, 0)
+    rows.loc[[6, 20], "z"] += 0.05
+    rows.to_csv(tmp_path / "R1.csv", index=False)
+    run = run_fleet(Fleet.from_toml(HEAD + arms("R1"), folder=tmp_path), tmp_path / "out", workers=1)
+    words = next(reason.words for reason in run.arms[0].reasons if reason.kind == "outliers")
+    assert words.startswith("2 of 60 rows are outliers: row ")
+    assert {"row 7 (", "row 21 ("} <= set(re.findall(r"row \d+ \(", words))
+    assert words in (tmp_path / "out" / "fleet.html").read_text()
 
 
 def test_an_error_beyond_its_limit_is_told_as_larger():

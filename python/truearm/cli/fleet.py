@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from truearm.fleet import Fleet, FleetRun
     from truearm.fleet.rows import Judged
 
-COLUMNS = ("arm", "verdict", "mean", "max", "before", "drift", "at most")
+COLUMNS = ("arm", "verdict", "mean", "max", "nominal", "drift", "at most")
 
 
 def command(

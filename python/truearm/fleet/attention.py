@@ -138,8 +138,8 @@ def _stands_out(arm: Row, fleet: Sequence[Row]) -> Iterator[Reason]:
 def _outliers(arm: Row) -> Iterator[Reason]:
     share = arm["outliers"] / arm["rows"]
     if share > MOST_OUTLIERS:
-        words = f"{arm['outliers']} of {arm['rows']} rows are outliers: look at them in the report."
-        yield Reason("outliers", words, share)
+        named = f": {arm['outliers_named']}" if arm.get("outliers_named") else ""
+        yield Reason("outliers", f"{arm['outliers']} of {arm['rows']} rows are outliers{named}.", share)
 
 
 def _intervals(arm: Row) -> Iterator[Reason]:

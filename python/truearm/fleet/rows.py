@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from truearm.errors import list_outliers
 from truearm.fleet.attention import ATTENTION, FAILED, GOOD, Reason, order, reasons
 from truearm.fleet.fleet_file import Fleet
 from truearm.fleet.task import ArmMade
@@ -90,11 +91,17 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "floor_mm": made.floor_mm,
         "coverage_95": summary["coverage_95"],
         "outliers": len(summary["outliers"]),
+        "outliers_named": list_outliers(summary["outliers"], several=_are_of_several(summary["outliers"])),
         "determined": summary["identifiability"]["rank"],
         "parameters": summary["identifiability"]["parameters"],
         "drift": made.drift,
         "notices": summary["notices"],
     }
+
+
+def _are_of_several(outliers: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether they are rows of several files."""
+    return len({entry["file"] for entry in outliers}) > 1
 
 
 def row_of_failed(arm: str, error: Exception, earlier: Sequence[str] = ()) -> Row:
