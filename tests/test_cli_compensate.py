@@ -54,6 +54,7 @@ def test_a_program_as_people_rewrite_it():
     assert "MoveL pNowhere" in done.stdout
     assert "not declared in this module" in done.stdout
     assert "Written: out.mod" in done.stdout
+    assert "This tells whether the arm is still as it was calibrated:" in done.stdout
     assert sorted(path.name for path in Path().iterdir() if "out" in path.name) == ["out.mod"]
 
 

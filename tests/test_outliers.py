@@ -86,7 +86,7 @@ def test_what_is_fitted_is_said_to_be_without_outliers_that_were_taken_out(tmp_p
 
 
 def test_of_the_outliers_the_advice_has_the_largest_distance():
-    """The row with the worst score need not be the farthest: far from the base a joint's scatter is larger."""
+    """The row with the worst score need not be the farthest: far out a joint scatters more."""
     arm = VirtualArm.paper(seed=2)
     table = arm.measure_table(arm.poses(90))
     for row, shift in ((11, 0.02), (30, 0.03), (52, 0.05)):

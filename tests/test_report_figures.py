@@ -10,6 +10,7 @@ from tests.report_support import figures_of, repeated_measurements, small_calibr
 from truearm.reporting.advice import advise
 from truearm.reporting.curves import in_words
 from truearm.reporting.facts import Facts
+from truearm.reporting.numbers import fixed, without_zeros
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 
@@ -70,7 +71,8 @@ def test_every_cell_with_measured_poses_is_filled_and_good_ones_are_dark(drawn, 
 
 
 def test_arrows_and_arm_lie_within_the_axes_that_the_page_fits_into_view(drawn):
-    figure = next(figure for title, figure in drawn.items() if title.startswith("Errors in space"))
+    figure = drawn["Errors in space, enlarged"]
+    assert all(choice["label"].endswith(":1") for choice in figure["choices"])
     for choice in figure["choices"]:
         scene = choice["layout"]["scene"]
         sides = {}
@@ -82,6 +84,45 @@ def test_arrows_and_arm_lie_within_the_axes_that_the_page_fits_into_view(drawn):
                 assert not is_shown or (low <= min(values) and max(values) <= high)
         ratios = [scene["aspectratio"][name] / sides[name] for name in "xyz"]
         np.testing.assert_allclose(ratios, ratios[0], rtol=1e-2)
+
+
+def test_every_parameter_has_its_name_below_a_map(drawn):
+    titles = ("Which parameter varies", "Correlations of the constant")
+    maps = [figure["layout"] for title, figure in drawn.items() if title.startswith(titles)]
+    assert len(maps) == 2
+    assert {layout["xaxis"]["dtick"] for layout in maps} == {1}
+
+
+def test_no_button_has_a_zero_with_a_sign(variable, drawn):
+    labels = [choice["label"] for figure in drawn.values() for choice in figure["choices"]]
+    assert not [label for label in labels if re.search(r"-0\b(?!\.)", label)]
+    assert fixed(-0.3, 0) == "0"
+
+
+def test_decimals_of_refusals_end_without_zeros():
+    said = "joint 10 turns by 2.2370 deg from -360.0479 deg, 1.0000 deg of 120.00 is allowed."
+    assert without_zeros(said) == "joint 10 turns by 2.237 deg from -360.0479 deg, 1 deg of 120 is allowed."
+    assert without_zeros("of 0.0000 mm") == "of 0 mm"
+
+
+def test_few_poses_have_no_lines_along_joints_and_no_share_of_all_errors():
+    """Twenty make two stretches: they are neither compared nor joined."""
+    arm = VirtualArm.paper(seed=2)
+    found = report(ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant", holdout=0.5))
+    figures = dict(zip([title for title, _ in found.figures], figures_of(found.html)["figures"], strict=True))
+    assert dict(found.figures)["Error along joint 1"].startswith("Too few poses")
+    assert {trace["mode"] for trace in figures["Error along joint 1"]["traces"]} == {"markers"}
+    assert "These 12 of 20 held-out rows" in words_of(found.html)
+    few = report(ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant", holdout=0.25))
+    assert "held-out rows make up" not in words_of(few.html)
+
+
+def test_errors_of_shots_are_counted_in_rows():
+    robot, data = repeated_measurements(sides_apart_mm=0.0, noise_mm=0.05)
+    for measured, counted in ((data, "rows"), (data.select(np.arange(1, len(data), 16)), "poses")):
+        made = report(ta.calibrate(robot, measured, model="constant", drift="none"))
+        assert f"95 % of the {counted} have an error below" in words_of(made.html)
+        assert f"share of the {counted}, %" in made.html
 
 
 @pytest.mark.parametrize(("amplitude", "told"), [(0.0003, False), (0.02, True)])

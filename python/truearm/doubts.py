@@ -171,7 +171,7 @@ def constant_is_better(
     robust = " --robust cauchy" if best == VARIABLE and outliers is not None and outliers.entries else ""
     text = (
         f"Constant parameters do better on {validation.judged} rows{apart}: a mean error of "
-        f"{means[CONSTANT]:.4g} mm against {means[best]:.4g} mm. Give --model constant{robust}, or measure "
+        f"{means[CONSTANT]:.3g} mm against {means[best]:.3g} mm. Give --model constant{robust}, or measure "
         "more poses."
     )
     return [Notice(CONSTANT_BETTER, text)]

@@ -47,7 +47,8 @@ def command(
 ) -> None:
     """Rewrite a robot program so that the calibrated arm's tool goes where the author meant it to go.
 
-    Only numbers of targets change; what cannot be changed with certainty is left as it is and listed.
+    Only numbers of targets change, and a comment at the top says so; what cannot be changed with certainty
+    is left as it is and listed.
 
     Examples:
       truearm compensate arm.calib weld.script --dry-run
@@ -142,7 +143,7 @@ def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:
     if dry_run:
         suggest(f"truearm compensate {asked} -o OUT")
     else:
-        when = "Run it slowly at first. Whether the arm is as it was calibrated tells:"
+        when = "Run it slowly at first. This tells whether the arm is still as it was calibrated:"
         suggest(f"truearm evaluate {typed(calibration)} MEASURED.csv", when=when)
 
 

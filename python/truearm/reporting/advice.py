@@ -23,7 +23,7 @@ from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import of_last_link, target_lever_mm
-from truearm.reporting.numbers import listed, percent, short, shown_readings
+from truearm.reporting.numbers import fixed, listed, percent, short, shown_readings
 from truearm.row_order import ORDER_OF_POSES
 
 MOST: Final = 4
@@ -235,7 +235,7 @@ def _range(facts: Facts, weak: Stretch) -> str:
     low, high = (
         shown_readings(facts.typical * 0.0 + end, facts.joints)[weak.joint] for end in (weak.low, weak.high)
     )
-    return f"joint {weak.joint + 1} between {low:.0f} and {high:.0f} {facts.unit(weak.joint)}"
+    return f"joint {weak.joint + 1} between {fixed(low, 0)} and {fixed(high, 0)} {facts.unit(weak.joint)}"
 
 
 def _unseen(facts: Facts) -> Iterator[Advice]:

@@ -1,7 +1,7 @@
 """Traces that several figures use."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,9 @@ from truearm.reporting.style import SEQUENTIAL, colour_of, dash_of, marker_of
 
 Floats = NDArray[np.float64]
 Trace = dict[str, Any]
+
+EVERY_NAME: Final[Mapping[str, Any]] = {"tickmode": "linear", "dtick": 1, "tickfont": {"size": 9}}
+"""Of an axis of names: each of them is shown, on a phone too."""
 
 
 def axis(title: str, **more: object) -> dict[str, Any]:

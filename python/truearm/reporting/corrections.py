@@ -12,8 +12,8 @@ from truearm.errors import count_of
 from truearm.limits import Limits, Task
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
-from truearm.reporting.facts import Facts
-from truearm.reporting.numbers import fixed, lean, short, signed
+from truearm.reporting.facts import ROWS, Facts
+from truearm.reporting.numbers import fixed, lean, short, signed, without_zeros
 from truearm.reporting.parts import Figure, Part, Section, Table, Text
 
 Floats = NDArray[np.float64]
@@ -60,7 +60,7 @@ def _overall(found: Compensated, asked: tuple[Task, str], count: int) -> str:
     refused = f"{int(found.refused.sum()) or 'none'} refused"
     which = "first " if len(found.q) < count else ""
     return (
-        f"The {which}{count_of(len(found.q), 'measured pose')}, each corrected as a waypoint of a program "
+        f"The {which}{count_of(len(found.q), 'measured row')}, each corrected as a waypoint of a program "
         f"({met} of {of}): {corrected} corrected, {refused}."
     )
 
@@ -101,7 +101,7 @@ def _sizes(facts: Facts, found: Compensated) -> list[Figure]:
         f"The median shift is {middle} mm, the largest {most} mm; the largest rotation is "
         f"{short(float(found.correction_mrad[good].max()))[0]} mrad.",
         [trace],
-        {"xaxis": axis("shift of the tool, mm", rangemode="tozero"), "yaxis": axis("poses"), "bargap": 0.05},
+        {"xaxis": axis("shift of the tool, mm", rangemode="tozero"), "yaxis": axis(ROWS), "bargap": 0.05},
         height=300,
     )
     return [figure, sizes]
@@ -154,10 +154,10 @@ def _refusals(data: Measurements, found: Compensated) -> list[Table]:
     for code, times in codes.most_common():
         mine = [refusal for refusal in found.refusals if refusal.code == code]
         named = ", ".join(_row_name(data, refusal.number - 1) for refusal in mine[:5])
-        rows.append([str(times), named + (" ..." if times > 5 else ""), mine[0].reason])
+        rows.append([str(times), named + (" ..." if times > 5 else ""), without_zeros(mine[0].reason)])
     table = Table(
         "Refused",
-        ["poses", "rows", "reason for the first"],
+        ["count", "rows", "reason for the first"],
         rows,
         says="A refused waypoint needs a person's decision: no correction is clipped.",
         left=(1, 2),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.models import VARIABLE
-from truearm.reporting.charts import axis, band, colour_bar, line
+from truearm.reporting.charts import EVERY_NAME, axis, band, colour_bar, line
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, lean, short, significant
 from truearm.reporting.parameters import per_unit, unit_of
@@ -47,7 +47,7 @@ def influence(facts: Facts, effects: Floats) -> Figure:
         f"the parameters, the effect is largest along {inputs[summed]}.",
         [trace],
         {
-            "xaxis": axis("parameter", tickangle=-60),
+            "xaxis": axis("parameter", tickangle=-90, **EVERY_NAME),
             "yaxis": {**axis("varies along"), "autorange": "reversed"},
         },
         height=120 + 34 * len(inputs),

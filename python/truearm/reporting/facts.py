@@ -26,6 +26,7 @@ OUTER: Final = 0.01
 """Share of the readings on either side that a joint's usual range leaves out."""
 WIDEST_TURN: Final = np.pi
 DRAWN_FOR_TYPICAL: Final = 0
+ROWS: Final = "rows"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,12 @@ class Facts:
     def poses_judged(self) -> str:
         """How many they are: "832 held-out poses"."""
         return self.calibration.validation.poses_judged
+
+    @property
+    def counted(self) -> str:
+        """What single errors are of: "poses", or "rows" where some poses were measured several times."""
+        validation = self.calibration.validation
+        return "poses" if validation.n_holdout_poses == validation.n_holdout else ROWS
 
     @property
     def error(self) -> str:

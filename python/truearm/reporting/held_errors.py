@@ -23,6 +23,8 @@ DRAWN: Final = 1500
 """More points than these are not told apart."""
 JOINT_BINS: Final = 12
 FEWEST_IN_BIN: Final = 8
+FEWEST_STRETCHES: Final = 3
+"""Medians over a joint that are compared, and joined by a line."""
 STANDS_OUT: Final = 1.35
 """A stretch of a joint whose median error is so many times that of all is named."""
 WORST: Final = 12
@@ -36,7 +38,7 @@ def held_errors(facts: Facts) -> Section:
     if facts.held is None:
         return Section(title, [Text(_without_rows(facts))])
     errors = facts.errors_mm
-    parts: list[Part] = [histogram(errors), cumulative(errors)]
+    parts: list[Part] = [histogram(errors, facts.counted), cumulative(errors, facts.counted)]
     words = (
         "Along the joints, lines are medians over stretches with equally many poses, and dots are errors of "
         f"the {facts.best} model; where poses are too few for lines, all models have dots."
@@ -65,8 +67,8 @@ def _known(errors: Floats) -> Floats:
     return np.maximum(errors[np.isfinite(errors)], SMALLEST)
 
 
-def histogram(errors: Mapping[str, Floats]) -> Figure:
-    """Shares of the poses over logarithmic classes of errors (n,) in mm."""
+def histogram(errors: Mapping[str, Floats], counted: str) -> Figure:
+    """Shares of the poses or rows, as `counted` says, over logarithmic classes of errors (n,) in mm."""
     known = {name: _known(values) for name, values in errors.items()}
     low, high = _ends(known)
     edges = np.geomspace(low, high, BINS + 1)
@@ -86,13 +88,13 @@ def histogram(errors: Mapping[str, Floats]) -> Figure:
         traces,
         legend(
             xaxis=log_axis("position error, mm (logarithmic)", low, high),
-            yaxis=axis("share of the poses, %", rangemode="tozero"),
+            yaxis=axis(f"share of the {counted}, %", rangemode="tozero"),
         ),
     )
 
 
-def cumulative(errors: Mapping[str, Floats]) -> Figure:
-    """Share of the poses below each error (n,) in mm."""
+def cumulative(errors: Mapping[str, Floats], counted: str) -> Figure:
+    """Share of the poses or rows, as `counted` says, below each error (n,) in mm."""
     known = {name: np.sort(_known(values)) for name, values in errors.items()}
     low, high = _ends(known)
     traces = []
@@ -105,11 +107,11 @@ def cumulative(errors: Mapping[str, Floats]) -> Figure:
     mark = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": 95, "y1": 95}
     return Figure(
         "Cumulative distribution of the errors",
-        f"95 % of the poses have an error below {listed(within)}.",
+        f"95 % of the {counted} have an error below {listed(within)}.",
         traces,
         legend(
             xaxis=log_axis("position error, mm (logarithmic)", low, high),
-            yaxis=axis("poses with a smaller error, %", range=[0, 101]),
+            yaxis=axis(f"{counted} with a smaller error, %", range=[0, 101]),
             shapes=[{**mark, "line": {"color": "@muted", "width": 1, "dash": "dot"}}],
         ),
     )
@@ -132,7 +134,7 @@ def along_joint(facts: Facts, joint: int) -> Figure:
         errors = facts.errors_mm[model]
         known = np.isfinite(errors)
         _, middles, medians = running_median(q[known], errors[known], JOINT_BINS, FEWEST_IN_BIN)
-        has_line = len(middles) > 1
+        has_line = len(middles) >= FEWEST_STRETCHES
         if model == name or not has_line:
             single = _known(errors)[:DRAWN]
             traces.append(points(q[known][:DRAWN], single, model, showlegend=not has_line))
@@ -158,14 +160,14 @@ def _where_along(q: Floats, errors: Floats, unit: str) -> str:
     overall = float(np.median(errors[known]))
     worst_bin = int(np.argmax(medians))
     here, everywhere = short(float(medians[worst_bin]), overall)
-    if len(medians) < 3:
+    if len(medians) < FEWEST_STRETCHES:
         return f"Too few poses to compare stretches of the joint; the median is {everywhere} mm."
     if medians[worst_bin] < STANDS_OUT * overall:
         return (
             f"No stretch of the joint stands out: the largest median of one is {here} mm, that of all poses "
             f"{everywhere} mm."
         )
-    stretch = f"{edges[worst_bin]:.0f} and {edges[worst_bin + 1]:.0f} {unit}"
+    stretch = f"{fixed(edges[worst_bin], 0)} and {fixed(edges[worst_bin + 1], 0)} {unit}"
     return f"Largest between {stretch}: the median there is {here} mm, that of all poses {everywhere} mm."
 
 
@@ -189,11 +191,11 @@ def orientation(facts: Facts) -> list[Figure]:
     within = [f"{text} mrad ({name})" for name, text in zip(bounds, short(*bounds.values()), strict=True)]
     figure = Figure(
         "Cumulative distribution of the orientation errors",
-        f"95 % of the poses have an orientation error below {listed(within)}.",
+        f"95 % of the {facts.counted} have an orientation error below {listed(within)}.",
         traces,
         legend(
             xaxis=log_axis("orientation error, mrad (logarithmic)", *_ends(known)),
-            yaxis=axis("poses with a smaller error, %", range=[0, 101]),
+            yaxis=axis(f"{facts.counted} with a smaller error, %", range=[0, 101]),
         ),
     )
     return [figure]
@@ -215,12 +217,12 @@ def worst(held: HeldRows, facts: Facts) -> Table:
     units = "/".join(dict.fromkeys(facts.unit(joint) for joint in range(len(facts.joints))))
     share = mine[order].sum() / mine[mine >= 0].sum()
     judged = count_of(len(held), f"{facts.calibration.validation.judged} row")
+    part = f"These {len(rows)} of {judged} make up {100 * share:.0f} % of the sum of all errors. "
     return Table(
         "Worst poses",
         [*columns, f"joints, {units}"],
         rows,
-        says=f"These {len(rows)} of {judged} make up {100 * share:.0f} % of the sum of all errors. "
-        "Row 1 is the first below the header of the file.",
+        says=f"{part if len(rows) < len(held) else ''}Row 1 is the first below the header of the file.",
         left=(0, len(columns)) if not several else (0, 1, len(columns)),
     )
 

@@ -1,5 +1,6 @@
 """Numbers as pages show and hold them: rounded, with units, and without what JSON has no word for."""
 
+import re
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -55,6 +56,11 @@ def short(*values: float) -> list[str]:
     sizes = [abs(value) for value in values if value and np.isfinite(value)]
     decimals = 2 if not sizes else int(np.clip(1 - np.floor(np.log10(min(sizes))), 0, 3))
     return [f"{_no_minus_zero(value, decimals):.{decimals}f}" for value in values]
+
+
+def without_zeros(words: str) -> str:
+    """The same sentence, its decimals without zeros at their ends: "1.0000 deg" is "1 deg"."""
+    return re.sub(r"(\d)(?:\.0+|(\.\d*?[1-9])0+)(?![\d.])", r"\1\2", words)
 
 
 def significant(value: float) -> str:

@@ -5,7 +5,7 @@ import numpy as np
 from truearm.doubts import OF_NO_USE
 from truearm.errors import count_of
 from truearm.reporting.advice import Advice
-from truearm.reporting.facts import Facts
+from truearm.reporting.facts import ROWS, Facts
 from truearm.reporting.held_errors import cumulative, histogram
 from truearm.reporting.numbers import fixed, short
 from truearm.reporting.parts import Part, Section, Table
@@ -51,5 +51,5 @@ def other_data(facts: Facts) -> Section:
     parts: list[Part] = [table]
     if found.rows is not None:
         lengths = {name: MM_PER_METRE * e.distance_m for name, e in found.rows.errors.items()}
-        parts += [histogram(lengths), cumulative(lengths)]
+        parts += [histogram(lengths, ROWS), cumulative(lengths, ROWS)]
     return Section(title, parts)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from truearm.errors import count_of
 from truearm.models import CONSTANT
 from truearm.parameters import KIND_COUNT, KINDS
-from truearm.reporting.charts import colour_bar
+from truearm.reporting.charts import EVERY_NAME, axis, colour_bar
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import lean, signed
 from truearm.reporting.parts import Cell, Figure, Table
@@ -154,8 +154,8 @@ def confounding(facts: Facts) -> Figure | None:
         f"{pair}. {others}",
         [trace],
         {
-            "xaxis": {"title": {"text": "parameter"}, "tickangle": -60},
-            "yaxis": {"title": {"text": "parameter"}, "autorange": "reversed"},
+            "xaxis": {**axis("parameter", **EVERY_NAME), "tickangle": -90},
+            "yaxis": {**axis("parameter", **EVERY_NAME), "autorange": "reversed"},
         },
         height=max(340, 16 * size + 120),
         is_wide=True,

@@ -50,7 +50,7 @@ def quiver(facts: Facts) -> Figure | None:
     fixed_traces = len(traces) - len(states)
     shown = [[True] * fixed_traces + [j == k for j in range(len(states))] for k in range(len(states))]
     return Figure(
-        f"Errors in space, enlarged {scale} times",
+        "Errors in space, enlarged",
         _says(facts, held),
         traces,
         {

@@ -120,7 +120,7 @@ class Cut:
         order = [1, 0, 2]
         return [
             Choice(
-                f"joint {third + 1} at {labels[k]:.0f} {self.facts.unit(third)}",
+                f"joint {third + 1} at {fixed(labels[k], 0)} {self.facts.unit(third)}",
                 [j == k for j in range(count)],
             )
             for k in order

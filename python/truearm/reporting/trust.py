@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from truearm.reporting.charts import axis, data_points, heatmap
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import STRETCHES, Known, configurations, means_along, std_mm
-from truearm.reporting.numbers import percent, short
+from truearm.reporting.numbers import fixed, percent, short
 from truearm.reporting.parts import Figure, Part, Section, Text
 from truearm.units import MM_PER_METRE
 
@@ -112,7 +112,7 @@ def pair_map(facts: Facts, found: Known, pair: tuple[int, int]) -> Figure:
     most, place = cells.extreme(np.nanargmax)
     large, small = short(most, cells.extreme(np.nanargmin)[0])
     where = " and ".join(
-        f"joint {joint + 1} near {middle:.0f} {facts.unit(joint)}"
+        f"joint {joint + 1} near {fixed(middle, 0)} {facts.unit(joint)}"
         for joint, middle in zip(pair, place, strict=True)
     )
     says = f"Means over the other joints: from {small} mm to {large} mm, the largest with {where}."
@@ -176,8 +176,8 @@ def workspace(facts: Facts, found: Known) -> Figure:
     largest, place = cells.extreme(np.nanargmax)
     small, large = short(cells.extreme(np.nanargmin)[0], largest)
     says = (
-        f"From {small} mm to {large} mm, the largest {place[0]:.0f} mm from the axis of the base at height "
-        f"{place[1]:.0f} mm."
+        f"From {small} mm to {large} mm, the largest {fixed(place[0], 0)} mm from the axis of the base at "
+        f"height {fixed(place[1], 0)} mm."
     )
     if len(cells.measured):
         count = np.bincount(_numbers(cells.measured, cells.edges), minlength=cells.means.size)
