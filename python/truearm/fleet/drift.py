@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.errors import InputError
+from truearm.errors import InputError, WorkError
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT
+from truearm.nominal_misfit import some_rows
 from truearm.parameters import are_lengths
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
@@ -19,6 +20,8 @@ Floats = NDArray[np.float64]
 
 SURE: Final = 2.0
 """A change of a position beyond so many standard deviations of both calibrations together is seen."""
+MOST_POSES: Final = 200
+"""Poses at the most at which standard deviations are asked for: they tell the share beyond within 4 %."""
 FAR: Final = 0.1
 """Tables of one arm, rad and m, do not differ by so much, whoever wrote them down."""
 MOVED: Final = 4.0
@@ -46,12 +49,12 @@ def drift_of(previous: Calibration, now: Calibration, data: Measurements) -> dic
     """What changed from one calibration of an arm to another, over the poses of `data`; JSON values.
 
     Positions are those of the robot file's tool in its base frame. How uncertain their change is follows
-    from both calibrations' conservative standard deviations, where both know them.
+    from both calibrations' standard deviations at some of the poses, where both know them.
     """
-    before, after = (_positions(calibration, data) for calibration in (previous, now))
-    change_m = np.linalg.norm(after - before, axis=1)
+    change_m = _change_m(previous, now, data)
     worst = int(np.argmax(change_m))
-    uncertain_m = _uncertain(previous, now, data)
+    some = some_rows(np.arange(len(data)), MOST_POSES)
+    uncertain_m = _uncertain(previous, now, data.select(some))
     return {
         "since_version": previous.version,
         "poses": len(data),
@@ -60,7 +63,7 @@ def drift_of(previous: Calibration, now: Calibration, data: Measurements) -> dic
         "max_row": int(data.rows[worst]),
         "max_file": str(data.sources[worst]),
         "std_mm": None if uncertain_m is None else float(np.median(uncertain_m) * MM_PER_METRE),
-        "share_beyond": None if uncertain_m is None else float(np.mean(change_m > SURE * uncertain_m)),
+        "share_beyond": None if uncertain_m is None else float(np.mean(change_m[some] > SURE * uncertain_m)),
         "moved": list(_moved(previous, now)),
     }
 
@@ -78,19 +81,33 @@ def _features(calibration: Calibration, data: Measurements) -> dict[str, Floats]
     return {name: data.features[name].to_numpy(dtype=np.float64) for name in names} or None
 
 
-def _positions(calibration: Calibration, data: Measurements) -> Floats:
-    return calibration.position(data.readings, features=_features(calibration, data))
+def _change_m(previous: Calibration, now: Calibration, data: Measurements) -> Floats:
+    """How far positions (n,) moved, m."""
+    before, after = (
+        calibration.position(data.readings, features=_features(calibration, data))
+        for calibration in (previous, now)
+    )
+    return np.asarray(np.linalg.norm(after - before, axis=1))
 
 
 def _uncertain(previous: Calibration, now: Calibration, data: Measurements) -> Floats | None:
     """Standard deviation (n,) of the change, m: that of its length, as if both were independent."""
-    if not (previous.has_conservative and now.has_conservative):
-        return None
-    stds = [
-        calibration.conservative_std(data.readings, features=_features(calibration, data))[:, 0]
-        for calibration in (previous, now)
-    ]
-    return np.asarray(np.hypot(*stds))
+    stds = [_std(calibration, data) for calibration in (previous, now)]
+    known = [std for std in stds if std is not None]
+    return np.asarray(np.hypot(*known)) if len(known) == len(stds) else None
+
+
+def _std(calibration: Calibration, data: Measurements) -> Floats | None:
+    """Standard deviation (n,) of positions, m, their coordinates together, or its bound where the rows were
+    left out of the file; None where neither is known.
+    """
+    features = _features(calibration, data)
+    try:
+        return np.asarray(np.linalg.norm(calibration.position_std(data.readings, features=features), axis=1))
+    except WorkError:
+        if not calibration.has_conservative:
+            return None
+        return calibration.conservative_std(data.readings, features=features)[:, 0]
 
 
 def _moved(previous: Calibration, now: Calibration) -> Iterator[dict[str, Any]]:

@@ -1,0 +1,51 @@
+"""How far an arm of a fleet has moved away from its last calibration, and how surely that is seen."""
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.remastered import remastered
+from truearm.fleet.drift import MOST_POSES, drift_of
+from truearm.simulation import VirtualArm
+
+SHIFT_DEG = (0.0, 0.2, 0.0, 0.0)
+CLEARLY = 0.9
+
+
+@pytest.fixture(scope="module")
+def scara():
+    """A SCARA, its calibration, and those after joint 2 was mastered anew and after nothing happened."""
+    arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=5)
+    data = [
+        arm.measure(arm.poses(100), seed=1),
+        remastered(arm, arm.poses(80, seed=3), SHIFT_DEG, seed=3),
+        arm.measure(arm.poses(80, seed=4), seed=4),
+    ]
+    return [ta.calibrate(arm.robot, rows) for rows in data], data
+
+
+def test_a_scara_whose_joint_was_mastered_anew_has_drifted_and_another_has_not(scara):
+    (previous, moved, same), (_, rows, others) = scara
+    assert drift_of(previous, moved, rows)["share_beyond"] > CLEARLY
+    assert drift_of(previous, same, others)["share_beyond"] < 1.0 - CLEARLY
+
+
+def test_without_measurements_the_bounds_of_the_standard_deviation_serve(scara):
+    (previous, moved, _), (_, rows, _) = scara
+    exact, stripped = (drift_of(one, moved, rows) for one in (previous, previous.without_rows()))
+    assert stripped["std_mm"] > 1.1 * exact["std_mm"]
+    assert stripped["mean_mm"] == pytest.approx(exact["mean_mm"])
+
+
+def test_standard_deviations_are_asked_for_at_some_of_many_poses(scara, monkeypatch):
+    (previous, _, _), (first, _, _) = scara
+    many = first.select(np.arange(6 * MOST_POSES) % len(first))
+    asked, exact = [], ta.Calibration.position_std
+
+    def position_std(self, q, **more):
+        asked.append(len(q))
+        return exact(self, q, **more)
+
+    monkeypatch.setattr(ta.Calibration, "position_std", position_std)
+    assert drift_of(previous, previous, many)["poses"] == len(many)
+    assert asked == [MOST_POSES, MOST_POSES]
