@@ -235,6 +235,7 @@ ROW: dict[str, Any] = {
     "coverage_95": 0.95,
     "outliers": 0,
     "drift": None,
+    "grave": [],
 }
 DRIFT = {"mean_mm": 0.2, "max_mm": 0.5, "std_mm": 0.3, "share_beyond": 0.0, "moved": []}
 SURE = {**DRIFT, "share_beyond": 0.9}
@@ -245,6 +246,7 @@ SURE = {**DRIFT, "share_beyond": 0.9}
     [
         ({}, {}, []),
         ({"nominal_mean_mm": 0.09}, {}, ["no_gain"]),
+        ({"grave": ["It is another robot."]}, {}, ["doubt"]),
         ({"outliers": 3}, {}, ["outliers"]),
         ({"coverage_95": 0.5}, {}, ["intervals"]),
         ({"coverage_95": None}, {}, []),

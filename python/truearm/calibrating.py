@@ -71,6 +71,8 @@ STUCK: Final = 0.2
 """Ratio of what constants leave below which those of the training rows were no minimum to judge."""
 ASTRAY: Final = 2.0
 """Ratio of the median errors of held-out rows, known and not, from which a fit went astray."""
+REFIT_ASTRAY: Final = "refit_astray"
+OPEN_SETUP: Final = "open_setup"
 
 
 def calibrate(
@@ -277,7 +279,7 @@ def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[
         "target are not harmed, but along what is left open neither the base's place in the world nor the "
         "target's on the flange is known, and corrections for other tools depend on that."
     )
-    return [Notice("open_setup", text)]
+    return [Notice(OPEN_SETUP, text)]
 
 
 def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> VariableSpread | None:
@@ -343,7 +345,7 @@ def _astray(task: Task, fits: tuple[Fits, Fits], held: Measurements, judged: Hel
         f"fitted to {count_of(len(trained.data), 'training row')} by {before:.4g} mm: the calibration in the "
         "file stays that of the training rows. Look at the table of the robot, and for rows that are wrong."
     )
-    return [Notice("refit_astray", text)]
+    return [Notice(REFIT_ASTRAY, text)]
 
 
 def _constant_details(task: Task, fits: Fits) -> ConstantDetails:

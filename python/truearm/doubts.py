@@ -61,6 +61,7 @@ CONSTANT_BETTER: Final = "constant_better"
 ROWS_SHIFTED: Final = "rows_shifted"
 FAR_FROM_NOMINAL: Final = "far_from_nominal"
 FITS_OTHERWISE: Final = "fits_otherwise"
+COMPUTED: Final = "computed"
 WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE)
 """What the measurements would fit, where a calibration does not help."""
 ON_A_GRID: Final = "on_a_grid"
@@ -348,7 +349,7 @@ def _computed() -> Notice:
         "what a controller computes from its joints, not what was measured. Nothing can be learnt from them. "
         "Give the points of an instrument that looks at the arm from outside."
     )
-    return Notice("computed", text)
+    return Notice(COMPUTED, text)
 
 
 def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:

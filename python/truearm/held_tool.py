@@ -51,6 +51,11 @@ def held_tool(robot: Robot, readings: Floats) -> HeldTool | None:
     return HeldTool(entirely, directions[:, 0], float(spreads[-1 if entirely else 0]))
 
 
+def never_turns_freely(robot: Robot) -> bool:
+    """Whether an arm holds a direction of its flange wherever it goes, as a SCARA does."""
+    return bool(_spreads(robot, _drawn(robot))[0][0] < HELD_RAD)
+
+
 def held_words(held: HeldTool) -> str:
     """How the tool was held, in words that end a sentence's subject."""
     within = f"to within {max(0.01, held.spread_rad / RADIANS_PER_DEGREE):.2g} deg"

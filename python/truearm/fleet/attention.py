@@ -30,8 +30,8 @@ class Reason:
     """Why an arm needs attention.
 
     Attributes:
-        kind: One word for programs: "failed", "no_gain", "drift", "mean", "max", "stands_out", "outliers" or
-            "intervals".
+        kind: One word for programs: "failed", "no_gain", "doubt", "drift", "mean", "max", "stands_out",
+            "outliers" or "intervals".
         words: The sentence for people.
         weight: How far beyond its limit; those of one kind are sorted by it.
     """
@@ -41,7 +41,7 @@ class Reason:
     weight: float = 1.0
 
 
-KINDS: Final = ("failed", "no_gain", "drift", "mean", "max", "stands_out", "outliers", "intervals")
+KINDS: Final = ("failed", "no_gain", "doubt", "drift", "mean", "max", "stands_out", "outliers", "intervals")
 """The worst first."""
 
 
@@ -55,7 +55,13 @@ def reasons(arm: Row, fleet: Sequence[Row], limits: LimitsSection) -> list[Reaso
     """
     if arm["status"] == FAILED:
         return [Reason("failed", f"{arm['error']}{_earlier(arm)}", np.inf)]
-    found = [*_no_gain(arm), *_drifted(arm, limits), *_beyond(arm, limits), *_stands_out(arm, fleet)]
+    found = [
+        *_no_gain(arm),
+        *_doubted(arm),
+        *_drifted(arm, limits),
+        *_beyond(arm, limits),
+        *_stands_out(arm, fleet),
+    ]
     found += [*_outliers(arm), *_intervals(arm)]
     return sorted(found, key=lambda reason: KINDS.index(reason.kind))
 
@@ -80,6 +86,11 @@ def _no_gain(arm: Row) -> Iterator[Reason]:
         said = "There is nothing to gain" if none else "The calibration does not help"
         words = f"{said}: its mean error is {after:.3f} mm, nominally {before:.3f} mm."
         yield Reason("no_gain", words, after / before)
+
+
+def _doubted(arm: Row) -> Iterator[Reason]:
+    """Notices that speak against data or table, or leave frame and target open."""
+    yield from (Reason("doubt", words) for words in arm.get("grave", ()))
 
 
 def _drifted(arm: Row, limits: LimitsSection) -> Iterator[Reason]:

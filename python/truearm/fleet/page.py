@@ -65,7 +65,7 @@ def fleet_page(fleet: Fleet, arms: Sequence[Judged], reports: Collection[str]) -
     )
     done = [arm for arm in arms if arm.verdict != FAILED]
     sections = [
-        Section("Arms", [_table(arms, reports)]),
+        Section("Arms", [_table(arms, reports), *_notices(arms)]),
         Section("Errors and drift", [figure for figure in (_errors(done), _drift(done)) if figure]),
         Section("What the verdicts mean", [Text(words) for words in _meaning(fleet)]),
     ]
@@ -119,6 +119,17 @@ def _cells(arm: Judged, reports: Collection[str]) -> list[str | Cell]:
         *("" if value is None else f"{value:.3f}" for value in numbers),
         " ".join(reason.words for reason in arm.reasons),
     ]
+
+
+def _notices(arms: Sequence[Judged]) -> list[Table]:
+    """What should be known of arms beside the reasons for attention; nothing where there is nothing."""
+    rows = [
+        [arm.row["arm"], notice]
+        for arm in arms
+        for notice in arm.row.get("notices", ())
+        if notice not in {reason.words for reason in arm.reasons}
+    ]
+    return [Table("What else should be known", ("arm", "notice"), rows, left=(0, 1))] if rows else []
 
 
 def _errors(arms: Sequence[Judged]) -> Figure | None:
@@ -195,8 +206,9 @@ def _meaning(fleet: Fleet) -> list[str]:
     stated = fleet.limits.model_dump(exclude_none=True)
     limits = ", ".join(f"{name} = {value:g}" for name, value in stated.items())
     return [
-        "An arm needs attention if its calibration does not help, if it moved since its last calibration by "
-        "more than the uncertainty of both, if its error exceeds a limit or is far above that of its kind, "
-        "if many of its rows are outliers, or if its 95 % intervals hold too few held-out coordinates.",
+        "An arm needs attention if its calibration does not help, if data or table are doubtful or leave frame "
+        "and target open, if it moved since its last calibration by more than the uncertainty of both, if its "
+        "error exceeds a limit or is far above that of its kind, if many of its rows are outliers, or if its "
+        "95 % intervals hold too few held-out coordinates.",
         f"Limits of the fleet file: {limits or 'none'}.",
     ]

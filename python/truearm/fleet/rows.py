@@ -96,6 +96,7 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "parameters": summary["identifiability"]["parameters"],
         "drift": made.drift,
         "notices": summary["notices"],
+        "grave": made.grave,
     }
 
 

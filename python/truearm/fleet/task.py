@@ -6,6 +6,7 @@ from typing import Any
 
 from truearm.calibrating import calibrate
 from truearm.calibration import Calibration
+from truearm.fleet.doubted import grave_notices
 from truearm.fleet.drift import check_comparable, drift_of
 from truearm.measurements import Measurements
 from truearm.options import Options
@@ -47,6 +48,7 @@ class ArmMade:
         model: Name of the model that predicts.
         floor_mm: Mean position error that noise alone would leave.
         drift: What changed since the last calibration; None where there is none.
+        grave: The notices that need attention.
         report: The page; None where it was not asked for.
     """
 
@@ -55,6 +57,7 @@ class ArmMade:
     model: str
     floor_mm: float
     drift: dict[str, Any] | None
+    grave: list[str]
     report: str | None
 
 
@@ -76,5 +79,6 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         model=made.model_name,
         floor_mm=distance_at_floor_mm(made),
         drift=None if previous is None else drift_of(previous, made, task.data.deduplicated()),
+        grave=grave_notices(made),
         report=report(made).html if task.with_report else None,
     )

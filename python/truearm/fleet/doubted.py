@@ -1,0 +1,20 @@
+"""Which notices on a calibration are reason enough to look at the arm before it is used."""
+
+from typing import Final
+
+from truearm.calibrating import OPEN_SETUP, REFIT_ASTRAY
+from truearm.calibration import Calibration
+from truearm.doubts import COMPUTED, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, SINGLE_ROWS, WOULD_FIT
+from truearm.held_tool import never_turns_freely
+
+GRAVE: Final = (COMPUTED, SINGLE_ROWS, *WOULD_FIT, FAR_FROM_NOMINAL, ORIENTATION_MISFIT, REFIT_ASTRAY)
+"""Data or table are wrong, or of another arm."""
+
+
+def grave_notices(calibration: Calibration) -> list[str]:
+    """What speaks against the data or the table of a calibration, or leaves its frame and target open.
+
+    The poses are not to blame where these stay open on an arm that cannot turn its tool freely.
+    """
+    kinds = GRAVE if never_turns_freely(calibration.robot) else (*GRAVE, OPEN_SETUP)
+    return [str(notice) for notice in calibration.notices if notice.kind in kinds]
