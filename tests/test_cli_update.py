@@ -11,7 +11,7 @@ from tests.remastered import remastered_table
 from tests.report_support import words_of
 from truearm.cli import main
 from truearm.reporting.report import report
-from truearm.simulation import VirtualArm
+from truearm.simulation import Imperfections, VirtualArm
 
 SHIFT = np.array([0.0, 0.6, 0.0, 0.9, 0.0])
 
@@ -80,6 +80,21 @@ def test_without_output_nothing_is_written(folder, capsys):
     assert "The calibration still holds" in told
     assert "truearm compensate old.calib PROGRAM --dry-run" in told
     assert sorted(folder.iterdir()) == before
+
+
+def test_a_calibration_that_no_longer_fits_is_made_anew_from_new_rows_alone(folder, capsys):
+    arm = VirtualArm.paper(seed=2, imperfections=Imperfections(share=0.5))
+    arm.measure_table(arm.poses(15, seed=9), seed=9).to_csv("bent.csv", index=False)
+    assert main(["update", "old.calib", "bent.csv"]) == 0
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= 80
+    words = " ".join(told.split())
+    assert "The calibration itself no longer fits" in words
+    assert "Check that these are measurements of this arm." in words
+    assert "The old rows are of the arm as it was: calibrate from new ones alone." in words
+    assert "truearm plan rv-m2 -n 60 -o poses.csv" in words
+    assert "truearm calibrate rv-m2 MEASUREMENTS.csv -o result" in words
+    assert "--next" not in words
 
 
 def test_coupled_joints_that_one_motor_changed_are_told(tmp_path, capsys):

@@ -1,16 +1,18 @@
 """Commands that commands propose: typed as they stand, they work."""
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import truearm as ta
 from tests.remastered import remastered_table
 from truearm.cli import calibrate, main, session_export
-from truearm.cli.again import calibrate_again, option_words
+from truearm.cli.again import calibrate_again, calibrate_anew, option_words, plan_anew
 from truearm.errors import typed
 from truearm.options import Options
 from truearm.simulation import VirtualArm
@@ -70,7 +72,9 @@ def test_next_poses_measured_and_calibrated_from_as_proposed_share_the_set_up(fo
     assert main(["calibrate", "my arm.toml", "my data.csv", "-o", "out", "--model", "constant"]) == 0
     capsys.readouterr()
     assert main(["plan", "--next", "4", "--from", "out/calibration.calib", "-o", "more.csv"]) == 0
-    words = proposed(capsys.readouterr().out, "calibrate")
+    told = capsys.readouterr().out
+    assert "Older rows count only if the arm has not changed since" in told
+    words = proposed(told, "calibrate")
     model = ["--model", "constant"]
     assert words[2:] == ["ROBOT", "my data.csv", "MEASUREMENTS.csv", *model, "-o", "result"]
     poses = pd.read_csv("more.csv")
@@ -150,6 +154,20 @@ def test_a_second_update_adds_its_file_to_those_before(measured, tmp_path, monke
     again = calibrate_again(ta.Calibration.load("twice.calib"), None, "MORE.csv")
     assert files_of(again) == ["old.csv", "new.csv", "newer.csv", "MORE.csv"]
     assert files_of(calibrate_again(twice.without_rows(), None, "MORE.csv")) == ["OLD.csv", "MORE.csv"]
+
+
+@pytest.mark.parametrize(("times", "planned"), [(1, 60), (2, 80), (9, 200)])
+def test_as_many_poses_are_planned_anew_as_an_arm_was_calibrated_from(times, planned, measured, tmp_path):
+    robot, old, later, _ = measured
+    old.to_csv(tmp_path / "old.csv", index=False)
+    made = ta.calibrate(robot, ta.Measurements.read_csv(tmp_path / "old.csv"), model="constant")
+    assert made.rows is not None
+    rows = made.rows.data.select(np.arange(40 * times) % 40)
+    shifted = replace(rows, readings=rows.readings + np.arange(40 * times)[:, None])
+    known = replace(made, rows=replace(made.rows, data=shifted))
+    assert plan_anew(known) == f"truearm plan rv-m2 -n {planned} -o poses.csv"
+    anew = calibrate_anew(ta.update(made, ta.Measurements.from_dataframe(later)).calibration)
+    assert anew.command == "truearm calibrate rv-m2 MEASUREMENTS.csv --model constant -o result"
 
 
 def test_options_that_the_command_lacks_are_named(measured):

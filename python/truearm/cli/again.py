@@ -17,6 +17,10 @@ RENAMED: Final = {"most_regions": "regions"}
 SAID_OTHERWISE: Final = frozenset({"by_purpose", "refit"})
 """Options that the command has another option for."""
 SOME_FILE: Final = "OLD.csv"
+NEW_FILE: Final = "MEASUREMENTS.csv"
+FEWEST_ANEW: Final = 60
+MOST_ANEW: Final = 200
+"""Poses to plan where an arm is calibrated anew: as many as before, between these."""
 NO_LONGER: Final = "the update found that the calibration no longer fits the arm"
 BESIDE: Final = (
     'frame and tool were found anew since, and {groups} would be one set-up: rename it in the column "group" '
@@ -50,11 +54,43 @@ def calibrate_again(calibration: "Calibration", robot: str | None, more: str) ->
     from truearm.cli.naming import name_of
 
     files, notes = _files(calibration)
-    words = [robot or name_of(calibration.robot), *files, more, *option_words(calibration.options)]
-    if missing := options_without_words(calibration.options):
-        given = ", ".join(f"{name}={value!r}" for name, value in missing.items())
-        notes.append(f"The command has no option for {given}: calibrate from Python to keep that.")
-    return Again(f"truearm calibrate {' '.join(typed(word) for word in words)} -o result", tuple(notes))
+    words = [robot or name_of(calibration.robot), *files, more]
+    notes += _not_kept(calibration.options)
+    return Again(_command(words, calibration.options), tuple(notes))
+
+
+def plan_anew(calibration: "Calibration") -> str:
+    """The command that plans as many poses as a calibration was learned from."""
+    from truearm.cli.naming import name_of
+    from truearm.visits import pose_count
+
+    learned = calibration.learned_from
+    poses = calibration.validation.n_train_poses if learned is None else pose_count(learned.data)
+    count = min(max(poses, FEWEST_ANEW), MOST_ANEW)
+    return f"truearm plan {typed(name_of(calibration.robot))} -n {count} -o poses.csv"
+
+
+def calibrate_anew(calibration: "Calibration") -> Again:
+    """The command that calibrates from other measurements alone, with the options that were no defaults."""
+    from truearm.cli.naming import name_of
+
+    options = calibration.options
+    return Again(_command([name_of(calibration.robot), NEW_FILE], options), tuple(_not_kept(options)))
+
+
+def _command(words: list[str], options: "Options") -> str:
+    """Calibrate the arm that is named from the files behind it, with the options that were no defaults."""
+    given = " ".join(typed(word) for word in (*words, *option_words(options)))
+    return f"truearm calibrate {given} -o result"
+
+
+def _not_kept(options: "Options") -> list[str]:
+    """A sentence on options that the command cannot be told, if there are any."""
+    missing = options_without_words(options)
+    if not missing:
+        return []
+    given = ", ".join(f"{name}={value!r}" for name, value in missing.items())
+    return [f"The command has no option for {given}: calibrate from Python to keep that."]
 
 
 def _files(calibration: "Calibration") -> tuple[list[str], list[str]]:

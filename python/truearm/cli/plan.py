@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from truearm.cli import plan_options as option
-from truearm.cli.again import Again, calibrate_again
+from truearm.cli.again import NEW_FILE, Again, calibrate_again
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
@@ -98,7 +98,7 @@ def command(
     if not as_json and cell is not None:
         suggest(f"truearm measure {typed(cell)} {typed(output)} --dry-run")
     elif not as_json:
-        suggest(f"truearm calibrate {typed(robot)} MEASUREMENTS.csv -o result", when=MEASURED)
+        suggest(f"truearm calibrate {typed(robot)} {NEW_FILE} -o result", when=MEASURED)
 
 
 def room(floor_mm: float | None, box_mm: str | None) -> "tuple[Rule, ...]":
@@ -220,12 +220,16 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
     _print_proposed(proposed, output)
     _print_features(calibration.options.features)
     if asked.acceptance is not None:
-        suggest(f"truearm update {typed(asked.calibration)} MEASUREMENTS.csv", when=MEASURED)
+        suggest(f"truearm update {typed(asked.calibration)} {NEW_FILE}", when=MEASURED)
     else:
-        _suggest_again(calibrate_again(calibration, asked.robot, "MEASUREMENTS.csv"))
+        _suggest_again(calibrate_again(calibration, asked.robot, NEW_FILE), asked.calibration)
 
 
-def _suggest_again(again: Again) -> None:
+def _suggest_again(again: Again, calibration: Path) -> None:
+    say_wrapped(
+        "Older rows count only if the arm has not changed since: "
+        f"truearm update {typed(calibration)} {NEW_FILE} tells."
+    )
     for note in again.notes:
         say_wrapped(note)
     suggest(again.command, when="Then calibrate:" if again.notes else "Then calibrate from all:")

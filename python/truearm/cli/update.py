@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import typer
 
 from truearm.cli import update_options as option
+from truearm.cli.again import calibrate_anew, plan_anew
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, Use
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.given import given_options
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 UPDATE_NAME: Final = "update.json"
 SUFFIX: Final = ".calib"
+FROM_NEW_ROWS: Final = "The old rows are of the arm as it was: calibrate from new ones alone."
 
 
 def command(
@@ -163,7 +165,9 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
         given: The measurements, and the options that the command was given, as they were typed.
     """
     if found.verdict == "field":
-        suggest(f"truearm plan --next 20 --from {typed(old)} -o poses.csv", when="Poses that teach most:")
+        anew = calibrate_anew(known)
+        say_wrapped(" ".join((FROM_NEW_ROWS, *anew.notes)))
+        suggest(plan_anew(known), anew.command, when="Measure anew:")
     elif place is not None:
         suggest(f"truearm update --roll-back {typed(place)} -o OLD.calib", when="Back to the old one:")
     elif found.verdict == "moved":
@@ -188,8 +192,9 @@ def _verdict(found: "Update") -> str:
     kept = way_out_of_keeping(found.kept)
     return (
         f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "
-        f"{kept and f'{kept}. '}Measure again and calibrate. If the measuring device scatters more than when "
-        "the arm was calibrated, say so in a column sigma_mm and update again."
+        f"{kept and f'{kept}. '}Check that these are measurements of this arm. If they are, measure anew and "
+        "calibrate. If the measuring device scatters more than when the arm was calibrated, say so in a "
+        "column sigma_mm and update again."
     )
 
 

@@ -96,7 +96,8 @@ def _no_longer_fits(facts: Facts) -> Iterator[Advice]:
     if facts.update is not None and facts.update["verdict"] == "field":
         words = (
             f"{listed(facts.update['estimated']).capitalize()} do not explain what the update measured. "
-            "Measure more poses, truearm plan --next says which first, and calibrate."
+            "Check that these are measurements of this arm. If they are, measure as many poses as it was "
+            "calibrated from, and calibrate from these alone: older rows are of the arm as it was."
         )
         yield Advice("calibrate_anew", "Calibrate anew.", words, 10.0 * facts.mean_mm())
 
