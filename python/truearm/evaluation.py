@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm._core import Setup, fit_constant
+from truearm.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
 from truearm.calibration import Calibration
 from truearm.core_set import Use, core_set, rotations, select
 from truearm.defaults import FIRST_TARGET, SEED
@@ -34,8 +35,6 @@ Rows = NDArray[np.int64]
 
 MOST_FRAME_ROWS: Final = 400
 FEWEST_FRAME_ROWS: Final = 3
-AS_KNOWN: Final = 2.0
-"""A calibration whose error is within this factor of that on its own held-out rows fits."""
 
 
 @dataclass(frozen=True)
@@ -150,8 +149,8 @@ def evaluate(
         errors = judge(task, models, chosen_rows, found_by)
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
-        spoiled, outliers = _gross(task, calibration, models[best], found_by, rows, chosen)
-    of_no_use = spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration))
+        spoiled, outliers, changed = _gross(task, calibration, models[best], found_by, rows, chosen)
+    of_no_use = spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration)) or changed
     if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
         of_no_use = _moved(calibration, data, chosen, errors[best]) or of_no_use
     notices = [*notices, *of_no_use, *outliers]
@@ -214,7 +213,8 @@ def _moved(
         return []
     best = calibration.model_name
     known = calibration.validation.holdout.get(best)
-    if anew.rows is None or known is None or {NO_HELP, FAR_ROWS} & {notice.kind for notice in anew.notices}:
+    misses = {NO_HELP, FAR_ROWS, NOT_AS_CALIBRATED} & {notice.kind for notice in anew.notices}
+    if anew.rows is None or known is None or misses:
         return []
     before, after = (
         MM_PER_METRE * float(np.nanmedian(errors.distance_m)) for errors in (kept, anew.rows.errors[best])
@@ -240,8 +240,9 @@ def _gross(
     frame: Measurements,
     held: tuple[Measurements, HeldRows],
     options: EvaluationOptions,
-) -> tuple[list[Notice], list[Notice]]:
-    """Notices of rows that spoil frame and tool, and of gross ones among those that were judged.
+) -> tuple[list[Notice], list[Notice], list[Notice]]:
+    """Notices of rows that spoil frame and tool, of gross ones among those that were judged, and that the arm
+    is not as it was calibrated.
 
     Where frame and tool are found, a robust fit says where the first of them belong.
     """
@@ -250,13 +251,14 @@ def _gross(
     of_frame = Expected(task, calibration, model, frame, **finds)
     judged = Expected(task, calibration, model, held[0], **finds)
     outliers = gross_judged_rows(judged, of_frame, held[1])
+    changed = not_as_calibrated(judged, of_frame, held[1])
     if finds["finds_tool"]:
         measured = core_set(task.arm.robot, frame, task.selection, task.groups)
         with core_errors(frame):
             chosen = fit_options(task, parameters=of_frame.parameters, robust="cauchy")
             setup = fit_constant(task.problem(measured, []), chosen).setup
         of_frame = replace(of_frame, model=replace(model, setup=setup))
-    return gross_frame_rows(of_frame), outliers
+    return gross_frame_rows(of_frame), outliers, changed
 
 
 def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:

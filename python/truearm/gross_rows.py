@@ -89,28 +89,32 @@ class Expected:
         parts += [turned] if self.finds_tool else []
         return np.concatenate(parts, axis=2) if parts else np.empty((len(points), AXES, 0))
 
-    def length_m(self, row: int) -> float:
-        """Root mean square length of the error that the calibration expects at a row, m.
+    def lengths_m(self, rows: Rows) -> Floats:
+        """Root mean square lengths (m,) of the errors that the calibration expects at rows, m.
 
         Its standard deviation there, what it leaves unexplained, and the row's own sigma. Where it does not
         know the first, the bound of it; where there is none either, the others alone.
         """
-        own = 0.0 if self.data.sigma_m is None else float(np.nan_to_num(self.data.sigma_m[row]))
+        own = np.zeros(len(rows)) if self.data.sigma_m is None else np.nan_to_num(self.data.sigma_m[rows])
         noise = noise_mm(self.calibration) / MM_PER_METRE
         squares = AXES * (noise**2 + own**2)
-        reading = self.data.readings[row : row + 1]
-        tool = self.tools[row]
-        names = self.task.options.features
-        features = {name: self.data.features[name].to_numpy()[row : row + 1] for name in names}
+        kinds, kind = np.unique(self.tools[rows], axis=0, return_inverse=True)
+        for number, tool in enumerate(kinds):
+            alike = kind.ravel() == number
+            squares[alike] += self._variances(rows[alike], tool)
+        return np.asarray(np.sqrt(squares))
+
+    def _variances(self, rows: Rows, tool: Floats) -> Floats:
+        """Variances (m,) of a tool's position at rows, coordinates together, m^2, or what bounds them."""
+        readings, names = self.data.readings[rows], self.task.options.features
+        features = {name: self.data.features[name].to_numpy()[rows] for name in names}
         try:
-            squares += float(
-                np.square(self.calibration.position_std(reading, tool=tool, features=features)).sum()
-            )
+            std = self.calibration.position_std(readings, tool=tool, features=features)
         except WorkError:
-            if self.calibration.has_conservative:
-                bound = self.calibration.conservative_std(reading, tool=tool, features=features)
-                squares += float(bound[0, 0]) ** 2
-        return float(np.sqrt(squares))
+            if not self.calibration.has_conservative:
+                return np.zeros(len(rows))
+            std = self.calibration.conservative_std(readings, tool=tool, features=features)[:, :1]
+        return np.asarray(np.square(std).sum(axis=1))
 
     def measured(self, errors: Floats) -> Iterator[Rows]:
         """The rows of each set-up whose errors (n, 3) are known."""
@@ -155,11 +159,11 @@ def gross_judged_rows(found: Expected, frame: Expected, held: HeldRows) -> list[
         if not len(rows):
             continue
         in_frame = frame.jacobian[frame.data.group == found.data.group[rows[0]]]
-        lengths = _widened(errors[rows], found.jacobian[rows], in_frame)
+        lengths = widened(errors[rows], found.jacobian[rows], in_frame)
         usual = float(np.median(lengths))
         for place in np.flatnonzero(lengths > UNUSUAL * usual):
             row = int(rows[place])
-            if lengths[place] > FAR * found.length_m(row):
+            if lengths[place] > FAR * found.lengths_m(np.array([row]))[0]:
                 far[row] = float(np.linalg.norm(errors[row]))
     if not far:
         return []
@@ -185,7 +189,7 @@ def _contradicted(found: Expected, rows: Rows) -> dict[int, float]:
         worst, length = int(np.flatnonzero(kept)[lengths.argmax()]), float(lengths.max())
         kept[worst] = False
         usual = float(np.median(left_out(errors[kept], jacobian[kept]).lengths))
-        if length <= UNUSUAL * usual or length <= FAR * found.length_m(int(rows[worst])):
+        if length <= UNUSUAL * usual or length <= FAR * found.lengths_m(rows[[worst]])[0]:
             kept[worst] = True
             break
     moved = np.linalg.lstsq(jacobian[kept].reshape(-1, jacobian.shape[2]), errors[kept].ravel())[0]
@@ -193,7 +197,7 @@ def _contradicted(found: Expected, rows: Rows) -> dict[int, float]:
     return {int(rows[k]): float(distances[k]) for k in np.flatnonzero(~kept)}
 
 
-def _widened(errors: Floats, jacobian: Floats, in_frame: Floats) -> Floats:
+def widened(errors: Floats, jacobian: Floats, in_frame: Floats) -> Floats:
     """Lengths (n,) of errors (n, 3), in units in which what `in_frame` (m, 3, p) leaves uncertain is noise.
 
     Where few rows found frame and tool, both are uncertain, at some places much more than at others.

@@ -1,19 +1,29 @@
 """`truearm evaluate`: errors of a calibration on other measurements."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from truearm.cli.arguments import AngleUnit, AsJson, CalibFile, LengthUnit, MeasurementFiles, Use
 from truearm.cli.console import print_json, say, suggest, warn
+from truearm.cli.given import given_options
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import told_stages
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.errors import count_of, typed
 
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
+    from truearm.evaluation import Evaluation
+
+NOT_OF_UPDATE: Final = ("seed", "judge_target", "frame_rows", "keep_tool", "keep_frames", "as_json")
+"""Options of an evaluation that an update has not, or not in this sense."""
+
 
 def command(
+    context: typer.Context,
     calibration: CalibFile,
     measurements: MeasurementFiles,
     seed: Annotated[int, typer.Option(help="Seed of the draw of frame rows.")] = SEED,
@@ -43,9 +53,7 @@ def command(
     """
     from truearm.calibration import Calibration
     from truearm.cli.error_tables import print_errors
-    from truearm.doubts import OF_NO_USE
     from truearm.evaluation import EvaluationOptions, evaluate
-    from truearm.gross_rows import FAR_ROWS
     from truearm.measurements import Measurements
 
     options = EvaluationOptions(
@@ -73,6 +81,20 @@ def command(
     say(f"{known.robot.name}: {how}, {count_of(found.n_judged, 'row')} judged.")
     print_errors(found.errors, count_of(found.n_judged, "row"))
     others = " ".join(map(typed, measurements))
-    useful = all(notice.kind not in (*OF_NO_USE, FAR_ROWS) for notice in found.notices)
-    next_one = compensate_commands(known, calibration) if useful else []
-    suggest(f"truearm report {typed(calibration)} {others} -o other.html", *next_one)
+    update = f"truearm update {typed(calibration)} {others}{given_options(context, *NOT_OF_UPDATE)}"
+    suggest(
+        f"truearm report {typed(calibration)} {others} -o other.html",
+        *_next_commands(found, known, calibration, update),
+    )
+
+
+def _next_commands(found: "Evaluation", known: "Calibration", file: Path, update: str) -> list[str]:
+    """What to do with a calibration that was judged: `update` it where the arm is not as it was."""
+    from truearm.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
+    from truearm.doubts import OF_NO_USE
+    from truearm.gross_rows import FAR_ROWS
+
+    kinds = {notice.kind for notice in found.notices}
+    if NOT_AS_CALIBRATED in kinds:
+        return [update] if can_be_updated(known) else []
+    return [] if kinds & {*OF_NO_USE, FAR_ROWS} else compensate_commands(known, file)

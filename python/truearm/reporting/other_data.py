@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from truearm.as_calibrated import NOT_AS_CALIBRATED
 from truearm.doubts import OF_NO_USE
 from truearm.errors import count_of
+from truearm.evaluation import Evaluation
 from truearm.reporting.advice import Advice
 from truearm.reporting.facts import ROWS, Facts
 from truearm.reporting.held_errors import cumulative, histogram
@@ -14,12 +16,24 @@ from truearm.units import MM_PER_METRE
 
 
 def not_met(facts: Facts) -> list[Advice]:
-    """What to do first where the calibration is of no use on the other measurements; empty elsewhere."""
+    """What to do first where the calibration is of no use on the other measurements, or the arm is not as it
+    was; empty elsewhere.
+    """
     notices = () if facts.other is None else facts.other.notices
-    why = [notice.message for notice in notices if notice.kind in OF_NO_USE]
+    why = [notice.message for notice in notices if notice.kind in (*OF_NO_USE, NOT_AS_CALIBRATED)]
     words = f"Of {', '.join(facts.other_names)}: {' '.join(why)}"
     return (
         [Advice("other_measurements", "Look at the other measurements first.", words, np.inf)] if why else []
+    )
+
+
+def _no_help(found: Evaluation) -> str:
+    """A sentence, with a blank before it, where the calibration is of no use on the other measurements."""
+    kinds = {notice.kind for notice in found.notices}
+    if kinds & set(OF_NO_USE):
+        return " On these measurements the calibration does not help."
+    return (
+        " The arm, its tool or the set-up is not as it was calibrated." if NOT_AS_CALIBRATED in kinds else ""
     )
 
 
@@ -39,7 +53,7 @@ def other_data(facts: Facts) -> Section:
         if found.n_frame
         else "Frame and tool were kept"
     )
-    no_help = " On these measurements the calibration does not help." if not_met(facts) else ""
+    no_help = _no_help(found)
     table = Table(
         f"{', '.join(facts.other_names)}: {count_of(found.n_judged, 'row')} judged, mm",
         ["model", *HEADINGS],
