@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field
 from truearm.cell.schema import Positive, Section, checked
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed, read_text
+from truearm.fleet.keys import in_keys
 from truearm.options import Options
 
 ARM_NAME: Final = re.compile(r"\w(?:[\w .+-]{0,98}[\w+-])?")
@@ -187,9 +188,8 @@ def _options(section: ArmSection, place: str) -> Options:
     try:
         return Options.of(**given)
     except UsageError as error:
-        raise InputError(error.what, where=error.where, rule=error.rule, way_out=error.way_out).at(
-            place
-        ) from None
+        rule, way_out = in_keys(error.rule), in_keys(error.way_out)
+        raise InputError(error.what, where=error.where, rule=rule, way_out=way_out).at(place) from None
 
 
 def _check_name(name: str, place: str) -> None:

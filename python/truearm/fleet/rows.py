@@ -9,6 +9,7 @@ from typing import Any, Final
 from truearm.errors import list_outliers
 from truearm.fleet.attention import ATTENTION, FAILED, GOOD, Reason, order, reasons
 from truearm.fleet.fleet_file import Fleet
+from truearm.fleet.keys import in_keys
 from truearm.fleet.task import ArmMade
 from truearm.models import NOMINAL
 from truearm.workers import is_expected
@@ -95,8 +96,8 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "determined": summary["identifiability"]["rank"],
         "parameters": summary["identifiability"]["parameters"],
         "drift": made.drift,
-        "notices": summary["notices"],
-        "grave": made.grave,
+        "notices": [in_keys(notice) for notice in summary["notices"]],
+        "grave": [in_keys(notice) for notice in made.grave],
     }
 
 
@@ -108,7 +109,7 @@ def _are_of_several(outliers: Sequence[Mapping[str, Any]]) -> bool:
 def row_of_failed(arm: str, error: Exception, earlier: Sequence[str] = ()) -> Row:
     """The row of an arm that could not be calibrated; `earlier` are names of results of an earlier run."""
     kind = type(error).__name__
-    words = str(error) if is_expected(error) else f"{kind}: {error}"
+    words = in_keys(str(error)) if is_expected(error) else f"{kind}: {error}"
     return {"arm": arm, "status": FAILED, "error": words, "kind": kind, "earlier": list(earlier)}
 
 
