@@ -193,9 +193,10 @@ SERIES = (
 )
 
 
-def test_a_terminal_shows_a_bar_with_the_time_left_and_takes_it_away():
-    shown = on_a_terminal(SERIES)
-    assert "Seed 2 of 2" in shown
+@pytest.mark.parametrize("left", ["", " that are left"])
+def test_a_terminal_shows_a_bar_with_the_time_left_and_takes_it_away(left):
+    shown = on_a_terminal(SERIES.replace("} of 2", f"}} of 2{left}"))
+    assert f"Seed 2 of 2{left}" in shown
     assert "50 %" in shown
     assert "s left" in shown
     assert "\x1b[?25h" in shown, "the cursor is back"

@@ -96,6 +96,8 @@ def test_drift_is_what_changed_and_not_noise(runs, plant):
     true_mm = 1e3 * np.linalg.norm(one.true_position(q) - other.true_position(q), axis=1)
     assert 0.5 < found["R3"]["mean_mm"] / true_mm.mean() < 2.0, "but for what belongs to base and target"
     assert found["R3"]["share_beyond"] == 1.0
+    first = {name: arm.row["mean_mm"] for name, arm in by_name(runs[0]).items()}
+    assert {name: drift["previous_mean_mm"] for name, drift in found.items()} == first
     assert found["R3"]["moved"]
     assert min(entry["standard_errors"] for entry in found["R3"]["moved"]) > MOVED
     for name in ("R1", "R2"):
@@ -149,6 +151,19 @@ def test_finished_arms_are_not_done_again(plant, again):
     other = FIRST.replace('name = "R3"', 'name = "R3"\nseed = 8')
     assert run_fleet(Fleet.from_toml(other, folder=plant), again, workers=1).done_before == 0
     assert run_fleet(Fleet.from_toml(other, folder=plant), again).done_before == 3
+
+
+def test_progress_says_that_it_counts_the_arms_that_are_left(plant, again):
+    named = []
+
+    @contextmanager
+    def stages(name):
+        named.append(name)
+        yield
+
+    (again / "R1" / "arm.json").unlink()
+    run_fleet(Fleet.from_toml(FIRST, folder=plant), again, workers=1, stages=stages)
+    assert named == ["looking for what is done", "arm 1 of 1 that are left"]
 
 
 def test_limits_can_be_changed_without_new_fits(plant, again):
@@ -256,6 +271,9 @@ SURE = {**DRIFT, "share_beyond": 0.9}
         ({"drift": SURE}, {"drift_mm": 0.5}, []),
         ({"drift": DRIFT}, {"drift_mm": 0.1}, ["drift"]),
         ({"drift": {**DRIFT, "share_beyond": None}}, {}, []),
+        ({"drift": {**DRIFT, "previous_mean_mm": 0.04}}, {}, ["worse"]),
+        ({"drift": {**DRIFT, "previous_mean_mm": 0.06}}, {}, []),
+        ({"drift": {**DRIFT, "previous_mean_mm": 0.04}}, {"mean_mm": 0.2}, []),
     ],
 )
 def test_reasons(changed, limits, kinds):
@@ -292,6 +310,12 @@ def test_outliers_are_named_on_the_page_which_may_have_no_report_to_look_into(tm
     assert words.startswith("2 of 60 rows are outliers: row ")
     assert {"row 7 (", "row 21 ("} <= set(re.findall(r"row \d+ \(", words))
     assert words in (tmp_path / "out" / "fleet.html").read_text()
+
+
+def test_an_error_that_grew_is_told_with_what_it_was():
+    row = {**ROW, "drift": {**DRIFT, "previous_mean_mm": 0.03}}
+    (found,) = reasons(row, [row], LimitsSection())
+    assert found.words == "Mean error 0.100 mm on held-out rows: it was 0.030 mm."
 
 
 def test_an_error_beyond_its_limit_is_told_as_larger():

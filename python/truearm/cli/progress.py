@@ -12,15 +12,15 @@ from truearm.cli.durations import Took, remember, remembered
 
 Stages = Callable[[str], AbstractContextManager[None]]
 
-ONE_OF: Final = re.compile(r"(?P<what>.*?)(?P<number>\d+) of (?P<total>\d+)")
+ONE_OF: Final = re.compile(r"(?P<what>.*?)(?P<number>\d+) of (?P<total>\d+)(?: that are left)?")
 
 
 def told_stages(work: str = "", size: int = 0) -> Stages:
     """Stages that say what is going on: a bar on a terminal, rare lines elsewhere.
 
-    A stage whose name ends like "seed 3 of 20" is one of a series, and the time left is told by the pace of
-    the series. Of other stages nobody knows when they end; their time left is what the same work took the
-    last time.
+    A stage whose name ends like "seed 3 of 20", or "seed 3 of 20 that are left", is one of a series, and the
+    time left is told by the pace of the series. Of other stages nobody knows when they end; their time left
+    is what the same work took the last time.
 
     Args:
         work: Names what takes as long again, such as "calibrate ur10 variable"; nothing is kept without it.

@@ -18,6 +18,8 @@ MOST_MOVED_NAMED: Final = 3
 PEERS: Final = 4
 """Arms of one kind that make a median to stand out from."""
 STANDS_OUT: Final = 2.0
+WORSE: Final = 2.0
+"""Times the mean error of the last calibration."""
 FEWEST_COVERED: Final = 0.85
 MOST_OUTLIERS: Final = 0.02
 HALF: Final = 0.5
@@ -30,8 +32,8 @@ class Reason:
     """Why an arm needs attention.
 
     Attributes:
-        kind: One word for programs: "failed", "no_gain", "doubt", "drift", "mean", "max", "stands_out",
-            "outliers" or "intervals".
+        kind: One word for programs: "failed", "no_gain", "doubt", "drift", "mean", "max", "worse",
+            "stands_out", "outliers" or "intervals".
         words: The sentence for people.
         weight: How far beyond its limit; those of one kind are sorted by it.
     """
@@ -41,7 +43,18 @@ class Reason:
     weight: float = 1.0
 
 
-KINDS: Final = ("failed", "no_gain", "doubt", "drift", "mean", "max", "stands_out", "outliers", "intervals")
+KINDS: Final = (
+    "failed",
+    "no_gain",
+    "doubt",
+    "drift",
+    "mean",
+    "max",
+    "worse",
+    "stands_out",
+    "outliers",
+    "intervals",
+)
 """The worst first."""
 
 
@@ -62,7 +75,7 @@ def reasons(arm: Row, fleet: Sequence[Row], limits: LimitsSection) -> list[Reaso
         *_beyond(arm, limits),
         *_stands_out(arm, fleet),
     ]
-    found += [*_outliers(arm), *_intervals(arm)]
+    found += [*_worse(arm, limits), *_outliers(arm), *_intervals(arm)]
     return sorted(found, key=lambda reason: KINDS.index(reason.kind))
 
 
@@ -123,6 +136,14 @@ def _beyond(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
         if limit is not None and value > limit:
             words = f"{noun} error {_above(value, limit)} mm on held-out rows, beyond {limit:g} mm."
             yield Reason(kind, words, value / limit)
+
+
+def _worse(arm: Row, limits: LimitsSection) -> Iterator[Reason]:
+    """Against the last calibration; where a limit of the mean is stated, that says what matters."""
+    was = (arm["drift"] or {}).get("previous_mean_mm")
+    if was is not None and limits.mean_mm is None and arm["mean_mm"] > WORSE * was:
+        words = f"Mean error {arm['mean_mm']:.3f} mm on held-out rows: it was {was:.3f} mm."
+        yield Reason("worse", words, arm["mean_mm"] / was)
 
 
 def _above(value: float, limit: float) -> str:

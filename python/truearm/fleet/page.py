@@ -208,7 +208,7 @@ def _meaning(fleet: Fleet) -> list[str]:
     return [
         "An arm needs attention if its calibration does not help, if data or table are doubtful or leave "
         "frame and target open, if it moved since its last calibration by more than the uncertainty of both, "
-        "if its error exceeds a limit or is far above that of its kind, if many of its rows are outliers, or "
-        "if its 95 % intervals hold too few held-out coordinates.",
+        "if its error exceeds a limit, is more than twice what it was or far above that of its kind, if many "
+        "of its rows are outliers, or if its 95 % intervals hold too few held-out coordinates.",
         f"Limits of the fleet file: {limits or 'none'}.",
     ]

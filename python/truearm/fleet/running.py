@@ -82,9 +82,10 @@ def run_fleet(
         todo = _open(fleet, folder, rows)
     before = sum(row["status"] != FAILED for row in rows.values())
     tasks = [task for _, task in todo]
+    left = "" if len(todo) == len(fleet.arms) else " that are left"
     with closing(run_tasks(calibrate_arm, tasks, scheduler=scheduler, workers=workers)) as finished:
         for number in range(1, len(todo) + 1):
-            with stages(f"arm {number} of {len(todo)}"):
+            with stages(f"arm {number} of {len(todo)}{left}"):
                 done = next(finished)
             inputs = todo[done.index][0]
             rows[inputs.entry.name] = _row(inputs, done, folder)
