@@ -1,5 +1,7 @@
 """MELFA BASIC programs: variables, flags, tools and offsets, and what is left as it is."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -378,6 +380,23 @@ def test_waypoints_before_joints_are_joints_in_joint_variables(robot, name):
     assert names[names.index(name) + 1 :][:2] == ["P2", "P4"]
     said = says(MELFA, done.contents[0], robot, FLANGE)[again.moves.target]
     assert (np.diff(said[: len(way) + 2, 0]) > 0.0).all(), "in the order of the way"
+
+
+def test_angles_of_waypoints_lie_within_half_a_turn(robot):
+    text = long_line(robot, ["Mov P1", "Mvs P3", "Mvs P1", "End"])
+    turned = re.sub(r"([+-][\d.]+)\)\(", lambda c: f"{float(c.group(1)) + 360.0:+.3f})(", text)
+    plain, done = (
+        rewritten(MELFA, one, robot, by=Bend(), frames=FLANGE, spacing=FINE_STEPS) for one in (text, turned)
+    )
+    assert done.inserted == plain.inserted >= 4
+    angles = {
+        name: float(angle)
+        for name, angle in re.findall(r"(P\d+)=\(.*,([+-]?[\d.]+)\)\(", done.contents[0].decode())
+    }
+    assert min(abs(angles.pop(name)) for name in ("P1", "P3")) > 180.0, "targets keep their notation"
+    assert max(abs(angle) for angle in angles.values()) <= 180.0
+    said = says(MELFA, done.contents[0], robot, FLANGE)
+    np.testing.assert_allclose(said, says(MELFA, plain.contents[0], robot, FLANGE), atol=1e-5)
 
 
 def test_numbers_out_of_order_stay(robot):

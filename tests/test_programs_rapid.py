@@ -103,6 +103,14 @@ def test_only_numbers_change():
     assert "! CONST robtarget pX:=[[1,2 is no code" in after
 
 
+def test_a_number_with_an_exponent_gets_the_decimals_of_its_unit():
+    place = "[[0,10,1.2E-07,-3.5e-10,3.0E1,-3.7185420358343666e-18]"
+    text = f"MoveAbsJ {place},{UNUSED}],v1000,z50,tG;"
+    done = rewritten(read("demo.mod", module(text), ABB), models(ABB))
+    (joints,) = re.findall(r"MoveAbsJ \[\[(.*?)\]", done.contents[0].decode("latin-1"))
+    assert [len(number.partition(".")[2]) for number in joints.split(",")] == [4] * 6
+
+
 def reasons(body, data="", frames="", **others):
     done = rewritten(read("demo.mod", module(body, data, **others), ABB, frames), models(ABB))
     return {one.name: one.reason for one in done.listed}

@@ -22,7 +22,7 @@ from truearm.programs.densify import Spacing
 from truearm.programs.folding import constant
 from truearm.programs.frames import Frames
 from truearm.programs.languages import LANGUAGES, language_of
-from truearm.programs.layouts import EulerPose, Joints, QuaternionPose, RotationVectorPose
+from truearm.programs.layouts import EulerPose, Joints, QuaternionPose, RotationVectorPose, within_half_turn
 from truearm.programs.lexing import Token
 from truearm.programs.marks import MARK, mark_text
 from truearm.programs.notices import payload_notices
@@ -374,6 +374,13 @@ def test_euler_angles_at_the_pole_keep_the_third():
     layout = EulerPose()
     near = np.array([[1.0, 2.0, 3.0, 40.0, 90.0, 25.0]])
     np.testing.assert_allclose(layout.from_poses(layout.to_poses(near), near), near, atol=1e-5)
+
+
+def test_angles_within_half_a_turn():
+    values = np.array([[200.0, -400.0, 0.0, 180.0, -180.0, 190.5], [1.0, 2.0, 3.0, 540.0, -190.0, 0.0]])
+    wanted = [[200.0, -400.0, 0.0, 180.0, 180.0, -169.5], [1.0, 2.0, 3.0, 180.0, 170.0, 0.0]]
+    np.testing.assert_allclose(within_half_turn(EulerPose(), values), wanted)
+    np.testing.assert_array_equal(within_half_turn(Joints.of(ABB.joints), values), values)
 
 
 def test_turns_stay_within_limits():

@@ -13,7 +13,7 @@ from truearm.inverse import Inverse
 from truearm.kinds import check_positive
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
-from truearm.programs.layouts import of_joints, of_pose
+from truearm.programs.layouts import of_joints, of_pose, within_half_turn
 from truearm.programs.listing import listed_move
 from truearm.programs.program import LinearStep, Listed, Program, StepTexts
 from truearm.programs.tables import NOWHERE, Motion
@@ -230,6 +230,7 @@ class Densifier:
         reason = self._encoder.reasons.pop(target, None)
         if reason is not None:
             return f"waypoints between cannot be written: {reason}"
+        values = within_half_turn(layout, values)
         line, _ = program.sources[file].place(int(moves.at[move]))
         return [
             LinearStep(line, file, move, tuple(row.tolist()), tuple(digits.tolist()), room)

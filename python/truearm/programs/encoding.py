@@ -23,6 +23,8 @@ Integers = NDArray[np.int64]
 
 STEPS: Final = 4
 ALMOST: Final = 1e-9
+MOST_DECIMALS: Final = 17
+"""More than a double of some size holds; they come of an exponent."""
 AGREES_RAD: Final = 1e-3
 NOT_UNIQUE: Final = "no configuration data says its corrected readings and no others"
 CORRECTED_SINGULAR: Final = "its correction ends at a singularity, where a pose does not determine the joints"
@@ -174,7 +176,8 @@ class Encoder:
         if not all_ones(factors):
             lost = np.ceil(np.log10(np.abs(factors)) - ALMOST).astype(np.int64)
             values, least = values / factors, np.maximum(least + lost, 0).astype(np.int16)
-        return values, np.maximum(targets.of(targets.decimals, which, layout.width), least)
+        stated = np.minimum(targets.of(targets.decimals, which, layout.width), MOST_DECIMALS)
+        return values, np.maximum(stated, least)
 
     def _factors(self, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
         factors: Floats = self.program.targets.of(self.program.targets.factors, which, layout.width)

@@ -160,6 +160,15 @@ class EulerPose:
         return written
 
 
+def within_half_turn(layout: Layout, values: Floats) -> Floats:
+    """Numbers (n, width) of poses with angles beyond -180 and 180 deg a turn back; others as they are."""
+    if not isinstance(layout, EulerPose):
+        return values
+    within = np.array(values)
+    within[:, 3:6] -= 360.0 * np.ceil((values[:, 3:6] - 180.0) / 360.0)
+    return within
+
+
 @dataclass(frozen=True)
 class QuaternionPose:
     """X Y Z in mm and a quaternion, w first; the sign is that of the text."""

@@ -22,7 +22,6 @@ from truearm.rotations import rigid_inverse
 Transform = NDArray[np.float64]
 
 _DEEPEST: Final = 20
-MOST_DECIMALS: Final = 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,5 +216,6 @@ def _number(node: Node, place: int) -> Number:
     if not np.isfinite(value):
         raise RunTime(f"number {place} of it is too large")
     mantissa, _, exponent = node.text.lower().partition("e")
-    decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
-    return Number(node.start, node.end, value, min(max(decimals, 0), MOST_DECIMALS), factor)
+    power = int(exponent or 0)
+    decimals = max(len(mantissa.partition(".")[2]) - power, 0) if power >= 0 else 0
+    return Number(node.start, node.end, value, decimals, factor)
