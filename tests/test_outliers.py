@@ -78,7 +78,7 @@ def test_what_is_fitted_is_said_to_be_without_outliers_that_were_taken_out(tmp_p
     assert "Outliers, taken out of the fits: row 12 (" in printed
     assert "Constants, frame and tool are without them where they bend these." in printed
     text = words_of(report(ta.Calibration.load("out/calibration.calib")).html)
-    assert "the calibration in the file is fitted to 60 but 1 outlier" in text
+    assert "the calibration in the file is fitted to 60 but for 1 outlier" in text
     assert "Outliers were taken out of the fit of what varies, and of constants" in text
     assert "They were taken out of the fits;" in text
     assert main(["calibrate", "rv-m2", "m.csv", "-o", "constant", "--model", "constant"]) == 0

@@ -49,7 +49,7 @@ def _rows(facts: Facts, fitted: int | None) -> str:
     if fitted is None:
         return said
     without = taken_out(facts.calibration)
-    but = f" but {count_of(without, 'outlier')}" if without else ""
+    but = f" but for {count_of(without, 'outlier')}" if without else ""
     return f"{said}; the calibration in the file is fitted to {fitted}{but}"
 
 
