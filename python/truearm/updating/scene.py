@@ -16,6 +16,7 @@ from truearm.fitting import FRAME_UNKNOWNS, Task, core_errors, fit_options
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse
+from truearm.uncertainty import noises_of
 from truearm.updating.unknowns import OPEN, Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
@@ -166,9 +167,24 @@ class Scene:
         """Covariance (R, R) of what rows show anew: noise, and what the device says of itself."""
         jacobian, _ = linearise(self.problem, self._moved_parameters(state), state.setup)
         noise, seen = self._calibration.spread.noise(jacobian, self.orientation), self.seen.reshape(-1)
-        own = np.zeros(len(self.data)) if self.data.sigma_m is None else np.nan_to_num(self.data.sigma_m)
-        whole = block_diag(*(noise + (own[:, None, None] ** 2) * np.diag(~self.orientation)))
+        own = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
+        whole = block_diag(*(noise + own))
         return np.asarray(whole[np.ix_(seen, seen)])
+
+    def _stated_beyond_noise(self) -> Floats:
+        """Variances (n,) of what rows state as their sigma, beyond the noise that holds the device's already.
+
+        It does where the calibration's own rows stated none: then the larger of both counts. What constants
+        alone leave is mostly the arm's, and holds no sigma.
+        """
+        if self.data.sigma_m is None:
+            return np.zeros(len(self.data))
+        stated, details = np.nan_to_num(self.data.sigma_m) ** 2, self._calibration.variable
+        learned = self._calibration.learned_from
+        if details is None or learned is None or learned.data.sigma_m is not None:
+            return stated
+        noise, _ = noises_of(details.hyper)
+        return np.maximum(stated - (details.inflation * noise) ** 2, 0.0)
 
     def _moved_parameters(self, state: State) -> Floats:
         """Parameters (n, L, 5) of the arm in a state."""

@@ -1,0 +1,49 @@
+"""What the rows of an update state as their sigma, beside the noise of the calibration."""
+
+import pytest
+
+import truearm as ta
+from truearm.simulation import VirtualArm
+from truearm.uncertainty import noises_of
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return VirtualArm.paper(seed=2)
+
+
+@pytest.fixture(scope="module")
+def silent(arm):
+    """A calibration whose rows stated no sigma."""
+    return ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
+
+
+@pytest.fixture(scope="module")
+def later(arm):
+    return arm.measure_table(arm.poses(15, seed=8), seed=8)
+
+
+def rest(calibration, table):
+    return ta.update(calibration, ta.Measurements.from_dataframe(table)).rest.squares
+
+
+def noise_mm(calibration):
+    return 1e3 * calibration.variable.inflation * noises_of(calibration.variable.hyper)[0]
+
+
+def test_a_sigma_that_the_noise_holds_already_changes_nothing(silent, later):
+    without = rest(silent, later)
+    assert rest(silent, later.assign(sigma_mm=0.99 * noise_mm(silent))) == pytest.approx(without, rel=1e-6)
+    assert rest(silent, later.assign(sigma_mm=2.0 * noise_mm(silent))) < without
+
+
+def test_a_sigma_comes_on_top_of_noise_that_was_told_beside_one(arm, later):
+    rows = arm.measure_table(arm.poses(60)).assign(sigma_mm=0.01)
+    stated = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(rows))
+    assert rest(stated, later.assign(sigma_mm=0.99 * noise_mm(stated))) < rest(stated, later)
+
+
+def test_a_sigma_comes_on_top_of_what_constants_alone_leave(arm, later):
+    constant = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
+    sigma_mm = 0.5e3 * constant.constant.noise_m
+    assert rest(constant, later.assign(sigma_mm=sigma_mm)) < rest(constant, later)
