@@ -12,7 +12,6 @@ from truearm._core import (
     fit_constant,
     fit_field,
     identifiability,
-    linearise,
 )
 
 LINKS = np.array(
@@ -28,7 +27,6 @@ LINKS = np.array(
 COLUMNS = [k for k in range(30) if k % 5 != 4]
 TARGET = np.array([0.05, 0.02, 0.1])
 CHAIN = Chain("standard", ["revolute"] * 6, LINKS, np.eye(4), np.eye(4))
-SETUP = Setup(np.eye(4)[None], TARGET[None, None], np.eye(3)[None], np.zeros((1, 3)))
 PRIOR = (2e-3, 2e-3, True)
 
 
@@ -103,9 +101,6 @@ def test_a_field_is_not_fitted_to_distances():
     problem = Problem(CHAIN, measured(q, targets=np.zeros((40, 0, 3)), distances=distances), COLUMNS)
     with pytest.raises(CoreError, match="points are needed"):
         field(problem, 40)
-    several = measured(q, targets=np.full((40, 2, 3), np.nan), distances=distances)
-    with pytest.raises(CoreError, match="points are needed"):
-        linearise(Problem(CHAIN, several, COLUMNS), LINKS, SETUP)
 
 
 def test_a_field_of_poses_that_nobody_trusts_is_fitted_all_the_same():
