@@ -79,7 +79,7 @@ fn five_of_six_joints_meet_the_direction_of_the_tool() {
     accepted(&scene, options(Task::Axis, Some(vec![0, 1, 2, 3, 4])), |i, from, to| {
         let (meant, real) = (scene.meant(from)[0], scene.real(to)[0]);
         let (a, b) = (axis(&meant), axis(&real));
-        let tilt = norm([a[0] - b[0], a[1] - b[1], a[2] - b[2]]);
+        let tilt = (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
         assert!(distance(&meant, &real) < MET && tilt < 1e-7, "waypoint {i}: {tilt:e}");
         assert_eq!(from[5], to[5], "waypoint {i}");
     });
