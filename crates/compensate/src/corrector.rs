@@ -92,7 +92,8 @@ impl Corrector {
     /// A corrector for a tool.
     ///
     /// # Errors
-    /// [`CompensateError`] if the models have different joints, the programming one varies with features, the tool is no rigid motion, or an option breaks a rule.
+    /// [`CompensateError`] if the models have different joints, the programming one varies with features, the tool is no
+    /// rigid motion, or an option breaks a rule.
     pub fn new(
         calibrated: Arc<Model>,
         programming: Arc<Model>,
