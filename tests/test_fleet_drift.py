@@ -1,11 +1,15 @@
 """How far an arm of a fleet has moved away from its last calibration, and how surely that is seen."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import truearm as ta
+from tests.nests import a_target_a_row
 from tests.remastered import remastered
 from truearm.fleet.drift import MOST_POSES, drift_of
+from truearm.fleet.task import ArmTask, calibrate_arm
 from truearm.simulation import VirtualArm
 
 SHIFT_DEG = (0.0, 0.2, 0.0, 0.0)
@@ -49,3 +53,18 @@ def test_standard_deviations_are_asked_for_at_some_of_many_poses(scara, monkeypa
     monkeypatch.setattr(ta.Calibration, "position_std", position_std)
     assert drift_of(previous, previous, many)["poses"] == len(many)
     assert asked == [MOST_POSES, MOST_POSES]
+
+
+def test_nests_in_rows_of_their_own_are_one_pose_of_the_drift(scara):
+    (previous, _, _), (rows, _, _) = scara
+    wide = replace(rows, targets=np.repeat(rows.targets, 3, axis=1))
+    task = ArmTask(
+        robot=previous.robot.to_dict(),
+        data=a_target_a_row(wide),
+        options=ta.Options(model="constant"),
+        previous=previous.to_bytes(),
+        previous_name="previous.calib",
+        strip=True,
+        with_report=False,
+    )
+    assert calibrate_arm(task).drift["poses"] == len(rows)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.nests import a_target_a_row
 from truearm.points_together import KIND, points_together
 from truearm.simulation import VirtualArm
 
@@ -19,15 +20,6 @@ def wide(sigma=False):
     parts = [arm.measure(q, seed=k) for k in range(3)]
     targets = np.concatenate([part.targets for part in parts], axis=1)
     return arm, replace(parts[0], targets=targets, sigma_m=np.full(POSES, 1e-5) if sigma else None)
-
-
-def a_target_a_row(data):
-    """The same with a row for each target, in the order of the poses."""
-    which = np.tile(np.arange(3), len(data))
-    rows = data.select(np.repeat(np.arange(len(data)), 3))
-    alone = np.full(rows.targets.shape, np.nan)
-    alone[np.arange(len(which)), which] = rows.targets[np.arange(len(which)), which]
-    return replace(rows, targets=alone, rows=np.arange(1, len(which) + 1))
 
 
 @pytest.mark.parametrize("sigma", [False, True])

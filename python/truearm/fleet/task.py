@@ -10,6 +10,7 @@ from truearm.fleet.doubted import grave_notices
 from truearm.fleet.drift import check_comparable, drift_of
 from truearm.measurements import Measurements
 from truearm.options import Options
+from truearm.points_together import points_together
 from truearm.reporting.report import report
 from truearm.robot import Robot
 from truearm.summary import distance_at_floor_mm
@@ -73,12 +74,13 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         previous = Calibration.from_bytes(task.previous, where=task.previous_name)
         check_comparable(previous, robot, task.previous_name)
     made = calibrate(robot, task.data, task.options)
+    poses, _ = points_together(task.data.deduplicated())
     return ArmMade(
         calibration=made.to_bytes(with_rows=not task.strip),
         summary=made.summary,
         model=made.model_name,
         floor_mm=distance_at_floor_mm(made),
-        drift=None if previous is None else drift_of(previous, made, task.data.deduplicated()),
+        drift=None if previous is None else drift_of(previous, made, poses),
         grave=grave_notices(made),
         report=report(made).html if task.with_report else None,
     )
