@@ -67,4 +67,6 @@ def test_nests_in_rows_of_their_own_are_one_pose_of_the_drift(scara):
         strip=True,
         with_report=False,
     )
-    assert calibrate_arm(task).drift["poses"] == len(rows)
+    drift = calibrate_arm(task).drift
+    assert drift is not None
+    assert drift["poses"] == len(rows)
