@@ -317,6 +317,7 @@ def field_options(
         "features": np.ascontiguousarray(features),
         "feature_ranges": list(ranges),
         "payloads": [k for k, name in enumerate(task.options.features) if is_payload(name)],
+        "coupling": np.ascontiguousarray(task.arm.robot.coupling),
         "degree": task.options.degree,
         "prior": task.options.prior,
         "hyper": known.exactly,

@@ -143,6 +143,8 @@ def _describe(
     cells = 1
     for axis in block["axes"]:
         cells *= axis[4]
+    if "reading" in block:
+        found["over_reading"] = True
     return found | {
         "joints": [k + 1 for k in block["inputs"] if k < joints],
         "features": [calibration.options.features[k - joints] for k in block["inputs"] if k >= joints],

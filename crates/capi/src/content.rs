@@ -58,6 +58,8 @@ pub struct BlockContent {
     pub outputs: Vec<usize>,
     /// Which way is up in the base frame; the `sag` block says it where it is not the z axis.
     pub up: Option<[f64; 3]>,
+    /// Factors of joint values whose sum is the reading that it is over, in place of a joint's value.
+    pub reading: Option<Vec<f64>>,
 }
 
 #[derive(Deserialize)]

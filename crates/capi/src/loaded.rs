@@ -133,6 +133,7 @@ fn blocks(container: &Container, stored: &[BlockContent], name: &str) -> Result<
             },
             outputs: block.outputs.clone(),
             weights,
+            reading: block.reading.clone(),
         })
     };
     stored.iter().enumerate().map(block).collect()

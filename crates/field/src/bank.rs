@@ -16,6 +16,9 @@ pub struct Block {
     pub outputs: Vec<usize>,
     /// Weights (cells, outputs), rad or m.
     pub weights: Vec<f64>,
+    /// Factors of the joint values (N,) whose sum is the only input, where that is not a joint's value but the reading of that
+    /// number.
+    pub reading: Option<Vec<f64>>,
 }
 
 /// All blocks of a field.
@@ -90,6 +93,9 @@ impl Bank {
                 });
             }
             check_weights(&block.weights, "weights of a block")?;
+            if let Some(factors) = &block.reading {
+                check_reading(factors, self.input_count, axes.len())?;
+            }
             let input = inputs.iter().copied().max().unwrap_or(0);
             if input >= self.input_count {
                 let expected = self.input_count;
@@ -150,6 +156,17 @@ impl Bank {
     pub fn cell_count(&self) -> usize {
         self.blocks.iter().map(|block| block.grid.cell_count()).sum()
     }
+}
+
+/// Refuses a reading that is no sum of inputs, or that is not alone.
+fn check_reading(factors: &[f64], inputs: usize, axes: usize) -> Result<(), FieldError> {
+    if !factors.iter().all(|factor| factor.is_finite()) {
+        return Err(FieldError::NotFinite { what: "factors of a reading" });
+    }
+    if axes != 1 || factors.is_empty() || factors.len() > inputs {
+        return Err(FieldError::Block { what: "a reading is not one sum of the arm's joint values" });
+    }
+    Ok(())
 }
 
 /// Refuses weights that are not finite, or that the tables' single precision does not hold.

@@ -27,6 +27,8 @@ pub struct Compiled {
     parameter_count: usize,
     /// Cells that a value excites, 3 or 4.
     active: usize,
+    /// Factors of the joint values whose sums are further inputs.
+    readings: Vec<Vec<f64>>,
     axes: Vec<CompiledAxis>,
     /// The same for a single pose.
     abreast: Vec<Abreast>,
@@ -48,6 +50,7 @@ impl Compiled {
             input_count: bank.input_count,
             parameter_count: bank.parameter_count,
             active: degrees.max().map_or(MOST_ACTIVE, |degree| degree + 1),
+            readings: Vec::new(),
             axes: Vec::new(),
             abreast: Vec::new(),
             lines: Vec::new(),
@@ -69,9 +72,11 @@ impl Compiled {
     }
 
     fn push(&mut self, block: &Block) {
+        let reading = block.reading.as_ref().map(|factors| self.reading(factors));
         let inputs = block.grid.inputs.iter().zip(&block.grid.axes);
-        let axes: Vec<usize> =
-            inputs.map(|(&input, axis)| self.axis(CompiledAxis::new(input, axis))).collect();
+        let axes: Vec<usize> = inputs
+            .map(|(&input, axis)| self.axis(CompiledAxis::new(reading.unwrap_or(input), axis)))
+            .collect();
         if let (&[axis], &[output]) = (&axes[..], &block.outputs[..]) {
             let single = self.single(output);
             self.lines.push(Line::new(block, (axis, &self.axes[axis]), single));
@@ -93,6 +98,16 @@ impl Compiled {
             self.axes.push(axis);
             self.axes.len() - 1
         })
+    }
+
+    /// The input that a reading is.
+    fn reading(&mut self, factors: &[f64]) -> usize {
+        let known = self.readings.iter().position(|known| known == factors);
+        self.input_count
+            + known.unwrap_or_else(|| {
+                self.readings.push(factors.to_vec());
+                self.readings.len() - 1
+            })
     }
 
     fn single(&mut self, output: usize) -> usize {
@@ -233,10 +248,21 @@ impl Compiled {
     pub fn excite_and_add<I: Isa>(&self, inputs: &[Lane], scratch: &mut FieldScratch, rows: &mut [f64]) {
         let FieldScratch { three, four, sums } = scratch;
         if self.active == MOST_ACTIVE {
-            self.group::<I, MOST_ACTIVE>(|input| inputs[input], four, sums, rows);
+            self.group::<I, MOST_ACTIVE>(|input| self.input::<I>(inputs, input), four, sums, rows);
         } else {
-            self.group::<I, 3>(|input| inputs[input], three, sums, rows);
+            self.group::<I, 3>(|input| self.input::<I>(inputs, input), three, sums, rows);
         }
+    }
+
+    /// A joint's value, a feature or a reading.
+    #[inline(always)]
+    fn input<I: Isa>(&self, inputs: &[Lane], input: usize) -> Lane {
+        let Some(reading) = input.checked_sub(self.input_count) else { return inputs[input] };
+        let mut sum = Lane::ZERO;
+        for (joint, factor) in inputs.iter().zip(&self.readings[reading]) {
+            sum = I::mul_add(*joint, Lane::splat(*factor), sum);
+        }
+        sum
     }
 
     /// How fast the joints' own lines turn or shift them: for each joint j the derivative by its value of what lines over it

@@ -286,7 +286,7 @@ fn bank(plan: &ConservativePlan, grids: Vec<Grid>, solved: &[Solved]) -> Bank {
         first = cells.end;
         let weights = cells.flat_map(|cell| solved.iter().map(move |one| one.weights[cell])).collect();
         let name = if grid.inputs.len() == 1 { "each" } else { "together" }.to_owned();
-        tables.blocks.push(Block { name, grid, outputs: (0..BOUNDED).collect(), weights });
+        tables.blocks.push(Block { name, grid, outputs: (0..BOUNDED).collect(), weights, reading: None });
     }
     tables
 }

@@ -90,8 +90,7 @@ impl Pairing {
 impl<'a> Continuous<'a> {
     /// Under given hyper-parameters.
     pub fn new(training: &'a Training, pairings: &'a [Pairing], hyper: &'a Hyper) -> Self {
-        let inputs = &training.inputs;
-        let poses = pairings.par_iter().map(|pairing| dispatch(Fill { pairing, inputs, hyper })).collect();
+        let poses = pairings.par_iter().map(|pairing| dispatch(Fill { pairing, training, hyper })).collect();
         Self { training, hyper, pairings, poses }
     }
 }
@@ -120,7 +119,7 @@ impl PairKernels for Continuous<'_> {
 
 struct Fill<'a> {
     pairing: &'a Pairing,
-    inputs: &'a [Input],
+    training: &'a Training,
     hyper: &'a Hyper,
 }
 
@@ -129,13 +128,19 @@ impl Kernel for Fill<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> PoseKernels {
-        let Self { pairing: Pairing { distances, count, .. }, inputs, hyper } = self;
+        let Self { pairing: Pairing { distances, count, .. }, training, hyper } = self;
+        let inputs = &training.inputs;
         let length = padded(*count);
         let mut own = Columns::zeros(PER_INPUT * inputs.len(), length);
         let mut smooth = Columns::zeros(PER_INPUT, length);
-        for ((input, distances), slopes) in inputs.iter().zip(distances).zip(own.iter_mut_by()) {
-            write_own::<I>(OwnKernel::of(hyper, input.kind), distances, slopes);
-            for sums in smooth.iter_mut_by() {
+        let plain = training.input_count();
+        for (k, ((input, distances), slopes)) in
+            inputs.iter().zip(distances).zip(own.iter_mut_by()).enumerate()
+        {
+            if training.has_curve(k) {
+                write_own::<I>(OwnKernel::of(hyper, input.kind), distances, slopes);
+            }
+            for sums in smooth.iter_mut_by().filter(|_| k < plain) {
                 add_smooth::<I>(input, distances, hyper, sums);
             }
         }

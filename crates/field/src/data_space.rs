@@ -58,7 +58,7 @@ impl DataSpace {
             let total: f64 = (0..training.pose_count()).map(|pose| pull[pose * columns + p]).sum();
             self.model.constant_deviation(p).powi(2) * total
         };
-        let mut bank = Bank::empty(training.inputs.len(), training.parameter_count);
+        let mut bank = Bank::empty(training.input_count(), training.parameter_count);
         bank.blocks = self.model.plans().iter().map(|plan| self.block(plan, &pull)).collect();
         bank.sag = self.model.sag(self.sag_weights(&pull));
         Solution { constant: (0..columns).map(constant).collect(), bank, setup: step }
@@ -120,8 +120,7 @@ impl DataSpace {
             weights = cells.spread(&weights, inner);
             inner *= cells.axis.count;
         }
-        let outputs = plan.driven.iter().map(|&(p, _)| training.columns[p].parameter).collect();
-        Block { name: plan.name.to_owned(), grid, outputs, weights }
+        training.block(plan, grid, weights)
     }
 
     /// What each pose's residuals (R,) would be if it had taken no part.

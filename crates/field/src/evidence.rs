@@ -374,7 +374,8 @@ impl PoseGradient<'_> {
         for (class, (factor, share)) in hyper.constant.iter().zip(shares.constants()).enumerate() {
             gradient[AT_CONSTANT + class] = factor.powi(2) * share.iter().sum::<f64>();
         }
-        let anew: f64 = shares.own().map(|share| share[0]).sum();
+        let has_curve = &self.evidence.by_column.has_curve;
+        let anew: f64 = shares.own().zip(has_curve).filter(|(_, has)| **has).map(|(share, _)| share[0]).sum();
         gradient[AT_REPEATABILITY] = hyper.repeatability.powi(2) * anew;
         gradient[noise] = shares.noise[0];
         gradient[noise + 1] = shares.noise[1];

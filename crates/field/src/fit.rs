@@ -4,6 +4,7 @@ use truearm_estimate::{Cancel, ConstantFit, Layout, Point, Prior, Problem, Setup
 
 use crate::FieldError;
 use crate::bank::Bank;
+use crate::drives::Drives;
 use crate::evidence::Evidence;
 use crate::extrapolation::extrapolation_factor;
 use crate::hyper::{Hyper, Wave};
@@ -37,6 +38,8 @@ pub struct FieldOptions {
     pub payloads: Vec<usize>,
     /// Values of the features, (n, F) row-major.
     pub feature_values: Vec<f64>,
+    /// Drives that turn several joints, with whose readings curves may go.
+    pub drives: Option<Drives>,
     /// Hyper-parameters to use instead of searching for them.
     pub hyper: Option<Hyper>,
     /// Where a fit to nearly the same measurements ended, which the search begins at.
@@ -244,7 +247,8 @@ fn rows(problem: &Problem, point: Point, options: &FieldOptions) -> Result<Joine
     }
     let begun = options.hyper.iter().chain(options.near.as_ref().map(|near| &near.hyper));
     for hyper in begun {
-        hyper.check(&joined.training.inputs, problem.chain.joint_count())?;
+        let drives = options.drives.as_ref().map_or(0, Drives::len);
+        hyper.check(&joined.training.inputs, problem.chain.joint_count(), drives)?;
     }
     Ok(joined)
 }
@@ -326,20 +330,20 @@ impl Search<'_> {
     fn trusted_beyond(&self, training: &Training, mut hyper: Hyper) -> Result<Hyper, FieldError> {
         let trusted = training.trusted();
         let told = if trusted.pose_count() == 0 { training } else { &trusted };
-        let large = part_of(told, ROWS_FOR_EXTRAPOLATION, 0).lifted(hyper.up)?;
+        let large = part_of(told, ROWS_FOR_EXTRAPOLATION, 0).under(&hyper)?;
         hyper.extrapolation =
             extrapolation_factor(&large, &hyper, self.options.degree, &self.options.cancel)?;
         Ok(hyper)
     }
 
     fn widened(&self, training: &Training, hyper: &Hyper) -> Result<Hyper, FieldError> {
-        let middle = middle_of(training).lifted(hyper.up)?;
+        let middle = middle_of(training).under(hyper)?;
         with_widenings(&Evidence::new(&middle, &self.options.cancel), hyper)
     }
 
     /// The waves of single joints that the residuals show under hyper-parameters.
     fn waves(&self, training: &Training, hyper: &Hyper) -> Result<Vec<Wave>, FieldError> {
-        let large = part_of(training, ROWS_FOR_POLISH, 0).lifted(hyper.up)?;
+        let large = part_of(training, ROWS_FOR_POLISH, 0).under(hyper)?;
         find_waves(&large, hyper, &self.options.cancel)
     }
 
@@ -357,7 +361,22 @@ impl Search<'_> {
         self.widened(training, &found)
     }
 
+    /// The more probable of hyper-parameters whose curves go with joint values, and with readings of coupled joints.
     fn searched(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
+        let mut found = self.searched_in(training, noise)?;
+        if training.drives.is_some() {
+            let other = self.searched_in(&training.clone().by_readings(), noise)?;
+            if other.value > found.value {
+                found.hyper = Hyper { by_readings: true, ..other.hyper };
+                found.value = other.value;
+            }
+            found.evaluations += other.evaluations;
+        }
+        self.note(&found);
+        Ok(found.hyper)
+    }
+
+    fn searched_in(&self, training: &Training, noise: [f64; 2]) -> Result<Found, FieldError> {
         let joints = self.problem.measurements.joint_count;
         let small = part_of(training, ROWS_FOR_SELECTION, POSES_FOR_SELECTION);
         let chosen = select_major(&small, joints, noise, &self.options.cancel)?;
@@ -368,14 +387,12 @@ impl Search<'_> {
         found.evaluations += chosen.evaluations;
         let found = contest_major(&evidence, found, joints)?;
         let found = prune_major(&evidence, found)?;
-        let found = refine_more(&evidence, found, POLISH)?;
-        self.note(&found);
-        Ok(found.hyper)
+        refine_more(&evidence, found, POLISH)
     }
 
     /// Hyper-parameters from present ones, on as many rows as can be afforded.
     fn again(&mut self, training: &Training, hyper: Hyper) -> Result<Hyper, FieldError> {
-        let large = part_of(training, ROWS_FOR_POLISH, 0).lifted(hyper.up)?;
+        let large = part_of(training, ROWS_FOR_POLISH, 0).under(&hyper)?;
         let evidence = Evidence::new(&large, &self.options.cancel);
         let found = refine(&evidence, hyper, POLISH)?;
         self.note(&found);
@@ -385,7 +402,7 @@ impl Search<'_> {
     /// Logarithm of the evidence of hyper-parameters on some rows.
     fn value(&mut self, training: &Training, hyper: &Hyper) -> Result<f64, FieldError> {
         self.evaluations += 1;
-        Evidence::new(&training.clone().lifted(hyper.up)?, &self.options.cancel).value(hyper)
+        Evidence::new(&training.clone().under(hyper)?, &self.options.cancel).value(hyper)
     }
 
     fn note(&mut self, found: &Found) {

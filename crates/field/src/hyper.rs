@@ -24,7 +24,7 @@ pub struct Product {
 /// A wave of one joint's angle or way, as gears, encoders and screws leave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wave {
-    /// The joint, from 0.
+    /// The input: a joint, from 0, or a reading behind all joints and features.
     pub joint: usize,
     /// Its phase by the joint's value: cycles a turn; where the joint slides, rad/m.
     pub cycles: f64,
@@ -56,6 +56,8 @@ pub struct Hyper {
     pub sag: f64,
     /// The direction, in the base frame, against which `sag` takes links to weigh.
     pub up: [f64; 3],
+    /// Whether what drives of coupled joints leave goes with their readings, and not with joint values.
+    pub by_readings: bool,
     /// Blocks over several joints together.
     pub products: Vec<Product>,
     /// Waves of single joints; they are found by a scan and not by the optimiser.
@@ -175,6 +177,7 @@ impl Hyper {
             repeatability: REPEATABILITY.start,
             sag: SAG.start,
             up: UPRIGHT,
+            by_readings: false,
             products,
             waves: Vec::new(),
             noise,

@@ -11,11 +11,12 @@ const MOST_CYCLES: f64 = 1e4;
 const LONGEST_SCALE: f64 = 1e3;
 
 impl Hyper {
-    /// Checks what a file may say of an arm of so many joints: joints that there are, and waves that some drive may leave.
+    /// Checks what a file may say of an arm of so many joints, and so many drives that turn several of them: joints that there
+    /// are, and waves that some drive may leave.
     ///
     /// # Errors
     /// [`FieldError::Hyper`].
-    pub fn check(&self, inputs: &[Input], joints: usize) -> Result<(), FieldError> {
+    pub fn check(&self, inputs: &[Input], joints: usize, drives: usize) -> Result<(), FieldError> {
         let refuse = |what| Err(FieldError::Hyper { what });
         self.check_numbers()?;
         if self.products.iter().any(|product| product.joints.len() > MOST_AXES) {
@@ -46,8 +47,12 @@ impl Hyper {
         if self.waves.len() > MOST_WAVES {
             return refuse("there are more waves than an arm has drives");
         }
+        if self.by_readings && drives == 0 {
+            return refuse("curves go with readings of an arm whose joints are not coupled");
+        }
+        let readings = inputs.len()..inputs.len() + if self.by_readings { drives } else { 0 };
         for wave in &self.waves {
-            if wave.joint >= joints {
+            if wave.joint >= joints && !readings.contains(&wave.joint) {
                 return refuse("a wave is of a joint that the arm has not");
             }
             let of_drives = wave.cycles > 0.0 && wave.cycles <= MOST_CYCLES;
@@ -98,9 +103,9 @@ mod tests {
         let inputs = [Input::ANGLE; 6];
         let good = Hyper::start(&[1, 2], 6, [1e-4, 1e-4]);
         let waved = |joint, cycles, amplitude| {
-            Hyper { waves: vec![Wave { joint, cycles, amplitude }], ..good.clone() }.check(&inputs, 6)
+            Hyper { waves: vec![Wave { joint, cycles, amplitude }], ..good.clone() }.check(&inputs, 6, 0)
         };
-        assert!(good.check(&inputs, 6).is_ok());
+        assert!(good.check(&inputs, 6, 0).is_ok());
         assert!(waved(5, 202.0, 1e-4).is_ok());
         for (joint, cycles, amplitude) in [
             (6, 202.0, 1e-4),
@@ -114,22 +119,25 @@ mod tests {
             assert!(waved(joint, cycles, amplitude).is_err(), "{joint} {cycles} {amplitude}");
         }
         for own_cycles in [-1.0, 1e17, f64::NAN] {
-            assert!(Hyper { own_cycles, ..good.clone() }.check(&inputs, 6).is_err(), "{own_cycles}");
+            assert!(Hyper { own_cycles, ..good.clone() }.check(&inputs, 6, 0).is_err(), "{own_cycles}");
         }
         for wrong in [1e13, 1e300] {
             let own = Hyper { own_length: wrong, ..good.clone() };
             let line = Hyper { smooth_line_length: wrong, ..good.clone() };
-            assert!(own.check(&inputs, 6).is_err() && line.check(&inputs, 6).is_err(), "{wrong}");
+            assert!(own.check(&inputs, 6, 0).is_err() && line.check(&inputs, 6, 0).is_err(), "{wrong}");
         }
         for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let constant = [1.0, wrong, 1.0];
-            assert!(Hyper { own_length: wrong, ..good.clone() }.check(&inputs, 6).is_err(), "length {wrong}");
-            assert!(Hyper { constant, ..good.clone() }.check(&inputs, 6).is_err(), "factor {wrong}");
+            assert!(
+                Hyper { own_length: wrong, ..good.clone() }.check(&inputs, 6, 0).is_err(),
+                "length {wrong}"
+            );
+            assert!(Hyper { constant, ..good.clone() }.check(&inputs, 6, 0).is_err(), "factor {wrong}");
         }
         let with = |spoil: &dyn Fn(&mut Hyper)| {
             let mut spoilt = good.clone();
             spoil(&mut spoilt);
-            spoilt.check(&inputs, 6)
+            spoilt.check(&inputs, 6, 0)
         };
         assert!(with(&|hyper| hyper.products[0] = Product::start(MAJOR_NAME, vec![0, 1, 2, 3])).is_err());
         assert!(with(&|hyper| hyper.products[0].lengths.truncate(1)).is_err());
@@ -145,8 +153,8 @@ mod tests {
             assert!(with(&|hyper| hyper.extrapolation = wrong).is_err(), "extrapolation {wrong}");
         }
         let elsewhere = Hyper::start(&[1, 9], 6, [1e-4, 1e-4]);
-        assert!(elsewhere.check(&inputs, 6).unwrap_err().to_string().contains("calibrate again"));
+        assert!(elsewhere.check(&inputs, 6, 0).unwrap_err().to_string().contains("calibrate again"));
         let many = vec![Wave { joint: 1, cycles: 100.0, amplitude: 1e-4 }; MOST_WAVES + 1];
-        assert!(Hyper { waves: many, ..good }.check(&inputs, 6).is_err());
+        assert!(Hyper { waves: many, ..good }.check(&inputs, 6, 0).is_err());
     }
 }

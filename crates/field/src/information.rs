@@ -99,13 +99,11 @@ impl Slopes<'_> {
             slopes.push(Slope::Product(m));
             slopes.extend((0..product.joints.len()).map(|k| Slope::ProductByLength(m, k)));
         }
-        let own = self.by_column.own.iter().enumerate().filter(|(_, own)| own.is_some());
-        for joint in own.map(|(joint, _)| joint) {
+        for (joint, _, _) in self.by_column.curved() {
             slopes.extend([Slope::Own(joint), Slope::OwnByLength(joint), Slope::OwnByCycles(joint)]);
-            if joint < self.training.geometry.joint_count() {
-                slopes.push(Slope::Sag(joint));
-            }
         }
+        let bears = |&joint: &usize| self.by_column.own[joint].is_some();
+        slopes.extend((0..self.training.geometry.joint_count()).filter(bears).map(Slope::Sag));
         slopes
     }
 
@@ -234,7 +232,7 @@ impl Slopes<'_> {
             let class = self.class(p);
             share(AT_CONSTANT + class, p, 2.0 * hyper.constant[class].powi(2) * variance, &all)
         });
-        let anew = self.by_column.own.iter().flatten().map(|&(p, lever)| {
+        let anew = self.by_column.curved().map(|(_, p, lever)| {
             let factor = 2.0 * (hyper.repeatability * lever).powi(2);
             share(AT_REPEATABILITY, p, factor, pulls.col_as_slice(p))
         });

@@ -6,7 +6,7 @@
 //! (a kernel on its cells), so that fit, evidence and standard deviation are those of exact Gaussian inference.
 //!
 //! Blocks: `constant` (the constants, kernel one), `own` (theta of a revolute joint, d of a prismatic one, over that
-//! joint), `sag` (the same parameter in proportion to the levers of the links behind the joint), `wave` (the angle of a
+//! joint; where joints are coupled, over a reading, if the evidence has it so), `sag` (the same parameter in proportion to the levers of the links behind the joint), `wave` (the angle of a
 //! joint by a cosine and a sine of some hundred cycles a turn, where gears, encoders or screws leave one),
 //! `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
 //! together: those that the evidence chooses, and the last three).
@@ -28,6 +28,7 @@ mod conservative_fit;
 mod continuous;
 mod data_space;
 mod drift;
+mod drives;
 mod error;
 mod evidence;
 mod extrapolation;
@@ -70,6 +71,7 @@ pub use compiled::{Compiled, FieldScratch};
 pub use conservative::{BOUNDED, Conservative, ConservativeParts, ConservativeScratch};
 pub use conservative_fit::{ConservativePlan, Samples};
 pub use drift::{Drift, Left, find_drift};
+pub use drives::Drives;
 pub use error::FieldError;
 pub use fit::{FieldFit, FieldOptions, fit_field, restore};
 pub use greedy::{Candidates, Greedy, choose_informative, choose_telling};

@@ -30,6 +30,8 @@ pub fn training(problem: &Problem, point: Point, options: &FieldOptions) -> Resu
         levers: values.chunks_exact(inputs.len()).flat_map(|values| geometry.at(values)).collect(),
         inputs,
         values,
+        drives: options.drives.clone(),
+        by_readings: false,
         geometry,
         offsets: vec![0],
         jacobian: Vec::new(),

@@ -37,7 +37,9 @@ impl Cells {
         let own = |k: usize| {
             let kernel = OwnKernel::of(hyper, training.inputs[k].kind);
             let axis = axis(k, hyper.own_length, kernel.finest_scale() / OWN_CELLS);
-            by_column.own[k].map(|_| CellKernel::new(axis, |d| kernel.at(d)))
+            by_column.own[k]
+                .filter(|_| training.has_curve(k))
+                .map(|_| CellKernel::new(axis, |d| kernel.at(d)))
         };
         let smooth = |k: usize, length: f64| {
             CellKernel::new(axis(k, length, length / CELLS), |d| Shape::SquaredExponential.at(d, length))
@@ -52,8 +54,7 @@ impl Cells {
         };
         Self {
             own: (0..training.inputs.len()).map(own).collect(),
-            smooth: training
-                .inputs
+            smooth: training.inputs[..training.input_count()]
                 .iter()
                 .enumerate()
                 .map(|(k, input)| smooth(k, hyper.smooth_length_of(input)))

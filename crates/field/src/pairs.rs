@@ -60,8 +60,10 @@ pub struct ByColumn {
     pub pose: Vec<usize>,
     /// Columns of each class that blocks drive.
     pub driven: [Vec<usize>; 3],
-    /// Column and lever of each joint's `own` block.
+    /// Column and lever of each joint's `own` block, and of its `sag`.
     pub own: Vec<Option<(usize, f64)>>,
+    /// Whether what the joint's drive leaves, curves and what it does not repeat, goes with this input.
+    pub has_curve: Vec<bool>,
     /// Column and prior variance of each constant.
     pub constant: Vec<(usize, f64)>,
     /// Columns that are summed together.
@@ -86,6 +88,13 @@ pub type Step = [Lane; STEP / LANES];
 const NOTHING: Step = [Lane::ZERO; STEP / LANES];
 
 impl ByColumn {
+    /// Column and lever of each input's drive, where curves go with that input.
+    pub fn curved(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let own = self.own.iter().zip(&self.has_curve).enumerate();
+        own.filter(|(_, (_, has_curve))| **has_curve)
+            .filter_map(|(k, (own, _))| own.map(|(p, lever)| (k, p, lever)))
+    }
+
     /// The columns of a training set's Jacobian.
     pub fn new(training: &Training) -> Self {
         let (rows, width) = (training.row_count(), training.columns.len());
@@ -128,6 +137,7 @@ impl ByColumn {
                 .collect(),
             driven: [of_class(Class::Theta), of_class(Class::Angle), of_class(Class::Length)],
             own,
+            has_curve: (0..training.inputs.len()).map(|input| training.has_curve(input)).collect(),
             constant: constant.map(|(p, column)| (p, column.constant.powi(2))).collect(),
             groups,
         }
@@ -243,7 +253,9 @@ impl RowFactors {
             let (variance, sag) = ((hyper.own * lever).powi(2), (hyper.sag * lever).powi(2));
             by_pose.clear();
             by_pose.extend(kernels.iter().zip(loads).map(|(kernel, load)| variance * kernel + sag * load));
-            by_pose[0] += (hyper.repeatability * lever).powi(2);
+            if by_column.has_curve[joint] {
+                by_pose[0] += (hyper.repeatability * lever).powi(2);
+            }
             let waves = hyper.waves.iter().zip(&table.waves).filter(|(wave, _)| wave.joint == joint);
             for (wave, kernels) in waves {
                 let variance = (wave.amplitude * lever).powi(2);

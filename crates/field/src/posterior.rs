@@ -1,5 +1,6 @@
 //! The posterior of weights, constants and set-up: exact Gaussian inference in whichever space is smaller.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use faer::Mat;
@@ -9,6 +10,7 @@ use truearm_estimate::dense::{Cholesky, column, to_vec};
 use crate::FieldError;
 use crate::bank::Bank;
 use crate::data_space::DataSpace;
+use crate::drives::Drives;
 use crate::hyper::Hyper;
 use crate::model::Model;
 use crate::training::Training;
@@ -44,9 +46,9 @@ pub enum Posterior {
 /// Configurations whose covariance is asked for.
 pub struct Query<'a> {
     /// Inputs, (n, I).
-    pub values: &'a [f64],
+    pub values: Cow<'a, [f64]>,
     /// (n, m, P).
-    pub jacobian: &'a [f64],
+    pub jacobian: Cow<'a, [f64]>,
     /// Set-up columns (n, m, s), or the arm's part alone.
     pub setup: Option<&'a [f64]>,
     /// Rows of each, m.
@@ -118,9 +120,10 @@ impl Posterior {
     /// # Errors
     /// [`FieldError::NotPositiveDefinite`], [`FieldError::Hyper`], and [`FieldError::Kinematics`] if `up` is no direction.
     pub fn new(training: Training, hyper: Hyper, degree: usize, cancel: &Cancel) -> Result<Self, FieldError> {
-        hyper.check(&training.inputs, training.geometry.joint_count())?;
+        let drives = training.drives.as_ref().map_or(0, Drives::len);
+        hyper.check(&training.inputs[..training.input_count()], training.geometry.joint_count(), drives)?;
         let rows = training.row_count();
-        let model = Model::new(training.lifted(hyper.up)?, hyper, degree);
+        let model = Model::new(training.under(&hyper)?, hyper, degree);
         if rows <= FEW_ROWS {
             return Ok(Self::Data(Box::new(DataSpace::new(model, cancel)?)));
         }
@@ -266,7 +269,7 @@ impl Posterior {
             Self::Data(space) => space.constants(),
             Self::Weight(space) => space.constants(),
         };
-        let size = covariance.nrows();
+        let size = self.training().column_count();
         (0..size * size).map(|k| covariance[(k / size, k % size)]).collect()
     }
 
@@ -278,10 +281,16 @@ impl Posterior {
         rows: usize,
     ) -> Result<Query<'a>, FieldError> {
         let training = self.training();
-        let widths = (training.inputs.len(), training.columns.len());
-        let query = Query { values, jacobian, setup, rows, widths };
+        let widths = (training.input_count(), training.column_count());
+        let query =
+            Query { values: Cow::Borrowed(values), jacobian: Cow::Borrowed(jacobian), setup, rows, widths };
         query.check(training.setup_width)?;
-        Ok(query)
+        Ok(Query {
+            values: training.with_own_inputs(values),
+            jacobian: training.with_own_columns(jacobian),
+            widths: (training.inputs.len(), training.columns.len()),
+            ..query
+        })
     }
 
     /// Variances of `J* CEP(q*)` before any measurement, (n, m).
@@ -310,14 +319,15 @@ impl Posterior {
     pub fn repeatability(&self, jacobian: &[f64], rows: usize) -> Result<Vec<f64>, FieldError> {
         check_rows(rows)?;
         let model = self.model();
-        let size = rows * model.training.columns.len();
+        let size = rows * model.training.column_count();
         let (poses, found) = (jacobian.len() / size, jacobian.len());
         if poses * size != found {
             return Err(FieldError::Length { what: "jacobian", found, expected: poses * size });
         }
+        let jacobian = model.training.with_own_columns(jacobian);
         let mut out = Vec::with_capacity(poses * rows * rows);
         for pose in 0..poses {
-            let noise = model.noise_covariance(jacobian, pose * rows..(pose + 1) * rows);
+            let noise = model.noise_covariance(&jacobian, pose * rows..(pose + 1) * rows);
             (0..rows * rows).for_each(|k| out.push(noise[(k / rows, k % rows)]));
         }
         Ok(out)

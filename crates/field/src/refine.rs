@@ -51,7 +51,7 @@ pub fn relinearised(
 /// [`FieldError`] of the bank.
 pub fn explained(training: &Training, solution: &Solution) -> Result<Vec<f64>, FieldError> {
     let mut ceps = vec![0.0; training.pose_count() * training.parameter_count];
-    solution.bank.add(&training.values, &mut ceps)?;
+    solution.bank.add(&training.without_readings(), &mut ceps)?;
     let mut out = Vec::with_capacity(training.row_count());
     for pose in 0..training.pose_count() {
         let ceps = &ceps[pose * training.parameter_count..(pose + 1) * training.parameter_count];
@@ -60,6 +60,7 @@ pub fn explained(training: &Training, solution: &Solution) -> Result<Vec<f64>, F
                 .jacobian_row(row)
                 .iter()
                 .zip(training.columns.iter().zip(&solution.constant))
+                .take(training.column_count())
                 .map(|(entry, (column, constant))| entry * (constant + ceps[column.parameter]))
                 .sum();
             let setup = &training.setup[row * training.setup_width..(row + 1) * training.setup_width];

@@ -87,6 +87,7 @@ impl Sag {
             grid: Grid { inputs, axes: Vec::new() },
             outputs: self.outputs.clone(),
             weights: self.weights.clone(),
+            reading: None,
         }
     }
 }

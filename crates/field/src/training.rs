@@ -3,6 +3,8 @@
 use truearm_estimate::Cancel;
 
 use crate::FieldError;
+use crate::drives::Drives;
+use crate::hyper::Hyper;
 use crate::kernel::Input;
 use crate::sag::Levers;
 
@@ -60,10 +62,14 @@ pub struct Training {
     pub columns: Vec<Column>,
     /// Parameters of the chain, 5 L.
     pub parameter_count: usize,
-    /// Inputs of the field, I: the joints in order, then features.
+    /// Inputs of the field: the joints in order, then features, I of these, then readings where they are inputs.
     pub inputs: Vec<Input>,
     /// Values of the inputs, (n, I).
     pub values: Vec<f64>,
+    /// Drives that turn several joints; none where joints are not coupled.
+    pub drives: Option<Drives>,
+    /// Whether what they leave goes with their readings, which are inputs then, behind the others.
+    pub by_readings: bool,
     /// The arm's levers, L.
     pub geometry: Levers,
     /// The levers of each pose, (n, L).
@@ -157,6 +163,15 @@ impl Training {
         Ok(self)
     }
 
+    /// The same as hyper-parameters have it: which way is up, and what curves go with.
+    ///
+    /// # Errors
+    /// [`FieldError::Kinematics`] if up is no direction.
+    pub fn under(self, hyper: &Hyper) -> Result<Training, FieldError> {
+        let lifted = self.lifted(hyper.up)?;
+        Ok(if hyper.by_readings { lifted.by_readings() } else { lifted })
+    }
+
     /// All poses, with the rows of some of them (ascending) alone.
     pub fn only(&self, kept: &[usize]) -> Training {
         let mut thinned = self.select(kept);
@@ -193,6 +208,8 @@ impl Training {
             parameter_count: self.parameter_count,
             inputs: self.inputs.clone(),
             values: poses.iter().flat_map(|&pose| self.values_of(pose)).copied().collect(),
+            drives: self.drives.clone(),
+            by_readings: self.by_readings,
             geometry: self.geometry.clone(),
             levers: poses.iter().flat_map(|&pose| self.levers_of(pose)).copied().collect(),
             offsets,

@@ -84,13 +84,12 @@ pub fn find_waves(training: &Training, hyper: &Hyper, cancel: &Cancel) -> Result
         return Ok(found.waves);
     }
     let (evidence, by_column) = (Evidence::new(training, cancel), ByColumn::new(training));
-    let joints: Vec<usize> =
-        (0..training.inputs.len()).filter(|&joint| by_column.own[joint].is_some()).collect();
+    let drives: Vec<(usize, usize, f64)> = by_column.curved().collect();
     for _ in 0..ROUNDS {
         let pull = evidence.pull(&found)?;
-        let new: Vec<(Wave, f64)> = joints
+        let new: Vec<(Wave, f64)> = drives
             .par_iter()
-            .filter_map(|&joint| Scan::new(training, joint, by_column.own[joint]?, &pull).best(joints.len()))
+            .filter_map(|&(joint, p, lever)| Scan::new(training, joint, (p, lever), &pull).best(drives.len()))
             .collect();
         if new.is_empty() {
             break;

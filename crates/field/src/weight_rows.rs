@@ -166,7 +166,7 @@ impl Model {
     pub fn noise_covariance(&self, jacobian: &[f64], rows: std::ops::Range<usize>) -> Mat<f64> {
         let columns = self.training.columns.len();
         let mut noise = Mat::zeros(rows.len(), rows.len());
-        for (p, lever) in self.by_column.own.iter().flatten() {
+        for (_, p, lever) in self.by_column.curved() {
             let entry =
                 |i: usize| jacobian[(rows.start + i) * columns + p] * lever * self.hyper.repeatability;
             for i in 0..rows.len() {

@@ -124,7 +124,7 @@ impl WeightSpace {
         }
         let start = self.model.by_column.constant.len();
         let setup = solution[start..start + training.setup_width].to_vec();
-        let mut bank = Bank::empty(training.inputs.len(), training.parameter_count);
+        let mut bank = Bank::empty(training.input_count(), training.parameter_count);
         let plans = self.model.plans();
         bank.blocks =
             plans.iter().zip(&self.unknowns).map(|(plan, u)| self.block(plan, u, &solution)).collect();
@@ -170,8 +170,7 @@ impl WeightSpace {
                 }
             }
         }
-        let outputs = plan.driven.iter().map(|&(p, _)| self.model.training.columns[p].parameter).collect();
-        Block { name: plan.name.to_owned(), grid, outputs, weights }
+        self.model.training.block(plan, grid, weights)
     }
 
     /// What each pose's residuals (R,) would be if it had taken no part; of large sets exactly for some poses alone.

@@ -22,7 +22,7 @@ fn block(name: &str, inputs: &[usize], outputs: &[usize], degree: usize, random:
     };
     let grid = Grid { inputs: inputs.to_vec(), axes: inputs.iter().map(axis).collect() };
     let weights = (0..grid.cell_count() * outputs.len()).map(|_| random.normal()).collect();
-    Block { name: name.to_owned(), grid, outputs: outputs.to_vec(), weights }
+    Block { name: name.to_owned(), grid, outputs: outputs.to_vec(), weights, reading: None }
 }
 
 fn bank(degree: usize) -> Bank {
@@ -125,6 +125,37 @@ fn summed(bank: &Bank, q: &[f64]) -> Vec<(f64, f64)> {
         }
     }
     wanted
+}
+
+#[test]
+fn a_block_over_a_reading_is_one_over_an_input_of_its_value() {
+    let mut random = Random::new(5);
+    for outputs in [&[4][..], &[0, 7]] {
+        let mut blocks =
+            vec![block("own", &[1], &[3], 2, &mut random), block("own", &[0], outputs, 2, &mut random)];
+        let plain = Bank { blocks: blocks.clone(), ..Bank::empty(INPUTS, PARAMETERS) };
+        blocks[1].reading = Some(vec![-1.0, 1.0]);
+        let read = Bank { blocks: blocks.clone(), ..Bank::empty(INPUTS, PARAMETERS) };
+        read.check().unwrap();
+        let given = values(20);
+        let shifted: Vec<f64> = given.chunks(INPUTS).flat_map(|q| [q[1] - q[0], q[1], q[2]]).collect();
+        assert_eq!(evaluate(&read, &given), evaluate(&plain, &shifted));
+        blocks[1].grid.axes.push(blocks[0].grid.axes[0].clone());
+        blocks[1].grid.inputs.push(1);
+        let wrong = Bank { blocks, ..Bank::empty(INPUTS, PARAMETERS) };
+        assert!(wrong.check().is_err());
+    }
+}
+
+#[test]
+fn readings_that_are_no_sums_of_joint_values_are_refused() {
+    let mut random = Random::new(6);
+    for factors in [vec![], vec![1.0; INPUTS + 1], vec![f64::NAN, 1.0]] {
+        let mut block = block("own", &[0], &[4], 2, &mut random);
+        block.reading = Some(factors.clone());
+        let bank = Bank { blocks: vec![block], ..Bank::empty(INPUTS, PARAMETERS) };
+        assert!(bank.check().is_err(), "{factors:?}");
+    }
 }
 
 #[test]
@@ -286,6 +317,7 @@ fn a_sag_that_no_fit_makes_is_refused() {
             grid: Grid { inputs: inputs.to_vec(), axes: Vec::new() },
             outputs: outputs.repeat(times),
             weights: vec![1e-4; outputs.len() * times],
+            reading: None,
         };
         Bank::restored(8, parameters, vec![block], levers.clone())
     };
@@ -308,6 +340,7 @@ fn a_sag_that_no_fit_makes_is_refused() {
             grid: Grid { inputs: (0..6).collect(), axes: Vec::new() },
             outputs: outputs.clone(),
             weights: vec![1e-4; outputs.len()],
+            reading: None,
         };
         block.weights[2] = weight;
         let refused = Bank::restored(8, parameters, vec![block], levers.clone()).unwrap_err();

@@ -4,11 +4,11 @@
 mod common;
 
 use common::{
-    Arm, Fitted, Measure, Truth, deviations, fit, fitted, options, problem, root_mean_square, six_axes,
-    subset,
+    Arm, Fitted, Measure, Truth, deviations, fit, fit_from, fitted, options, problem, root_mean_square,
+    six_axes, subset,
 };
 use truearm_estimate::{ConstantFit, EstimateError, MeasurementSet, Point, Problem, Setup};
-use truearm_field::{FieldError, FieldOptions, Input, fit_field, measurement_covariance};
+use truearm_field::{Drives, FieldError, FieldOptions, Input, fit_field, measurement_covariance};
 
 const NOISE: f64 = 3e-5;
 
@@ -45,6 +45,24 @@ fn what_varies_is_found_and_intervals_hold() {
     assert!((0.90..=0.99).contains(&share), "{share} of the components lie within their 95 % intervals");
     assert!((0.5..1.7).contains(&(fit.field.hyper.noise[0] / NOISE)), "{:?}", fit.field.hyper);
     assert!(fit.field.judgement.outliers.is_empty(), "{:?}", fit.field.judgement.outliers);
+}
+
+#[test]
+fn curves_of_drives_behind_a_parallel_link_go_with_readings_and_others_do_not() {
+    let parallel = Some([1, 2]);
+    for truth in [Truth { parallel, ..Truth::BENDING }, Truth::BENDING] {
+        let arm = six_axes(truth);
+        let set = Measure::poses(250).of(&arm);
+        let (constant, mut options) = options(&arm, &set).unwrap();
+        options.drives = Drives::of(&six_axes(Truth { parallel, ..truth }).coupling(), |_| false);
+        let fit = fit_from(&arm, &set, constant, options).unwrap();
+        assert_eq!(fit.field.hyper.by_readings, truth.parallel.is_some());
+        let (_, field) = deviations(&arm, &fit, &held_out(200).of(&arm));
+        let field = root_mean_square(&field);
+        assert!(field < 1.7 * NOISE, "the field leaves {field}");
+        let share = coverage(&arm, &fit, &held_out(200));
+        assert!((0.90..=0.99).contains(&share), "{share} of the components lie within their 95 % intervals");
+    }
 }
 
 #[test]

@@ -10,6 +10,8 @@ use crate::measured::matrix;
 
 /// Key of the direction that a `sag` block takes for up, in the base frame.
 const UP: &str = "up";
+/// Key of the factors of joint values whose sum is the reading that a block is over.
+const READING: &str = "reading";
 
 pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<'py, PyDict>> {
     let axes: Vec<StoredAxis> = block.grid.axes.iter().map(Axis::stored).collect();
@@ -19,6 +21,9 @@ pub(crate) fn block_into<'py>(py: Python<'py>, block: &Block) -> PyResult<Bound<
     stored.set_item("axes", axes)?;
     stored.set_item("outputs", &block.outputs)?;
     stored.set_item("weights", matrix(py, &block.weights, block.outputs.len()))?;
+    if let Some(factors) = &block.reading {
+        stored.set_item(READING, factors)?;
+    }
     Ok(stored)
 }
 
@@ -49,5 +54,6 @@ pub(crate) fn block_from(stored: &Bound<'_, PyDict>) -> PyResult<Block> {
         },
         outputs: item("outputs")?.extract()?,
         weights: weights.as_array().iter().copied().collect(),
+        reading: stored.get_item(READING)?.map(|factors| factors.extract()).transpose()?,
     })
 }

@@ -14,8 +14,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truearm_estimate::{Cancel, Point};
 use truearm_field::{
-    Bank, Compiled, FieldError, FieldFit as CoreFit, FieldOptions, Input, Levers, Posterior as CorePosterior,
-    UPRIGHT, fit_field as fit, measurement_covariance, restore,
+    Bank, Compiled, Drives, FieldError, FieldFit as CoreFit, FieldOptions, Input, Levers,
+    Posterior as CorePosterior, UPRIGHT, fit_field as fit, measurement_covariance, restore,
 };
 
 use crate::blocks::{block_from, block_into, sag_into, up_of};
@@ -34,6 +34,7 @@ pub struct Options<'py> {
     features: PyReadonlyArray2<'py, f64>,
     feature_ranges: Vec<f64>,
     payloads: Vec<usize>,
+    coupling: PyReadonlyArray2<'py, f64>,
     degree: usize,
     prior: PriorTuple,
     hyper: Option<HashMap<String, Vec<f64>>>,
@@ -44,7 +45,8 @@ pub struct Options<'py> {
 }
 
 impl Options<'_> {
-    fn core(&self, cancel: Cancel) -> PyResult<FieldOptions> {
+    fn core(&self, problem: &IdentificationProblem, cancel: Cancel) -> PyResult<FieldOptions> {
+        let problem = problem.core();
         Ok(FieldOptions {
             degree: self.degree,
             prior: prior(self.prior)?,
@@ -53,6 +55,7 @@ impl Options<'_> {
             features: self.feature_ranges.iter().map(|&r| Input::line(r)).collect(),
             payloads: self.payloads.clone(),
             feature_values: self.features.as_array().iter().copied().collect(),
+            drives: Drives::of(&numbers(&self.coupling), |joint| problem.chain.slides(joint)),
             hyper: self.hyper.as_ref().map(hyper_from).transpose()?,
             near: self.near.as_ref().map(|fit| fit.core.start()),
             contested: self.contested,
@@ -77,7 +80,7 @@ pub fn fit_field(
     constant: &ConstantFit,
     options: Options<'_>,
 ) -> PyResult<FieldFit> {
-    let mut core = options.core(Cancel::default())?;
+    let mut core = options.core(problem, Cancel::default())?;
     let threads = options.threads;
     let core = long(py, move |cancel| {
         core.cancel = cancel.clone();
@@ -154,7 +157,7 @@ impl FieldFit {
     fn constant_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let posterior = &self.core.posterior;
         let values = quick(py, || Ok::<_, FieldError>(posterior.constants()))?;
-        Ok(matrix(py, &values, posterior.training().columns.len()))
+        Ok(matrix(py, &values, posterior.training().column_count()))
     }
 
     /// Poses that were judged but not fitted.
@@ -321,7 +324,7 @@ struct Asked<'a> {
 impl<'a> Asked<'a> {
     /// Configurations, n; one where the arrays are not of as many, so that the core sees them whole and refuses them.
     fn poses(&self, core: &CorePosterior) -> usize {
-        let count = self.inputs.len() / core.training().inputs.len();
+        let count = self.inputs.len() / core.training().input_count();
         let even = |array: &[f64]| array.len().is_multiple_of(count) && count > 0;
         if even(self.inputs) && even(self.jacobian) && self.setup.is_none_or(even) { count } else { 1 }
     }
@@ -346,7 +349,7 @@ impl Posterior {
         options: Options<'_>,
     ) -> PyResult<Self> {
         let values: Vec<f64> = parameters.as_array().iter().copied().collect();
-        let mut known = options.core(Cancel::default())?;
+        let mut known = options.core(problem, Cancel::default())?;
         let Some(hyper) = known.hyper.clone() else {
             return Err(CoreError::new_err("a posterior needs the fitted hyper-parameters"));
         };
@@ -443,7 +446,7 @@ impl Posterior {
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
         let entries: Vec<f64> = jacobian.as_array().iter().copied().collect();
-        let columns = self.core().training().columns.len();
+        let columns = self.core().training().column_count();
         if jacobian.shape()[2] != columns {
             return Err(CoreError::new_err(format!(
                 "jacobian has {} columns, the posterior {columns}",

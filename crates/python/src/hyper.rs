@@ -7,6 +7,9 @@ use truearm_field::{Hyper, MAJOR_NAME, Product, UNRIPPLED, UPRIGHT, WRIST_NAME, 
 
 use crate::door::CoreError;
 
+/// Key of what curves of coupled joints go with; kept where it is not zero.
+const BY_READINGS: &str = "by_readings";
+
 /// From values by name.
 pub fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
     let get = |name: &str| {
@@ -57,6 +60,7 @@ pub fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
         up: values.get("up").map_or(Ok(UPRIGHT), |_| three("up"))?,
         sag_widening: values.get("sag_widening").map_or(Ok(1.0), |_| one("sag_widening"))?,
         extrapolation: one("extrapolation")?,
+        by_readings: values.get(BY_READINGS).map_or(Ok(0.0), |_| one(BY_READINGS))? != 0.0,
     })
 }
 
@@ -100,6 +104,9 @@ pub fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
         ("up".to_owned(), hyper.up.to_vec()),
         ("extrapolation".to_owned(), vec![hyper.extrapolation]),
     ]);
+    if hyper.by_readings {
+        values.insert(BY_READINGS.to_owned(), vec![1.0]);
+    }
     let waves = hyper.waves.iter().flat_map(|wave| [wave.joint as f64, wave.cycles, wave.amplitude]);
     values.insert("waves".to_owned(), waves.collect());
     for product in &hyper.products {

@@ -45,7 +45,8 @@ def _blocks(facts: Facts) -> Table:
     shown = [key for key in _AMPLITUDES if any(key in block["amplitudes"] for block in blocks)]
     for block in blocks:
         amplitudes = block["amplitudes"]
-        inputs = [f"joint {joint}" for joint in block["joints"]] + list(block["features"])
+        kind = "reading" if block.get("over_reading") else "joint"
+        inputs = [f"{kind} {joint}" for joint in block["joints"]] + list(block["features"])
         if block["name"] == WAVE:
             inputs.append(waves_in_words([block]))
         if "ripples" in block:

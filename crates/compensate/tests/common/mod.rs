@@ -113,11 +113,17 @@ pub fn field(chain: &Chain, size: f64) -> Bank {
     for (joint, column) in chain.joint_columns().iter().enumerate() {
         let grid = Grid { inputs: vec![joint], axes: vec![axis(0.3, -3.0, 3.0)] };
         let weights = stream(grid.cell_count(), 11 + joint).iter().map(|x| size * x).collect();
-        blocks.push(Block { name: "own".to_owned(), grid, outputs: vec![*column], weights });
+        blocks.push(Block { name: "own".to_owned(), grid, outputs: vec![*column], weights, reading: None });
     }
     let grid = Grid { inputs: vec![1], axes: vec![axis(1.0, -1.0, 1.0)] };
     let weights = stream(grid.cell_count() * width, 3).iter().map(|x| size * x).collect();
-    blocks.push(Block { name: "smooth".to_owned(), grid, outputs: (0..width).collect(), weights });
+    blocks.push(Block {
+        name: "smooth".to_owned(),
+        grid,
+        outputs: (0..width).collect(),
+        weights,
+        reading: None,
+    });
     Bank { blocks, ..Bank::empty(joints, width) }
 }
 

@@ -5,7 +5,9 @@ use truearm_estimate::dense::{Cholesky, column};
 use truearm_estimate::{Cancel, EstimateError};
 
 use super::oracle::{Exact, Oracle};
-use super::sets::{hyper, line_inputs, loaded, poses_in_two_groups, positions, rippling, several_shots};
+use super::sets::{
+    by_readings, hyper, line_inputs, loaded, poses_in_two_groups, positions, rippling, several_shots,
+};
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
@@ -99,6 +101,15 @@ fn levers_of_a_payload_are_those_of_the_arm_in_proportion_to_the_largest() {
         let share = [0.0, 0.5, 1.0][pose % 3];
         arm.iter().zip(payload).for_each(|(arm, payload)| assert_eq!(*payload, share * arm));
     }
+}
+
+#[test]
+fn gradient_and_information_where_curves_go_with_readings() {
+    let training = by_readings(18);
+    let mut hyper = rippling(&training, 6);
+    hyper.waves[0].joint = 6;
+    check_gradient(&training, &hyper);
+    check_information(&training, &hyper);
 }
 
 #[test]

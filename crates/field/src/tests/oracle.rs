@@ -143,7 +143,7 @@ impl<'a, K: Kernels> Oracle<'a, K> {
             let mut sum = 0.0;
             if column.driven {
                 let class = Class::of(column.parameter).index();
-                for k in 0..self.training.inputs.len() {
+                for k in 0..self.training.input_count() {
                     sum += hyper.smooth[class].powi(2) * self.kernels.smooth(k, a[k], b[k]);
                 }
                 for (index, product) in hyper.products.iter().enumerate() {
@@ -154,7 +154,9 @@ impl<'a, K: Kernels> Oracle<'a, K> {
                 }
             }
             if let Some(k) = column.own {
-                sum += (hyper.own * self.lever(k)).powi(2) * self.kernels.own(k, a[k], b[k]);
+                if self.training.has_curve(k) {
+                    sum += (hyper.own * self.lever(k)).powi(2) * self.kernels.own(k, a[k], b[k]);
+                }
                 sum += (hyper.sag * self.lever(k)).powi(2) * self.loads(k, a, b);
                 for (index, wave) in hyper.waves.iter().enumerate().filter(|(_, wave)| wave.joint == k) {
                     sum += (wave.amplitude * self.lever(k)).powi(2) * self.kernels.wave(index, a[k], b[k]);
@@ -224,7 +226,8 @@ impl<'a, K: Kernels> Oracle<'a, K> {
     /// What joints do not repeat.
     pub fn anew(&self, a: &[f64], b: &[f64]) -> f64 {
         let of = |(p, column): (usize, &crate::Column)| {
-            column.own.map_or(0.0, |k| a[p] * b[p] * (self.hyper.repeatability * self.lever(k)).powi(2))
+            let drive = column.own.filter(|&k| self.training.has_curve(k));
+            drive.map_or(0.0, |k| a[p] * b[p] * (self.hyper.repeatability * self.lever(k)).powi(2))
         };
         self.training.columns.iter().enumerate().map(of).sum()
     }

@@ -3,6 +3,7 @@
 use truearm_estimate::{MeasurementSet, Point, Setup};
 
 use super::common::{Arm, Measure, Truth, options, problem, scara, shots, six_axes, subset};
+use crate::drives::Drives;
 use crate::fit::FieldOptions;
 use crate::hyper::{Hyper, Wave};
 use crate::joined::join;
@@ -83,6 +84,15 @@ pub fn loaded(poses: usize) -> Training {
         let of = |pose: usize| [2.5 * (pose % 3) as f64, 20.0 + 12.0 * (pose as f64 * 0.618).fract()];
         options.feature_values = (0..poses).flat_map(of).collect();
     })
+}
+
+/// Positions of an arm with a parallel link, whose curves go with readings.
+pub fn by_readings(poses: usize) -> Training {
+    let arm = six_axes(Truth { parallel: Some([1, 2]), ..Truth::BENDING });
+    let set = Measure { orientation: Some(1e-4), ..Measure::poses(poses) }.of(&arm);
+    let drives = Drives::of(&arm.coupling(), |_| false);
+    assert_eq!(drives.as_ref().map(Drives::len), Some(2));
+    rows_of(&arm, &set, |options| options.drives = drives.clone()).by_readings()
 }
 
 /// Hyper-parameters away from the centre of their priors.

@@ -19,12 +19,20 @@ pub struct Truth {
     pub coupled: (f64, [usize; 2]),
     /// Amplitude of a wave of a joint's angle, rad, its cycles a turn, and the joint.
     pub wave: (f64, f64, usize),
+    /// Two joints with a parallel link: what the first one's drive leaves turns both, and the second is read against the horizon.
+    pub parallel: Option<[usize; 2]>,
 }
 
 impl Truth {
     /// Constants alone.
-    pub const RIGID: Truth =
-        Truth { constant: 5e-4, own: 0.0, gravity: 0.0, coupled: (0.0, [0, 1]), wave: (0.0, 100.0, 0) };
+    pub const RIGID: Truth = Truth {
+        constant: 5e-4,
+        own: 0.0,
+        gravity: 0.0,
+        coupled: (0.0, [0, 1]),
+        wave: (0.0, 100.0, 0),
+        parallel: None,
+    };
     /// Own curves and gravity.
     pub const BENDING: Truth = Truth { own: 1.5e-4, gravity: 5e-4, ..Truth::RIGID };
 }
@@ -86,6 +94,23 @@ impl Arm {
             .collect()
     }
 
+    /// What the drive of a joint reads.
+    fn reading(&self, q: &[f64], joint: usize) -> f64 {
+        let behind = self.truth.parallel.filter(|pair| pair[1] == joint);
+        behind.map_or(q[joint], |[first, second]| q[second] - q[first])
+    }
+
+    /// The matrix that makes joint values of readings, row-major.
+    pub fn coupling(&self) -> Vec<f64> {
+        let count = self.chain.joint_count();
+        let mut matrix: Vec<f64> =
+            (0..count * count).map(|k| if k / count == k % count { 1.0 } else { 0.0 }).collect();
+        if let Some([first, second]) = self.truth.parallel {
+            matrix[second * count + first] = 1.0;
+        }
+        matrix
+    }
+
     /// True parameters at a configuration, (5 L,).
     pub fn parameters(&self, q: &[f64]) -> Vec<f64> {
         let nominal = self.chain.nominal();
@@ -93,14 +118,20 @@ impl Arm {
         for (joint, &column) in self.chain.joint_columns().iter().enumerate() {
             let (low, high) = self.ranges[joint];
             let is_line = column % 5 == 1;
-            let phase = if is_line { TAU * (q[joint] - low) / (high - low) } else { 2.0 * q[joint] };
+            let reading = self.reading(q, joint);
+            let phase = if is_line { TAU * (reading - low) / (high - low) } else { 2.0 * reading };
             let lever = if is_line { 0.3 } else { 1.0 };
             let shift = joint as f64;
-            parameters[column] +=
-                lever * self.truth.own * ((phase + shift).sin() + 0.5 * (2.0 * phase).cos());
+            let mut left = lever * self.truth.own * ((phase + shift).sin() + 0.5 * (2.0 * phase).cos());
+            let (amplitude, cycles, waving) = self.truth.wave;
+            if waving == joint {
+                left += amplitude * (cycles * reading + 0.4).cos();
+            }
+            parameters[column] += left;
+            if let Some([first, second]) = self.truth.parallel.filter(|pair| pair[0] == joint) {
+                parameters[column + 5 * (second - first)] += left;
+            }
         }
-        let (amplitude, cycles, joint) = self.truth.wave;
-        parameters[self.chain.joint_columns()[joint]] += amplitude * (cycles * q[joint] + 0.4).cos();
         if self.truth.gravity != 0.0 {
             let sag = self.truth.gravity * (q[1] + q[2]).cos();
             parameters[5] += self.truth.gravity * q[1].cos() + 0.5 * sag;

@@ -39,6 +39,7 @@ pub fn options(arm: &Arm, set: &MeasurementSet) -> Result<(ConstantFit, FieldOpt
         features: Vec::new(),
         payloads: Vec::new(),
         feature_values: Vec::new(),
+        drives: None,
         hyper: None,
         near: None,
         contested: false,
