@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.parallel_link import calibrated
 from tests.wall import on_a_wall
 from truearm.simulation import Imperfections, VirtualArm
 
@@ -151,6 +152,18 @@ def test_it_knows_which_way_is_up(library, tmp_path):
     known = Library(library, tmp_path / "arm.calib", calibration.robot.tool)
     for q in measured.readings[:5]:
         assert known.pose(q) == pytest.approx(calibration.pose(q), abs=1e-12)
+
+
+def test_it_knows_what_goes_with_readings(library, tmp_path):
+    calibration = calibrated(behind_a_link=True)
+    calibration.save(tmp_path / "arm.calib", with_rows=False)
+    known = Library(library, tmp_path / "arm.calib", calibration.robot.tool)
+    compensator = ta.Compensator(calibration, limits=ta.Limits(largest_std_mm=None))
+    for q in np.random.default_rng(5).uniform(-0.8, 0.8, (20, 6)):
+        assert known.pose(q) == pytest.approx(calibration.pose(q), abs=1e-12)
+        status, out, _ = known.correct(q)
+        assert status == OK
+        assert out == pytest.approx(compensator.joints(q).q[0], abs=1e-12)
 
 
 def test_a_base_that_is_corrected_is_read(library, tmp_path):

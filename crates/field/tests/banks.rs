@@ -140,7 +140,8 @@ fn a_block_over_a_reading_is_one_over_an_input_of_its_value() {
         let given = values(20);
         let shifted: Vec<f64> = given.chunks(INPUTS).flat_map(|q| [q[1] - q[0], q[1], q[2]]).collect();
         assert_eq!(evaluate(&read, &given), evaluate(&plain, &shifted));
-        blocks[1].grid.axes.push(blocks[0].grid.axes[0].clone());
+        let second = blocks[0].grid.axes[0].clone();
+        blocks[1].grid.axes.push(second);
         blocks[1].grid.inputs.push(1);
         let wrong = Bank { blocks, ..Bank::empty(INPUTS, PARAMETERS) };
         assert!(wrong.check().is_err());

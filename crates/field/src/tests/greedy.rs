@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use truearm_estimate::Cancel;
 
-use super::posterior::{close, queries, sets, space_without, spaces};
+use super::posterior::{close, own_columns, queries, sets, space_without, spaces};
 use crate::greedy::{Candidates, Greedy, choose_informative, choose_telling};
 use crate::posterior::Posterior;
 use crate::training::Training;
@@ -55,7 +55,7 @@ fn cases() -> impl Strategy<Value = Case> {
 fn rows_of(posterior: &Posterior, training: &Training, pose: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let rows = training.rows(pose);
     let (columns, width) = (training.columns.len(), training.setup_width);
-    let jacobian = training.jacobian[rows.start * columns..rows.end * columns].to_vec();
+    let jacobian = own_columns(training, &training.jacobian[rows.start * columns..rows.end * columns]);
     let setup = training.setup[rows.start * width..rows.end * width].to_vec();
     let mut noise = posterior.repeatability(&jacobian, rows.len()).unwrap();
     for (i, row) in rows.clone().enumerate() {

@@ -48,7 +48,7 @@ pub fn close(found: &[f64], wanted: &[f64], share: f64, what: &str) {
 /// What the field adds to each column of the problem at a configuration, (P,).
 fn varying(solution: &Solution, training: &Training, values: &[f64]) -> Vec<f64> {
     let mut ceps = vec![0.0; training.parameter_count];
-    solution.bank.add(&values[..training.input_count()], &mut ceps).unwrap();
+    solution.bank.add(values, &mut ceps).unwrap();
     training.columns[..training.column_count()].iter().map(|column| ceps[column.parameter]).collect()
 }
 
@@ -63,21 +63,26 @@ fn together(training: &Training, of_columns: &[f64]) -> Vec<f64> {
 }
 
 /// Rows (m, P) of a Jacobian with the problem's columns alone.
-fn own_columns(training: &Training, jacobian: &[f64]) -> Vec<f64> {
+pub fn own_columns(training: &Training, jacobian: &[f64]) -> Vec<f64> {
     let rows = jacobian.chunks_exact(training.columns.len());
     rows.flat_map(|row| &row[..training.column_count()]).copied().collect()
 }
 
-/// Configurations among the data, and one beyond it.
+/// Joints and features of a training pose, (I,).
+fn inputs_of(training: &Training, pose: usize) -> &[f64] {
+    &training.values_of(pose)[..training.input_count()]
+}
+
+/// Joints and features of configurations among the data, and of one beyond it.
 pub fn queries(training: &Training) -> Vec<Vec<f64>> {
     let mut random = Random::new(3);
     let mut inside = |_| {
-        let (a, b) = (training.values_of(1), training.values_of(2));
+        let (a, b) = (inputs_of(training, 1), inputs_of(training, 2));
         let share = random.unit();
         a.iter().zip(b).map(|(x, y)| x + share * (y - x)).collect::<Vec<f64>>()
     };
     let mut all: Vec<Vec<f64>> = (0..4).map(&mut inside).collect();
-    all.push(training.values_of(0).iter().map(|x| x + 0.4).collect());
+    all.push(inputs_of(training, 0).iter().map(|x| x + 0.4).collect());
     all
 }
 
@@ -94,7 +99,8 @@ fn solution_is_that_of_the_covariance_written_out() {
                 let oracle = Oracle::new(&training, &model.hyper, OfCells(model));
                 let solution = posterior.solve(&training.residual).unwrap();
                 for values in queries(&training) {
-                    let (constant, setup, field) = oracle.solution(&training.residual, &values);
+                    let (constant, setup, field) =
+                        oracle.solution(&training.residual, &training.with_own_inputs(&values));
                     close(&solution.constant, &constant, share, "constants");
                     close(&solution.setup, &setup, share, "set-up");
                     let field = together(&training, &field);
@@ -117,10 +123,9 @@ fn covariance_is_that_of_the_covariance_written_out() {
             let setup = &training.setup[rows.start * width..rows.end * width];
             for values in queries(&training) {
                 for (given, own) in [(Some(setup), setup.to_vec()), (None, vec![0.0; setup.len()])] {
-                    let (inputs, own_columns) =
-                        (&values[..training.input_count()], own_columns(&training, jacobian));
-                    let found = posterior.covariance(inputs, &own_columns, given, rows.len()).unwrap();
-                    let wanted = oracle.posterior(&values, jacobian, &own);
+                    let asked = own_columns(&training, jacobian);
+                    let found = posterior.covariance(&values, &asked, given, rows.len()).unwrap();
+                    let wanted = oracle.posterior(&training.with_own_inputs(&values), jacobian, &own);
                     let m = rows.len();
                     let wanted: Vec<f64> = (0..m * m).map(|k| wanted[(k / m, k % m)]).collect();
                     close(&found, &wanted, share, "covariance");
@@ -158,7 +163,7 @@ fn refitted(posterior: &Posterior, pose: usize) -> (Vec<f64>, f64) {
     let (model, training) = (posterior.model(), posterior.training());
     let fewer = space_without(model, pose);
     let solution = fewer.solve(&fewer.training().residual).unwrap();
-    let field = varying(&solution, training, training.values_of(pose));
+    let field = varying(&solution, training, inputs_of(training, pose));
     let ceps: Vec<f64> = field.iter().zip(&solution.constant).map(|(a, b)| a + b).collect();
     let rows = training.rows(pose);
     let (columns, width) = (training.columns.len(), training.setup_width);
@@ -170,8 +175,9 @@ fn refitted(posterior: &Posterior, pose: usize) -> (Vec<f64>, f64) {
             - dot(&setup[k * width..(k + 1) * width], &solution.setup)
     };
     let residual: Vec<f64> = rows.clone().enumerate().map(left).collect();
-    let known = fewer.covariance(training.values_of(pose), jacobian, Some(setup), rows.len()).unwrap();
-    let anew = fewer.repeatability(jacobian, rows.len()).unwrap();
+    let asked = own_columns(training, jacobian);
+    let known = fewer.covariance(inputs_of(training, pose), &asked, Some(setup), rows.len()).unwrap();
+    let anew = fewer.repeatability(&asked, rows.len()).unwrap();
     let covariance = faer::Mat::from_fn(rows.len(), rows.len(), |i, j| {
         let row = rows.start + i;
         let noise = training.noise_variance(row, model.hyper.noise) * training.weight[row];
