@@ -178,7 +178,7 @@ impl Corrector {
 
     /// Where the calibrated model puts the tool, base_from_tool, without allocation, lock or panic.
     ///
-    /// None where a number is not finite or an array does not fit.
+    /// None where a number is not finite, a finite one is so large that the result is not, or an array does not fit.
     pub fn predict(
         &self,
         readings: &[f64],
@@ -189,7 +189,8 @@ impl Corrector {
         let frame = dispatch(Predict { corrector: self, workspace });
         let (rotation, translation) =
             (frame.rotation.map(|lane| lane.0[0]), frame.position.map(|lane| lane.0[0]));
-        Some(Transform { rotation, translation })
+        let finite = rotation.iter().chain(&translation).all(|value| value.is_finite());
+        finite.then_some(Transform { rotation, translation })
     }
 
     /// Puts one waypoint into all lanes, if it can be used.

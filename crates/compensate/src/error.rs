@@ -31,6 +31,14 @@ pub enum CompensateError {
         /// Its value.
         value: f64,
     },
+    /// A time that is nothing, or never ends.
+    #[error("{what} is {value}, it must be positive and finite")]
+    Time {
+        /// The time.
+        what: &'static str,
+        /// Its value, s.
+        value: f64,
+    },
     /// Joint limits between which no reading lies.
     #[error(
         "the limits of joint {joint} are {low} and {high}: give the lowest reading first; infinity is none"

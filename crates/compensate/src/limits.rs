@@ -64,8 +64,8 @@ impl Limits {
             }
         }
         check_bounds(&[
-            ("the largest joint correction", self.largest_angle),
-            ("the largest joint correction", self.largest_slide),
+            ("the largest correction of a revolute joint", self.largest_angle),
+            ("the largest correction of a prismatic joint", self.largest_slide),
             ("the largest shift", self.largest_shift),
             ("the largest turn", self.largest_turn),
             ("the largest standard deviation", self.largest_std),

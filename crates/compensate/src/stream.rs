@@ -3,12 +3,12 @@
 //! What is added to the set-points follows the wanted correction with bounded rate and acceleration. Switched on or
 //! off it ramps. Where a set-point is refused, is not finite or comes late, the last correction is held for a
 //! moment and then ramped down, until good set-points come again. Where that would lead a joint out of its limits it
-//! stays at the limit; with a set-point beyond them what leads farther out goes down to nothing.
+//! stays at the limit; with a set-point beyond them nothing is added that leads farther out.
 
 use std::sync::Arc;
 
 use crate::corrector::{Corrector, Workspace};
-use crate::error::{CompensateError, check_bounds, check_finite};
+use crate::error::{CompensateError, check_bounds};
 use crate::refusal::Refusal;
 
 /// Between two steps less than this nothing moves, s.
@@ -39,15 +39,19 @@ impl Default for StreamOptions {
 impl StreamOptions {
     fn check(&self) -> Result<(), CompensateError> {
         check_bounds(&[
-            ("the largest rate of the correction", self.rate[0]),
-            ("the largest rate of the correction", self.rate[1]),
-            ("the largest acceleration of the correction", self.acceleration[0]),
-            ("the largest acceleration of the correction", self.acceleration[1]),
-            ("the time of the ramp", self.ramp),
+            ("the largest rate of a revolute joint's correction", self.rate[0]),
+            ("the largest rate of a prismatic joint's correction", self.rate[1]),
+            ("the largest acceleration of a revolute joint's correction", self.acceleration[0]),
+            ("the largest acceleration of a prismatic joint's correction", self.acceleration[1]),
             ("the time that a correction is held", self.hold),
             ("the longest time between set-points", self.deadline),
         ])?;
-        check_finite("the time of the ramp", &[self.ramp])
+        let ends = self.ramp > 0.0 && self.ramp.is_finite();
+        if ends {
+            Ok(())
+        } else {
+            Err(CompensateError::Time { what: "the time of the ramp", value: self.ramp })
+        }
     }
 }
 
@@ -117,7 +121,7 @@ impl Stream {
     /// A stream that is switched on and has nothing applied.
     ///
     /// # Errors
-    /// [`CompensateError::Bound`] if an option is not positive, [`CompensateError::NotFinite`] if the ramp never ends.
+    /// [`CompensateError::Bound`] if an option is not positive, [`CompensateError::Time`] if it is the ramp, or that never ends.
     pub fn new(corrector: Arc<Corrector>, options: StreamOptions) -> Result<Stream, CompensateError> {
         options.check()?;
         let count = corrector.joint_count();
@@ -289,11 +293,13 @@ impl Follower {
         }
     }
 
-    /// The same within what is left to the limits; where the set-point itself is beyond one, towards nothing on that side.
+    /// The same within what is left to the limits; where the set-point itself is beyond one, nothing is on that side.
+    ///
+    /// What is cut at once is no more than the set-point moved: before, it led no farther than to the limit.
     fn follow_within(&mut self, aim: f64, elapsed: f64, [low, high]: [f64; 2]) {
-        let inside = low <= 0.0 && 0.0 <= high;
-        self.follow(if inside { aim } else { aim.clamp(low.min(0.0), high.max(0.0)) }, elapsed);
-        if inside && !(low..=high).contains(&self.applied) {
+        let (low, high) = (low.min(0.0), high.max(0.0));
+        self.follow(aim.clamp(low, high), elapsed);
+        if !(low..=high).contains(&self.applied) {
             (self.applied, self.rate) = (self.applied.clamp(low, high), 0.0);
         }
     }

@@ -156,8 +156,11 @@ fn missing_late_and_broken_set_points_keep_the_last_one_corrected() {
 #[test]
 fn options_that_bound_nothing_are_refused() {
     for bad in [0.0, -1.0, f64::NAN] {
-        let options = StreamOptions { ramp: bad, ..StreamOptions::default() };
+        let options = StreamOptions { hold: bad, ..StreamOptions::default() };
         assert!(matches!(Stream::new(corrector(), options), Err(CompensateError::Bound { .. })));
+        let options = StreamOptions { rate: [0.1, bad], ..StreamOptions::default() };
+        let said = Stream::new(corrector(), options).unwrap_err().to_string();
+        assert!(said.contains("a prismatic joint's correction") && said.contains("infinity"), "{said}");
     }
 }
 
@@ -169,7 +172,8 @@ enum Event {
     Broken,
     Missing,
     Late(f64),
-    Beyond,
+    /// Of the joint's limit: positive above, negative below.
+    Beyond(f64),
     Switch(bool),
 }
 
@@ -180,7 +184,7 @@ fn event() -> impl Strategy<Value = Event> {
         2 => Just(Event::Broken),
         2 => Just(Event::Missing),
         2 => (0.0..1.0f64).prop_map(Event::Late),
-        4 => Just(Event::Beyond),
+        4 => prop_oneof![Just(Event::Beyond(1.0)), Just(Event::Beyond(-1.0))],
         2 => any::<bool>().prop_map(Event::Switch),
     ]
 }
@@ -204,7 +208,7 @@ proptest! {
                     Event::Broken => readings[2] = f64::NAN,
                     Event::Missing => given = false,
                     Event::Late(by) => elapsed = by,
-                    Event::Beyond => readings[0] = 3.2,
+                    Event::Beyond(side) => readings[0] = 3.2 * side,
                     Event::Switch(on) => stream.switch(on),
                 }
                 let mut out = [0.0; JOINTS];
@@ -215,6 +219,13 @@ proptest! {
                 for joint in 0..JOINTS {
                     prop_assert!(out[joint].is_finite());
                     let change = now[joint] - applied[joint];
+                    if let (0, Event::Beyond(side)) = (joint, &event) {
+                        prop_assert!(now[0] * side <= 0.0);
+                        if applied[0] * side > 0.0 {
+                            rate[0] = 0.0;
+                            continue;
+                        }
+                    }
                     prop_assert!(change.abs() <= options.rate[0] * dt + 1e-12);
                     if dt > 1e-6 {
                         let next = change / dt;
@@ -249,19 +260,39 @@ fn a_held_correction_leads_no_joint_out_of_its_limits() {
 
 #[test]
 fn nothing_leads_farther_out_beyond_a_limit_or_jumps_about_it() {
-    let mut stream = stream();
-    let (mut out, mut readings) = ([0.0; JOINTS], START);
-    run(&mut stream, 0.0, 2.0);
-    let wanted: Vec<f64> = stream.applied().collect();
-    let joint = (0..JOINTS).find(|&joint| wanted[joint].abs() > 1e-5).unwrap();
-    let (limit, sign) = (3.0 * wanted[joint].signum(), wanted[joint].signum());
-    for k in 0..1400 {
-        let past = f64::from(k - 700).abs();
-        readings[joint] = limit + sign * (1e-4 - 1e-6 * past);
+    for speed in [5e-4, 0.01, 0.1, 0.5, 2.0] {
+        let (mut stream, by) = (stream(), speed * CYCLE);
+        run(&mut stream, 0.0, 2.0);
+        let wanted: Vec<f64> = stream.applied().collect();
+        let joint = (0..JOINTS).find(|&joint| wanted[joint].abs() > 1e-5).unwrap();
+        let (limit, sign) = (3.0 * wanted[joint].signum(), wanted[joint].signum());
+        let (mut out, mut readings, mut before) = ([0.0; JOINTS], START, None);
+        for k in 0..1600 {
+            // 0.3 steps, so that no set-point is the limit itself.
+            readings[joint] = limit + sign * by * (100.3 - f64::from(k - 800).abs());
+            stream.step(Some(&readings), &[], CYCLE, &mut out);
+            let applied = stream.applied().nth(joint).unwrap();
+            let room = (limit - readings[joint]) * sign;
+            assert!(applied * sign <= room.max(0.0), "{applied} at {room} with {speed} rad/s");
+            let change = before.map_or(0.0, |before: f64| (out[joint] - before).abs());
+            assert!(change <= by + StreamOptions::default().rate[0] * CYCLE + 1e-12, "{change} at {k}");
+            before = Some(out[joint]);
+        }
+    }
+}
+
+#[test]
+fn a_set_point_that_jumps_beyond_a_limit_is_led_no_farther() {
+    for side in [-1.0, 1.0] {
+        let mut stream = stream();
+        let (mut out, mut readings) = ([0.0; JOINTS], moved(run(&mut stream, 0.0, 2.0)));
+        readings.fill(3.1 * side);
+        let before: Vec<f64> = stream.applied().collect();
         stream.step(Some(&readings), &[], CYCLE, &mut out);
-        let applied = stream.applied().nth(joint).unwrap();
-        let room = (limit - readings[joint]) * sign;
-        assert!(applied * sign <= room.max(0.0) + 1e-15, "{applied} at {room}");
+        for (joint, before) in before.iter().enumerate() {
+            let outward = before * side > 0.0;
+            assert!(if outward { out[joint] == readings[joint] } else { out[joint] != readings[joint] });
+        }
     }
 }
 
@@ -306,8 +337,10 @@ fn a_clock_that_gives_no_times_is_late_and_ends_in_nothing() {
 }
 
 #[test]
-fn a_ramp_that_never_ends_is_refused() {
-    let options = StreamOptions { ramp: f64::INFINITY, ..StreamOptions::default() };
-    let refused = Stream::new(corrector(), options).unwrap_err();
-    assert_eq!(refused, CompensateError::NotFinite { what: "the time of the ramp", value: f64::INFINITY });
+fn a_ramp_that_takes_no_time_or_never_ends_is_refused() {
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let options = StreamOptions { ramp: bad, ..StreamOptions::default() };
+        let said = Stream::new(corrector(), options).unwrap_err().to_string();
+        assert_eq!(said, format!("the time of the ramp is {bad}, it must be positive and finite"));
+    }
 }
