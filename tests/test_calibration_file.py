@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import os
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -300,6 +302,25 @@ def test_files_that_are_no_calibration(content, words, tmp_path):
     (tmp_path / "x.calib").write_bytes(content)
     with pytest.raises(ta.InputError, match=words):
         ta.Calibration.load(tmp_path / "x.calib")
+
+
+def test_what_is_no_regular_file_is_refused_and_not_waited_for(tmp_path):
+    pipe = tmp_path / "pipe.calib"
+    os.mkfifo(pipe)
+    for path in (pipe, Path("/dev/zero")):
+        with pytest.raises(ta.InputError, match=rf"{path}: this is a pipe or a device. A regular file"):
+            ta.Calibration.load(path)
+    with pytest.raises(ta.InputError, match="this is a directory"):
+        ta.Calibration.load(tmp_path)
+
+
+@pytest.mark.parametrize("first", [b"", b"\x02" + bytes(7) + b"[", bytes(5) + b"\x01\0\0{"])
+def test_a_file_is_refused_by_its_first_bytes_however_long_it_is(first, tmp_path):
+    path = tmp_path / "long.calib"
+    path.write_bytes(first)
+    os.truncate(path, 2**40)
+    with pytest.raises(ta.InputError, match=r"long\.calib: this is no calibration file"):
+        ta.Calibration.load(path)
 
 
 def test_a_file_that_is_not_there():

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from truearm import calibration_content
 from truearm._core import Chain, Conservative
 from truearm.arrays import as_rows
-from truearm.calibration_file import calibration_bytes, parse_calibration
+from truearm.calibration_file import calibration_bytes, parse_calibration, read_calibration
 from truearm.conservative import conservative_of
 from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.endpoints import Endpoint, at_target, at_tool
 from truearm.errors import Notice, WorkError
-from truearm.files import as_path, read_bytes, write_whole
+from truearm.files import as_path, write_whole
 from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
@@ -101,10 +101,10 @@ class Calibration:
         """Read a calibration file.
 
         Raises:
-            InputError: If there is no such file, it is none of ours, is cut short or altered, or has a
-                layout that this version does not know.
+            InputError: If there is no such file, it is a pipe or a device, is none of ours, is cut short or
+                altered, or has a layout that this version does not know.
         """
-        return cls.from_bytes(read_bytes(as_path(path)), where=str(path))
+        return cls.from_bytes(read_calibration(as_path(path)), where=str(path))
 
     @classmethod
     def from_bytes(cls, data: bytes, *, where: str) -> "Calibration":

@@ -7,8 +7,12 @@ version of the layout and the digest: SHA-256 over the whole file with the diges
 import hashlib
 import json
 import math
+import os
 import re
+import stat
 from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -17,12 +21,14 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from truearm.errors import InputError
+from truearm.files import read_bytes
 
 SCHEMA: Final = 1
 METADATA_KEY: Final = "truearm"
 NO_DIGEST: Final = "0" * 64
 DIGEST: Final = re.compile(rb'\\"sha256\\":\\"([0-9a-f]{64})\\"')
 LENGTH_BYTES: Final = 8
+FIRST_BYTES: Final = LENGTH_BYTES + 1
 LONGEST_HEADER: Final = 100_000_000
 NOT_OURS: Final = "A calibration is written by: truearm calibrate"
 AGAIN: Final = "Copy it again from where it was written, or calibrate again"
@@ -64,14 +70,42 @@ def parse_calibration(data: bytes, where: str) -> tuple[Arrays, dict[str, Any]]:
     return arrays, content
 
 
+def read_calibration(path: Path) -> bytes:
+    """The content of a file, if its first bytes are those of a calibration.
+
+    What it is is looked up before it is opened: opening a pipe waits for its other end.
+
+    Raises:
+        InputError: If there is no such file, it cannot be read, is none of ours or is cut short.
+    """
+    with suppress(OSError):
+        kind = path.stat().st_mode
+        if stat.S_ISREG(kind):
+            with path.open("rb") as file:
+                _check_first(file.read(FIRST_BYTES), os.fstat(file.fileno()).st_size, str(path))
+        elif not stat.S_ISDIR(kind):
+            raise InputError(
+                "this is a pipe or a device",
+                where=str(path),
+                rule="A regular file is needed",
+                way_out="Copy the calibration into one",
+            )
+    return read_bytes(path)
+
+
+def _check_first(first: bytes, size: int, where: str) -> int:
+    """The length of the header of a file of `size` bytes, by its first ones."""
+    length = int.from_bytes(first[:LENGTH_BYTES], "little")
+    if length > LONGEST_HEADER or first[LENGTH_BYTES:FIRST_BYTES] != b"{":
+        raise _not_ours(where, "this is no calibration file" if first else "this is an empty file")
+    if size < LENGTH_BYTES + length:
+        raise _cut_short(where, size, LENGTH_BYTES + length)
+    return length
+
+
 def _header(data: bytes, where: str) -> dict[str, Any]:
     """The header of a safetensors file."""
-    size = int.from_bytes(data[:LENGTH_BYTES], "little")
-    start = data[LENGTH_BYTES : LENGTH_BYTES + 1]
-    if len(data) <= LENGTH_BYTES or size > LONGEST_HEADER or start != b"{":
-        raise _not_ours(where, "this is an empty file" if not data else "this is no calibration file")
-    if len(data) < LENGTH_BYTES + size:
-        raise _cut_short(where, len(data), LENGTH_BYTES + size)
+    size = _check_first(data[:FIRST_BYTES], len(data), where)
     try:
         header = json.loads(data[LENGTH_BYTES : LENGTH_BYTES + size])
     except ValueError:
