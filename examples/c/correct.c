@@ -13,7 +13,7 @@ enum { MOST_JOINTS = 16, CYCLES = 700 };
 
 static int failed(const char *what, truearm_status status, const char *message)
 {
-    fprintf(stderr, "%s: %s%s%s\n", what, truearm_status_text(status), *message ? ": " : "", message);
+    fprintf(stderr, "%s: %s\n", what, *message ? message : truearm_status_text(status));
     return EXIT_FAILURE;
 }
 
@@ -53,6 +53,12 @@ static int correct_one(const truearm_corrector *corrector, const double *q, size
     return EXIT_SUCCESS;
 }
 
+/* Where no set-point has come yet a stream writes nothing, and waits for one. */
+static int may_go_on(truearm_status status)
+{
+    return status >= TRUEARM_STATUS_OK || status == TRUEARM_STATUS_NOT_STARTED;
+}
+
 /* A stream at 500 Hz that rests at one set-point: the correction ramps up in a second. */
 static int correct_stream(const truearm_corrector *corrector, const double *q, size_t joints)
 {
@@ -61,7 +67,7 @@ static int correct_stream(const truearm_corrector *corrector, const double *q, s
     double command[MOST_JOINTS];
     char message[256] = "";
     truearm_status status = truearm_stream_new(corrector, NULL, &stream, message, sizeof message);
-    for (int cycle = 0; cycle < CYCLES && status >= TRUEARM_STATUS_OK; cycle++) {
+    for (int cycle = 0; cycle < CYCLES && may_go_on(status); cycle++) {
         status = truearm_stream_step(stream, q, joints, NULL, 0, 0.002, command, joints, &state);
     }
     truearm_stream_free(stream);

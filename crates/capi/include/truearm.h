@@ -6,6 +6,9 @@
  * Loaded calibrations and correctors never change and may be used by any number of threads at once. Each thread
  * needs a workspace of its own, each robot a stream of its own.
  *
+ * C99 or C++11 at least. Threads need 64 kB of stack at least, and round to nearest, as they do unless
+ * fesetround() was called.
+ *
  * Made by cbindgen from the Rust sources; see docs/reference/c-library.md.
  */
 
@@ -32,9 +35,9 @@ enum truearm_status
     TRUEARM_STATUS_REFUSED = 2,
     // A pointer is null or not aligned.
     TRUEARM_STATUS_BAD_POINTER = -1,
-    // An array has another length than the arm needs.
+    // An array has another length than the arm or the calibration's features need.
     TRUEARM_STATUS_WRONG_SIZE = -2,
-    // A reading or a feature is NaN or infinite; the output is not written.
+    // A reading or a feature is NaN or infinite, or so large that the result is; the output is not written.
     TRUEARM_STATUS_NOT_FINITE = -3,
     // A handle is of another kind or was freed.
     TRUEARM_STATUS_BAD_HANDLE = -4,
@@ -56,6 +59,10 @@ enum truearm_status
     TRUEARM_STATUS_INTERNAL = -12,
     // The workspace was made for another corrector.
     TRUEARM_STATUS_OTHER_WORKSPACE = -13,
+    // The calibration is whole, but its model is none that this library knows: constant and variable ones.
+    TRUEARM_STATUS_UNKNOWN_MODEL = -14,
+    // The thread does not round to nearest, without which numbers would be wrong: fesetround(FE_TONEAREST).
+    TRUEARM_STATUS_BAD_ROUNDING = -15,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -163,7 +170,7 @@ const char *truearm_status_text(int32_t status);
 // A sentence about the reason of a correction or of a stream's state; never null.
 const char *truearm_reason_text(uint32_t reason);
 
-// Loads a calibration file.
+// Loads a calibration file, which has to be a regular one: no pipe and no device.
 //
 // On failure `*out` is null and `message` (of `message_size` bytes; may be null) says what is wrong.
 //
@@ -315,14 +322,17 @@ truearm_status truearm_predict_position(const truearm_corrector *corrector,
 
 // Corrects the next set-point of a robot.
 //
-// `readings` may be null where none came in time. `elapsed_s` is the time since the call before; above the deadline, below
-// zero or not finite the set-point counts as missed. TRUEARM_STATUS_OK or TRUEARM_STATUS_HELD: `out` is written and finite; HELD says that this set-point
-// has no correction of its own, and that the last one is held or on its ramp down (`state` says why). Where the
+// `readings` may be null where none came in time, and then `features`, too. `elapsed_s` is the time since the call before;
+// above the deadline, below zero or not finite the set-point counts as missed. The first one is never late.
+//
+// TRUEARM_STATUS_OK or TRUEARM_STATUS_HELD: `out` is written and finite; HELD says that this set-point has no
+// correction of its own, and that the last one is held or on its ramp down (`state` says why). Where the
 // set-point itself is not finite, `out` is the last finite one, corrected. TRUEARM_STATUS_NOT_STARTED: there was
-// none yet, and `out` is not written. `state` may be null.
+// none yet, and `out` is not written; go on calling. `state` may be null. After any other status nothing has become
+// of the set-point.
 //
 // # Safety
-// `stream` was made and not freed, `readings` is null or has `joints` numbers, `features` has `feature_count`, `out`
+// `stream` was made and not freed, `readings` is null or has `joints` numbers, `features` `feature_count`, `out`
 // `out_size`, `state` is null or points to a state.
 truearm_status truearm_stream_step(truearm_stream *stream,
                                    const double *readings,

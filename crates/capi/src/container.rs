@@ -10,6 +10,12 @@ use sha2::{Digest, Sha256};
 use crate::load_error::LoadError;
 
 const METADATA_KEY: &str = "truearm";
+/// Bytes before the header: its length.
+const LENGTH_BYTES: usize = 8;
+/// Bytes that tell whether a file can be a safetensors file: the length of the header, and its first byte.
+pub const FIRST_BYTES: usize = LENGTH_BYTES + 1;
+/// Longest header of a safetensors file.
+const LONGEST_HEADER: u64 = 100_000_000;
 /// What stands before the digest's digits.
 const DIGEST_KEY: &[u8] = br#"\"sha256\":\""#;
 const DIGITS: usize = 64;
@@ -56,11 +62,28 @@ impl<'a> Container<'a> {
     }
 }
 
-fn header_text(bytes: &[u8]) -> Result<String, LoadError> {
-    if bytes.get(8) != Some(&b'{') {
-        let what = if bytes.is_empty() { "it is empty" } else { "no safetensors file" };
-        return Err(LoadError::NotOurs(what));
+/// Whether a file of `size` bytes, of which `first` are the first [`FIRST_BYTES`], can be a safetensors file.
+///
+/// # Errors
+/// [`LoadError::NotOurs`], [`LoadError::Altered`].
+pub fn check_first(first: &[u8], size: u64) -> Result<(), LoadError> {
+    if size == 0 {
+        return Err(LoadError::NotOurs("it is empty"));
     }
+    let length = first.first_chunk::<LENGTH_BYTES>().map(|bytes| u64::from_le_bytes(*bytes));
+    let begins = first.get(LENGTH_BYTES) == Some(&b'{');
+    let Some(length) = length.filter(|length| begins && *length <= LONGEST_HEADER) else {
+        return Err(LoadError::NotOurs("no safetensors file"));
+    };
+    let needed = LENGTH_BYTES as u64 + length;
+    if size < needed {
+        return Err(LoadError::Altered(format!("it has {size} bytes, its header alone needs {needed}")));
+    }
+    Ok(())
+}
+
+fn header_text(bytes: &[u8]) -> Result<String, LoadError> {
+    check_first(bytes, bytes.len() as u64)?;
     let (_, header) =
         SafeTensors::read_metadata(bytes).map_err(|error| LoadError::Altered(error.to_string()))?;
     let text = header.metadata().as_ref().and_then(|metadata| metadata.get(METADATA_KEY));

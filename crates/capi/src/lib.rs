@@ -8,6 +8,7 @@ mod content;
 mod ffi;
 mod load_error;
 mod loaded;
+mod reading;
 
 pub use ffi::*;
 pub use load_error::LoadError;

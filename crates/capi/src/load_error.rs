@@ -10,6 +10,9 @@ pub enum LoadError {
     /// The file could not be read at all.
     #[error("the file cannot be read: {0}")]
     Unreadable(#[from] std::io::Error),
+    /// What is there is no file, and might never end.
+    #[error("this is {0}, a regular file is needed: copy the calibration into one")]
+    NoFile(&'static str),
     /// Something else than a calibration.
     #[error("this is no calibration ({0}); one is written by: truearm calibrate")]
     NotOurs(&'static str),
@@ -29,6 +32,12 @@ pub enum LoadError {
         /// Version of truearm that wrote it.
         version: String,
     },
+    /// A model that controllers do not get.
+    #[error(
+        "the model of this calibration is a scheme of the paper, this library knows constant and variable models: \
+         calibrate with --model constant or --model variable"
+    )]
+    UnknownModel,
     /// Contents that contradict each other.
     #[error("this calibration is not complete: {0}")]
     Content(String),

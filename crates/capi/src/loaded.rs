@@ -45,7 +45,7 @@ impl Loaded {
         }
         let content: Content = container.content()?;
         if content.scheme.is_some() {
-            return Err(incomplete("a scheme of the paper: calibrate with --model variable or constant"));
+            return Err(LoadError::UnknownModel);
         }
         let robot = &content.robot;
         let coupling = square(&robot.coupling)?;

@@ -206,7 +206,7 @@ fn streams_ramp_up_and_hold() {
 #[test]
 fn every_status_and_reason_has_words() {
     let known = |text: String| !text.starts_with("no ");
-    assert!((-12..=2).all(|status| known(text(truearm_status_text(status)))));
+    assert!((-15..=2).all(|status| known(text(truearm_status_text(status)))));
     assert!((0..=11).chain([100]).all(|reason| known(text(truearm_reason_text(reason)))));
     assert!(!known(text(truearm_status_text(77))) && !known(text(truearm_reason_text(77))));
     assert_eq!(truearm_abi_version(), TRUEARM_ABI_VERSION);
@@ -220,4 +220,117 @@ fn a_workspace_serves_the_corrector_that_it_was_made_for() {
     assert_eq!(rig.correct(&HOME).0, Status::OtherWorkspace);
     std::mem::swap(&mut rig.workspace, &mut other.workspace);
     assert_eq!(rig.correct(&HOME).0, Status::Ok);
+}
+
+#[test]
+fn a_stranger_is_told_by_its_first_eight_bytes() {
+    let mut word = 7_u64;
+    let stranger = &raw mut word;
+    // SAFETY: eight bytes are read, and found to be no handle.
+    unsafe {
+        let (q, out) = (HOME.as_ptr(), [0.0; JOINTS].as_mut_ptr());
+        let step = truearm_stream_step(stranger.cast(), q, JOINTS, null(), 0, 0.0, out, JOINTS, null_mut());
+        assert_eq!(step, Status::BadHandle);
+        assert_eq!(truearm_stream_switch(stranger.cast(), 0), Status::BadHandle);
+        assert_eq!(truearm_joint_count(stranger.cast()), 0);
+        assert_eq!(truearm_stream_free(stranger.cast()), Status::BadHandle);
+        assert_eq!(truearm_workspace_free(stranger.cast()), Status::BadHandle);
+        assert_eq!(truearm_corrector_free(stranger.cast()), Status::BadHandle);
+        assert_eq!(truearm_calibration_free(stranger.cast()), Status::BadHandle);
+        let mut made = null_mut();
+        assert_eq!(truearm_workspace_new(stranger.cast(), &mut made), Status::BadHandle);
+    }
+}
+
+#[test]
+fn what_is_too_large_to_be_computed_is_not_finite() {
+    let mut file = File::new();
+    for link in [1, 2] {
+        file.arrays[0].2[5 * link + 2] = 1.7e308;
+    }
+    let (rig, mut pose) = (Rig::of(&file.bytes(), &truearm_default_options()), [-1.0; 16]);
+    // SAFETY: all pointers are to memory of the sizes given.
+    unsafe {
+        let (corrector, workspace, q, to) = (rig.corrector, rig.workspace, [0.0; JOINTS], pose.as_mut_ptr());
+        let status = truearm_predict_pose(corrector, workspace, q.as_ptr(), JOINTS, null(), 0, to, 16);
+        assert_eq!(status, Status::NotFinite);
+        let status = truearm_predict_position(corrector, workspace, q.as_ptr(), JOINTS, null(), 0, to, 3);
+        assert_eq!(status, Status::NotFinite);
+    }
+    assert_eq!(pose, [-1.0; 16]);
+}
+
+#[test]
+#[cfg(all(target_arch = "x86_64", target_os = "linux"))]
+fn a_thread_that_does_not_round_to_nearest_gets_no_numbers() {
+    // SAFETY: as the C library declares it.
+    unsafe extern "C" {
+        fn fesetround(mode: i32) -> i32;
+    }
+    let (rig, bytes) = (Rig::new(), File::new().bytes());
+    let (stream, mut out, mut calibration) = (rig.stream(), [-1.0; JOINTS], null_mut());
+    for (mode, expected) in [
+        (0x400, Status::BadRounding),
+        (0x800, Status::BadRounding),
+        (0xc00, Status::BadRounding),
+        (0, Status::Ok),
+    ] {
+        let (c, w, q, to) = (rig.corrector, rig.workspace, HOME.as_ptr(), out.as_mut_ptr());
+        // SAFETY: all pointers are to memory of the sizes given; the last mode is the usual one.
+        let found = unsafe {
+            assert_eq!(fesetround(mode), 0);
+            let found = [
+                truearm_correct(c, w, q, JOINTS, null(), 0, to, JOINTS, null_mut()),
+                truearm_predict_position(c, w, q, JOINTS, null(), 0, to, 3),
+                truearm_stream_step(stream, q, JOINTS, null(), 0, 0.0, to, JOINTS, null_mut()),
+                truearm_load_memory(bytes.as_ptr(), bytes.len(), &mut calibration, null_mut(), 0),
+            ];
+            fesetround(0);
+            found
+        };
+        assert_eq!(found, [expected; 4]);
+        assert_eq!(out == [-1.0; JOINTS], expected == Status::BadRounding);
+    }
+    // SAFETY: made above and not used afterwards.
+    unsafe {
+        truearm_stream_free(stream);
+        truearm_calibration_free(calibration);
+    }
+}
+
+#[test]
+fn nothing_happens_to_a_stream_whose_state_has_no_place() {
+    let rig = Rig::new();
+    let (stream, mut out, mut states) = (rig.stream(), [0.0; JOINTS], [0_u64; 8]);
+    let askew = states.as_mut_ptr().cast::<u8>().wrapping_add(1).cast();
+    let mut step = |q: *const f64, state| {
+        // SAFETY: all pointers are to memory of the sizes given; one that is askew is refused.
+        unsafe { truearm_stream_step(stream, q, JOINTS, null(), 0, 0.0, out.as_mut_ptr(), JOINTS, state) }
+    };
+    assert_eq!(step(HOME.as_ptr(), askew), Status::BadPointer);
+    assert_eq!(step(null(), null_mut()), Status::NotStarted);
+    // SAFETY: made above and not used afterwards.
+    unsafe { truearm_stream_free(stream) };
+}
+
+#[test]
+fn a_missing_set_point_needs_no_features() {
+    let mut file = File::new();
+    file.content["options"]["features"] = json!(["temperature_C"]);
+    file.content["conservative"]["ranges"] = json!(vec![json!(null); JOINTS + 1]);
+    let rig = Rig::of(&file.bytes(), &truearm_default_options());
+    let (stream, warm, mut out) = (rig.stream(), [25.0], [0.0; JOINTS]);
+    let mut step = |q: *const f64, features: *const f64, count| {
+        let to = out.as_mut_ptr();
+        // SAFETY: all pointers are to memory of the sizes given.
+        unsafe { truearm_stream_step(stream, q, JOINTS, features, count, 0.002, to, JOINTS, null_mut()) }
+    };
+    assert_eq!(step(HOME.as_ptr(), warm.as_ptr(), 1), Status::Ok);
+    assert_eq!(step(null(), null(), 1), Status::Held);
+    assert_eq!(step(null(), null(), 0), Status::Held);
+    assert_eq!(step(HOME.as_ptr(), null(), 1), Status::BadPointer);
+    assert_eq!(step(HOME.as_ptr(), null(), 0), Status::WrongSize);
+    assert!(text(truearm_status_text(Status::WrongSize as i32)).contains("truearm_feature_count"));
+    // SAFETY: made above and not used afterwards.
+    unsafe { truearm_stream_free(stream) };
 }

@@ -100,7 +100,7 @@ fn the_c_example_says_what_is_wrong() {
     std::fs::write(&example.calibration, b"{\"no\": \"calibration\"}").unwrap();
     let done = example.run(&HOME);
     assert_eq!(done.status.code(), Some(1));
-    assert!(String::from_utf8(done.stderr).unwrap().contains("the file is no calibration"));
+    assert!(String::from_utf8(done.stderr).unwrap().contains("this is no calibration"));
 }
 
 #[test]

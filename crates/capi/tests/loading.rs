@@ -42,6 +42,58 @@ fn a_missing_file_is_said_to_be_missing() {
     assert!(text(message.as_ptr()).contains("cannot be read"));
 }
 
+/// A path of this test in the system's folder for such.
+fn scratch(name: &str) -> std::path::PathBuf {
+    std::env::temp_dir().join(format!("truearm-{}-{name}", std::process::id()))
+}
+
+/// The status and the message of a file that is refused.
+fn refused_file(path: &std::path::Path) -> (Status, String) {
+    let name = CString::new(path.to_str().unwrap()).unwrap();
+    let (mut out, mut message) = (null_mut(), [0 as std::ffi::c_char; 200]);
+    // SAFETY: all pointers are to memory of the sizes given.
+    let status = unsafe { truearm_load_file(name.as_ptr(), &mut out, message.as_mut_ptr(), 200) };
+    assert_eq!(out, null_mut());
+    (status, text(message.as_ptr()))
+}
+
+#[test]
+#[cfg(unix)]
+fn what_is_no_regular_file_is_refused_without_waiting_for_its_end() {
+    let pipe = scratch("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for (path, what) in [
+        (pipe.as_path(), "a pipe or a device"),
+        ("/dev/zero".as_ref(), "a pipe or a device"),
+        ("/".as_ref(), "a directory"),
+    ] {
+        let (status, said) = refused_file(path);
+        assert_eq!(status, Status::Unreadable);
+        assert!(said.contains(what) && said.contains("a regular file is needed"), "{said}");
+    }
+    std::fs::remove_file(pipe).unwrap();
+}
+
+#[test]
+fn a_file_is_refused_by_its_first_bytes_however_long_it_is() {
+    let path = scratch("long");
+    let endless = 1_u64 << 40;
+    for (first, status) in [
+        (&b""[..], Status::NotACalibration),
+        (b"\x02\0\0\0\0\0\0\0[", Status::NotACalibration),
+        (b"\0\0\0\0\0\x01\0\0{", Status::NotACalibration),
+    ] {
+        std::fs::write(&path, first).unwrap();
+        std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(endless).unwrap();
+        assert_eq!(refused_file(&path).0, status);
+    }
+    std::fs::write(&path, b"\0\x01\0\0\0\0\0\0{}").unwrap();
+    let (status, said) = refused_file(&path);
+    assert_eq!(status, Status::Altered);
+    assert!(said.contains("it has 10 bytes, its header alone needs 264"), "{said}");
+    std::fs::remove_file(path).unwrap();
+}
+
 #[test]
 #[cfg(unix)]
 fn a_name_is_whatever_the_system_takes() {
@@ -98,6 +150,15 @@ fn other_files_and_layouts_are_refused_in_words() {
     assert!(words.contains("version 7") && words.contains("0.1.0"), "{words}");
 }
 
+#[test]
+fn a_whole_calibration_with_a_model_of_another_kind_is_not_called_altered() {
+    let mut file = File::new();
+    file.content["scheme"] = json!({"name": "fcmac"});
+    let (status, words) = refused(&file.bytes());
+    assert_eq!(status, Status::UnknownModel);
+    assert!(words.contains("--model constant or --model variable"), "{words}");
+}
+
 /// A factor with a row less.
 fn shortened(file: &mut File) {
     let (_, shape, values) = &mut file.arrays[4];
@@ -108,8 +169,7 @@ fn shortened(file: &mut File) {
 #[test]
 fn contents_that_contradict_themselves_are_refused() {
     type Change = fn(&mut File);
-    let changes: [(Change, &str); 13] = [
-        (|file| file.content["scheme"] = json!({"name": "fcmac"}), "scheme"),
+    let changes: [(Change, &str); 12] = [
         (|file| drop(file.arrays.remove(2)), "variable.block0.weights"),
         (|file| file.arrays[0].2[3] = f64::NAN, "finite"),
         (|file| file.arrays[2].2[3] = f64::INFINITY, "finite"),
@@ -157,6 +217,8 @@ fn options_are_checked() {
         (status, text(message.as_ptr()))
     };
     assert_eq!(options(|options| options.task = 3), (Status::BadOption, "the task must be 0, 1 or 2".into()));
+    let (_, words) = options(|options| options.largest_slide_m = 0.0);
+    assert!(words.contains("a prismatic joint is 0"), "{words}");
     let (status, words) = options(|options| options.largest_shift_m = -1.0);
     assert!(status == Status::BadOption && words.contains("largest shift is -1"), "{words}");
     assert_eq!(options(|options| options.moving = 1 << 40).0, Status::BadOption);

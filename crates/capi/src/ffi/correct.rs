@@ -5,8 +5,8 @@ use std::sync::Arc;
 use truearm_compensate::Corrector;
 use truearm_kinematics::Transform;
 
-use super::guard::{check_array, copy_in, copy_out, guarded, put};
-use super::handles::{CorrectorHandle, Turn, WorkspaceHandle, borrow, check};
+use super::guard::{check_array, check_place, copy_in, copy_out, guarded, put, rounds_to_nearest};
+use super::handles::{CorrectorHandle, Turn, WorkspaceHandle, borrow, place};
 use super::status::Status;
 use super::types::Waypoint;
 
@@ -38,11 +38,12 @@ pub unsafe extern "C" fn truearm_correct(
             (core, Held::take(core, workspace, (readings, joints), (features, feature_count))?)
         };
         check_array(out, out_size, corrector.joint_count())?;
+        check_place(correction)?;
         let (workspace, memory) = held.parts();
         let (readings, features, spread) = (&memory.readings, &memory.features, !correction.is_null());
         let found = corrector.correct(readings, features, spread, &mut memory.out, workspace);
         // SAFETY: as the caller promises.
-        unsafe { put(correction, Waypoint::of(&found))? };
+        unsafe { put(correction, Waypoint::of(&found)) };
         if found.refusal.is_some() {
             let finite = memory.readings.iter().chain(&memory.features).all(|value| value.is_finite());
             return if finite { Ok(Status::Refused) } else { Err(Status::NotFinite) };
@@ -142,7 +143,8 @@ impl Held {
     ) -> Result<Self, Status> {
         // SAFETY: the handle lives as long as this, by the caller's promise; the turn keeps others off its memory.
         unsafe {
-            check(pointer)?;
+            rounds_to_nearest()?;
+            let pointer = place(pointer)?;
             let turn = Turn::take(&(*pointer).busy)?;
             let mut held = Self { pointer, _turn: turn };
             if !Arc::ptr_eq(corrector, &(*pointer).of) {

@@ -1,6 +1,7 @@
 //! What every C function does: check pointers and sizes, copy, and let no panic out.
 
 use std::ffi::c_char;
+use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::status::Status;
@@ -46,20 +47,27 @@ pub unsafe fn copy_out(from: &[f64], to: *mut f64) {
     unsafe { std::ptr::copy_nonoverlapping(from.as_ptr(), to, from.len()) };
 }
 
-/// Writes a value where C wants one; null means that it does not.
+/// Checks where a value goes; null means that C wants none.
+pub fn check_place<T>(to: *const T) -> Result<(), Status> {
+    if to.is_null() || to.is_aligned() { Ok(()) } else { Err(Status::BadPointer) }
+}
+
+/// Writes a value where C wants one, whose place was checked.
 ///
 /// # Safety
 /// `to` is null or points to writable memory of the size of the value.
-pub unsafe fn put<T>(to: *mut T, value: T) -> Result<(), Status> {
-    if to.is_null() {
-        return Ok(());
+pub unsafe fn put<T>(to: *mut T, value: T) {
+    if !to.is_null() {
+        // SAFETY: not null, aligned, writable by the caller's promise.
+        unsafe { to.write(value) };
     }
-    if !to.is_aligned() {
-        return Err(Status::BadPointer);
-    }
-    // SAFETY: not null, aligned, writable by the caller's promise.
-    unsafe { to.write(value) };
-    Ok(())
+}
+
+/// Checks that sums are rounded to nearest: what is less than half a step changes 1 neither upwards nor downwards.
+pub fn rounds_to_nearest() -> Result<(), Status> {
+    const LITTLE: f64 = f64::EPSILON / 8.0;
+    let (one, little) = black_box((1.0_f64, LITTLE));
+    if one + little == 1.0 && one - little == 1.0 { Ok(()) } else { Err(Status::BadRounding) }
 }
 
 /// Checks where a new handle goes, and leaves null there until there is one.

@@ -12,47 +12,27 @@ use crate::loaded::Loaded;
 pub trait Handle: Sized {
     /// Mark of the kind.
     const MARK: u64;
-    /// Where the mark is.
-    fn mark(&mut self) -> &mut u64;
-    /// The mark of a handle that may be none.
-    ///
-    /// # Safety
-    /// `pointer` points to readable memory of the size of the handle.
-    unsafe fn mark_at(pointer: *const Self) -> u64;
 }
 
-macro_rules! handle {
-    ($name:ident, $mark:literal) => {
-        impl Handle for $name {
-            const MARK: u64 = u64::from_le_bytes(*$mark);
-
-            fn mark(&mut self) -> &mut u64 {
-                &mut self.mark
-            }
-
-            unsafe fn mark_at(pointer: *const Self) -> u64 {
-                // SAFETY: the caller's promise.
-                unsafe { (&raw const (*pointer).mark).read() }
-            }
-        }
-    };
+/// What a handle is in memory. C's pointer leads to its first bytes, so that a check reads nothing but the mark.
+#[repr(C)]
+struct Marked<T> {
+    mark: u64,
+    handle: T,
 }
 
 /// A loaded calibration.
 pub struct Calibration {
-    pub(super) mark: u64,
     pub(super) loaded: Loaded,
 }
 
 /// A calibration and a tool, ready to correct and predict.
 pub struct CorrectorHandle {
-    pub(super) mark: u64,
     pub(super) core: Arc<Corrector>,
 }
 
 /// Memory of one thread.
 pub struct WorkspaceHandle {
-    pub(super) mark: u64,
     /// The corrector that it was made for.
     pub(super) of: Arc<Corrector>,
     pub(super) busy: AtomicBool,
@@ -62,16 +42,26 @@ pub struct WorkspaceHandle {
 
 /// Corrections of one robot's set-points.
 pub struct StreamHandle {
-    pub(super) mark: u64,
     pub(super) busy: AtomicBool,
     pub(super) core: Stream,
     pub(super) memory: Memory,
 }
 
-handle!(Calibration, b"ta-calib");
-handle!(CorrectorHandle, b"ta-corre");
-handle!(WorkspaceHandle, b"ta-works");
-handle!(StreamHandle, b"ta-strea");
+impl Handle for Calibration {
+    const MARK: u64 = u64::from_le_bytes(*b"ta-calib");
+}
+
+impl Handle for CorrectorHandle {
+    const MARK: u64 = u64::from_le_bytes(*b"ta-corre");
+}
+
+impl Handle for WorkspaceHandle {
+    const MARK: u64 = u64::from_le_bytes(*b"ta-works");
+}
+
+impl Handle for StreamHandle {
+    const MARK: u64 = u64::from_le_bytes(*b"ta-strea");
+}
 
 /// Room for what comes from C, so that its arrays may overlap.
 pub struct Memory {
@@ -89,49 +79,59 @@ impl Memory {
 
 /// A handle for C to keep.
 pub fn give<T: Handle>(handle: T) -> *mut T {
-    Box::into_raw(Box::new(handle))
+    Box::into_raw(Box::new(Marked { mark: T::MARK, handle })).cast()
 }
 
-/// Checks a pointer to a handle.
+/// Checks a pointer that C passed; what it says is of this kind was made by `give`.
 ///
 /// # Safety
-/// `pointer` is null or points to readable memory of the size of a handle.
-pub unsafe fn check<T: Handle>(pointer: *const T) -> Result<(), Status> {
-    if pointer.is_null() || !pointer.is_aligned() {
+/// `pointer` is null or points to eight readable bytes.
+unsafe fn check<T: Handle>(pointer: *const T) -> Result<*const Marked<T>, Status> {
+    let mark = pointer.cast::<u64>();
+    if mark.is_null() || !mark.is_aligned() {
         return Err(Status::BadPointer);
     }
     // SAFETY: not null, aligned, and readable by the caller's promise.
-    let mark = unsafe { T::mark_at(pointer) };
-    if mark == T::MARK { Ok(()) } else { Err(Status::BadHandle) }
+    if unsafe { mark.read() } == T::MARK { Ok(pointer.cast()) } else { Err(Status::BadHandle) }
+}
+
+/// Where the handle is that C's pointer means.
+///
+/// # Safety
+/// `pointer` is null or points to a handle, of whatever kind.
+pub unsafe fn place<T: Handle>(pointer: *mut T) -> Result<*mut T, Status> {
+    // SAFETY: as the caller promises; the mark says that `give` made it.
+    unsafe {
+        let marked = check(pointer)?.cast_mut();
+        Ok(&raw mut (*marked).handle)
+    }
 }
 
 /// A handle that is only read.
 ///
 /// # Safety
-/// As for [`check`]; nobody frees the handle meanwhile.
+/// As for [`place`]; nobody frees the handle meanwhile.
 pub unsafe fn borrow<'a, T: Handle>(pointer: *const T) -> Result<&'a T, Status> {
-    // SAFETY: as the caller promises.
-    unsafe {
-        check(pointer)?;
-        Ok(&*pointer)
-    }
+    // SAFETY: as the caller promises; the mark says that `give` made it.
+    unsafe { Ok(&(*check(pointer)?).handle) }
 }
 
 /// Frees a handle; null is no mistake, and what is none of this kind is left alone.
 ///
 /// # Safety
-/// As for [`check`]; nobody uses the handle meanwhile or afterwards.
+/// As for [`place`]; nobody uses the handle meanwhile or afterwards.
 pub unsafe fn free<T: Handle>(pointer: *mut T) -> Status {
     if pointer.is_null() {
         return Status::Ok;
     }
     // SAFETY: the mark says that `give` made it, and the caller that nobody uses it.
     unsafe {
-        if let Err(status) = check(pointer) {
-            return status;
-        }
-        let mut handle = Box::from_raw(pointer);
-        std::ptr::write_volatile(handle.mark(), 0);
+        let marked = match check(pointer) {
+            Ok(marked) => marked.cast_mut(),
+            Err(status) => return status,
+        };
+        (&raw mut (*marked).mark).write_volatile(0);
+        drop(Box::from_raw(marked));
     }
     Status::Ok
 }

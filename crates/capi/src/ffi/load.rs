@@ -1,26 +1,26 @@
 //! Loading and freeing. These functions may allocate and take milliseconds.
 
 use std::ffi::{CStr, c_char};
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use truearm_compensate::{Corrector, Stream};
 use truearm_kinematics::Transform;
 
-use super::guard::{copy_in, empty, guarded, tell, worded};
+use super::guard::{copy_in, empty, guarded, rounds_to_nearest, tell, worded};
 use super::handles::{
-    Calibration, CorrectorHandle, Handle, Memory, StreamHandle, WorkspaceHandle, borrow, free, give,
+    Calibration, CorrectorHandle, Memory, StreamHandle, WorkspaceHandle, borrow, free, give,
 };
 use super::status::Status;
 use super::types::{CorrectorOptions, StreamSettings};
 use crate::load_error::LoadError;
 use crate::loaded::Loaded;
+use crate::reading::read;
 
 /// Joints at the most: more than any arm has, and what a mask of moving joints holds.
 const MOST_JOINTS: usize = 64;
 
-/// Loads a calibration file.
+/// Loads a calibration file, which has to be a regular one: no pipe and no device.
 ///
 /// On failure `*out` is null and `message` (of `message_size` bytes; may be null) says what is wrong.
 ///
@@ -37,6 +37,7 @@ pub unsafe extern "C" fn truearm_load_file(
     unsafe {
         worded(message, message_size, || {
             empty(out)?;
+            rounds_to_nearest()?;
             if path.is_null() {
                 return Err(Status::BadPointer);
             }
@@ -64,6 +65,7 @@ pub unsafe extern "C" fn truearm_load_memory(
     unsafe {
         worded(message, message_size, || {
             empty(out)?;
+            rounds_to_nearest()?;
             if bytes.is_null() {
                 return Err(Status::BadPointer);
             }
@@ -156,6 +158,7 @@ pub unsafe extern "C" fn truearm_corrector_new(
     unsafe {
         worded(message, message_size, || {
             empty(out)?;
+            rounds_to_nearest()?;
             let loaded = &borrow(calibration)?.loaded;
             let tool = tool(flange_from_tool, &loaded.tool).inspect_err(|status| {
                 if *status == Status::BadOption {
@@ -171,7 +174,7 @@ pub unsafe extern "C" fn truearm_corrector_new(
             match Corrector::new(calibrated, programming, &tool, options) {
                 Ok(core) => {
                     warm_up(&core);
-                    out.write(give(CorrectorHandle { mark: CorrectorHandle::MARK, core: Arc::new(core) }));
+                    out.write(give(CorrectorHandle { core: Arc::new(core) }));
                     Ok(Status::Ok)
                 }
                 Err(error) => {
@@ -208,7 +211,6 @@ pub unsafe extern "C" fn truearm_workspace_new(
             empty(out)?;
             let core = &borrow(corrector)?.core;
             out.write(give(WorkspaceHandle {
-                mark: WorkspaceHandle::MARK,
                 of: Arc::clone(core),
                 busy: AtomicBool::new(false),
                 core: core.workspace(),
@@ -260,7 +262,7 @@ pub unsafe extern "C" fn truearm_stream_new(
             match Stream::new(Arc::clone(core), options.core()) {
                 Ok(core) => {
                     let busy = AtomicBool::new(false);
-                    out.write(give(StreamHandle { mark: StreamHandle::MARK, busy, core, memory }));
+                    out.write(give(StreamHandle { busy, core, memory }));
                     Ok(Status::Ok)
                 }
                 Err(error) => {
@@ -282,14 +284,6 @@ pub unsafe extern "C" fn truearm_stream_free(stream: *mut StreamHandle) -> Statu
     guarded(|| Ok(unsafe { free(stream) }))
 }
 
-fn read(path: &CStr) -> Result<Vec<u8>, LoadError> {
-    #[cfg(unix)]
-    let path: &Path = <std::ffi::OsStr as std::os::unix::ffi::OsStrExt>::from_bytes(path.to_bytes()).as_ref();
-    #[cfg(not(unix))]
-    let path = Path::new(path.to_str().map_err(|_| std::io::Error::from(std::io::ErrorKind::InvalidInput))?);
-    Ok(std::fs::read(path)?)
-}
-
 /// Gives a loaded calibration to C, or says why there is none.
 ///
 /// # Safety
@@ -309,7 +303,7 @@ unsafe fn hand_over(
     unsafe {
         match loaded {
             Ok(loaded) => {
-                out.write(give(Calibration { mark: Calibration::MARK, loaded }));
+                out.write(give(Calibration { loaded }));
                 Ok(Status::Ok)
             }
             Err(error) => {
@@ -322,9 +316,10 @@ unsafe fn hand_over(
 
 fn status(error: &LoadError) -> Status {
     match error {
-        LoadError::Unreadable(_) => Status::Unreadable,
+        LoadError::Unreadable(_) | LoadError::NoFile(_) => Status::Unreadable,
         LoadError::NotOurs(_) => Status::NotACalibration,
         LoadError::Schema { .. } => Status::UnknownLayout,
+        LoadError::UnknownModel => Status::UnknownModel,
         _ => Status::Altered,
     }
 }

@@ -14,9 +14,9 @@ pub enum Status {
     Refused = 2,
     /// A pointer is null or not aligned.
     BadPointer = -1,
-    /// An array has another length than the arm needs.
+    /// An array has another length than the arm or the calibration's features need.
     WrongSize = -2,
-    /// A reading or a feature is NaN or infinite; the output is not written.
+    /// A reading or a feature is NaN or infinite, or so large that the result is; the output is not written.
     NotFinite = -3,
     /// A handle is of another kind or was freed.
     BadHandle = -4,
@@ -38,6 +38,10 @@ pub enum Status {
     Internal = -12,
     /// The workspace was made for another corrector.
     OtherWorkspace = -13,
+    /// The calibration is whole, but its model is none that this library knows: constant and variable ones.
+    UnknownModel = -14,
+    /// The thread does not round to nearest, without which numbers would be wrong: fesetround(FE_TONEAREST).
+    BadRounding = -15,
 }
 
 impl Status {
@@ -76,8 +80,8 @@ pub extern "C" fn truearm_status_text(status: i32) -> *const c_char {
         1 => c"the set-point has no correction of its own; the last one is held or ramped down",
         2 => c"the waypoint must not be corrected: see reason",
         -1 => c"a pointer is null or not aligned",
-        -2 => c"an array has another length than the arm needs",
-        -3 => c"a reading or a feature is NaN or infinite",
+        -2 => c"an array has another length than is needed: of joints see truearm_joint_count, of features truearm_feature_count",
+        -3 => c"a reading or a feature is NaN or infinite, or so large that the result is",
         -4 => c"a handle is of another kind or was freed",
         -5 => c"another thread is using this workspace or stream: give each thread its own",
         -6 => c"the file cannot be read",
@@ -88,6 +92,8 @@ pub extern "C" fn truearm_status_text(status: i32) -> *const c_char {
         -11 => c"there was no set-point yet",
         -12 => c"a mistake in this library: please report it",
         -13 => c"the workspace was made for another corrector",
+        -14 => c"this library knows constant and variable models: calibrate with --model constant or variable",
+        -15 => c"the thread does not round to nearest: call fesetround(FE_TONEAREST) before",
         _ => c"no status of this library",
     };
     text.as_ptr()

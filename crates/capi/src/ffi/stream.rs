@@ -2,21 +2,24 @@
 
 use truearm_compensate::Fault;
 
-use super::guard::{check_array, copy_in, copy_out, guarded, put};
-use super::handles::{StreamHandle, Turn, check};
+use super::guard::{check_array, check_place, copy_in, copy_out, guarded, put, rounds_to_nearest};
+use super::handles::{StreamHandle, Turn, place};
 use super::status::Status;
 use super::types::StreamState;
 
 /// Corrects the next set-point of a robot.
 ///
-/// `readings` may be null where none came in time. `elapsed_s` is the time since the call before; above the deadline, below
-/// zero or not finite the set-point counts as missed. TRUEARM_STATUS_OK or TRUEARM_STATUS_HELD: `out` is written and finite; HELD says that this set-point
-/// has no correction of its own, and that the last one is held or on its ramp down (`state` says why). Where the
+/// `readings` may be null where none came in time, and then `features`, too. `elapsed_s` is the time since the call before;
+/// above the deadline, below zero or not finite the set-point counts as missed. The first one is never late.
+///
+/// TRUEARM_STATUS_OK or TRUEARM_STATUS_HELD: `out` is written and finite; HELD says that this set-point has no
+/// correction of its own, and that the last one is held or on its ramp down (`state` says why). Where the
 /// set-point itself is not finite, `out` is the last finite one, corrected. TRUEARM_STATUS_NOT_STARTED: there was
-/// none yet, and `out` is not written. `state` may be null.
+/// none yet, and `out` is not written; go on calling. `state` may be null. After any other status nothing has become
+/// of the set-point.
 ///
 /// # Safety
-/// `stream` was made and not freed, `readings` is null or has `joints` numbers, `features` has `feature_count`, `out`
+/// `stream` was made and not freed, `readings` is null or has `joints` numbers, `features` `feature_count`, `out`
 /// `out_size`, `state` is null or points to a state.
 #[unsafe(no_mangle)]
 #[allow(clippy::too_many_arguments, reason = "C passes arrays with their sizes")]
@@ -34,18 +37,22 @@ pub unsafe extern "C" fn truearm_stream_step(
     guarded(|| {
         // SAFETY: the handle is as the caller promises; the turn keeps others off its memory.
         unsafe {
-            check(stream)?;
+            rounds_to_nearest()?;
+            let stream = place(stream)?;
             let _turn = Turn::take(&(*stream).busy)?;
             let (core, memory) = (&mut (*stream).core, &mut (*stream).memory);
             check_array(out, out_size, core.joint_count())?;
+            check_place(state)?;
             let given = !readings.is_null();
             if given {
                 copy_in(readings, joints, &mut memory.readings)?;
             }
-            copy_in(features, feature_count, &mut memory.features)?;
+            if given || !features.is_null() {
+                copy_in(features, feature_count, &mut memory.features)?;
+            }
             let readings = given.then_some(&memory.readings[..]);
             let step = core.step(readings, &memory.features, elapsed_s, &mut memory.out);
-            put(state, StreamState::of(&step))?;
+            put(state, StreamState::of(&step));
             match step.fault {
                 Some(Fault::NotStarted) => Err(Status::NotStarted),
                 fault => {
@@ -66,7 +73,7 @@ pub unsafe extern "C" fn truearm_stream_switch(stream: *mut StreamHandle, on: u3
     guarded(|| {
         // SAFETY: the handle is as the caller promises; the turn keeps others off its memory.
         unsafe {
-            check(stream)?;
+            let stream = place(stream)?;
             let _turn = Turn::take(&(*stream).busy)?;
             let core = &mut (*stream).core;
             core.switch(on != 0);
