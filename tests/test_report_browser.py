@@ -1,5 +1,6 @@
 """The report in a real browser: it draws all figures, says nothing on the console, and prints."""
 
+import json
 import os
 import re
 import subprocess
@@ -40,6 +41,23 @@ def test_every_figure_is_drawn_without_a_word_on_the_console(page, path, tmp_pat
     assert 'data-figures="printable"' in done.stdout
     assert done.stdout.count('class="printed"') == len(figures_of(page)["figures"])
     assert done.stdout.count("main-svg") >= len(figures_of(page)["figures"])
+
+
+def test_a_figure_that_cannot_be_drawn_says_so_and_stops_no_other(page, tmp_path):
+    figures = figures_of(page)
+    smooth = (figure for figure in figures["figures"] if "zsmooth" in figure["traces"][0])
+    for trace in next(smooth)["traces"]:
+        trace["y"] = [0] * len(trace["y"])
+    path = tmp_path / "report.html"
+    opening = '<script type="application/json" id="figures">'
+    before, _, after = page.partition(opening)
+    path.write_text(before + opening + json.dumps(figures) + after[after.index("</script>") :])
+    command = browser_command(browser(), str(tmp_path), ["--dump-dom", path.as_uri()])
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert 'data-figures="printable"' in done.stdout
+    assert done.stdout.count(">This figure could not be drawn.<") == 1
+    whole = re.findall(r'class="figure[^"]* ready', done.stdout)
+    assert len(whole) == len(figures["figures"]) - 1
 
 
 @pytest.mark.parametrize("width", [NARROW, MIDDLE, WIDE])

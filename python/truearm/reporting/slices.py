@@ -10,8 +10,9 @@ from truearm.reporting.charts import axis, heatmap
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed
 from truearm.reporting.parameters import effect_mm
-from truearm.reporting.parts import Choice, Figure
+from truearm.reporting.parts import Choice, Figure, Part, Text
 from truearm.reporting.style import DIVERGING
+from truearm.stillness import still_joints, still_words
 
 Floats = NDArray[np.float64]
 
@@ -21,25 +22,34 @@ SLICES: Final = 3
 PARAMETERS: Final = 2
 
 
-def slices(facts: Facts) -> list[Figure]:
-    """The block over its first two joints at three places of its third, and its largest parameters."""
+def slices(facts: Facts) -> list[Part]:
+    """The block over its first two joints at three places of its third, and its largest parameters.
+
+    Joints that stood still are no axes; without two others there is a sentence in place of the figures.
+    """
     field = facts.calibration.model.field
     blocks = [] if field is None else [block for block in field.blocks() if block["name"] == BLOCK]
     joints = len(facts.joints)
     if field is None or not blocks or len(blocks[0]["inputs"]) < 2 or max(blocks[0]["inputs"]) >= joints:
         return []
+    inputs = list(blocks[0]["inputs"])
+    still = {k: at for k, at in still_joints(facts.span.T, facts.joints).items() if k - 1 in inputs}
+    moving = [joint for joint in inputs if joint + 1 not in still]
+    stood = f"In the `{BLOCK}` block, {still_words(still, facts.joints)} stood still" if still else ""
+    if len(moving) < 2:
+        return [Text(f"{stood}: there are no two joints to show it over.", is_note=True)]
     alone = Field(field.input_count, field.parameter_count, blocks, facts.calibration.arm.flange_chain)
-    cut = Cut(facts, alone, blocks[0])
+    cut = Cut(facts, alone, moving, f" {stood}." if stood else "")
     order = np.argsort(-cut.effects.max(axis=0))[:PARAMETERS]
     return [cut.moved(), *(cut.parameter(int(column)) for column in order)]
 
 
 class Cut:
-    """A block on a grid over its first two inputs, at three places of its third, less its means there."""
+    """A block on a grid over two joints, at three places of a third if there is one, less its means there."""
 
-    def __init__(self, facts: Facts, alone: Field, block: dict[str, Any]) -> None:
-        """Ask the block alone."""
-        self.facts, self.inputs = facts, list(block["inputs"])
+    def __init__(self, facts: Facts, alone: Field, joints: list[int], besides: str) -> None:
+        """Ask the block alone; `besides` is said of it."""
+        self.facts, self.inputs, self.besides = facts, joints, besides
         first, second = self.inputs[:2]
         self.axes = [facts.places(joint, GRID) for joint in (first, second)]
         self.places = self._places()
@@ -74,7 +84,8 @@ class Cut:
             "mm",
             "Deviation of the parameters from their means over these slices, as it moves the measured point "
             f"(root sum of squares over the parameters): up to {fixed(float(z.max()))} mm, with a median of "
-            f"{fixed(float(np.median(z)))} mm. The means are no part of it: the constants could take them.",
+            f"{fixed(float(np.median(z)))} mm. The means are no part of it: the constants could take them."
+            f"{self.besides}",
             {"zmin": 0, "zmax": float(f"{z.max():.4g}")},
         )
 

@@ -110,7 +110,7 @@
     return found;
   };
 
-  const draw = async (number) => {
+  const plot = async (number) => {
     const figure = page.figures[number];
     const place = placeOf(number);
     if (figure.spatial && !draws) {
@@ -127,7 +127,24 @@
     });
   };
 
-  const printable = async (number) => {
+  // A figure that cannot be drawn stops no other.
+  const broken = new Set();
+  const attempt = (work, failed) => async (number) => {
+    if (broken.has(number)) return;
+    try {
+      await work(number);
+    } catch (error) {
+      console.error(error);
+      failed(number);
+    }
+  };
+  const draw = attempt(plot, (number) => {
+    broken.add(number);
+    Plotly.purge(placeOf(number));
+    missing(placeOf(number), "This figure could not be drawn.");
+  });
+
+  const printable = attempt(async (number) => {
     const figure = page.figures[number];
     const place = placeOf(number);
     if (figure.spatial && !draws) return;
@@ -158,7 +175,7 @@
     }
     printed.replaceChildren(...images);
     place.parentElement.classList.add("ready");
-  };
+  }, () => {});
 
   const follow = new ResizeObserver((entries) => {
     for (const { target } of entries) {
