@@ -68,7 +68,7 @@ def along(facts: Facts, which: int, effects: Floats) -> Figure:
     found = sweep(facts, which)
     is_joint, swept = which < len(facts.joints), swept_names(facts)[which]
     unit = facts.unit(which) if is_joint else f"units of {swept}"
-    q = facts.shown(_as_readings(facts, which, found.q))[:, which] if is_joint else found.q
+    q = facts.shown_of(which, found.q) if is_joint else found.q
     spread = deviations(facts, which, names) if facts.best == VARIABLE else None
     traces, choices, says = [], [], ""
     candidates = facts.calibration.arm.candidates
@@ -120,12 +120,6 @@ def _chosen(facts: Facts, which: int, effects: Floats) -> list[str]:
     others = [candidates.names[k] for k in candidates.driven if candidates.names[k] != own]
     others.sort(key=lambda name: -effects[candidates.column(name)])
     return [*([own] if own in candidates.names else []), *others][:SHOWN_ALONG]
-
-
-def _as_readings(facts: Facts, joint: int, values: Floats) -> Floats:
-    readings = np.zeros((len(values), len(facts.joints)))
-    readings[:, joint] = values
-    return readings
 
 
 def _surely(spread: Floats | None, k: int, unit: float) -> float | None:

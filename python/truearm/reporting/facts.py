@@ -178,6 +178,10 @@ class Facts:
         """Readings (n, N) in deg and mm."""
         return shown_readings(readings, self.joints)
 
+    def shown_of(self, joint: int, values: Floats) -> Floats:
+        """Values (n,) of one joint, from 0, in deg or mm."""
+        return np.asarray(shown_readings(values[:, None], self.joints[joint : joint + 1])[:, 0])
+
     @cached_property
     def readings(self) -> Floats | None:
         """Readings (n, N) that the calibration was fitted to; None where they were left out of the file."""
@@ -258,9 +262,9 @@ class Facts:
         width = np.maximum(np.ptp(self.readings, axis=0), 1e-9)
         return np.asarray(self.readings[np.argmin(np.square((self.readings - centre) / width).sum(axis=1))])
 
-    def places(self, joint: int, count: int, *, reachable: bool = False) -> Floats:
-        """Readings of one joint (count,) from end to end of its usual range, or of all that it reaches."""
-        low, high = (self.reachable if reachable else self.span)[joint].tolist()
+    def places(self, joint: int, count: int) -> Floats:
+        """Readings of one joint (count,) from end to end of all that it reaches."""
+        low, high = self.reachable[joint].tolist()
         return np.linspace(low, high, count)
 
     def drawn(self, count: int) -> Floats:

@@ -100,7 +100,7 @@ def weakest(facts: Facts, found: Known) -> Stretch | None:
     """The stretch of a joint with the largest standard deviation, if it stands out."""
     median, worst = float(np.median(found.std_mm)), None
     for joint in range(len(facts.joints)):
-        edges = facts.places(joint, STRETCHES + 1, reachable=True)
+        edges = facts.places(joint, STRETCHES + 1)
         means = means_along(found.readings[:, joint], found.std_mm, edges)
         k = int(np.nanargmax(means))
         if means[k] > STANDS_OUT * median and (worst is None or means[k] > worst.std_mm):

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 
 from truearm.errors import count_of
+from truearm.reporting.axes import input_axis
 from truearm.reporting.charts import colour_bar
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import lean, short
@@ -61,10 +62,8 @@ def _label(facts: Facts, scheme: RegionalCeps, k: int) -> str:
     tree, parts = scheme.regions, []
     for axis, joint in enumerate(scheme.inputs):
         if tree.low[k, axis] > tree.low[0, axis] or tree.high[k, axis] < tree.high[0, axis]:
-            ends = np.zeros((2, len(facts.joints)))
-            ends[:, joint] = tree.low[k, axis], tree.high[k, axis]
-            low, high = facts.shown(ends)[:, joint]
-            parts.append(f"joint {joint + 1} {low:.0f} to {high:.0f} {facts.unit(joint)}")
+            low, high = facts.shown_of(joint, np.array([tree.low[k, axis], tree.high[k, axis]]))
+            parts.append(f"{input_axis(facts, joint).name} {low:.0f} to {high:.0f} {facts.unit(joint)}")
     return ", ".join(parts) or "all"
 
 

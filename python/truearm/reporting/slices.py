@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Field
+from truearm.reporting.axes import JointAxis, ends, input_axis, places, readings_at
 from truearm.reporting.charts import axis, heatmap
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed
@@ -33,7 +34,8 @@ def slices(facts: Facts) -> list[Part]:
     if field is None or not blocks or len(blocks[0]["inputs"]) < 2 or max(blocks[0]["inputs"]) >= joints:
         return []
     inputs = list(blocks[0]["inputs"])
-    still = {k: at for k, at in still_joints(facts.span.T, facts.joints).items() if k - 1 in inputs}
+    spans = np.array([ends(facts, input_axis(facts, joint)) for joint in range(joints)])
+    still = {k: at for k, at in still_joints(spans.T, facts.joints).items() if k - 1 in inputs}
     moving = [joint for joint in inputs if joint + 1 not in still]
     stood = f"In the `{BLOCK}` block, {still_words(still, facts.joints)} stood still" if still else ""
     if len(moving) < 2:
@@ -49,9 +51,9 @@ class Cut:
 
     def __init__(self, facts: Facts, alone: Field, joints: list[int], besides: str) -> None:
         """Ask the block alone; `besides` is said of it."""
-        self.facts, self.inputs, self.besides = facts, joints, besides
-        first, second = self.inputs[:2]
-        self.axes = [facts.places(joint, GRID) for joint in (first, second)]
+        self.facts, self.besides = facts, besides
+        self.inputs = [input_axis(facts, joint) for joint in joints]
+        self.axes = [places(facts, along, GRID) for along in self.inputs[:2]]
         self.places = self._places()
         values = np.stack([self._ask(alone, place) for place in self.places])
         self.values = values - values.mean(axis=(0, 1, 2))
@@ -60,16 +62,15 @@ class Cut:
     def _places(self) -> list[float | None]:
         if len(self.inputs) < SLICES:
             return [None]
-        low, high = self.facts.span[self.inputs[2]]
+        low, high = ends(self.facts, self.inputs[2])
         return [float(low + share * (high - low)) for share in (1 / 6, 1 / 2, 5 / 6)]
 
     def _ask(self, alone: Field, place: float | None) -> Floats:
         """Corrections (G, G, 5 L), second input along the first axis."""
-        q = np.repeat(self.facts.typical[None], GRID * GRID, axis=0)
-        first, second = np.meshgrid(*self.axes)
-        q[:, self.inputs[0]], q[:, self.inputs[1]] = first.ravel(), second.ravel()
+        values = [grid.ravel() for grid in np.meshgrid(*self.axes)]
         if place is not None:
-            q[:, self.inputs[2]] = place
+            values.append(np.full(GRID * GRID, place))
+        q = readings_at(self.facts, self.facts.typical, dict(zip(self.inputs, values, strict=False)))
         table = np.zeros_like(self.facts.calibration.arm.table)
         found = alone.parameters(np.ascontiguousarray(self.facts.inputs(q)), table)
         return np.asarray(found.reshape(GRID, GRID, -1))
@@ -77,9 +78,10 @@ class Cut:
     def moved(self) -> Figure:
         """Root of the sum of squares of what all parameters do to the judged point."""
         z = np.sqrt(np.square(self.values * effect_mm(self.facts)).sum(axis=-1))
-        names = listed([f"{joint + 1}" for joint in self.inputs])
+        names = listed([f"{along.joint + 1}" for along in self.inputs])
+        of = "D-H values of joints" if any(along.of_value for along in self.inputs) else "joints"
         return self._figure(
-            f"Variation over joints {names} together, all parameters",
+            f"Variation over {of} {names} together, all parameters",
             z,
             "mm",
             "Deviation of the parameters from their means over these slices, as it moves the measured point "
@@ -106,7 +108,7 @@ class Cut:
 
     def _figure(self, title: str, z: Floats, bar: str, says: str, colours: dict[str, Any]) -> Figure:
         first, second = self.inputs[:2]
-        shown = [self._shown(joint, ends) for joint, ends in zip((first, second), self.axes, strict=True)]
+        shown = [self._shown(along, at) for along, at in zip((first, second), self.axes, strict=True)]
         traces = [
             heatmap(shown[0], shown[1], values, bar, visible=k == len(z) // 2, zsmooth="best") | colours
             for k, values in enumerate(z)
@@ -116,8 +118,8 @@ class Cut:
             says,
             traces,
             {
-                "xaxis": axis(f"joint {first + 1}, {self.facts.unit(first)}"),
-                "yaxis": axis(f"joint {second + 1}, {self.facts.unit(second)}"),
+                "xaxis": axis(self._label(first)),
+                "yaxis": axis(self._label(second)),
             },
             height=330,
             choices=self._choices(len(z)),
@@ -131,13 +133,14 @@ class Cut:
         order = [1, 0, 2]
         return [
             Choice(
-                f"joint {third + 1} at {fixed(labels[k], 0)} {self.facts.unit(third)}",
+                f"{third.name} at {fixed(labels[k], 0)} {self.facts.unit(third.joint)}",
                 [j == k for j in range(count)],
             )
             for k in order
         ]
 
-    def _shown(self, joint: int, values: Floats) -> Floats:
-        readings = np.zeros((len(values), len(self.facts.joints)))
-        readings[:, joint] = values
-        return self.facts.shown(readings)[:, joint]
+    def _label(self, along: JointAxis) -> str:
+        return f"{along.name}, {self.facts.unit(along.joint)}"
+
+    def _shown(self, along: JointAxis, values: Floats) -> Floats:
+        return self.facts.shown_of(along.joint, values)

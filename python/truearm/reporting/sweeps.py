@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.errors import WorkError
+from truearm.reporting.axes import curve_axis, places, readings_at
 from truearm.reporting.facts import OUTER, Facts
 from truearm.reporting.parameters import effect_mm
 from truearm.units import MM_PER_METRE
@@ -37,7 +38,7 @@ class Sweep:
 
 def swept_names(facts: Facts) -> list[str]:
     """What can be swept, numbered as the inputs of the model: joints, then features whose range is known."""
-    joints = [f"joint {joint + 1}" for joint in range(len(facts.joints))]
+    joints = [curve_axis(facts, joint).name for joint in range(len(facts.joints))]
     return joints if facts.readings is None else [*joints, *facts.features]
 
 
@@ -56,25 +57,24 @@ def feature_ends(facts: Facts, name: str) -> tuple[float, float]:
 
 def _asked(
     facts: Facts, which: int, steps: int, base: Floats | None = None
-) -> tuple[Floats, dict[str, Floats]]:
-    """Readings (s, N) and features (s,) by name that differ in one input alone, end to end of its range."""
-    readings = np.repeat((facts.typical if base is None else base)[None], steps, axis=0)
+) -> tuple[Floats, Floats, dict[str, Floats]]:
+    """Values (s,) of one input from end to end of its range, with readings (s, N) and features (s,) there."""
+    start = facts.typical if base is None else base
     features = {name: np.full(steps, value) for name, value in facts.features.items()}
     if which < len(facts.joints):
-        readings[:, which] = facts.places(which, steps)
-    else:
-        name = swept_names(facts)[which]
-        features[name] = np.linspace(*feature_ends(facts, name), steps)
-    return readings, features
+        along = curve_axis(facts, which)
+        values = places(facts, along, steps)
+        return values, readings_at(facts, start, {along: values}), features
+    name = swept_names(facts)[which]
+    features[name] = np.linspace(*feature_ends(facts, name), steps)
+    return features[name], np.repeat(start[None], steps, axis=0), features
 
 
 def sweep(facts: Facts, which: int, steps: int = STEPS, base: Floats | None = None) -> Sweep:
     """Ask the model that predicts, along a joint or a feature."""
-    readings, features = _asked(facts, which, steps, base)
+    values, readings, features = _asked(facts, which, steps, base)
     inputs = np.column_stack([facts.calibration.robot.joints_from_readings(readings), *features.values()])
-    joints = len(facts.joints)
-    q = readings[:, which] if which < joints else features[swept_names(facts)[which]]
-    return Sweep(q, _corrections(facts, np.ascontiguousarray(inputs)))
+    return Sweep(values, _corrections(facts, np.ascontiguousarray(inputs)))
 
 
 def corrections(facts: Facts, readings: Floats) -> Floats:
@@ -115,7 +115,7 @@ def deviations(facts: Facts, which: int, names: list[str]) -> Floats | None:
 
     None where the model does not tell them.
     """
-    readings, features = _asked(facts, which, BAND_STEPS)
+    _, readings, features = _asked(facts, which, BAND_STEPS)
     try:
         return facts.calibration.variation_std(readings, names, features=features or None)
     except WorkError:

@@ -100,7 +100,7 @@ def _most_telling(facts: Facts, found: Known) -> list[int]:
     """Joints over which the standard deviation changes most, ascending."""
     spread = []
     for joint in range(len(facts.joints)):
-        edges = facts.places(joint, STRETCHES + 1, reachable=True)
+        edges = facts.places(joint, STRETCHES + 1)
         spread.append(float(np.nanstd(means_along(found.readings[:, joint], found.std_mm, edges))))
     return sorted(np.argsort(spread)[::-1][:MAPPED_JOINTS].tolist())
 

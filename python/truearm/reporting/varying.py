@@ -3,6 +3,7 @@
 from typing import Final
 
 from truearm.models import CONSTANT, VARIABLE
+from truearm.reporting.axes import coupling_words
 from truearm.reporting.curves import along, influence
 from truearm.reporting.facts import Facts
 from truearm.reporting.gravity import sag
@@ -23,7 +24,7 @@ def varying(facts: Facts) -> Section:
     swept = "joint or feature" if facts.features else "joint"
     words = (
         f"Curves show the deviation of a parameter from its mean along the {swept}; the other joints stay in "
-        f"a typical pose.{facts.at_features}"
+        f"a typical pose.{coupling_words(facts)}{facts.at_features}"
     )
     if facts.best == VARIABLE and facts.readings is not None:
         words += " Bands are two standard deviations of that deviation to either side."
