@@ -380,6 +380,13 @@ def test_nothing_to_gain_is_said_of_small_errors_and_of_noise_alone(before, afte
     assert no_help(after, before, "mean error", floor) == []
 
 
+@pytest.mark.parametrize("alone", [True, False])
+def test_what_constants_leave_is_not_called_noise(alone):
+    said = str(no_help(1.69, 1.7, "mean error", 1.6, constants_alone=alone)[0])
+    assert ("calibrate with --model variable" in said) == alone
+    assert ("Noise alone would leave 1.6 mm" in said) != alone
+
+
 def test_poses_that_others_stood_for_are_told():
     (told,) = poses_aside(1000, 5000)
     assert (told.kind, "4000 of 5000 poses" in told.message) == ("poses_aside", True)

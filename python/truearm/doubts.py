@@ -41,6 +41,14 @@ NEAR_MM: Final = 0.5
 """Wrong data, or those of another arm, are never so near the nominal model."""
 NOISY_MM: Final = 5.0
 """Nor so near, and as far off as noise alone leaves them."""
+AS_THE_TABLE: Final = (
+    "As far as these poses tell the arm is where its table has it: use the arm without a calibration, or "
+    "measure more poses."
+)
+MAY_VARY: Final = (
+    "What they leave may be noise, or vary with the joints, which constants cannot tell apart: calibrate "
+    "with --model variable."
+)
 LIKE_NOISE: Final = 0.2
 """Part of what noise leaves by which a mean error may differ from it: that of some twenty rows does."""
 MOST_NAMED: Final = 4
@@ -123,7 +131,7 @@ def doubts(
     return [
         *(
             _single_rows(before, after, best, what, outliers)
-            or no_help(before, after, what, floor_mm, outliers)
+            or no_help(before, after, what, floor_mm, outliers, constants_alone=best == CONSTANT)
         ),
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, models[CONSTANT]),
@@ -273,7 +281,13 @@ def helps(before_mm: float, after_mm: float) -> bool:
 
 
 def no_help(
-    before_mm: float, after_mm: float, what: str, floor_mm: float, outliers: Outliers | None = None
+    before_mm: float,
+    after_mm: float,
+    what: str,
+    floor_mm: float,
+    outliers: Outliers | None = None,
+    *,
+    constants_alone: bool = False,
 ) -> list[Notice]:
     """A warning where a calibration is of no use.
 
@@ -283,20 +297,22 @@ def no_help(
         what: What these are.
         floor_mm: What noise alone would leave on average.
         outliers: Rows that are far off, if any are known.
+        constants_alone: Whether its own has constants alone, which take what varies for noise.
     """
     if helps(before_mm, after_mm):
         return []
     if nothing_to_gain(before_mm, after_mm, floor_mm):
-        why = (
-            "As far as these poses tell the arm is where its table has it: use the arm without a "
-            "calibration, or measure more poses."
-            if before_mm < NEAR_MM
-            else f"Noise alone would leave {floor_mm:.4g} mm: what the arm errs by is hidden in it. Measure "
-            "with a better instrument, each pose several times, or more poses."
-        )
+        start, why = "There is nothing to gain", AS_THE_TABLE
+        if before_mm >= NEAR_MM and constants_alone:
+            start, why = "Constants gain nothing", MAY_VARY
+        elif before_mm >= NEAR_MM:
+            why = (
+                f"Noise alone would leave {floor_mm:.4g} mm: what the arm errs by is hidden in it. Measure "
+                "with a better instrument, each pose several times, or more poses."
+            )
         text = (
-            f"There is nothing to gain: the {what} is {after_mm:.4g} mm, that of the nominal model "
-            f"{before_mm:.4g} mm already. {why}"
+            f"{start}: the {what} is {after_mm:.4g} mm, that of the nominal model {before_mm:.4g} mm "
+            f"already. {why}"
         )
         return [Notice(NO_GAIN, text)]
     text = (

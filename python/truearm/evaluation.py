@@ -21,7 +21,7 @@ from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judge
 from truearm.held_rows import HeldRows
 from truearm.judging import check_judged, judge, model_inputs
 from truearm.measurements import Measurements
-from truearm.models import NOMINAL, ArmModel
+from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
 from truearm.registration import register
@@ -198,7 +198,8 @@ def _setup(
 def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> list[Notice]:
     """A warning where the calibration does not help; medians, since single rows may be wrong."""
     before, after = (MM_PER_METRE * float(np.nanmedian(errors[name].distance_m)) for name in (NOMINAL, best))
-    return no_help(before, after, "median error on the rows that were judged", floor_mm)
+    what = "median error on the rows that were judged"
+    return no_help(before, after, what, floor_mm, constants_alone=best == CONSTANT)
 
 
 def _moved(

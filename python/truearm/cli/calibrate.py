@@ -232,14 +232,21 @@ def print_results(calibration: "Calibration") -> None:
 
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
-    """Say what the model leaves unexplained, and the mean error that noise alone would leave."""
+    """Say what the model leaves unexplained, and the mean error of that; constants leave more than noise."""
+    from truearm.models import CONSTANT
     from truearm.summary import states_sigma
 
     per = "distance" if calibration.selection.distances else "coordinate"
     beyond = ", beyond the stated sigma" if states_sigma(calibration) else ""
+    left = f"{summary['noise_floor_mm']:.3f} mm"
+    alone = (
+        f"It makes a mean error of {left}: noise and, with constants alone, what varies with the joints."
+        if calibration.model_name == CONSTANT
+        else f"Mean error that noise alone would leave: {left}."
+    )
     say_wrapped(
         f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "
-        f"{per}. Mean error that noise alone would leave: {summary['noise_floor_mm']:.3f} mm."
+        f"{per}. {alone}"
     )
 
 

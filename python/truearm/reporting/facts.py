@@ -137,7 +137,7 @@ class Facts:
 
     @cached_property
     def floor_mm(self) -> float:
-        """Mean position error that noise alone would leave, mm."""
+        """Mean position error that noise alone would leave, mm; with constants, with what varies in it."""
         return distance_at_floor_mm(self.calibration)
 
     @property

@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import helps, nothing_to_gain
+from truearm.doubts import MAY_VARY, NEAR_MM, helps, nothing_to_gain
 from truearm.errors import count_of
-from truearm.models import NOMINAL
+from truearm.models import CONSTANT, NOMINAL
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
@@ -69,6 +69,8 @@ def verdict(facts: Facts) -> str:
     if facts.is_spoilt_by_rows:
         return f"{said} Single rows are far off: correct them or leave them out, and calibrate again."
     if nothing_to_gain(nominal.mean, after.mean, facts.floor_mm):
+        if facts.best == CONSTANT and nominal.mean >= NEAR_MM:
+            return f"{said} Constants gain nothing. {MAY_VARY}"
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
@@ -116,7 +118,7 @@ def cards(facts: Facts) -> list[Card]:
         *_card_without_outliers(facts),
         Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"),
     ]
-    if not facts.is_of_no_help:
+    if facts.best != CONSTANT and not facts.is_of_no_help:
         floor = facts.floor_mm
         found.append(Card(*_short_mm(floor), "mean error that noise alone would leave"))
     ratios = summary["error_to_repeatability"]
