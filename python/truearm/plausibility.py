@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
+from truearm.mixed_units import check_mixed_units
 from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
 from truearm.robot import Robot
 from truearm.turning_sense import FIT, MISFIT
@@ -87,6 +88,7 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
 def check_points(measurements: Measurements, robot: Robot) -> None:
     """Raise InputError where points lie too far apart, too close together, in inches, or in two units."""
     check_one_unit(measurements, robot)
+    check_mixed_units(measurements, robot)
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
     _check_distances(measurements, robot)
