@@ -369,7 +369,7 @@ def test_one_gross_row_is_named_and_not_taken_for_wrong_data():
         (0.1, 0.12, 0.05, "no_gain"),
         (0.1, 1.3, 0.05, "no_help"),
         (0.6, 0.7, 0.05, "no_help"),
-        (1.69, 1.7, 1.6, "no_gain"),
+        (1.69, 1.78, 1.6, "no_gain"),
         (1.69, 2.4, 1.6, "no_help"),
         (3.0, 3.1, 20.0, "no_help"),
         (8.0, 9.0, 8.5, "no_help"),

@@ -13,6 +13,7 @@ from truearm.calibration import Calibration
 from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails
+from truearm.distance_zero import zero_notices
 from truearm.doubts import (
     FAR_FROM_NOMINAL,
     NO_HELP,
@@ -50,7 +51,7 @@ from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge
 from truearm.measurements import Measurements
-from truearm.models import VARIABLE
+from truearm.models import CONSTANT, NOMINAL, VARIABLE
 from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
@@ -173,6 +174,7 @@ def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Out
     judged, best = found.validation, found.model_name
     points = None if found.selection.distances else found.held
     return [
+        *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
         *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
         *constant_is_better(judged, best, points, outliers),

@@ -277,7 +277,7 @@ def _held_one_way(robot: Robot, readings: Floats) -> list[Notice]:
 
 def helps(before_mm: float, after_mm: float) -> bool:
     """Whether a calibration that leaves `after_mm` on average of `before_mm` is one to use."""
-    return after_mm < min(before_mm, LARGE_MM)
+    return after_mm < min(SAME * before_mm, LARGE_MM)
 
 
 def no_help(

@@ -102,9 +102,8 @@ def _check_readings(own: Measurements, robot: Robot) -> None:
         return
     most, others = (np.abs(written[rows][:, degrees]).max() for rows in (found, ~odd))
     raise InputError(
-        f"the joint readings in {own.row_names(found)} are {most:.3g} deg at the most, those of the other rows "
-        f"{others:.4g} deg: they look "
-        "like radians among rows in degrees",
+        f"the joint readings in {own.row_names(found)} are {most:.3g} deg at the most, those of the other "
+        f"rows {others:.4g} deg: they look like radians among rows in degrees",
         where=", ".join(own.files),
         rule=ONE_UNIT,
         way_out=f"Convert these rows (multiply by {1.0 / RADIANS_PER_DEGREE:.4f}), {REMOVE}",

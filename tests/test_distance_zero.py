@@ -1,0 +1,42 @@
+"""The zero of a wire that nobody measured is told with its length; right distances are left alone."""
+
+import re
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from truearm.doubts import helps
+from truearm.simulation import VirtualArm
+
+ANCHOR = np.array([0.9, -0.6, 0.2])
+
+
+def wire(length_m, count=80, seed=5):
+    """Distances to one fixed point that are `length_m` longer than they are."""
+    arm = VirtualArm(ta.Robot.load("ur5e"), seed=seed)
+    table = arm.measure_table(arm.poses(count))
+    away = np.linalg.norm(table[["x", "y", "z"]] - table[["x", "y", "z"]].mean() - ANCHOR, axis=1)
+    joints = table[[f"q{k}" for k in range(1, 7)]]
+    return ta.Measurements.from_dataframe(joints.assign(anchor="box", distance=away + length_m))
+
+
+def told(data, kind):
+    found = ta.calibrate(ta.Robot.load("ur5e"), data, model="constant")
+    return next((notice.message for notice in found.notices if notice.kind == kind), "")
+
+
+@pytest.mark.parametrize(("length_m", "way_out"), [(0.15, "Subtract 1[45]"), (-0.05, "Add [45]")])
+def test_a_wire_with_an_unknown_zero_is_told_with_the_length(length_m, way_out):
+    words = told(wire(length_m), "distance_zero")
+    assert 'distances to "box" seem to be' in words
+    assert re.search(way_out, words), words
+
+
+def test_right_distances_are_left_alone():
+    assert not told(wire(0.0), "distance_zero")
+
+
+def test_a_calibration_that_changes_next_to_nothing_does_not_help():
+    assert not helps(6.376, 6.366)
+    assert helps(6.376, 6.0)
