@@ -28,9 +28,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-FAR_M: Final = 0.02
+FAR_M: Final = 0.01
 FAR_RAD: Final = 0.1
-"""Arms are off by millimetres and milliradians; joints that were never mastered by a little more."""
+"""Lengths of arms are off by a millimetre or two, angles by milliradians, those of joints that were never
+mastered by a little more; siblings of one family differ by a centimetre and more."""
 LARGE_MM: Final = 10.0
 """No arm that fits its table misses by so much once it is calibrated."""
 LARGE_MRAD: Final = 50.0
@@ -134,7 +135,7 @@ def doubts(
             or no_help(before, after, what, floor_mm, outliers, constants_alone=best == CONSTANT)
         ),
         *_turns_otherwise(validation, best),
-        *_far_from_nominal(arm, models[CONSTANT]),
+        *_far_from_nominal(arm, [models[CONSTANT], models[best]]),
     ]
 
 
@@ -381,14 +382,10 @@ def _turns_otherwise(validation: Validation, best: str) -> list[Notice]:
     return [Notice(ORIENTATION_MISFIT, text)]
 
 
-def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
-    found, nominal = constant.constants, arm.table
-    length = are_lengths(range(KIND_COUNT))
-    change = found - nominal
-    change[:, ~length] = np.arctan2(np.sin(change[:, ~length]), np.cos(change[:, ~length]))
-    share = np.abs(change) / np.where(length, FAR_M, FAR_RAD)
-    if arm.world_is_known:
-        share[0] = 0.0
+def _far_from_nominal(arm: IdentifiedArm, models: Sequence[ArmModel]) -> list[Notice]:
+    """A warning where parameters of one of the models, the farthest one, are too far from the table."""
+    found = max((model.constants for model in models), key=lambda each: float(_share_of_far(arm, each).max()))
+    nominal, share = arm.table, _share_of_far(arm, found)
     names = dict(zip(arm.candidates.columns, arm.candidates.names, strict=True))
     order = [int(k) for k in np.argsort(-share, axis=None) if share.flat[k] > 1.0 and int(k) in names]
     if not order:
@@ -400,6 +397,17 @@ def _far_from_nominal(arm: IdentifiedArm, constant: ArmModel) -> list[Notice]:
         "or the table or the data are wrong."
     )
     return [Notice(FAR_FROM_NOMINAL, text)]
+
+
+def _share_of_far(arm: IdentifiedArm, found: Floats) -> Floats:
+    """How far parameters (L, 5) are from the table, over what is too far; a base does not count."""
+    length = are_lengths(range(KIND_COUNT))
+    change = found - arm.table
+    change[:, ~length] = np.arctan2(np.sin(change[:, ~length]), np.cos(change[:, ~length]))
+    share = np.abs(change) / np.where(length, FAR_M, FAR_RAD)
+    if arm.world_is_known:
+        share[0] = 0.0
+    return share
 
 
 def _from_to(name: str, place: int, nominal: Floats, found: Floats) -> str:
