@@ -212,3 +212,17 @@ def test_bad_files_are_explained(tmp_path: Path, content: str, message: str) -> 
 def test_xacro_is_told_apart() -> None:
     with pytest.raises(InputError, match=r"xacro macro.*Expand it first"):
         Robot.load(Path("arm.urdf.xacro"))
+
+
+def test_a_urdf_in_millimetres_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mm.urdf"
+    path.write_text(urdf([("revolute", (0.0, 0.0, 425.0), (0.0, 0.0, 0.0), "0 0 1")]))
+    with pytest.raises(InputError, match=r"425 m from the joint before.*longer than 50 m.*divide all xyz"):
+        Robot.load(path)
+
+
+def test_measurements_in_the_place_of_a_robot_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    path.write_text("q1,x,y,z\n0,1,2,3\n")
+    with pytest.raises(InputError, match="table of measurements.*calibrate ROBOT MEASUREMENTS"):
+        Robot.load(path)

@@ -28,6 +28,11 @@ NAMELESS: Final = (
 )
 LOOKED_AT: Final = 4096
 """Bytes of a file in another encoding, an even number, from which its marks are told."""
+UNIT_WORDS: Final = frozenset(
+    ("", "-", "1", "rad", "deg", "°", "m", "mm", "in", "um", "µm", "c", "°c", "degc", "k", "kg", "s", "ms")
+)
+"""What stands below the names of columns where a row says their units."""
+SAID: Final = "q1_deg and x_mm"
 COMMENTS: Final = ("#", "//")
 REMARKS: Final = (*COMMENTS, "sep=", "SEP=")
 """What lines begin with that are not of the table; those of COMMENTS may be anywhere in a file."""
@@ -107,11 +112,12 @@ class Table:
         return values
 
     def _no_number(self, name: str, row: int, cell: str) -> InputError:
-        way_out = (
+        row_out = self._way_out_of_row(name, cell, row)
+        way_out = row_out or (
             "Correct the cell; an empty one says that nothing was measured, and "
             "truearm import --missing TEXT empties those that say so"
         )
-        if "," in cell and "." not in cell:
+        if not row_out and "," in cell and "." not in cell:
             way_out = 'If this is a decimal comma, convert the file with: truearm import --decimal ","'
         return InputError(
             f'column "{name}" holds "{cell}" in row {row + 1}',
@@ -119,6 +125,17 @@ class Table:
             rule="It must hold numbers",
             way_out=way_out,
         )
+
+    def _way_out_of_row(self, name: str, cell: str, row: int) -> str:
+        """What is said where a row repeats the header or holds the units of the columns; else empty."""
+        if cell.casefold() == name.strip().casefold():
+            return "The row repeats the header: remove it"
+        own = [self.texts(each)[row].strip("[]()").casefold() for each in self.names]
+        if cell.strip("[]()").casefold() in UNIT_WORDS and all(each in UNIT_WORDS for each in own):
+            return (
+                f"The row holds the units of the columns: remove it, and state them in their names, as {SAID}"
+            )
+        return ""
 
 
 def table_from_frame(frame: pd.DataFrame, *, where: str) -> Table:

@@ -20,6 +20,7 @@ from truearm.robot_file import parse_robot_file
 from truearm.urdf import UrdfChain, read_urdf, urdf_chain
 
 URDF_ENDINGS: Final = (".urdf", ".xml")
+TABLE_ENDINGS: Final = (".csv", ".tsv", ".txt", ".xlsx")
 
 
 class Robot(RobotData):
@@ -56,6 +57,13 @@ class Robot(RobotData):
                 "this is a xacro macro, not a URDF",
                 where=given,
                 way_out=f"Expand it first: xacro {path.name} > {path.stem}.urdf",
+            )
+        if path.suffix.lower() in TABLE_ENDINGS and is_file(path):
+            raise InputError(
+                "this looks like a table of measurements, not like a robot",
+                where=given,
+                rule="A robot is a name from the library (truearm robots), a TOML file or a URDF",
+                way_out="Name the robot before the measurements: truearm calibrate ROBOT MEASUREMENTS",
             )
         is_path = "/" in given or "\\" in given or given in {".", ".."}
         if path.suffix.lower() == ".toml" or is_file(path) or is_path:

@@ -9,6 +9,7 @@ from truearm.robot_data import RobotData
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 
 MAX_LENGTH_M: Final = 50.0
+NO_LONGER: Final = f"No link is longer than {MAX_LENGTH_M:g} m"
 SHORTEST_ARM_M: Final = 0.02
 MAX_ANGLE_RAD: Final = 2.0 * np.pi + 1e-6
 MAX_LIMIT_RAD: Final = 40.0 * np.pi
@@ -62,6 +63,6 @@ def _refuse_large(robot: RobotData, column: int, name: str, bound: float, unit: 
         raise InputError(
             f"{robot.table[link, column]:.6g} {unit[0]}",
             where=f"link {link + 1}, {name}",
-            rule=f"No {'angle is beyond one turn' if unit[0] == 'rad' else 'link is longer than 50 m'}",
+            rule="No angle is beyond one turn" if unit[0] == "rad" else NO_LONGER,
             way_out=f"Check {unit[1]}",
         )

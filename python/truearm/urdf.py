@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from truearm.dh_from_axes import Axis, dh_from_axes
 from truearm.errors import InputError, did_you_mean, list_names
 from truearm.files import read_text
+from truearm.robot_checks import MAX_LENGTH_M, NO_LONGER
 from truearm.urdf_checks import check_urdf
 from truearm.urdf_names import UrdfNames
 
@@ -151,6 +152,7 @@ def _axes(joints: Sequence[Any]) -> tuple[list[Axis], Floats]:
     axes = []
     for joint in joints:
         if joint.origin is not None:
+            _check_length(joint)
             frame = frame @ joint.origin
         if joint.type in MOVING:
             if joint.mimic is not None:
@@ -168,6 +170,18 @@ def _axes(joints: Sequence[Any]) -> tuple[list[Axis], Floats]:
                 rule="The chain may have revolute, continuous, prismatic and fixed joints",
             )
     return axes, frame
+
+
+def _check_length(joint: Any) -> None:  # noqa: ANN401
+    """Raise InputError where a joint is farther from the one before than any link of an arm is long."""
+    away = float(np.linalg.norm(joint.origin[:3, 3]))
+    if away > MAX_LENGTH_M:
+        raise InputError(
+            f"its origin is {away:.6g} m from the joint before",
+            where=f'joint "{joint.name}"',
+            rule=f"{NO_LONGER}, and a URDF is in metres",
+            way_out="If these are millimetres, divide all xyz, and limits of prismatic joints, by 1000",
+        )
 
 
 def _direction(joint: Any) -> Floats:  # noqa: ANN401
