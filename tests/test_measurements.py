@@ -341,3 +341,12 @@ def test_the_name_of_a_set_up_counts_in_the_hash() -> None:
     assert one.hash() != two.hash()
     named = [Measurements.from_dataframe(frame().assign(group="a"), name=name) for name in ("one", "two")]
     assert named[0].hash() == named[1].hash()
+
+
+def test_distances_that_nothing_names_lead_to_one_anchor() -> None:
+    wire = pd.DataFrame({"q1": [0.0, 1.0, 2.0], "distance": [1.0, 2.0, 3.0]})
+    data = Measurements.from_dataframe(wire)
+    assert data.anchor is not None
+    assert data.anchor.tolist() == ["anchor 1"] * 3
+    assert [notice.kind for notice in data.notices] == ["one_anchor"]
+    assert not Measurements.from_dataframe(wire.assign(anchor="box")).notices

@@ -82,7 +82,11 @@ TABLES = {
     ),
     "sigma empty": ("q1,x,y,z,sigma_mm", ["0,1,2,3,"], "empty, zero or negative in row 1"),
     "group empty": ("q1,x,y,z,group", ["0,1,2,3,a", "0,1,2,3,"], '"group" is empty in row 2'),
-    "distance to nowhere": ("q1,distance", ["0,1"], "the distance leads nowhere in row 1.*anchor.*pair"),
+    "distance to nowhere": (
+        "q1,distance,anchor",
+        ["0,1,"],
+        "the distance leads nowhere in row 1.*anchor.*pair",
+    ),
     "distance to both": ("q1,distance,anchor,pair", ["0,1,a,p"], "leads to an anchor and a pair in row 1"),
     "distance negative": ("q1,distance,anchor", ["0,-1,a"], '"distance" is not positive in row 1'),
     "pair of one": ("q1,distance,pair", ["0,1,p"], 'not exactly two rows share the name in "pair" in row 1'),
@@ -97,6 +101,9 @@ TABLES = {
         ["0,1,2,3,,p", "1,1,2,3,1,p"],
         "distance of a pair is empty in row 1",
     ),
+    "header again": ("q1,x,y,z", ["0,1,2,3", "q1,x,y,z"], '"q1" in row 2.*repeats the header: remove it'),
+    "units below": ("q1,x,y,z", ["rad,m,m,m", "0,1,2,3"], '"rad" in row 1.*holds the units .*: remove it'),
+    "no units": ("q1,x,y,z", ["rad,1,2,3"], '"rad" in row 1.*--missing TEXT'),
     "no rows": ("q1,x,y,z", [], "no data rows below the header"),
     "short line": (
         "q1,x,y,z",

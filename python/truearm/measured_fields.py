@@ -26,6 +26,8 @@ Mask = NDArray[np.bool_]
 
 LARGEST_SIGMA_M: Final = 10.0
 """No instrument is less sure of a point that it has seen."""
+ONE_ANCHOR: Final = "anchor 1"
+"""The fixed point of distances that nothing names."""
 
 
 def read_fields(
@@ -42,6 +44,7 @@ def read_fields(
     distance = _distances(table, layout)
     if measured or layout.targets:
         _check_measured(table, targets, distance)
+    ends, assumed = _ends(table, layout, distance)
     purpose = _purpose(table, layout)
     features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
@@ -55,9 +58,9 @@ def read_fields(
         "rows": np.arange(1, table.row_count + 1),
         "joint_units": tuple(column.unit for column in layout.joints),
         "distance_m": distance,
-        **_ends(table, layout, distance),
+        **ends,
         "purpose": purpose,
-        "notices": tuple(notices),
+        "notices": (*assumed, *notices),
         "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
 
@@ -161,12 +164,19 @@ def _group(table: Table, layout: Layout, default: str) -> Texts:
     return groups
 
 
-def _ends(table: Table, layout: Layout, distance: Floats | None) -> dict[str, Texts | None]:
-    """What the distances lead to: `anchor` and `pair`, each None where there is no such column."""
+def _ends(
+    table: Table, layout: Layout, distance: Floats | None
+) -> tuple[dict[str, Texts | None], list[Notice]]:
+    """What the distances lead to: `anchor` and `pair`, each None where there is none; and notices.
+
+    Distances without either column lead to one fixed point.
+    """
     anchor = table.texts("anchor") if "anchor" in layout.words else None
     pair = table.texts("pair") if "pair" in layout.words else None
     if distance is None:
-        return {"anchor": anchor, "pair": pair}
+        return {"anchor": anchor, "pair": pair}, []
+    if anchor is None and pair is None:
+        return {"anchor": np.where(np.isfinite(distance), ONE_ANCHOR, ""), "pair": None}, [_one_anchor(table)]
     has_anchor, has_pair = (_is_given(word, table.row_count) for word in (anchor, pair))
     rule = 'A distance leads to a fixed point named in "anchor", or to the other row of the same "pair"'
     measured = np.isfinite(distance)
@@ -174,7 +184,16 @@ def _ends(table: Table, layout: Layout, distance: Floats | None) -> dict[str, Te
     _refuse(table, measured & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
     if pair is not None:
         _check_pairs(table, pair, distance)
-    return {"anchor": anchor, "pair": pair}
+    return {"anchor": anchor, "pair": pair}, []
+
+
+def _one_anchor(table: Table) -> Notice:
+    text = (
+        f"{table.where}: no column says where the distances lead: all are taken as measured to one fixed "
+        f'point, "{ONE_ANCHOR}". If there are several, name them in a column anchor; distances between two '
+        "poses have a column pair."
+    )
+    return Notice("one_anchor", text)
 
 
 def _is_given(words: Texts | None, count: int) -> Mask:
