@@ -178,7 +178,7 @@ impl Corrector {
 
     /// Where the calibrated model puts the tool, base_from_tool, without allocation, lock or panic.
     ///
-    /// None where a number is not finite, a finite one is so large that the result is not, or an array does not fit.
+    /// None where a number is not finite, or so large that the result is not, or an array does not fit.
     pub fn predict(
         &self,
         readings: &[f64],

@@ -121,7 +121,8 @@ impl Stream {
     /// A stream that is switched on and has nothing applied.
     ///
     /// # Errors
-    /// [`CompensateError::Bound`] if an option is not positive, [`CompensateError::Time`] if it is the ramp, or that never ends.
+    /// [`CompensateError::Bound`] if an option is not positive; [`CompensateError::Time`] if the ramp takes no time
+    /// or never ends.
     pub fn new(corrector: Arc<Corrector>, options: StreamOptions) -> Result<Stream, CompensateError> {
         options.check()?;
         let count = corrector.joint_count();
@@ -293,7 +294,7 @@ impl Follower {
         }
     }
 
-    /// The same within what is left to the limits; where the set-point itself is beyond one, nothing is on that side.
+    /// The same within what is left to the limits; of one that the set-point itself is beyond nothing is left.
     ///
     /// What is cut at once is no more than the set-point moved: before, it led no farther than to the limit.
     fn follow_within(&mut self, aim: f64, elapsed: f64, [low, high]: [f64; 2]) {

@@ -80,7 +80,7 @@ pub extern "C" fn truearm_status_text(status: i32) -> *const c_char {
         1 => c"the set-point has no correction of its own; the last one is held or ramped down",
         2 => c"the waypoint must not be corrected: see reason",
         -1 => c"a pointer is null or not aligned",
-        -2 => c"an array has another length than is needed: of joints see truearm_joint_count, of features truearm_feature_count",
+        -2 => c"an array has another length than truearm_joint_count and truearm_feature_count say",
         -3 => c"a reading or a feature is NaN or infinite, or so large that the result is",
         -4 => c"a handle is of another kind or was freed",
         -5 => c"another thread is using this workspace or stream: give each thread its own",
@@ -92,7 +92,9 @@ pub extern "C" fn truearm_status_text(status: i32) -> *const c_char {
         -11 => c"there was no set-point yet",
         -12 => c"a mistake in this library: please report it",
         -13 => c"the workspace was made for another corrector",
-        -14 => c"this library knows constant and variable models: calibrate with --model constant or variable",
+        -14 => {
+            c"this library knows constant and variable models: calibrate with --model constant or variable"
+        }
         -15 => c"the thread does not round to nearest: call fesetround(FE_TONEAREST) before",
         _ => c"no status of this library",
     };

@@ -9,14 +9,15 @@ use super::types::StreamState;
 
 /// Corrects the next set-point of a robot.
 ///
-/// `readings` may be null where none came in time, and then `features`, too. `elapsed_s` is the time since the call before;
-/// above the deadline, below zero or not finite the set-point counts as missed. The first one is never late.
+/// `readings` may be null where none came in time, and then `features`, too. `elapsed_s` is the time since the
+/// call before; above the deadline, below zero or not finite the set-point counts as missed. The first one is
+/// never late.
 ///
 /// TRUEARM_STATUS_OK or TRUEARM_STATUS_HELD: `out` is written and finite; HELD says that this set-point has no
 /// correction of its own, and that the last one is held or on its ramp down (`state` says why). Where the
 /// set-point itself is not finite, `out` is the last finite one, corrected. TRUEARM_STATUS_NOT_STARTED: there was
-/// none yet, and `out` is not written; go on calling. `state` may be null. After any other status nothing has become
-/// of the set-point.
+/// none yet, and `out` is not written; go on calling. `state` may be null. After any other status nothing has
+/// become of the set-point.
 ///
 /// # Safety
 /// `stream` was made and not freed, `readings` is null or has `joints` numbers, `features` `feature_count`, `out`
