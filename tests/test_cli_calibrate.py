@@ -302,3 +302,17 @@ def test_measurements_are_not_written_over(name, folder, capsys):
     assert main(["calibrate", "rv-m2", name, "-o", "."]) == 2
     assert "never written over" in capsys.readouterr().err
     assert (folder / name).read_bytes() == before
+
+
+def test_another_calibration_that_is_there_is_kept(folder, capsys):
+    command = ["calibrate", "rv-m2", "arm.csv", "-o", "out", "--model", "constant"]
+    assert main(command) == 0
+    first = (folder / "out/calibration.calib").read_bytes()
+    capsys.readouterr()
+    assert main(command) == 0
+    assert "is kept" not in capsys.readouterr().err
+    assert not (folder / "out/calibration.previous.calib").exists()
+    assert main([*command, "--seed", "3"]) == 0
+    assert "was there is kept as out/calibration.previous.calib" in capsys.readouterr().err
+    assert (folder / "out/calibration.previous.calib").read_bytes() == first
+    assert (folder / "out/calibration.calib").read_bytes() != first

@@ -15,14 +15,14 @@ from truearm.cli.arguments import (
     RobotName,
     Use,
 )
-from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
+from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
 from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, HOLDOUT, MODEL, ROBUST, SEED
 from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
-from truearm.files import make_directory, refuse_own_input, write_whole
+from truearm.files import is_file, make_directory, read_bytes, refuse_own_input, write_whole
 from truearm.scheme_options import SchemeOptions
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 SCHEME = SchemeOptions()
 SUMMARY_NAME = "summary.json"
+PREVIOUS_NAME = "calibration.previous.calib"
 
 
 def command(
@@ -71,7 +72,8 @@ def command(
     """Calibrate an arm and judge the calibration on poses that took no part in it.
 
     Writes DIR/calibration.calib, fitted to all rows after the errors were judged, DIR/summary.json and
-    DIR/report.html, which opens in any browser.
+    DIR/report.html, which opens in any browser. Another calibration that is there is kept as
+    DIR/calibration.previous.calib.
 
     Examples:
       truearm calibrate ur10 measurements.csv -o result
@@ -109,7 +111,7 @@ def command(
         repeatability_mm=repeatability_mm,
     )
     check_directory(output)
-    for name in (CALIBRATION_NAME, SUMMARY_NAME, REPORT_NAME):
+    for name in (CALIBRATION_NAME, PREVIOUS_NAME, SUMMARY_NAME, REPORT_NAME):
         refuse_own_input(output / name, robot, *measurements)
     arm = Robot.load(robot)
     data = Measurements.read_files(
@@ -181,13 +183,26 @@ def bound_std(calibration: "Calibration", stages: Stages) -> None:
 
 
 def write_results(calibration: "Calibration", output: Path, *, with_rows: bool = True) -> dict[str, Any]:
-    """Write all three files to a directory, which is made if needed; the content of summary.json."""
-    summary = calibration.summary
+    """Write all three files to a directory, which is made if needed; the content of summary.json.
+
+    Another calibration that is there is kept beside them as PREVIOUS_NAME.
+    """
+    summary, content = calibration.summary, calibration.to_bytes(with_rows=with_rows)
     make_directory(output)
-    calibration.save(output / CALIBRATION_NAME, with_rows=with_rows)
+    _keep_previous(output, content)
+    write_whole(output / CALIBRATION_NAME, content)
     write_whole(output / SUMMARY_NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
     make_report(calibration if with_rows else calibration.without_rows(), output / REPORT_NAME)
     return summary
+
+
+def _keep_previous(output: Path, content: bytes) -> None:
+    """Keep the calibration that is replaced by another one, and say so."""
+    replaced = output / CALIBRATION_NAME
+    if not is_file(replaced) or (before := read_bytes(replaced)) == content:
+        return
+    write_whole(output / PREVIOUS_NAME, before)
+    tell(f"The calibration that was there is kept as {output / PREVIOUS_NAME}.")
 
 
 def print_places(output: Path) -> None:
