@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from truearm.cell.proposed import ProposalOptions, kept_still, propose_acceptance
 from truearm.cli import main
 from truearm.reporting.advice import advise
 from truearm.reporting.facts import Facts
@@ -61,7 +62,11 @@ def test_a_program_that_moves_it_is_warned_of(locked, tmp_path, monkeypatch, cap
         )
         words = ["compensate", "arm.calib", f"{name}.csv", "--controller", "nominal", "--dry-run"]
         main([*words, "--largest-mm", "50", "--largest-std-mm", "50"])
-        assert ("measured with joint 6 at 14.32 deg alone" in capsys.readouterr().err) == (by > 0.0)
+        told = " ".join(capsys.readouterr().err.split())
+        assert ("measured with joint 6 at 14.32 deg alone" in told) == (by > 0.0)
+        assert ("corrections move joint 6 by up to" in told) == (by == 0.0)
+    main([*words[:2], "still.csv", *words[3:], "--moving", "1,2,3,4,5"])
+    assert "move joint 6" not in " ".join(capsys.readouterr().err.split())
 
 
 def test_one_held_out_row_is_enough_for_a_report(tmp_path, monkeypatch):
@@ -88,3 +93,11 @@ def test_an_outlier_at_the_second_target_is_told_with_its_distance():
     (outlier,) = rows.outliers()
     assert outlier["row"] == data.rows[7]
     assert outlier["distance_mm"] == pytest.approx(8.0, abs=1.0)
+
+
+def test_proposed_poses_keep_a_joint_where_it_stood(locked):
+    options = ProposalOptions(4, seed=1)
+    assert kept_still(locked) == {6: pytest.approx(np.degrees(0.25))}
+    proposed = propose_acceptance(locked, options)
+    assert proposed.poses.readings[:, 5] == pytest.approx(0.25)
+    assert np.ptp(proposed.poses.readings[:, 0]) > 0.1

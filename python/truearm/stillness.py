@@ -1,6 +1,6 @@
 """Joints that stood still in all measured poses, of which nothing is known elsewhere."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,8 @@ Floats = NDArray[np.float64]
 STILL_DEG: Final = 0.5
 """More than what a controller that stops where it is told to differs by, less than what anybody measures."""
 STILL_MM: Final = 0.5
+CARRIED: Final = 1e-3
+"""Degrees or millimetres by which readings differ that are one place."""
 MOVE_IT: Final = (
     "What it changes looks like the place of the target, or like another joint, and no standard deviation "
     "knows of it. Measure poses in which it moves, over all of the range that the work needs"
@@ -40,10 +42,26 @@ def moved_joints(known: Floats, readings: Floats, joints: Sequence[str]) -> dict
     return {joint: at for joint, at in still_joints(known, joints).items() if joint not in stay}
 
 
-def still_words(still: dict[int, float], joints: Sequence[str]) -> str:
+def carried_joints(known: Floats, readings: Floats, joints: Sequence[str]) -> dict[int, float]:
+    """Of the joints that stood still in `known` (n, N), how far `readings` (t, N) take them beyond that.
+
+    Returns:
+        Farthest way beyond the lowest and highest of the known readings, deg or mm, by the number of the
+        joint from 1; without those that controllers do not tell from standing still.
+    """
+    there = readings[np.isfinite(readings).all(axis=1)]
+    if len(there) == 0:
+        return {}
+    beyond = np.maximum(known.min(axis=0) - there, there - known.max(axis=0)).max(axis=0)
+    shown = beyond * np.where(np.array(joints) == "prismatic", MM_PER_METRE, 1.0 / RADIANS_PER_DEGREE)
+    still = still_joints(known, joints)
+    return {joint: float(shown[joint - 1]) for joint in still if shown[joint - 1] > CARRIED}
+
+
+def still_words(still: Mapping[int, float], joints: Sequence[str], at: str = "at") -> str:
     """Joints that stood still, of which there must be one, in words: "joint 6 at 0 deg"."""
     units = ["mm" if kind == "prismatic" else "deg" for kind in joints]
-    return ", ".join(f"joint {joint} at {value:.4g} {units[joint - 1]}" for joint, value in still.items())
+    return ", ".join(f"joint {joint} {at} {value:.4g} {units[joint - 1]}" for joint, value in still.items())
 
 
 def still_warning(readings: Floats, joints: Sequence[str]) -> str:

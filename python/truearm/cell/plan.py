@@ -1,7 +1,8 @@
 """Which poses to measure: those that determine most, others to judge by, and some again, in a good order."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -46,6 +47,7 @@ MOST_TOLD: Final = 1000
 MOST_DRAWS: Final = 200_000
 OF_CELL: Final = "[world], [target] and the sensor's range in the cell file, at "
 UNLIMITED_RAD: Final = np.pi
+NONE_HELD: Final[Mapping[int, float]] = MappingProxyType({})
 JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
 JOINT_SPEED_RAD_S: Final = 1.0
 PRIOR_M: Final = 2e-3
@@ -204,9 +206,16 @@ def expected_mm(
 
 
 def measurable_pool(
-    arm: Robot, cell: Cell | None, size: int, seed: int, rules: Sequence[Rule] = ()
+    arm: Robot,
+    cell: Cell | None,
+    size: int,
+    seed: int,
+    rules: Sequence[Rule] = (),
+    held: Mapping[int, float] = NONE_HELD,
 ) -> Floats:
     """Readings (size, N) drawn evenly within the limits, all of which keep to the rules and can be measured.
+
+    Joints, by their number from 1, are held at readings, rad or m.
 
     Raises:
         WorkError: If there are too few.
@@ -216,6 +225,8 @@ def measurable_pool(
     found: list[Floats] = []
     drawn = 0
     for block in _drawn(arm, seed):
+        for joint, reading in held.items():
+            block[:, joint - 1] = reading
         allowed = accessible(arm, block, rules, tool=tool)
         for readings in block[allowed]:
             step = Step(0, "pose", 0, "", 0, readings)

@@ -24,7 +24,8 @@ from truearm.errors import UsageError
 from truearm.planning.accessibility import Rule, lowest
 from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
 from truearm.robot import Robot
-from truearm.units import MM_PER_METRE
+from truearm.stillness import still_joints
+from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
 
@@ -100,7 +101,9 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
         WorkError: If the sensor reaches too few poses, or the calibration has no standard deviations.
     """
     candidates = _candidates(calibration, options, cell)
-    workspace = measurable_pool(calibration.robot, cell, WORKSPACE, options.seed + 1, options.rules)
+    workspace = measurable_pool(
+        calibration.robot, cell, WORKSPACE, options.seed + 1, options.rules, _held(calibration)
+    )
     found = next_poses(candidates, workspace, options.count)
     proposed = _ordered(candidates, found, found.rows, "train", options, cell)
     return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))
@@ -113,6 +116,28 @@ def propose_acceptance(
     candidates = _candidates(calibration, options, cell)
     found = acceptance_poses(candidates, options.count)
     return _ordered(candidates, found, found.rows, "acceptance", options, cell)
+
+
+def kept_still(calibration: Calibration) -> dict[int, float]:
+    """Joints with one reading in all measurements, as without a motor: proposed poses keep it.
+
+    Returns:
+        The reading, deg or mm, by the number of the joint from 1.
+    """
+    rows = calibration.learned_from
+    if rows is None:
+        return {}
+    readings = rows.data.readings
+    alike = np.ptp(readings, axis=0) == 0.0
+    still = still_joints(readings, calibration.robot.joints)
+    return {joint: at for joint, at in still.items() if alike[joint - 1]}
+
+
+def _held(calibration: Calibration) -> dict[int, float]:
+    """Readings, rad or m, of these joints by the number of the joint from 1."""
+    joints = calibration.robot.joints
+    units = {joint: "mm" if joints[joint - 1] == "prismatic" else "deg" for joint in kept_still(calibration)}
+    return {joint: to_si(at, units[joint]) for joint, at in kept_still(calibration).items()}
 
 
 def check_same_arm(calibration: Calibration, arm: Robot) -> None:
@@ -138,7 +163,7 @@ def _candidates(calibration: Calibration, options: ProposalOptions, cell: Cell |
             way_out="Measure some, calibrate and ask again, or plan afresh with truearm plan ROBOT -n N",
         )
     size = min(max(LEAST_POOL, POOL_PER_POSE * options.count), MOST_CANDIDATES)
-    pool = measurable_pool(calibration.robot, cell, size, options.seed, options.rules)
+    pool = measurable_pool(calibration.robot, cell, size, options.seed, options.rules, _held(calibration))
     return Candidates(calibration, pool, options.group)
 
 

@@ -18,6 +18,7 @@ from truearm.files import refuse_own_input, refuse_same
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
+    from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import Plan
     from truearm.cell.proposed import Proposed
@@ -218,6 +219,7 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
         print_json({"poses": str(output), "order": asked.order, **proposed.to_dict()})
         return
     _print_proposed(proposed, output)
+    _print_still(calibration)
     _print_features(calibration.options.features)
     if asked.acceptance is not None:
         suggest(f"truearm update {typed(asked.calibration)} {NEW_FILE}", when=MEASURED)
@@ -257,6 +259,18 @@ def _print_proposed(proposed: "Proposed", output: Path) -> None:
     say("Smallest change that is noticed in 95 of 100 cases:")
     rows = [[name, f"{value:.4f}"] for name, value in told["noticed"].items()]
     print_table(("offset of joint in deg (mm), tool in mm (worst direction)", ""), rows)
+
+
+def _print_still(calibration: "Calibration") -> None:
+    from truearm.cell.proposed import kept_still
+    from truearm.stillness import still_words
+
+    still = kept_still(calibration)
+    if still:
+        say_wrapped(
+            f"Kept: {still_words(still, calibration.robot.joints)}, as in all measurements. For poses in "
+            "which every joint moves: truearm plan ROBOT -n N"
+        )
 
 
 def _print_features(features: Sequence[str]) -> None:

@@ -1,5 +1,6 @@
 """What is to be known of a rewritten program's load, tools and frames file."""
 
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -12,7 +13,7 @@ from truearm.programs.layouts import of_joints as layout_of_joints
 from truearm.programs.program import Program
 from truearm.programs.rewriting import Rewritten
 from truearm.robot import Robot
-from truearm.stillness import moved_joints, still_words
+from truearm.stillness import carried_joints, moved_joints, still_words
 
 SAME_PAYLOAD_KG: Final = 0.05
 MEASURED_M: Final = 1e-4
@@ -77,9 +78,12 @@ def update_notices(calibration: Calibration) -> list[Notice]:
 def still_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
     """Joints that stood still while the arm was measured, and move in the program."""
     rows, joints = calibration.learned_from, calibration.robot.joints
-    moved = {} if rows is None else moved_joints(rows.data.readings, done.nominal, joints)
-    if not moved:
+    if rows is None:
         return []
+    known = rows.data.readings
+    moved = moved_joints(known, done.nominal, joints)
+    if not moved:
+        return _carried_notices(carried_joints(known, done.corrected[done.changed], joints), joints)
     return [
         Notice(
             "stood_still",
@@ -88,6 +92,19 @@ def still_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
             "every joint moves",
         )
     ]
+
+
+def _carried_notices(carried: Mapping[int, float], joints: Sequence[str]) -> list[Notice]:
+    """Joints, by their number from 1, that corrections take so far from where they stood, deg or mm."""
+    if not carried:
+        return []
+    others = ",".join(str(joint) for joint in range(1, len(joints) + 1) if joint not in carried)
+    text = (
+        f"corrections move {still_words(carried, joints, 'by up to')}, which stood still while the arm was "
+        "measured. Where it cannot move, as without a motor, or must not, leave it as it is: "
+        f"--moving {others}"
+    )
+    return [Notice("still_joint_moved", text)]
 
 
 def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
