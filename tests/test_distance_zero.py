@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.cli.calibrate import suggest_next
 from truearm.doubts import helps
 from truearm.simulation import VirtualArm
 
@@ -40,3 +41,11 @@ def test_right_distances_are_left_alone():
 def test_a_calibration_that_changes_next_to_nothing_does_not_help():
     assert not helps(6.376, 6.366)
     assert helps(6.376, 6.0)
+
+
+def test_what_is_proposed_after_distances_takes_them(tmp_path, capsys):
+    suggest_next(ta.calibrate(ta.Robot.load("ur5e"), wire(0.0), model="constant"), tmp_path / "arm.calib")
+    said = capsys.readouterr().out + capsys.readouterr().err
+    assert "truearm compensate" in said
+    assert "truearm export" in said
+    assert "evaluate" not in said

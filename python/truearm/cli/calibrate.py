@@ -145,6 +145,10 @@ def suggest_next(calibration: "Calibration", file: Path) -> None:
 
     if any(notice.kind in (*OF_NO_USE, ORIENTATION_MISFIT) for notice in calibration.notices):
         suggest(f"truearm report {typed(file)}")
+    elif calibration.selection.distances:
+        suggest(
+            *compensate_commands(calibration, file), f"truearm export {typed(file)} --to dh-toml -o arm.toml"
+        )
     else:
         suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate_commands(calibration, file))
 

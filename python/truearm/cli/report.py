@@ -88,7 +88,7 @@ def command(
         for entry in made.advice:
             say_wrapped(f"- {entry.name} {entry.words}")
     say(f"Report: {target}")
-    if other is None:
+    if other is None and not known.selection.distances:
         suggest(f"truearm report {typed(calibration)} OTHER.csv -o {typed(target.with_stem(OTHER))}")
 
 
