@@ -297,3 +297,36 @@ def test_distances_are_compared_with_the_arm(size: float, unit: str, words: str 
         return
     with pytest.raises(InputError, match=words):
         check_against(data, robot)
+
+
+def test_metres_of_a_slide_that_are_named_mm_are_refused() -> None:
+    robot = Robot.load("adept-cobra-600")
+    slide = list(robot.joints).index("prismatic")
+    q = readings(robot)
+    right = table(robot, q)
+    for unit, factor, words in (("mm", 1.0, "times 1000 they fit"), ("m", 1e3, "beyond what .* can reach")):
+        named = right.rename(columns={f"q{slide + 1}": f"q{slide + 1}_{unit}"})
+        named[f"q{slide + 1}_{unit}"] *= factor
+        with pytest.raises(InputError, match=words):
+            check_against(Measurements.from_dataframe(named), robot)
+
+
+def test_a_slide_that_hardly_moved_is_let_be() -> None:
+    robot = Robot.load("adept-cobra-600")
+    slide = list(robot.joints).index("prismatic")
+    q = readings(robot)
+    low, high = robot.limits[slide]
+    q[:, slide] = np.clip(0.0, low, high) + 1e-3 * (q[:, slide] - q[:, slide].min())
+    check_against(Measurements.from_dataframe(table(robot, q)), robot)
+
+
+@pytest.mark.parametrize(("apart", "told"), [(0.09, True), (0.0005, False)])
+def test_points_that_lie_apart_at_equal_readings_are_told(apart: float, told: bool) -> None:
+    robot = Robot.load("ur10")
+    q = np.repeat(readings(robot, 20), 2, axis=0)
+    rows = table(robot, q)
+    rows.loc[1::2, "x"] += apart
+    notices = check_against(Measurements.from_dataframe(rows), robot)
+    found = [notice.message for notice in notices if notice.kind == "apart_at_equal_readings"]
+    assert bool(found) == told
+    assert all("rows 1 and 2" in words and "--map target=COLUMN" in words for words in found)

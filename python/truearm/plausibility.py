@@ -14,6 +14,7 @@ from truearm.robot import Robot
 from truearm.turning_sense import FIT, MISFIT
 from truearm.unit_change import check_one_unit
 from truearm.units import MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
+from truearm.visits import pose_numbers
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -21,6 +22,8 @@ Mask = NDArray[np.bool_]
 MAX_READING_RAD: Final = 4.0 * np.pi
 """Beyond two turns either way, and beyond its limits, a reading stated in no unit is taken for degrees."""
 ALIKE_RAD_OR_M: Final = 1e-4
+MOST: Final = 0.5
+"""Part of the poses that have to be repeated."""
 LIMIT_TOLERANCE: Final = 1e-6
 SPREAD_FACTOR: Final = 30.0
 """Between the factor that a long tool may stretch the poses by and the 1000 of a wrong unit."""
@@ -45,6 +48,11 @@ INCHES: Final = (
     ),
 )
 """Factors that bring points to metres where inches were mistaken, what they were taken for, what to do."""
+SLIDES_IN_M: Final = "Prismatic joints are in metres unless their columns say so"
+FIT_BETTER: Final = 5.0
+"""Times nearer to the points that an arm is whose slides were read in the right unit."""
+APART_M: Final = 0.01
+"""No arm comes back to the same readings so far from where it was."""
 SHORTEST_M: Final = 0.005
 """No bar or wire that tells distances is as short as this; a metre read as a millimetre is shorter."""
 
@@ -63,7 +71,7 @@ def check_against(measurements: Measurements, robot: Robot) -> list[Notice]:
     outside = check_readings(measurements, robot)
     _check_alike(measurements)
     check_points(measurements, robot)
-    return [*measurements.notices, *outside, *_repetitions(measurements)]
+    return [*measurements.notices, *outside, *_repetitions(measurements), *_apart_at_equal(measurements)]
 
 
 def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
@@ -88,6 +96,7 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
 def check_points(measurements: Measurements, robot: Robot) -> None:
     """Raise InputError where points lie too far apart, too close together, in inches, or in two units."""
     check_one_unit(measurements, robot)
+    _check_slides(measurements, robot)
     check_mixed_units(measurements, robot)
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
@@ -127,9 +136,9 @@ def _check_degrees(measurements: Measurements, robot: Robot) -> None:
 
 def _check_strokes(measurements: Measurements, robot: Robot) -> None:
     prismatic = np.array([kind == "prismatic" for kind in robot.joints])
-    unstated = prismatic & (np.array(measurements.joint_units) == "")
+    unstated: Mask = prismatic & np.isin(np.array(measurements.joint_units), ("", "m"))
     readings = measurements.readings
-    outside = (_outside(readings, robot.limits) & unstated).any(axis=1)
+    outside: Mask = np.asarray((_outside(readings, robot.limits) & unstated).any(axis=1))
     as_millimetres = np.where(unstated, readings / MM_PER_METRE, readings)
     if outside.mean() > 0.5 and not (_outside(as_millimetres, robot.limits) & unstated).any():
         columns = ", ".join(f"q{joint + 1}_mm" for joint in np.flatnonzero(unstated))
@@ -137,10 +146,51 @@ def _check_strokes(measurements: Measurements, robot: Robot) -> None:
             f"joint readings up to {np.abs(readings[:, unstated]).max():.4g} m in "
             f"{measurements.row_names(outside)}, beyond what {robot.name} can reach",
             where=", ".join(measurements.files),
-            rule="Prismatic joints are in metres unless their columns say so (q3_mm)",
+            rule=f"{SLIDES_IN_M} (q3_mm)",
             way_out=f"If these are millimetres, give --length-unit mm, or name the columns: {columns}; if "
             "truearm import took them for degrees, bring them in with their unit: --map q3=COLUMN:mm",
         )
+
+
+def _check_slides(measurements: Measurements, robot: Robot) -> None:
+    """Raise InputError where readings of slides, a thousandth of their range, fit the points if they are m.
+
+    Slides that hardly moved are as short: the nominal arm tells which of both they are.
+    """
+    slides = np.array([kind == "prismatic" for kind in robot.joints])
+    readings, (low, high) = measurements.readings, robot.limits.T
+    span, times = np.ptp(readings, axis=0), np.where(slides, MM_PER_METRE, 1.0)
+    short = slides & np.isfinite(high - low) & (span > 0.0) & (span * SPREAD_FACTOR < high - low)
+    if not short.any() or _outside(readings * times, robot.limits)[:, short].any():
+        return
+    found = np.flatnonzero(short)
+    converted = replace(measurements, readings=readings * np.where(short, MM_PER_METRE, 1.0))
+    if not _fits_much_better(converted, measurements, robot):
+        return
+    joints = ", ".join(f"joint {joint + 1}" for joint in found)
+    moved, could = (MM_PER_METRE * float(each[found[0]]) for each in (span, high - low))
+    raise InputError(
+        f"the readings of {joints} span {moved:.3g} mm of a range of {could:.4g} mm; "
+        f"times {MM_PER_METRE:g} they fit the measured points",
+        where=", ".join(measurements.files),
+        rule=f"{SLIDES_IN_M} (q3_mm)",
+        way_out="If these are metres, name the columns "
+        + ", ".join(f"q{joint + 1}_m" for joint in found)
+        + ", or give --length-unit m where their names say nothing",
+    )
+
+
+def _fits_much_better(converted: Measurements, given: Measurements, robot: Robot) -> bool:
+    """Whether the nominal arm fits points of the first set-up far better with other readings."""
+    if given.target_count == 0:
+        return False
+    target = given.most_held()
+    seen = np.isfinite(given.targets[:, target]).all(axis=1) & (given.group == given.groups[0])
+    if seen.sum() < FEWEST_ROWS:
+        return False
+    rows = some_rows(np.flatnonzero(seen))
+    now, then = (misfit_m(robot, each.select(rows), target) for each in (given, converted))
+    return then * FIT_BETTER < now
 
 
 def _check_alike(measurements: Measurements) -> None:
@@ -295,6 +345,30 @@ def _limit_notices(measurements: Measurements, robot: Robot) -> list[Notice]:
         )
         notices.append(Notice("limits", message, tuple(measurements.rows[rows].tolist())))
     return notices
+
+
+def _apart_at_equal(measurements: Measurements) -> list[Notice]:
+    """A warning where most rows at equal readings hold points that lie apart, as of several targets."""
+    if measurements.target_count == 0:
+        return []
+    points = measurements.targets[:, measurements.most_held()]
+    rows = np.flatnonzero(np.isfinite(points).all(axis=1))
+    poses = pose_numbers(measurements.readings[rows], measurements.group[rows])
+    _, first, number, counts = np.unique(poses, return_index=True, return_inverse=True, return_counts=True)
+    away = np.linalg.norm(points[rows] - points[rows[first]][number], axis=1)
+    others = np.delete(away, first)
+    if len(others) == 0 or (counts > 1).mean() < MOST or np.median(others) < APART_M:
+        return []
+    second = int(np.setdiff1d(np.arange(len(rows)), first)[0])
+    pair = np.zeros(len(measurements), dtype=bool)
+    pair[rows[[first[number[second]], second]]] = True
+    message = (
+        "Rows at equal readings hold points that lie apart, half of them by more than "
+        f"{MM_PER_METRE * np.median(others):.3g} mm, such as {measurements.row_names(pair)}: no arm comes "
+        "back so badly. If a row holds one of several targets on the tool, say which: truearm import --map "
+        "target=COLUMN, where COLUMN counts them from 1. Else readings and points do not belong together."
+    )
+    return [Notice("apart_at_equal_readings", message)]
 
 
 def _repetitions(measurements: Measurements) -> list[Notice]:
