@@ -304,3 +304,12 @@ def test_warnings_and_tables(capsys):
     assert printed.err == "Warning: Joint 2 is far out.\n"
     assert "[b]odd[/b]" in printed.out
     assert max(map(len, printed.out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("width", [80, 40, 20])
+def test_numbers_of_tables_are_whole_on_a_terminal_of_any_width(width, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(width))
+    numbers = ["1.703", "1.822", "2.913", "3.003", "13.061"]
+    console.print_table(["model", "mean", "RMS", "95 %", "99 %", "max"], [["nominal", *numbers]])
+    printed = capsys.readouterr().out
+    assert all(number in printed.split() for number in ["nominal", *numbers])

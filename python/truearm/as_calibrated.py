@@ -9,6 +9,7 @@ from truearm.calibration import Calibration
 from truearm.errors import Notice
 from truearm.gross_rows import AXES, Expected, widened
 from truearm.held_rows import HeldRows
+from truearm.lengths import length_mm
 from truearm.nominal_misfit import some_rows
 from truearm.units import MM_PER_METRE
 
@@ -44,10 +45,10 @@ def not_as_calibrated(found: Expected, frame: Expected, held: HeldRows) -> list[
     if share <= HALF:
         return []
     text = (
-        f"The arm, its tool or the set-up is not as it was calibrated, or the instrument scatters more: the "
-        f"mean error is {mean_mm:.4g} mm, {known.position.mean:.4g} mm on the calibration's own held-out "
-        f"rows, and {100.0 * share:.0f} % of the rows are farther off than its standard deviations and noise "
-        "allow 5 % to be."
+        "The arm, its tool or the set-up is not as it was calibrated, or the instrument scatters more: the "
+        f"mean error is {length_mm(mean_mm, 4)}, {length_mm(known.position.mean, 4)} on the calibration's "
+        f"own held-out rows, and {100.0 * share:.0f} % of the rows are farther off than its standard "
+        "deviations and noise allow 5 % to be."
     )
     return [Notice(NOT_AS_CALIBRATED, text)]
 

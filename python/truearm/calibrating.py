@@ -50,6 +50,7 @@ from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE
 from truearm.options import Options
@@ -343,9 +344,10 @@ def _astray(task: Task, fits: tuple[Fits, Fits], held: Measurements, judged: Hel
     if after <= ASTRAY * before:
         return []
     text = (
-        f"Fitted to all rows the variable model misses the held-out rows by {after:.4g} mm in the median, "
-        f"fitted to {count_of(len(trained.data), 'training row')} by {before:.4g} mm: the calibration in the "
-        "file stays that of the training rows. Look at the table of the robot, and for rows that are wrong."
+        f"Fitted to all rows the variable model misses the held-out rows by {length_mm(after, 4)} in the "
+        f"median, fitted to {count_of(len(trained.data), 'training row')} by {length_mm(before, 4)}: the "
+        "calibration in the file stays that of the training rows. Look at the table of the robot, and for "
+        "rows that are wrong."
     )
     return [Notice(REFIT_ASTRAY, text)]
 

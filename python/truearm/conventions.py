@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from truearm.doubts import FITS_OTHERWISE
 from truearm.errors import Notice, count_of
 from truearm.fitting import Task
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
 from truearm.parameters import ALPHA, KINDS, THETA, A, D
@@ -176,7 +177,7 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     fitting = [convention for convention, off in found.items() if off <= max(AS_WELL * best, EXACT_M)]
     fitting = [convention for convention in fitting if not _needs_less(convention, fitting)]
     named, *others = sorted(fitting, key=lambda convention: (convention.order, found[convention]))
-    off, instead = (f"{value * MM_PER_METRE:.3g} mm" for value in (found[named], before))
+    off, instead = (length_mm(value * MM_PER_METRE, 3) for value in (found[named], before))
     instead = f" in place of {instead}" if np.isfinite(before) else ""
     text = (
         f"The measurements fit {robot.name}, with a median of {off}{instead} before any "

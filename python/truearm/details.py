@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import ConstantFit
+from truearm.lengths import length_mm
 
 Floats = NDArray[np.float64]
 
@@ -104,7 +105,7 @@ class Jump:
     def words(self) -> str:
         """How far, and where."""
         where = ", where the poses change as well" if self.poses_change else ""
-        return f"{self.mm:.2g} mm of it at once, between {self.between}{where}"
+        return f"{length_mm(self.mm, 2)} of it at once, between {self.between}{where}"
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ class DriftDetails:
 
     def way(self, group: str) -> str:
         """How far a set-up moved, and what of it at once."""
-        parts = [f"{self.moved_mm[group]:.2g} mm", *(jump.words for jump in self.jumps.get(group, ()))]
+        parts = [length_mm(self.moved_mm[group], 2), *(jump.words for jump in self.jumps.get(group, ()))]
         return ", ".join(parts)
 
     @property

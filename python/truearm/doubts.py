@@ -15,6 +15,7 @@ from truearm.grids import BETWEEN, grid_steps, grid_words
 from truearm.held_rows import HeldRows
 from truearm.held_tool import TURN_MORE, held_tool, held_words
 from truearm.identified import IdentifiedArm
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.parameters import KIND_COUNT, are_lengths
@@ -148,9 +149,10 @@ def stated_too_large(
     if left > UNLIKELY * noise:
         return []
     text = (
-        f"The column of sigma typically says {stated:.3g} mm, which alone would leave a mean error of "
-        f"{noise:.3g} mm; on {validation.judged} rows it is {left:.3g} mm. So sigma is too large, and errors "
-        "of the arm are taken for noise. Correct it (sigma is in m, sigma_mm in mm), or leave the column out."
+        f"The column of sigma typically says {length_mm(stated, 3)}, which alone would leave a mean error "
+        f"of {length_mm(noise, 3)}; on {validation.judged} rows it is {length_mm(left, 3)}. So sigma is too "
+        "large, and errors of the arm are taken for noise. Correct it (sigma is in m, sigma_mm in mm), or "
+        "leave the column out."
     )
     return [Notice(STATED_TOO_LARGE, text)]
 
@@ -181,8 +183,8 @@ def constant_is_better(
     robust = " --robust cauchy" if best == VARIABLE and outliers is not None and outliers.entries else ""
     text = (
         f"Constant parameters do better on {validation.judged} rows{apart}: a mean error of "
-        f"{means[CONSTANT]:.3g} mm against {means[best]:.3g} mm. Give --model constant{robust}, or measure "
-        "more poses."
+        f"{length_mm(means[CONSTANT], 3)} against {length_mm(means[best], 3)}. Give --model "
+        f"constant{robust}, or measure more poses."
     )
     return [Notice(CONSTANT_BETTER, text)]
 
@@ -308,17 +310,17 @@ def no_help(
             start, why = "Constants gain nothing", MAY_VARY
         elif before_mm >= NEAR_MM:
             why = (
-                f"Noise alone would leave {floor_mm:.4g} mm: what the arm errs by is hidden in it. Measure "
-                "with a better instrument, each pose several times, or more poses."
+                f"Noise alone would leave {length_mm(floor_mm, 4)}: what the arm errs by is hidden in it. "
+                "Measure with a better instrument, each pose several times, or more poses."
             )
         text = (
-            f"{start}: the {what} is {after_mm:.4g} mm, that of the nominal model {before_mm:.4g} mm "
-            f"already. {why}"
+            f"{start}: the {what} is {length_mm(after_mm, 4)}, that of the nominal model "
+            f"{length_mm(before_mm, 4)} already. {why}"
         )
         return [Notice(NO_GAIN, text)]
     text = (
-        f"The calibration does not help: its {what} is {after_mm:.4g} mm, that of the nominal model "
-        f"{before_mm:.4g} mm. Do not use it until the reason is found. {to_check(outliers)}"
+        f"The calibration does not help: its {what} is {length_mm(after_mm, 4)}, that of the nominal model "
+        f"{length_mm(before_mm, 4)}. Do not use it until the reason is found. {to_check(outliers)}"
     )
     return [Notice(NO_HELP, text)]
 
@@ -353,9 +355,9 @@ def _single_rows(
     if not helps(nominally, without):
         return []
     text = (
-        f"Single rows are far off: {outliers.named}. With them the {what} is {after_mm:.4g} mm, that of the "
-        f"nominal model {before_mm:.4g} mm; without them they are {without:.4g} and {nominally:.4g} mm. "
-        "Correct these rows or leave them out, and calibrate again."
+        f"Single rows are far off: {outliers.named}. With them the {what} is {length_mm(after_mm, 4)}, that "
+        f"of the nominal model {length_mm(before_mm, 4)}; without them they are {length_mm(without, 4)} and "
+        f"{length_mm(nominally, 4)}. Correct these rows or leave them out, and calibrate again."
     )
     return [Notice(SINGLE_ROWS, text)]
 

@@ -12,6 +12,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from truearm.lengths import distance_mm
+
 MAX_ROWS_NAMED = 10
 OUTLIERS_NAMED = 5
 
@@ -90,7 +92,7 @@ def list_outliers(outliers: Sequence[Mapping[str, Any]], *, several: bool) -> st
     """
     named = [
         f"row {outlier['row']}{' of ' + Path(outlier['file']).name if several else ''}"
-        f" ({outlier['distance_mm']:.2f} mm)"
+        f" ({distance_mm(outlier['distance_mm'])})"
         for outlier in outliers[:OUTLIERS_NAMED]
     ]
     more = f" and {len(outliers) - len(named)} more" if len(outliers) > len(named) else ""

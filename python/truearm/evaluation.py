@@ -20,6 +20,7 @@ from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
 from truearm.judging import check_judged, judge, model_inputs
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.plausibility import check_against
@@ -227,9 +228,9 @@ def _moved(
     what = "frame and tool" if with_frame else "tool"
     where = "instrument or the target stands" if with_frame else "target sits"
     text = (
-        f"With the {what} of the calibration the median error is {before:.4g} mm, with what can be found "
-        f"anew {after:.4g} mm: the {where} elsewhere than then, and the calibration itself fits. Leave "
-        f"{' and '.join(option for option, is_given in given.items() if is_given)} out."
+        f"With the {what} of the calibration the median error is {length_mm(before, 4)}, with what can be "
+        f"found anew {length_mm(after, 4)}: the {where} elsewhere than then, and the calibration itself "
+        f"fits. Leave {' and '.join(option for option, is_given in given.items() if is_given)} out."
     )
     return [Notice("setup_moved", text)]
 

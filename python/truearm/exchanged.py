@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import Notice
 from truearm.fitted_rows import FittedRows
+from truearm.lengths import length_mm
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def exchanged_notices(found: "Calibration") -> list[Notice]:
 
 
 def _words(rows: str, kind: str, within_m: float) -> str:
-    within = f"to {within_m * MM_PER_METRE:.2g} mm"
+    within = f"to {length_mm(within_m * MM_PER_METRE, 2)}"
     what = (
         f"The points of {rows} fit the readings of one another {within}: they stand in the wrong order"
         if kind == "rows_exchanged"

@@ -11,6 +11,7 @@ from truearm.conventions import BETTER, NEAR_M
 from truearm.doubts import ROWS_SHIFTED
 from truearm.errors import Notice, count_of
 from truearm.fitting import Task
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.nominal_misfit import FEWEST_ROWS, distances_m, nominal_setup, some_rows
 from truearm.robot import Robot
@@ -102,7 +103,7 @@ def _of_set_up(rows: _Rows, data: Measurements) -> list[Notice]:
     off, before = np.nanmedian(own[told]), np.nanmedian(found[0, told])
     if off >= min(before / BETTER, NEAR_M):
         return []
-    fit, instead = (f"{value * MM_PER_METRE:.3g} mm" for value in (off, before))
+    fit, instead = (length_mm(value * MM_PER_METRE, 3) for value in (off, before))
     fits = f"fit {rows.robot.name}, with a median of {fit} in place of {instead} before any calibration"
     if np.ptp(lags) == 0:
         text = (

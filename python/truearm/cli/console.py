@@ -13,6 +13,7 @@ from truearm.errors import Notice, TruearmError, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
 DONE: Final = 0
 FAILED: Final = 1
@@ -64,7 +65,7 @@ def print_json(value: Any, *, on_one_line: bool = False) -> None:  # noqa: ANN40
 def print_table(
     columns: Sequence[str], rows: Iterable[Sequence[str]], *, title: str = "", left: Sequence[int] = (0,)
 ) -> None:
-    """Print a table of at most 80 columns on stdout.
+    """Print a table of at most 80 columns on stdout, with numbers whole on a terminal of any width.
 
     Args:
         columns: Headings, with units.
@@ -81,7 +82,18 @@ def print_table(
         table.add_column(Text(heading), justify="left" if position in left else "right")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
-    _console().print(table)
+    console = _console()
+    if _narrowest(table) > console.width:
+        table.padding = 0
+    console.width = max(console.width, _narrowest(table))
+    console.print(table)
+
+
+def _narrowest(table: "Table") -> int:
+    """Columns of a terminal on which no word or number of a table is cut."""
+    from rich.console import Console
+
+    return Console(width=sys.maxsize).measure(table).minimum
 
 
 def exit_status(error: BaseException) -> int | None:

@@ -95,7 +95,7 @@ def command(
     write(plan, output)
     if picture is not None:
         draw(plan, picture)
-    _print(plan, output, order, as_json=as_json)
+    _print(plan, output, order, arm.joints, as_json=as_json)
     if not as_json and cell is not None:
         suggest(f"truearm measure {typed(cell)} {typed(output)} --dry-run")
     elif not as_json:
@@ -218,7 +218,7 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
     if as_json:
         print_json({"poses": str(output), "order": asked.order, **proposed.to_dict()})
         return
-    _print_proposed(proposed, output)
+    _print_proposed(proposed, output, calibration.robot.joints)
     _print_still(calibration)
     _print_features(calibration.options.features)
     if asked.acceptance is not None:
@@ -237,10 +237,10 @@ def _suggest_again(again: Again, calibration: Path) -> None:
     suggest(again.command, when="Then calibrate:" if again.notes else "Then calibrate from all:")
 
 
-def _print_proposed(proposed: "Proposed", output: Path) -> None:
+def _print_proposed(proposed: "Proposed", output: Path, joints: "tuple[str, ...]") -> None:
     told = proposed.to_dict()
     say(f"{count_of(told['count'], 'pose')}: {output}")
-    say_wrapped(_motion(proposed.seconds))
+    say_wrapped(_motion(proposed.seconds, joints))
     say_wrapped(_lowest(proposed.lowest_m))
     if "noticed" not in told:
         before, after = told["expected_before_mm"], told["expected_after_mm"][-1]
@@ -292,12 +292,14 @@ def _told_unreached(poses: list[int]) -> list[Notice]:
     ]
 
 
-def _motion(seconds: "dict[str, float]") -> str:
+def _motion(seconds: "dict[str, float]", joints: "tuple[str, ...]") -> str:
     from truearm.cell.plan import JOINT_SPEED_RAD_S
 
+    units = [unit for unit, kind in (("rad/s", "revolute"), ("m/s", "prismatic")) if kind in joints]
+    speed = " and ".join(f"{JOINT_SPEED_RAD_S:g} {unit}" for unit in units)
     back, short, paper = seconds[THERE_AND_BACK], seconds["short"], seconds["paper"]
     return (
-        f"Motion of the joints at {JOINT_SPEED_RAD_S:g} rad/s: {back:.0f} s there and back, {short:.0f} s in "
+        f"Motion of the joints at {speed}: {back:.0f} s there and back, {short:.0f} s in "
         f"short order, {paper:.0f} s in the paper's. The way to the first pose, coming from one side, the "
         "sensor, contacts for the frame and checks come on top."
     )
@@ -308,7 +310,7 @@ def _lowest(height_m: float) -> str:
     return f"The lowest place of arm and tool is at z = {height} in the base frame (--floor-mm is a bound)."
 
 
-def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
+def _print(plan: "Plan", output: Path, order: str, joints: "tuple[str, ...]", *, as_json: bool) -> None:
     purposes = {name: plan.poses.purpose.count(name) for name in ("train", "validate", "repeat")}
     if as_json:
         print_json(
@@ -336,7 +338,7 @@ def _print(plan: "Plan", output: Path, order: str, *, as_json: bool) -> None:
         f"They determine the parameters {times:.2f} times as well as poses at random, in the geometric mean "
         f"(index O1). Condition number {kappa} (columns at 300 mm)."
     )
-    say_wrapped(_motion(plan.seconds))
+    say_wrapped(_motion(plan.seconds, joints))
     warn(_told_unreached(plan.unreached))
     say_wrapped(_lowest(plan.lowest_m))
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]

@@ -8,6 +8,7 @@ from scipy.stats import f as f_distribution
 
 from truearm.errors import InputError, Notice, WorkError, list_rows
 from truearm.leaving_out import left_out
+from truearm.lengths import length_mm
 from truearm.registration import register
 from truearm.units import MM_PER_METRE
 
@@ -49,8 +50,8 @@ def far_rows(residuals: Floats, jacobian: Floats, rows: Rows) -> list[Notice]:
     numbers = [int(rows[place]) for place in sorted(far)]
     lie, them = ("lies", "it") if len(far) == 1 else ("lie", "them")
     text = (
-        f"{list_rows(numbers)} {lie} far off, {max(far.values()) * MM_PER_METRE:.3g} mm from where the other "
-        f"rows say: look at {them}, or leave {them} out"
+        f"{list_rows(numbers)} {lie} far off, {length_mm(max(far.values()) * MM_PER_METRE, 3)} from where "
+        f"the other rows say: look at {them}, or leave {them} out"
     )
     return [Notice("far_rows", text, tuple(numbers))]
 
@@ -75,7 +76,7 @@ def check_agreement(noise_m: float, notices: list[Notice]) -> None:
         return
     named = "; ".join(notice.message for notice in notices)
     raise WorkError(
-        f"the rows disagree by {noise_m * MM_PER_METRE:.4g} mm (standard deviation of a coordinate)",
+        f"the rows disagree by {length_mm(noise_m * MM_PER_METRE, 4)} (standard deviation of a coordinate)",
         rule=f"Beyond {WORST_M * MM_PER_METRE:g} mm nothing is found from them",
         way_out=f"{named[0].upper()}{named[1:]}"
         if named
@@ -100,8 +101,8 @@ def check_places(touched: Floats, places: Floats) -> None:
     plain, mirrored = _misfit(touched, places), _misfit(touched, places * [1.0, 1.0, -1.0])
     if mirrored < MUCH_BETTER * plain:
         raise WorkError(
-            f"the touched points fit their places to {plain * MM_PER_METRE:.3g} mm, "
-            f"and their mirror image to {mirrored * MM_PER_METRE:.3g} mm",
+            f"the touched points fit their places to {length_mm(plain * MM_PER_METRE, 3)}, "
+            f"and their mirror image to {length_mm(mirrored * MM_PER_METRE, 3)}",
             rule="The axes x, y and z of an object are right-handed",
             way_out="Check the signs and the order of x, y and z, and which point each row touched",
         )

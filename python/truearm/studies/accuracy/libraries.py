@@ -16,8 +16,8 @@ def require(libraries: Iterable[str]) -> None:
     missing = sorted({name for name in libraries if name and find_spec(MODULES[name]) is None})
     if missing:
         raise UsageError(
-            f"{list_names(missing)} is not installed",
-            rule="Some of the compared methods are fitted by it",
+            f"{list_names(missing)} {'is' if len(missing) == 1 else 'are'} not installed",
+            rule=f"Some of the compared methods are fitted by {'it' if len(missing) == 1 else 'them'}",
             way_out='Install it with: pip install ".[study]" in the source; or leave them out with --methods',
         )
 
