@@ -71,6 +71,7 @@ def field(problem, count):
         "features": np.zeros((count, 0)),
         "feature_ranges": [],
         "payloads": [],
+        "coupling": np.eye(len(LINKS)),
         "degree": 3,
         "prior": PRIOR,
         "hyper": None,
