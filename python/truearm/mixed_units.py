@@ -23,7 +23,6 @@ ALIKE: Final = 1.5
 FEWEST: Final = 5
 """Other rows at the least."""
 ONE_UNIT: Final = "All rows of a column have one unit"
-REMOVE: Final = "or remove them"
 
 
 def check_mixed_units(measurements: Measurements, robot: Robot) -> None:
@@ -78,12 +77,18 @@ def _refuse(own: Measurements, far: Floats, factors: Floats, found: Mask, what: 
     rows = large if large.any() else found
     unit, others, how = ("mm", "m", "divide") if large.any() else ("m", "mm", "multiply")
     found_size = size.format(f"{np.median(far[rows]):.4g}")
-    raise InputError(
+    raise _mixed(
+        own,
         f"the {what} in {own.row_names(rows)} {found_size}, those of the other "
         f"rows {np.nanmedian(far[factors == 1.0]):.4g} m: they look like {unit} among rows in {others}",
-        where=", ".join(own.files),
-        rule=ONE_UNIT,
-        way_out=f"Convert these rows ({how} by {MM_PER_METRE:g}), {REMOVE}",
+        f"{how} by {MM_PER_METRE:g}",
+    )
+
+
+def _mixed(own: Measurements, what: str, how: str) -> InputError:
+    """The error of rows in another unit, and how to convert them."""
+    return InputError(
+        what, where=", ".join(own.files), rule=ONE_UNIT, way_out=f"Convert these rows ({how}), or remove them"
     )
 
 
@@ -101,12 +106,11 @@ def _check_readings(own: Measurements, robot: Robot) -> None:
     if not found.any():
         return
     most, others = (np.abs(written[rows][:, degrees]).max() for rows in (found, ~odd))
-    raise InputError(
+    raise _mixed(
+        own,
         f"the joint readings in {own.row_names(found)} are {most:.3g} deg at the most, those of the other "
         f"rows {others:.4g} deg: they look like radians among rows in degrees",
-        where=", ".join(own.files),
-        rule=ONE_UNIT,
-        way_out=f"Convert these rows (multiply by {1.0 / RADIANS_PER_DEGREE:.4f}), {REMOVE}",
+        f"multiply by {1.0 / RADIANS_PER_DEGREE:.4f}",
     )
 
 

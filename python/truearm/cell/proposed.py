@@ -25,7 +25,7 @@ from truearm.planning.accessibility import Rule, lowest
 from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
 from truearm.robot import Robot
 from truearm.stillness import still_joints
-from truearm.units import MM_PER_METRE, to_si
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
@@ -135,9 +135,10 @@ def kept_still(calibration: Calibration) -> dict[int, float]:
 
 def _held(calibration: Calibration) -> dict[int, float]:
     """Readings, rad or m, of these joints by the number of the joint from 1."""
-    joints = calibration.robot.joints
-    units = {joint: "mm" if joints[joint - 1] == "prismatic" else "deg" for joint in kept_still(calibration)}
-    return {joint: to_si(at, units[joint]) for joint, at in kept_still(calibration).items()}
+    rows = calibration.learned_from
+    if rows is None:
+        return {}
+    return {joint: float(rows.data.readings[0, joint - 1]) for joint in kept_still(calibration)}
 
 
 def check_same_arm(calibration: Calibration, arm: Robot) -> None:
