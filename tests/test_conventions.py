@@ -18,7 +18,9 @@ def measured_otherwise(name, **otherwise):
     robot, convention = ta.Robot.load(name), Convention(**otherwise)
     arm = VirtualArm(convention.robot(robot), seed=4)
     table = arm.measure_table(arm.poses(60))
-    return robot, convention.measured(ta.Measurements.from_dataframe(table, joints=robot.joints))
+    data = ta.Measurements.from_dataframe(table, joints=robot.joints)
+    readings, points = convention.measured(data.readings, data.targets[:, 0])
+    return robot, replace(data, readings=readings, targets=points[:, None])
 
 
 @pytest.mark.parametrize(

@@ -161,7 +161,7 @@ def test_orientations_that_no_instrument_measured_are_refused():
 def test_what_is_not_turned_can_be_read_otherwise():
     still = np.tile([1.0, 0.0, 0.0, 0.0], (3, 1))
     for _, _, other in otherwise_read(still):
-        np.testing.assert_allclose(np.linalg.norm(other, axis=1), 1.0)
+        np.testing.assert_allclose(np.linalg.norm(other, axis=-1), 1.0)
 
 
 def test_orientations_beside_several_targets_are_told_to_be_left_out():

@@ -8,12 +8,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm._core import Chain
 from truearm.doubts import FITS_OTHERWISE
 from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.nominal_misfit import FEWEST_ROWS, misfit_m, some_rows
+from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, some_rows
 from truearm.parameters import ALPHA, KINDS, THETA, A, D
 from truearm.robot import Robot
 from truearm.robot_data import Convention as Rows
@@ -78,27 +79,43 @@ class Convention:
         return beside, self.changes, self.mirrored, len(self.signs), len(self.zeros)
 
     def robot(self, robot: Robot) -> Robot:
-        """A robot with directions, coupling and zeros of this convention."""
-        coupling, table = robot.coupling.copy(), robot.table.copy()
+        """A robot with the coupling and the rows of this convention."""
+        coupling, table = self._coupling(robot), self._table(robot)
+        return replace(robot, coupling=coupling, table=table, convention=self._rows(robot))
+
+    def arm(self, robot: Robot) -> NominalArm:
+        """The same up to its flange, without the checks of a robot."""
+        table = self._table(robot)
+        chain = Chain(self._rows(robot), robot.joints, table, robot.base, robot.flange)
+        return NominalArm(chain, table, self._coupling(robot))
+
+    def _coupling(self, robot: Robot) -> Floats:
+        """Joint values from readings (N, N), with the directions of this convention."""
+        coupling = robot.coupling.copy()
         if self.coupled is not None:
             coupling[ELBOW, SHOULDER] = self.coupled
         coupling[:, self.turned] *= -1.0
+        return coupling
+
+    def _table(self, robot: Robot) -> Floats:
+        """The rows (N, 5), with the zeros and signs of this convention."""
+        table = robot.table.copy()
         for joint, quarters in self.zeros:
             table[joint, THETA] = np.deg2rad(_theta_deg(robot, joint, quarters))
         for link, place in self.signs:
             table[link, place] *= -1.0
-        convention = OTHER_ROWS[robot.convention] if self.other_rows else robot.convention
-        return replace(robot, coupling=coupling, table=table, convention=convention)
+        return table
 
-    def measured(self, data: Measurements) -> Measurements:
-        """Measurements with the points and the columns of this convention."""
-        if self.mirrored:
-            data = replace(data, targets=data.targets * MIRROR)
+    def _rows(self, robot: Robot) -> Rows:
+        return OTHER_ROWS[robot.convention] if self.other_rows else robot.convention
+
+    def measured(self, readings: Floats, points: Floats) -> tuple[Floats, Floats]:
+        """Readings (n, N) and points (n, 3) in the columns and the frame of this convention."""
         if self.exchanged:
-            readings = data.readings.copy()
-            readings[:, self.exchanged] = data.readings[:, self.exchanged[::-1]]
-            data = replace(data, readings=readings)
-        return data
+            own = readings.copy()
+            own[:, self.exchanged] = readings[:, self.exchanged[::-1]]
+            readings = own
+        return readings, points * MIRROR if self.mirrored else points
 
     def words(self, robot: Robot) -> str:
         """What is otherwise, and what the robot file then says."""
@@ -166,8 +183,11 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     if len(rows) < FEWEST_ROWS:
         return []
 
+    points = rows.targets[:, target]
+
     def misfit(convention: Convention) -> float:
-        return misfit_m(convention.robot(robot), convention.measured(rows), target, task.threads)
+        measured = convention.measured(rows.readings, points)
+        return convention.arm(robot).misfit_m(*measured, task.threads)
 
     before = misfit(Convention())
     found = {convention: misfit(convention) for convention in conventions_of(robot) if convention.changes}

@@ -22,7 +22,7 @@ TURN: Final = 2.0 * np.pi
 LEAST_TURN: Final = 1e-12
 
 
-def otherwise_read(quaternions: Floats) -> Iterator[tuple[str, str, Floats]]:
+def otherwise_read(quaternions: Floats) -> Iterator[tuple[list[str], str, Floats]]:
     """Orientations (n, 4), w first, as they are if the numbers that they were made from mean something else.
 
     About fixed axes the same turns have their angles in the opposite order (`twin`), so that moving axes
@@ -30,18 +30,34 @@ def otherwise_read(quaternions: Floats) -> Iterator[tuple[str, str, Floats]]:
     both sets of Euler angles are tried, each for all orientations, and rotation vectors beyond half a turn.
 
     Yields:
-        What they were taken for, and what they are then: "XYZ" about moving axes, "xyz" about fixed ones, or
-        "rotation vector"; and the quaternions (n, 4), w first.
+        What they were taken for, k kinds, and what they are then: "XYZ" about moving axes, "xyz" about fixed
+        ones, or "rotation vector"; and the quaternions (k, n, 4), w first.
     """
     rotation = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
-    for taken in (*MOVING, VECTOR):
-        for numbers in _numbers(rotation, taken):
-            for meant in (*FIXED, *MOVING):
-                if meant != taken:
-                    yield taken, meant, quaternion_from_euler(numbers, meant)
-            if taken != VECTOR:
-                yield taken, VECTOR, quaternion_from_rotation_vector(numbers)
-                yield twin(taken), VECTOR, quaternion_from_rotation_vector(numbers[:, ::-1])
+    read = [(taken, numbers) for taken in (*MOVING, VECTOR) for numbers in _numbers(rotation, taken)]
+    for meant in (*FIXED, *MOVING):
+        others = [(taken, numbers) for taken, numbers in read if taken != meant]
+        angles = np.concatenate([numbers for _, numbers in others])
+        yield _kinds(others), meant, _apart(quaternion_from_euler(angles, meant), len(others))
+    others = [(taken, numbers) for taken, numbers in read if taken != VECTOR]
+    others += [(twin(taken), numbers[:, ::-1]) for taken, numbers in others]
+    vectors = np.concatenate([numbers for _, numbers in others])
+    yield _kinds(others), VECTOR, _apart(quaternion_from_rotation_vector(vectors), len(others))
+
+
+def usual_first(kinds: tuple[str, str]) -> tuple[int, int]:
+    """The least comes first of what numbers were taken for and what they are then."""
+    taken, meant = kinds
+    return (*MOVING, *FIXED, VECTOR).index(taken), (*FIXED, *MOVING, VECTOR).index(meant)
+
+
+def _kinds(read: list[tuple[str, Floats]]) -> list[str]:
+    return [taken for taken, _ in read]
+
+
+def _apart(quaternions: Floats, count: int) -> Floats:
+    """The quaternions (k, n, 4) of each of the k sets of numbers."""
+    return quaternions.reshape(count, -1, 4)
 
 
 def with_twin(taken: str, meant: str) -> list[tuple[str, str]]:

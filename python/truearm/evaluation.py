@@ -193,7 +193,9 @@ def _setup(
         return _registered(task, calibration, data, parameters, _stored(task, calibration, model.setup))
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
     with core_errors(data):
-        return fit_constant(task.problem(measured, []), fit_options(task, parameters=parameters)).setup
+        return fit_constant(
+            task.problem(measured, []), fit_options(task.threads, parameters=parameters)
+        ).setup
 
 
 def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> list[Notice]:
@@ -257,7 +259,7 @@ def _gross(
     if finds["finds_tool"]:
         measured = core_set(task.arm.robot, frame, task.selection, task.groups)
         with core_errors(frame):
-            chosen = fit_options(task, parameters=of_frame.parameters, robust="cauchy")
+            chosen = fit_options(task.threads, parameters=of_frame.parameters, robust="cauchy")
             setup = fit_constant(task.problem(measured, []), chosen).setup
         of_frame = replace(of_frame, model=replace(model, setup=setup))
     return gross_frame_rows(of_frame), outliers, changed

@@ -207,13 +207,15 @@ class _Constants:
 
 def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> _Constants:
     with task.stages("finding frame and tool"), core_errors(data):
-        nominal = fit_constant(task.problem(measured, []), fit_options(task, robust=task.options.robust))
+        nominal = fit_constant(
+            task.problem(measured, []), fit_options(task.threads, robust=task.options.robust)
+        )
     with task.stages("asking what the poses determine"):
         found = identify(task.arm, measured, nominal.setup)
         _check_enough(task, data, found.total_rank)
     with task.stages("fitting the constants"), core_errors(data):
         chosen = task.problem(measured, task.columns(found.determined))
-        options = fit_options(task, prior=task.options.prior, robust=task.options.robust)
+        options = fit_options(task.threads, prior=task.options.prior, robust=task.options.robust)
         constant = fit_constant(chosen, options)
         for start in task.starts:
             near = {"parameters": start.parameters, "start": start.setup, "noise": start.noise}
@@ -255,7 +257,7 @@ def _unmasked(
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
     problem = task.problem(measured, task.columns(constants.identifiability.determined))
     with core_errors(data):
-        robust = fit_constant(problem, fit_options(task, prior=task.options.prior, robust="cauchy"))
+        robust = fit_constant(problem, fit_options(task.threads, prior=task.options.prior, robust="cauchy"))
     far = robust.weights < FAR_FROM_CONSTANTS
     if not far[variable.weights >= 1.0].any() or far.mean() > MOST_FAR:
         return fits
@@ -282,7 +284,7 @@ def _fit_scheme(
 
 
 def fit_options(
-    task: Task,
+    threads: int | None,
     prior: tuple[float, float, bool] | None = None,
     robust: str | None = None,
     parameters: Floats | None = None,
@@ -294,7 +296,7 @@ def fit_options(
         "robust": robust,
         "start": None,
         "parameters": parameters,
-        "threads": task.threads,
+        "threads": threads,
     }
 
 

@@ -1,6 +1,7 @@
 """Readings that belong to the points of other rows: a log began a row late, or lost one on the way."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,7 @@ from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.nominal_misfit import FEWEST_ROWS, distances_m, nominal_setup, some_rows
+from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, some_rows
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
 
@@ -36,21 +37,22 @@ class _Rows:
 
     robot: Robot
     data: Measurements
-    target: int
+    points: Floats
     threads: int | None
+
+    @cached_property
+    def arm(self) -> NominalArm:
+        """The arm up to its flange."""
+        return NominalArm.of(self.robot)
 
     @property
     def seen(self) -> Rows:
         """Rows with a measured point."""
-        return np.flatnonzero(np.isfinite(self.data.targets[:, self.target]).all(axis=1))
+        return np.flatnonzero(np.isfinite(self.points).all(axis=1))
 
     def has_partner(self, rows: Rows, lag: int | Rows) -> NDArray[np.bool_]:
         """Whether there are readings so many rows further on (m,)."""
         return np.asarray((rows + lag >= 0) & (rows + lag < len(self.data)))
-
-    def paired(self, rows: Rows, lag: int | Rows) -> Measurements:
-        """Points of rows with the readings of those so many further on."""
-        return replace(self.data.select(rows), readings=self.data.readings[rows + lag])
 
     def setup(self, rows: Rows, lag: int | Rows) -> Setup | None:
         """Frame and target that rows tell; None where they cannot."""
@@ -58,15 +60,23 @@ class _Rows:
             return None
         some = some_rows(np.arange(len(rows)))
         lags = np.broadcast_to(lag, rows.shape)
-        return nominal_setup(self.robot, self.paired(rows[some], lags[some]), self.target, self.threads)
+        return self.arm.setup(*self._paired(rows[some], lags[some]), self.threads)
+
+    def distances_m(self, rows: Rows, lag: int, setup: Setup) -> Floats:
+        """Distances (m,) of the points of rows that have a partner so many rows further on."""
+        return self.arm.distances_m(*self._paired(rows, lag), setup)
 
     def distances(self, setup: Setup) -> Floats:
         """Distances (lags, n) of all points, in m: infinite without readings, NaN without a point."""
         found = np.full((len(LAGS), len(self.data)), np.inf)
         for own, lag in zip(found, LAGS, strict=True):
             rows = np.flatnonzero(self.has_partner(np.arange(len(self.data)), lag))
-            own[rows] = distances_m(self.robot, self.paired(rows, lag), setup, self.target)
+            own[rows] = self.distances_m(rows, lag, setup)
         return found
+
+    def _paired(self, rows: Rows, lag: int | Rows) -> tuple[Floats, Floats]:
+        """Points of rows, and before them the readings of those so many further on."""
+        return self.data.readings[rows + lag], self.points[rows]
 
 
 def fits_shifted(task: Task, data: Measurements) -> list[Notice]:
@@ -81,7 +91,8 @@ def fits_shifted(task: Task, data: Measurements) -> list[Notice]:
     target = data.most_held(task.selection.targets)
     notices = []
     for group in task.groups:
-        rows = _Rows(task.arm.robot, data.select(data.group == group), target, task.threads)
+        own = data.select(data.group == group)
+        rows = _Rows(task.arm.robot, own, own.targets[:, target], task.threads)
         notices += _of_set_up(rows, data)
     return notices
 
@@ -141,7 +152,7 @@ def _first_setup(rows: _Rows) -> Setup | None:
             setup = rows.setup(own, lag)
             if setup is None:
                 continue
-            off = np.median(distances_m(rows.robot, rows.paired(own, lag), setup, rows.target))
+            off = np.median(rows.distances_m(own, lag, setup))
             if off < best:
                 best, found = float(off), setup
     return found

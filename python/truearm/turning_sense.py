@@ -1,5 +1,6 @@
 """Whether measured orientations can be of a given robot, and how they would have to be read."""
 
+from dataclasses import dataclass
 from itertools import permutations, product
 from typing import Final
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError
-from truearm.euler_orders import otherwise_read, with_twin
+from truearm.euler_orders import otherwise_read, usual_first, with_twin
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
@@ -38,6 +39,67 @@ READINGS: Final = tuple(product(permutations(range(4)), (False, True)))[1:]
 """Other readings of the four columns: which component each holds, and whether conjugate."""
 
 
+@dataclass(frozen=True)
+class _Arm:
+    """How a nominal arm turns and moves a target, its frame and its tool unknown.
+
+    Attributes:
+        flanges: Poses of its flange (n, 4, 4).
+        points: Measured positions (n, 3).
+        turns: How the flange turns from pose to pose (n - 1, 3), see `_turns`.
+        strengths: How much it turns about each of three directions (3), the most first.
+        axis: The direction (3,) that it turns about most.
+    """
+
+    flanges: Floats
+    points: Floats
+    turns: Floats
+    strengths: Floats
+    axis: Floats
+
+    @classmethod
+    def of(cls, flanges: Floats, points: Floats) -> "_Arm":
+        turns = _turns(flanges[:, :3, :3])
+        _, strengths, axes = np.linalg.svd(turns, full_matrices=False)
+        return cls(flanges, points, turns, strengths, axes[0])
+
+    def misfit(self, quaternions: Floats) -> float:
+        """How little the poses with these orientations (n, 4), w first, can be those of the arm.
+
+        Turns from pose to pose, seen from the world, give the frame's orientation; where the arm turns about
+        one axis, positions give the angle about it. The rest is then linear.
+
+        Returns:
+            The larger of the median distance between turns and that between positions, over their spread;
+            of turns that are off by MISFIT or more that alone.
+        """
+        frames, between_turns = self.between_turns(quaternions[None])
+        still = self.strengths[0] < STILL * np.sqrt(len(self.turns))
+        if still or between_turns[0] >= MISFIT:
+            return float(between_turns[0])
+        return max(float(between_turns[0]), self._between_points(frames[0]))
+
+    def between_turns(self, quaternions: Floats) -> tuple[Floats, Floats]:
+        """Frames world_from_base (k, 3, 3) of k sets of orientations (k, n, 4), and misfits of turns (k)."""
+        of_tool = _turns(matrix_from_quaternion(quaternions))
+        u, _, vt = np.linalg.svd(np.swapaxes(of_tool, 1, 2) @ self.turns)
+        u[:, :, -1] *= np.linalg.det(u @ vt)[:, None]
+        frames = u @ vt
+        distances = np.linalg.norm(of_tool - self.turns @ np.swapaxes(frames, 1, 2), axis=2)
+        return frames, np.median(distances, axis=1)
+
+    def _between_points(self, world_from_base: Floats) -> float:
+        """Median distance between positions, over their spread, once tool and the frame's place are found."""
+        points = self.points @ world_from_base
+        if self.strengths[1] < ABOUT_ONE * self.strengths[0]:
+            points = _turned_about(self.axis, points, self.flanges)
+        unknown = _frame_and_tool(self.flanges)
+        wanted = (points - self.flanges[:, :3, 3]).reshape(-1)
+        left = wanted - unknown @ np.linalg.lstsq(unknown, wanted)[0]
+        spread = np.linalg.norm(points - points.mean(axis=0), axis=1)
+        return float(np.median(np.linalg.norm(left.reshape(-1, AXES), axis=1)) / np.median(spread))
+
+
 def check_turns(measurements: Measurements, robot: Robot) -> None:
     """Check that the tool turns and moves as the nominal arm's does, whatever frame and tool are.
 
@@ -57,11 +119,11 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
         if seen.sum() < FEWEST_POSES:
             continue
         rows, poses = measurements.select(seen), (points[seen], turned[seen])
-        flanges = robot.pose(rows.readings)
-        if _misfit(flanges, *poses) < MISFIT:
+        arm = _Arm.of(robot.pose(rows.readings), poses[0])
+        if arm.misfit(poses[1]) < MISFIT:
             continue
         _check_they_turn(rows, poses[1], group)
-        ways = [_other_columns(flanges, *poses), _other_angles(flanges, *poses)]
+        ways = [_other_columns(arm, poses[1]), _other_angles(arm, poses[1])]
         if any(ways):
             fitting = ", or if ".join(filter(None, ways))
             raise InputError(
@@ -84,28 +146,30 @@ def _check_they_turn(rows: Measurements, quaternions: Floats, group: str) -> Non
     )
 
 
-def _other_columns(flanges: Floats, points: Floats, quaternions: Floats) -> str:
+def _other_columns(arm: _Arm, quaternions: Floats) -> str:
     """In words, the order and sense of the quaternions that fit; "" where none does."""
     for held, conjugate in READINGS:
         sense = np.where((np.arange(4) > 0) & conjugate, -1.0, 1.0)
-        if _misfit(flanges, points, quaternions[:, np.argsort(held)] * sense) < FIT:
+        if arm.misfit(quaternions[:, np.argsort(held)] * sense) < FIT:
             return _words(held, conjugate)
     return ""
 
 
-def _other_angles(flanges: Floats, points: Floats, quaternions: Floats) -> str:
+def _other_angles(arm: _Arm, quaternions: Floats) -> str:
     """In words, what the numbers are that orientations were made from, so that they fit; "" if nothing."""
-    some = np.linspace(0, len(points) - 1, min(len(points), MOST_POSES)).astype(np.int64)
-    flanges, points, quaternions = flanges[some], points[some], quaternions[some]
+    some = np.linspace(0, len(quaternions) - 1, min(len(quaternions), MOST_POSES)).astype(np.int64)
+    arm, quaternions = _Arm.of(arm.flanges[some], arm.points[some]), quaternions[some]
     found: dict[tuple[str, str], float] = {}
-    for taken, meant, other in otherwise_read(quaternions):
-        off = _misfit(flanges, points, other)
-        found[taken, meant] = min(off, found.get((taken, meant), off))
-    least = min(found.values())
+    for kinds, meant, others in otherwise_read(quaternions):
+        near = arm.between_turns(others)[1] < AS_WELL * FIT
+        for k in np.flatnonzero(near):
+            off = arm.misfit(others[k])
+            found[kinds[k], meant] = min(off, found.get((kinds[k], meant), off))
+    least = min(found.values(), default=np.inf)
     if least >= FIT:
         return ""
-    fitting = [kinds for kinds, off in found.items() if off <= AS_WELL * least][:MOST_NAMED]
-    ways = [way for taken, meant in fitting for way in with_twin(taken, meant)]
+    fitting = sorted((kinds for kinds, off in found.items() if off <= AS_WELL * least), key=usual_first)
+    ways = [way for taken, meant in fitting[:MOST_NAMED] for way in with_twin(taken, meant)]
     pairs = ", or those for ".join(f"{taken} are {meant}" for taken, meant in dict.fromkeys(ways))
     return f"the angles that were taken for {pairs} (capitals: moving axes, small letters: fixed axes)"
 
@@ -117,38 +181,6 @@ def _words(held: tuple[int, ...], conjugate: bool) -> str:
     if held == (0, 1, 2, 3):
         return turn
     return f"{order}, and {turn}" if conjugate else order
-
-
-def _misfit(flanges: Floats, points: Floats, quaternions: Floats) -> float:
-    """How little measured poses can be those of the arm, its frame and its tool unknown.
-
-    Turns from pose to pose, seen from the world, give the frame's orientation; where the arm turns about one
-    axis, positions give the angle about it. The rest is then linear.
-
-    Args:
-        flanges: Poses of the nominal flange (n, 4, 4).
-        points: Measured positions (n, 3).
-        quaternions: Measured orientations (n, 4), w first.
-
-    Returns:
-        The larger of the median distance between turns and that between positions, over their spread.
-    """
-    of_arm, of_tool = _turns(flanges[:, :3, :3]), _turns(matrix_from_quaternion(quaternions))
-    u, _, vt = np.linalg.svd(of_tool.T @ of_arm)
-    world_from_base = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    between_turns = np.linalg.norm(of_tool - of_arm @ world_from_base.T, axis=1)
-    _, strengths, axes = np.linalg.svd(of_arm)
-    if strengths[0] < STILL * np.sqrt(len(of_arm)):
-        return float(np.median(between_turns))
-    points_in_base = points @ world_from_base
-    if strengths[1] < ABOUT_ONE * strengths[0]:
-        points_in_base = _turned_about(axes[0], points_in_base, flanges)
-    unknown = _frame_and_tool(flanges)
-    wanted = (points_in_base - flanges[:, :3, 3]).reshape(-1)
-    left = wanted - unknown @ np.linalg.lstsq(unknown, wanted)[0]
-    between_points = np.linalg.norm(left.reshape(-1, AXES), axis=1)
-    spread = np.linalg.norm(points - points.mean(axis=0), axis=1)
-    return float(max(np.median(between_turns), np.median(between_points) / np.median(spread)))
 
 
 def _frame_and_tool(flanges: Floats) -> Floats:
@@ -172,6 +204,7 @@ def _turned_about(axis: Floats, points: Floats, flanges: Floats) -> Floats:
 
 
 def _turns(frames: Floats) -> Floats:
-    """Axis times sine of the angle (n - 1, 3) of the turn from each frame to the next, in the world."""
-    turns = frames[1:] @ np.swapaxes(frames[:-1], 1, 2)
-    return 0.5 * np.stack([turns[:, i - 1, i - 2] - turns[:, i - 2, i - 1] for i in range(AXES)], axis=1)
+    """Axis times sine of the angle (..., n - 1, 3) of the turn from each frame to the next, in the world."""
+    turns = frames[..., 1:, :, :] @ np.swapaxes(frames[..., :-1, :, :], -1, -2)
+    parts = [turns[..., i - 1, i - 2] - turns[..., i - 2, i - 1] for i in range(AXES)]
+    return 0.5 * np.stack(parts, axis=-1)

@@ -44,7 +44,7 @@ def tool_from_measurements(
     parameters = model.parameters(model_inputs(task.arm, data, task.options.features))
     measured = core_set(task.arm.robot, data, selection, task.groups)
     with core_errors(data):
-        fit = fit_constant(task.problem(measured, []), fit_options(task, parameters=parameters))
+        fit = fit_constant(task.problem(measured, []), fit_options(task.threads, parameters=parameters))
     residuals = np.asarray(fit.residuals).reshape(len(data), width)
     transform, covariance = np.eye(4), np.zeros((6, 6))
     transform[:3, 3] = fit.setup.targets[0, 0]

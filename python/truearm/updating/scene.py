@@ -98,7 +98,7 @@ class Scene:
         A part that they hardly tell, as a SCARA's height, is metres off where an offset changed.
         """
         with core_errors(self.data):
-            options = fit_options(self.task, parameters=self.parameters)
+            options = fit_options(self.task.threads, parameters=self.parameters)
             return fit_constant(self.task.problem(self.measured, []), options).setup
 
     def unchanged(self, state: State) -> State:

@@ -73,4 +73,4 @@ def setup_of(model: ArmModel, scene: Scene, data: Measurements) -> Setup:
     at = model.parameters(model_inputs(task.arm, data, task.options.features))
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
     with core_errors(data):
-        return fit_constant(task.problem(measured, []), fit_options(task, parameters=at)).setup
+        return fit_constant(task.problem(measured, []), fit_options(task.threads, parameters=at)).setup
