@@ -102,10 +102,10 @@ def is_served(port):
 
 
 def settle(client, request):
+    until = time.monotonic() + 20.0
     answer = client.ask(request)
-    for _ in range(400):
-        if answer["phase"] == "on" and answer["lag"] == 0.0:
-            break
+    while answer["phase"] != "on" or answer["lag"] != 0.0:
+        assert time.monotonic() < until, answer
         time.sleep(0.001)
         answer = client.ask(request)
     return answer

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use truearm_field::{ConservativeScratch, FieldScratch};
 use truearm_kinematics::{
-    Chain, Isa, Kernel, LANES, Lane, LaneFrame, LaneParameters, OnePose, Screw, Transform, dispatch_on,
-    lane_room, load_lanes,
+    Chain, Isa, Kernel, LANES, Lane, LaneFrame, LaneParameters, OnePose, Screw, Transform, lane_room,
+    load_lanes,
 };
 
 use crate::error::CompensateError;
@@ -114,18 +114,18 @@ impl Aimed {
         scratch: &mut AimedScratch,
     ) -> LaneFrame {
         self.set_joints::<I>(readings, scratch);
-        dispatch_on(I::LEVEL, Sweep { aimed: self, alone, columns: Some(columns), scratch })
+        I::call(Sweep { aimed: self, alone, columns: Some(columns), scratch })
     }
 
     /// The tool's frame alone.
     #[inline(always)]
     pub fn end<I: Isa>(&self, readings: &[Lane], alone: bool, scratch: &mut AimedScratch) -> LaneFrame {
         self.set_joints::<I>(readings, scratch);
-        dispatch_on(I::LEVEL, Sweep { aimed: self, alone, columns: None, scratch })
+        I::call(Sweep { aimed: self, alone, columns: None, scratch })
     }
 }
 
-/// An evaluation at `scratch.inputs`: large, and so compiled once for each instruction set and not wherever it is needed.
+/// An evaluation at `scratch.inputs`.
 struct Sweep<'a> {
     aimed: &'a Aimed,
     alone: bool,

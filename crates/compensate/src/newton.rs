@@ -11,8 +11,10 @@
 //! rate at which errors fell says that it is small enough (Hairer and Wanner, Solving Ordinary Differential Equations II,
 //! section IV.8). What a pose gets does not depend on the poses beside it.
 
+use std::marker::PhantomData;
+
 use truearm_estimate::ANGLE_ARM;
-use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, dispatch_on};
+use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::bend::Bend;
@@ -156,41 +158,33 @@ pub(crate) fn toward<I: Isa>(
     alone: bool,
     search: &mut Search,
 ) -> [Lane; 2] {
-    dispatch_on(I::LEVEL, Toward { aimed, plan, target, alone, search })
+    let to = To { aimed, plan, target, alone };
+    match plan.task {
+        Task::Pose => to.meet::<I, PoseGoal, 6>(search),
+        Task::Axis => to.meet::<I, AxisGoal, 5>(search),
+        Task::Position => to.meet::<I, PositionGoal, 3>(search),
+    }
 }
 
-/// A search: large, and so compiled once for each instruction set and not wherever it is needed.
-struct Toward<'a> {
+/// What is searched for.
+#[derive(Clone, Copy)]
+struct To<'a> {
     aimed: &'a Aimed,
     plan: &'a Plan,
     target: &'a LaneFrame,
     alone: bool,
-    search: &'a mut Search,
 }
 
-impl Kernel for Toward<'_> {
-    type Output = [Lane; 2];
-
-    #[inline(always)]
-    fn run<I: Isa>(self) -> [Lane; 2] {
-        match self.plan.task {
-            Task::Pose => self.meet::<I, PoseGoal, 6>(),
-            Task::Axis => self.meet::<I, AxisGoal, 5>(),
-            Task::Position => self.meet::<I, PositionGoal, 3>(),
-        }
-    }
-}
-
-impl Toward<'_> {
+impl To<'_> {
     /// The task's rows; then, where they cannot all be met, the position from there once more and alone.
     #[inline(always)]
-    fn meet<I: Isa, G: Goal<M>, const M: usize>(self) -> [Lane; 2] {
-        let Self { aimed, plan, target, alone, search } = self;
-        let left = approach::<I, G, M>(aimed, plan, target, alone, search);
+    fn meet<I: Isa, G: Goal<M>, const M: usize>(self, search: &mut Search) -> [Lane; 2] {
+        let left = I::call(Approach::<G, M> { to: self, search, goal: PhantomData });
+        let Self { aimed, plan, target, alone } = self;
         if !plan.position_first() {
             return left;
         }
-        let [position, _] = approach::<I, PositionGoal, 3>(aimed, plan, target, alone, search);
+        let [position, _] = I::call(Approach::<PositionGoal, 3> { to: self, search, goal: PhantomData });
         let frame = aimed.end::<I>(&search.best, alone, &mut search.model);
         let turn = squared::<I>(&G::error::<I>(&frame, target)[3..]);
         [position, turn.sqrt()]
@@ -198,14 +192,24 @@ impl Toward<'_> {
 }
 
 /// Moves `search.best` to the target; gives what is left of position (m) and orientation (rad).
+struct Approach<'a, G, const M: usize> {
+    to: To<'a>,
+    search: &'a mut Search,
+    goal: PhantomData<G>,
+}
+
+impl<G: Goal<M>, const M: usize> Kernel for Approach<'_, G, M> {
+    type Output = [Lane; 2];
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> [Lane; 2] {
+        approach::<I, G, M>(self.to, self.search)
+    }
+}
+
 #[inline(always)]
-fn approach<I: Isa, G: Goal<M>, const M: usize>(
-    aimed: &Aimed,
-    plan: &Plan,
-    target: &LaneFrame,
-    alone: bool,
-    search: &mut Search,
-) -> [Lane; 2] {
+fn approach<I: Isa, G: Goal<M>, const M: usize>(to: To<'_>, search: &mut Search) -> [Lane; 2] {
+    let To { aimed, plan, target, alone } = to;
     let mut progress = Progress::new();
     let mut factor = None;
     search.trial.copy_from_slice(&search.best);
@@ -320,7 +324,7 @@ impl Progress {
             let damping = Lane::splat(FLOOR) + norm * (0.25 / (plan.longest * plan.longest));
             self.damping = NO.where_below(self.damped, damping, self.damping);
             let columns = &search.columns[..plan.moving.len()];
-            dispatch_on(I::LEVEL, Damp { columns, damping: self.damping, factor });
+            I::call(Damp { columns, damping: self.damping, factor });
         }
         let slight = squared::<I>(&bent).where_below(norm * (SLIGHT * SLIGHT), YES, NO);
         let mut bends = NO.where_below(self.damped, NO, slight);

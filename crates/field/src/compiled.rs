@@ -246,12 +246,7 @@ impl Compiled {
     /// `inputs` are I lanes; `scratch` is this bank's own.
     #[inline(always)]
     pub fn excite_and_add<I: Isa>(&self, inputs: &[Lane], scratch: &mut FieldScratch, rows: &mut [f64]) {
-        let FieldScratch { three, four, sums } = scratch;
-        if self.active == MOST_ACTIVE {
-            self.group::<I, MOST_ACTIVE>(|input| self.input::<I>(inputs, input), four, sums, rows);
-        } else {
-            self.group::<I, 3>(|input| self.input::<I>(inputs, input), three, sums, rows);
-        }
+        I::call(ExciteAndAdd { bank: self, inputs, scratch, rows });
     }
 
     /// A joint's value, a feature or a reading.
@@ -342,6 +337,27 @@ impl Compiled {
         }
         for sheet in &self.sheets {
             sheet.add::<I, K>(excited, &begin, rows, out, width);
+        }
+    }
+}
+
+struct ExciteAndAdd<'a> {
+    bank: &'a Compiled,
+    inputs: &'a [Lane],
+    scratch: &'a mut FieldScratch,
+    rows: &'a mut [f64],
+}
+
+impl Kernel for ExciteAndAdd<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        let Self { bank, inputs, scratch: FieldScratch { three, four, sums }, rows } = self;
+        if bank.active == MOST_ACTIVE {
+            bank.group::<I, MOST_ACTIVE>(|input| bank.input::<I>(inputs, input), four, sums, rows);
+        } else {
+            bank.group::<I, 3>(|input| bank.input::<I>(inputs, input), three, sums, rows);
         }
     }
 }

@@ -3,7 +3,7 @@
 //! The latter are of single precision: what an evaluation of many outputs costs is to fetch them. They are rounded by less than
 //! a ten-millionth, some thousandths of a nanometre in the position.
 
-use truearm_kinematics::{Isa, LANES, Lane, Pick, Short};
+use truearm_kinematics::{Isa, Kernel, LANES, Lane, Pick, Short};
 
 use crate::bank::Block;
 use crate::cells::MOST_AXES;
@@ -223,32 +223,44 @@ impl Sheet {
             table.excite::<I, K>(excited, own);
             free = rest;
         }
+        let to = Poses { sheet: self, excited, singles, rows, out, width };
         match self.lanes() {
-            1 => self.poses::<I, K, 1>(excited, singles, rows, out, width),
-            2 => self.poses::<I, K, 2>(excited, singles, rows, out, width),
-            3 => self.poses::<I, K, 3>(excited, singles, rows, out, width),
-            4 => self.poses::<I, K, 4>(excited, singles, rows, out, width),
-            _ => self.poses::<I, K, MOST_LANES>(excited, singles, rows, out, width),
+            1 => I::call(Wide::<K, 1>(to)),
+            2 => I::call(Wide::<K, 2>(to)),
+            3 => I::call(Wide::<K, 3>(to)),
+            4 => I::call(Wide::<K, 4>(to)),
+            _ => I::call(Wide::<K, MOST_LANES>(to)),
         }
     }
+}
+
+/// Where the sums of up to eight poses come from, and where they go.
+struct Poses<'a, const K: usize> {
+    sheet: &'a Sheet,
+    excited: &'a [Excited<K>],
+    singles: &'a [Lane; LANES],
+    rows: &'a [Row],
+    out: &'a mut [f64],
+    width: usize,
+}
+
+/// The sums of a sheet that is so many lanes wide.
+struct Wide<'a, const K: usize, const W: usize>(Poses<'a, K>);
+
+impl<const K: usize, const W: usize> Kernel for Wide<'_, K, W> {
+    type Output = ();
 
     #[inline(always)]
-    fn poses<I: Isa, const K: usize, const W: usize>(
-        &self,
-        excited: &[Excited<K>],
-        singles: &[Lane; LANES],
-        rows: &[Row],
-        out: &mut [f64],
-        width: usize,
-    ) {
-        let (cells, _) = self.weights.as_chunks::<W>();
+    fn run<I: Isa>(self) {
+        let Poses { sheet, excited, singles, rows, out, width } = self.0;
+        let (cells, _) = sheet.weights.as_chunks::<W>();
         for (pose, out) in (0..LANES).zip(out.chunks_exact_mut(width)) {
             let mut sums = [Lane::ZERO; W];
-            for (sum, pick) in sums.iter_mut().zip(&self.begin) {
+            for (sum, pick) in sums.iter_mut().zip(&sheet.begin) {
                 *sum = I::pick(&singles[pose], &Lane::ZERO, pick);
             }
             let mut rows = rows.iter();
-            for table in &self.tables {
+            for table in &sheet.tables {
                 let mut grades = [Lane::ZERO; K];
                 for (grade, along) in grades.iter_mut().zip(&excited[table.last].grade) {
                     *grade = Lane::splat(along.0[pose]);
@@ -276,7 +288,7 @@ impl Sheet {
             }
             let mut found = [Lane::ZERO; MOST_LANES + 1];
             found[..W].copy_from_slice(&sums);
-            for way in &self.ways {
+            for way in &sheet.ways {
                 let picked = I::pick(&found[way.lane], &found[way.lane + 1], &way.pick);
                 let last = out.len().min(way.parameter + LANES);
                 I::add_to(&picked, &mut out[way.parameter..last]);

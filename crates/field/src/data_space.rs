@@ -196,10 +196,12 @@ impl DataSpace {
 
     /// Covariance (n, m, m) of the rows of each configuration of a query.
     pub fn covariance(&self, query: &Query) -> Vec<f64> {
-        let mut out = vec![0.0; query.poses() * query.rows * query.rows];
-        for first in (0..query.poses()).step_by(BATCH) {
-            self.batch_covariance(query, first..(first + BATCH).min(query.poses()), &mut out);
-        }
+        let size = query.rows * query.rows;
+        let mut out = vec![0.0; query.poses() * size];
+        out.par_chunks_mut(BATCH * size).enumerate().for_each(|(batch, out)| {
+            let first = batch * BATCH;
+            self.batch_covariance(query, first..first + out.len() / size, out);
+        });
         out
     }
 
@@ -209,13 +211,15 @@ impl DataSpace {
         for (index, pose) in poses.enumerate() {
             let excited = self.model.cells.excite(query.values_of(pose));
             let priors = self.model.variances(&excited);
+            let out = &mut out[index * rows * rows..(index + 1) * rows * rows];
             for i in 0..rows {
-                for j in 0..rows {
+                for j in 0..=i {
                     let (a, b) = (index * rows + i, index * rows + j);
                     let prior = query.prior(pose, (i, j), &priors);
                     let learned = learned.col(a).transpose() * learned.col(b);
                     let setup = lost.col(a).transpose() * lost.col(b);
-                    out[(pose * rows + i) * rows + j] = prior - learned + setup;
+                    let entry = prior - learned + setup;
+                    (out[i * rows + j], out[j * rows + i]) = (entry, entry);
                 }
             }
         }
@@ -284,13 +288,20 @@ impl DataSpace {
     fn cross(&self, excited: &Excited, rows: &[f64], mut out: MatMut<f64>) {
         let training = &self.model.training;
         let columns = training.columns.len();
+        let count = rows.len() / columns;
+        // Column by column, so that the sums of all rows go on side by side.
+        let own: Vec<f64> = (0..rows.len()).map(|k| rows[k % count * columns + k / count]).collect();
+        let mut sums = vec![0.0; count];
         let covariances = self.model.covariances(excited, &self.excited);
         for (pose, variances) in covariances.chunks_exact(columns).enumerate() {
             for row in training.rows(pose) {
-                let entries = training.jacobian_row(row);
-                for (k, own) in rows.chunks_exact(columns).enumerate() {
-                    out[(row, k)] = (0..columns).map(|p| entries[p] * variances[p] * own[p]).sum();
+                sums.fill(0.0);
+                let entries = training.jacobian_row(row).iter().zip(variances);
+                for ((entry, variance), own) in entries.zip(own.chunks_exact(count)) {
+                    let weight = entry * variance;
+                    sums.iter_mut().zip(own).for_each(|(sum, own)| *sum += weight * own);
                 }
+                sums.iter().enumerate().for_each(|(k, &sum)| out[(row, k)] = sum);
             }
         }
     }

@@ -173,6 +173,11 @@ impl Leverage {
     /// Deviations of the point, m, at the joint values of a group of which the first `poses` count.
     #[inline(always)]
     pub fn group<I: Isa>(&self, inputs: &[Lane], poses: usize, scratch: &mut LeverageScratch) -> Lane {
+        I::call(Group { leverage: self, inputs, poses, scratch })
+    }
+
+    #[inline(always)]
+    fn deviations<I: Isa>(&self, inputs: &[Lane], poses: usize, scratch: &mut LeverageScratch) -> Lane {
         let moved = self.sweep::<I>(inputs, poses == 1, scratch);
         let count = self.columns.len();
         let motion = |row: usize| if row < count { &scratch.screws[row].linear } else { &moved[row - count] };
@@ -244,6 +249,22 @@ impl Leverage {
             dispatch(Motions { leverage: self, inputs, width, group, out });
         });
         motions
+    }
+}
+
+struct Group<'a> {
+    leverage: &'a Leverage,
+    inputs: &'a [Lane],
+    poses: usize,
+    scratch: &'a mut LeverageScratch,
+}
+
+impl Kernel for Group<'_> {
+    type Output = Lane;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Lane {
+        self.leverage.deviations::<I>(self.inputs, self.poses, self.scratch)
     }
 }
 

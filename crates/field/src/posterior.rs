@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use faer::Mat;
+use rayon::prelude::*;
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, column, to_vec};
 
@@ -223,13 +224,13 @@ impl Posterior {
             Self::Data(space) => space.covariance(&query),
             Self::Weight(space) => space.covariance(&query),
         };
-        for (pose, block) in covariance.chunks_exact_mut(rows * rows).enumerate() {
+        covariance.par_chunks_exact_mut(rows * rows).enumerate().for_each(|(pose, block)| {
             let beyond = self.model().beyond(query.values_of(pose));
             if beyond.iter().any(|&variance| variance > 0.0) {
                 let entry = |k: usize| query.prior(pose, (k / rows, k % rows), &beyond);
                 block.iter_mut().enumerate().for_each(|(k, value)| *value += entry(k));
             }
-        }
+        });
         let scale = self.model().hyper.extrapolation.powi(2);
         covariance.iter_mut().for_each(|value| *value *= scale);
         Ok(covariance)
@@ -301,14 +302,15 @@ impl Posterior {
         let model = self.model();
         let query = self.query(values, jacobian, None, rows)?;
         let scale = model.hyper.extrapolation.powi(2);
-        let mut out = Vec::with_capacity(query.poses() * rows);
-        for pose in 0..query.poses() {
+        let mut out = vec![0.0; query.poses() * rows];
+        out.par_chunks_exact_mut(rows).enumerate().for_each(|(pose, out)| {
             let excited = model.cells.excite(query.values_of(pose));
             let mut variances = model.variances(&excited);
             let beyond = model.beyond(query.values_of(pose));
             variances.iter_mut().zip(beyond).for_each(|(variance, more)| *variance += more);
-            out.extend((0..rows).map(|i| scale * query.prior(pose, (i, i), &variances)));
-        }
+            let own = (0..rows).map(|i| scale * query.prior(pose, (i, i), &variances));
+            out.iter_mut().zip(own).for_each(|(out, variance)| *out = variance);
+        });
         Ok(out)
     }
 

@@ -9,8 +9,8 @@
 //! all links, not the last alone, lets its centre of gravity lie anywhere on the line from one's end to the next one's.
 
 use truearm_kinematics::{
-    Chain, InstructionSet, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose,
-    SharedParameters, dispatch, dispatch_on, lever_count,
+    Chain, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters,
+    dispatch, lever_count,
 };
 
 use crate::bank::Block;
@@ -269,18 +269,13 @@ impl Loads {
             for (carried, (payload, _)) in scratch.carried.iter_mut().zip(&self.payloads) {
                 *carried = input(*payload);
             }
-            self.carry(I::LEVEL, alone, scratch);
+            I::call(Carry { loads: self, alone, scratch });
         }
         &scratch.loads
     }
-
-    /// Adds what the payloads bring to the loads; rare, and so compiled once and not wherever loads are needed.
-    #[inline(never)]
-    fn carry(&self, level: InstructionSet, alone: bool, scratch: &mut SagScratch) {
-        dispatch_on(level, Carry { loads: self, alone, scratch });
-    }
 }
 
+/// Adds what the payloads bring to the loads: rare, and so kept out of the way of what is not.
 struct Carry<'a> {
     loads: &'a Loads,
     alone: bool,

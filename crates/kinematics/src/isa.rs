@@ -10,8 +10,10 @@ use crate::lane::{LANES, Lane, Pick, Short};
 
 /// What differs between instruction sets: whether a multiplication fuses with an addition, and how rows are moved.
 pub trait Isa {
-    /// The instruction set this stands for.
-    const LEVEL: InstructionSet;
+    /// Run a kernel that is compiled once for this instruction set, and not wherever it is called.
+    ///
+    /// For what is large, or called in several places: kernels that hold all they call take minutes to compile.
+    fn call<K: Kernel>(kernel: K) -> K::Output;
 
     /// a b + c, with one rounding only where the instruction set has it.
     fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane;
@@ -87,7 +89,7 @@ pub trait Isa {
 ///
 /// `run` and everything it calls in its loops must be `#[inline(always)]`: what is not inlined is compiled
 /// for the plainest machine, and every `mul_add` in it becomes a library call. That goes for larger closures too,
-/// such as those given to `array::map` and `array::from_fn`: write loops.
+/// such as those given to `array::map` and `array::from_fn`: write loops. What is large goes through [`Isa::call`].
 pub trait Kernel {
     /// What the work gives back.
     type Output;
@@ -150,8 +152,17 @@ impl InstructionSet {
 
 struct Plain;
 
+/// Runs a kernel that was compiled for every machine.
+#[inline(never)]
+fn run_plain<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Plain>()
+}
+
 impl Isa for Plain {
-    const LEVEL: InstructionSet = InstructionSet::Baseline;
+    #[inline(always)]
+    fn call<K: Kernel>(kernel: K) -> K::Output {
+        run_plain(kernel)
+    }
 
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
@@ -198,14 +209,19 @@ impl Isa for Plain {
 
 #[cfg(target_arch = "x86_64")]
 mod vector {
-    use super::{InstructionSet, Isa, Kernel, LANES, Lane, Pick, Short};
+    use super::{Isa, Kernel, LANES, Lane, Pick, Short};
     use crate::x86;
 
     pub struct Avx2;
     pub struct Avx512;
 
     impl Isa for Avx2 {
-        const LEVEL: InstructionSet = InstructionSet::Avx2;
+        #[inline(always)]
+        fn call<K: Kernel>(kernel: K) -> K::Output {
+            // SAFETY: this instruction set is only used on processors that have it.
+            unsafe { run_avx2(kernel) }
+        }
+
         #[inline(always)]
         fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
             // SAFETY: this instruction set is only used on processors that have it.
@@ -249,7 +265,12 @@ mod vector {
     }
 
     impl Isa for Avx512 {
-        const LEVEL: InstructionSet = InstructionSet::Avx512;
+        #[inline(always)]
+        fn call<K: Kernel>(kernel: K) -> K::Output {
+            // SAFETY: this instruction set is only used on processors that have it.
+            unsafe { run_avx512(kernel) }
+        }
+
         #[inline(always)]
         fn mul_add(a: Lane, b: Lane, c: Lane) -> Lane {
             // SAFETY: this instruction set is only used on processors that have it.
@@ -306,12 +327,14 @@ mod vector {
 
     /// Runs a kernel that was compiled for AVX2.
     #[target_feature(enable = "avx2,fma")]
+    #[inline(never)]
     pub fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Avx2>()
     }
 
     /// Runs a kernel that was compiled for AVX-512.
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
+    #[inline(never)]
     pub fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Avx512>()
     }
@@ -321,7 +344,6 @@ mod vector {
 ///
 /// The variable is read once; a value that [`InstructionSet::from_environment`] refuses is the business of
 /// the program's start and is taken here as not set.
-#[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     static CHOSEN: OnceLock<InstructionSet> = OnceLock::new();
     let chosen =
@@ -330,7 +352,6 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 }
 
 /// Run a kernel with one instruction set, or with the best this machine has if that is lower.
-#[inline]
 pub fn dispatch_on<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     match set.min(InstructionSet::detected()) {
@@ -342,5 +363,5 @@ pub fn dispatch_on<K: Kernel>(set: InstructionSet, kernel: K) -> K::Output {
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = set;
-    kernel.run::<Plain>()
+    run_plain(kernel)
 }
