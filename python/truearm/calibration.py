@@ -29,7 +29,6 @@ from truearm.models import CONSTANT, ArmModel
 from truearm.options import Options
 from truearm.revision import Revision
 from truearm.robot import Robot
-from truearm.rotations import rigid_motion
 from truearm.scheme_fitting import SchemeDetails
 from truearm.solving import solve
 from truearm.summary import summarise
@@ -290,6 +289,8 @@ class Calibration:
     ) -> Floats:
         """The same of position and rotation vector of `pose`, (n, 6), m and rad.
 
+        Where the orientation of a target was measured, how it is turned on the flange is seen as well.
+
         Raises:
             WorkError: If the orientation of the target was not measured.
         """
@@ -369,7 +370,7 @@ class Calibration:
         """
         rows, _ = self._readings(q)
         jacobian = self._jacobian(rows, features, tool, pose=True)
-        covariance = self._covariance(rows, features, tool, jacobian)
+        covariance = self._covariance(rows, features, Endpoint(at_tool(self.robot, tool)), jacobian)
         inputs = self.field_inputs(rows, features)
         return inputs, np.einsum("nii->ni", covariance), self.spread.prior(inputs, jacobian)
 
@@ -405,24 +406,17 @@ class Calibration:
     def _std(self, q: ArrayLike, end: Endpoint, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)
         jacobian = self._jacobian(rows, features, end.flange_from_end, pose=pose)
-        covariance = self._covariance(rows, features, end.flange_from_end, jacobian)
+        covariance = self._covariance(rows, features, end, jacobian)
         if end.world_from_base is not None:
             turn = np.kron(np.eye(jacobian.shape[1] // 3), end.world_from_base[:3, :3])
             covariance = turn @ covariance @ turn.T
         found: Floats = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
         return found[0] if single else found
 
-    def _covariance(
-        self, rows: Floats, features: Features | None, tool: ArrayLike | None, jacobian: Floats
-    ) -> Floats:
-        """Covariance (n, m, m) of a tool's position, or pose, as the device saw base and target."""
-        flange = self.pose(rows, tool=np.eye(4), features=features)
-        turned = flange[:, :3, :3]
-        points = flange[:, :3, 3] + turned @ at_tool(self.robot, tool)[:3, 3]
-        moved = np.concatenate([rigid_motion(points), turned], axis=2)
-        if jacobian.shape[1] > moved.shape[1]:
-            turns = np.broadcast_to(np.eye(3, moved.shape[2], 3), moved.shape)
-            moved = np.concatenate([moved, turns], axis=1)
+    def _covariance(self, rows: Floats, features: Features | None, end: Endpoint, jacobian: Floats) -> Floats:
+        """Covariance (n, m, m) of an end's position, or pose, as the device saw base and target."""
+        flanges = self.pose(rows, tool=np.eye(4), features=features)
+        moved = end.motions(flanges, pose=jacobian.shape[1] > ROWS_TOGETHER)
         return self.spread.covariance(self.field_inputs(rows, features), jacobian, moved)
 
     def _jacobian(

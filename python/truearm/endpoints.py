@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.arrays import check_finite, rigid
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.robot import Robot
+from truearm.rotations import rigid_motion
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -24,11 +25,35 @@ class Endpoint:
         flange_from_end: Transform (4, 4).
         world_from_base: Transform (4, 4), or None for the base frame.
         has_orientation: Whether the rotation of `flange_from_end` means anything.
+        was_turned: Whether that rotation was fitted, to a target's measured orientation.
     """
 
     flange_from_end: Floats
     world_from_base: Floats | None = None
     has_orientation: bool = True
+    was_turned: bool = False
+
+    def motions(self, flanges: Floats, *, pose: bool) -> Floats:
+        """How the end moves with base and tool as the device saw them, see SetupPlace.motion.
+
+        Args:
+            flanges: base_from_flange (n, 4, 4).
+            pose: Whether its rotation vector is asked for as well.
+
+        Returns:
+            Derivatives (n, 3, 9), or (n, 6, 9) of a pose; (n, 6, 12) where the target's turn was fitted.
+        """
+        turned = flanges[:, :3, :3]
+        points = flanges[:, :3, 3] + turned @ self.flange_from_end[:3, 3]
+        moved = np.concatenate([rigid_motion(points), turned], axis=2)
+        if not pose:
+            return moved
+        turns = np.broadcast_to(np.eye(3, moved.shape[2], 3), moved.shape)
+        moved = np.concatenate([moved, turns], axis=1)
+        if not self.was_turned:
+            return moved
+        own = np.concatenate([np.zeros_like(turned), turned @ self.flange_from_end[:3, :3]], axis=1)
+        return np.concatenate([moved, own], axis=2)
 
 
 def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
@@ -89,7 +114,7 @@ def at_target(
     transform[:3, 3] = setup.targets[number, known.index(wanted)]
     if selection.orientation:
         transform[:3, :3] = setup.rotations[number]
-    return Endpoint(transform, world_from_base, selection.orientation)
+    return Endpoint(transform, world_from_base, selection.orientation, was_turned=selection.orientation)
 
 
 def _group_number(calibration: "Calibration", group: str | None) -> int:

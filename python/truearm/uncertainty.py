@@ -31,6 +31,8 @@ Mask = NDArray[np.bool_]
 LENGTHS: Final = (1, 2)
 """Places of d and a among a link's parameters."""
 AXES: Final = 3
+MOTIONS: Final = FRAME_UNKNOWNS + AXES
+"""Of the base, and of the tool's place."""
 
 
 class Spread(Protocol):
@@ -39,8 +41,8 @@ class Spread(Protocol):
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m) of `jacobian` (n, m, 5 L) times parameters at inputs (n, I).
 
-        With `moved` (n, m, 9), derivatives by motions of base and tool as in SetupPlace, it is that of what
-        the device of the set-up with most rows sees: what frame and target can take over counts no more.
+        With `moved` (n, m, 9 or 12), derivatives by motions of base and tool as in SetupPlace, it is that of
+        what the device of the set-up with most rows sees: what frame and target can take over counts no more.
         """
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
@@ -62,8 +64,9 @@ class SetupPlace:
     """What of the unknowns of all set-ups is the frame and the target of one.
 
     Attributes:
-        motion: Motion (9, S) of the base (translation, rotation vector) and of the tool (translation in the
-            flange's frame, that of the targets' middle) with them; zero where nothing was fitted.
+        motion: Motion (12, S) of the base (translation, rotation vector), of the tool (translation in the
+            flange's frame, that of the targets' middle) and of the measured orientation (rotation vector in
+            the target's frame) with them; zero where nothing was fitted.
     """
 
     motion: Floats
@@ -74,16 +77,21 @@ class SetupPlace:
         groups, frame, count = list(task.groups), frame_unknowns(task), setup_unknowns(task)
         often = groups[0] if data is None else max(groups, key=lambda name: (data.group == name).sum())
         start = groups.index(often) * (count // len(groups))
-        motion = np.zeros((FRAME_UNKNOWNS + AXES, count))
+        motion = np.zeros((MOTIONS + AXES, count))
         motion[:frame, start : start + frame] = np.eye(frame)
         for k in range(len(task.selection.targets)):
             target = start + frame + AXES * k
-            motion[FRAME_UNKNOWNS:, target : target + AXES] = np.eye(AXES) / len(task.selection.targets)
+            motion[FRAME_UNKNOWNS:MOTIONS, target : target + AXES] = np.eye(AXES) / len(
+                task.selection.targets
+            )
+        if task.selection.orientation:
+            end = start + count // len(groups)
+            motion[MOTIONS:, end - AXES : end] = np.eye(AXES)
         return cls(motion)
 
     def among_all(self, moved: Floats | None) -> Floats | None:
-        """Derivatives (n, m, S) by all of them, of those (n, m, 9) by the motions."""
-        return None if moved is None else np.ascontiguousarray(moved @ self.motion)
+        """Derivatives (n, m, S) by all of them, of those (n, m, k) by the first k motions."""
+        return None if moved is None else np.ascontiguousarray(moved @ self.motion[: moved.shape[2]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,9 +128,9 @@ class ConstantSpread:
         What the constants leave of positions is an uncertain place of the base, the same in all directions.
         """
         count = len(self.columns)
-        known = np.zeros((count + len(self.place.motion), len(self.of_all)))
+        known = np.zeros((count + MOTIONS, len(self.of_all)))
         known[:count, :count] = np.eye(count)
-        known[count:, count : count + self.place.motion.shape[1]] = self.place.motion
+        known[count:, count : count + self.place.motion.shape[1]] = self.place.motion[:MOTIONS]
         found = known @ self.of_all @ known.T
         found[count : count + AXES, count : count + AXES] += self.noises[0] ** 2 * np.eye(AXES)
         return np.asarray(found)
