@@ -64,7 +64,7 @@ def constants(problem):
     return fit_constant(problem, options)
 
 
-def field(problem, count):
+def field(problem, count, **more):
     options = {
         "determined": list(range(len(COLUMNS))),
         "driven": list(range(len(COLUMNS))),
@@ -80,7 +80,7 @@ def field(problem, count):
         "rough": False,
         "threads": None,
     }
-    return fit_field(problem, constants(problem), options)
+    return fit_field(problem, constants(problem), {**options, **more})
 
 
 @pytest.mark.parametrize("part", [np.zeros((3, 3)), 2.0 * np.eye(3), np.diag([1.0, 1.0, -1.0])])
@@ -102,6 +102,13 @@ def test_a_field_is_not_fitted_to_distances():
     problem = Problem(CHAIN, measured(q, targets=np.zeros((40, 0, 3)), distances=distances), COLUMNS)
     with pytest.raises(CoreError, match="points are needed"):
         field(problem, 40)
+
+
+@pytest.mark.parametrize("shape", [(5, 5), (6, 7), (0, 0)])
+def test_a_coupling_of_another_arm_is_refused(shape):
+    problem = Problem(CHAIN, measured(drawn(40)), COLUMNS)
+    with pytest.raises(CoreError, match=rf"shape \({shape[0]}, {shape[1]}\), it must be \(6, 6\)"):
+        field(problem, 40, coupling=np.ones(shape))
 
 
 def test_a_field_of_poses_that_nobody_trusts_is_fitted_all_the_same():

@@ -27,7 +27,9 @@ def told(data, kind):
     return next((notice.message for notice in found.notices if notice.kind == kind), "")
 
 
-@pytest.mark.parametrize(("length_m", "way_out"), [(0.15, "Subtract 1[45]"), (-0.05, "Add [45]")])
+@pytest.mark.parametrize(
+    ("length_m", "way_out"), [(0.15, "Subtract 1[45]"), (-0.05, "Add [45]"), (0.5, "Subtract [45]")]
+)
 def test_a_wire_with_an_unknown_zero_is_told_with_the_length(length_m, way_out):
     words = told(wire(length_m), "distance_zero")
     assert 'distances to "box" seem to be' in words

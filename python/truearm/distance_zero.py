@@ -1,16 +1,16 @@
 """Distances to a fixed point that are all off by one length: the zero of a wire is unknown."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from truearm.core_set import anchor_names
+from truearm._core import CoreError, fit_constant
+from truearm.core_set import anchor_names, core_set
 from truearm.errors import Notice, count_of
-from truearm.fitting import Task
+from truearm.fitting import Task, fit_options
 from truearm.measurements import Measurements
 from truearm.models import ArmModel
 from truearm.units import MM_PER_METRE
@@ -24,6 +24,10 @@ SURE: Final = 5.0
 """Standard errors that such a length has to be."""
 UNKNOWNS: Final = 7
 """Where the fixed point and the target are, and the length."""
+FIRST_M: Final = 1e-3
+"""First length that is tried, one way or the other."""
+ENOUGH_M: Final = 1e-6
+MOST_STEPS: Final = 30
 FEWEST: Final = 3 * UNKNOWNS
 """Distances to one fixed point, at the least."""
 
@@ -58,39 +62,48 @@ def zero_notices(task: Task, data: Measurements, models: Sequence[ArmModel]) -> 
     if data.anchor is None or data.distance_m is None:
         return []
     found = []
-    for number, anchor in enumerate(anchor_names(data)):
-        for index, group in enumerate(task.groups):
+    for anchor in anchor_names(data):
+        for group in task.groups:
             rows = data.select((data.anchor == anchor) & (data.group == group) & np.isfinite(data.distance_m))
             if len(rows) >= FEWEST:
-                zeros = [_zero(task, rows, model, (index, number)) for model in models]
-                zero = min(zeros, key=lambda each: each.after_m)
-                found += [_notice(anchor, zero, len(rows))] if zero.is_sure else []
+                zeros = [zero for model in models if (zero := _zero(task, rows, model)) is not None]
+                zero = min(zeros, key=lambda each: each.after_m, default=None)
+                found += [_notice(anchor, zero, len(rows))] if zero is not None and zero.is_sure else []
     return found
 
 
-def _zero(task: Task, rows: Measurements, model: ArmModel, place: tuple[int, int]) -> Zero:
-    """That of rows of one set-up, by its number, with distances to one anchor, by its number."""
-    group, anchor = place
-    measured = np.asarray(rows.distance_m)
-    values = np.ascontiguousarray(task.arm.robot.joints_from_readings(rows.readings))
-    flanges = task.arm.flange_chain.pose(values, np.ascontiguousarray(model.constants))
-    frame = model.setup.frames[group]
-    fixed = frame[:3, :3].T @ (model.setup.anchors[anchor] - frame[:3, 3])
-    start = np.concatenate([model.setup.targets[group, 0], fixed, [0.0]])
+def _zero(task: Task, rows: Measurements, model: ArmModel) -> Zero | None:
+    """That of rows of one set-up with distances to one anchor; None where they tell no length.
 
-    def missed(unknowns: Floats) -> Floats:
-        targets = flanges[:, :3, :3] @ unknowns[:3] + flanges[:, :3, 3]
-        left: Floats = np.linalg.norm(targets - unknowns[3:6], axis=1) + unknowns[6] - measured
-        return left
+    Residuals add up to nothing where the length is right: with the fixed point and the target found anew for
+    each length, their sum is half of what the sum of squares falls by it. The secant method finds it.
+    """
+    own = replace(task, groups=rows.groups)
 
-    def missed_without(unknowns: Floats) -> Floats:
-        return missed(np.append(unknowns, 0.0))
+    def left(length_m: float) -> Floats:
+        shorter = replace(rows, distance_m=np.asarray(rows.distance_m) - length_m)
+        problem = own.problem(core_set(own.arm.robot, shorter, own.selection, own.groups), [])
+        return fit_constant(problem, fit_options(own.threads, parameters=model.constants)).residuals
 
-    without, with_it = least_squares(missed_without, start[:6]), least_squares(missed, start)
-    before, after = (float(np.sqrt(np.square(each.fun).mean())) for each in (without, with_it))
-    noise = after * np.sqrt(len(rows) / (len(rows) - UNKNOWNS))
-    std = float(noise * np.linalg.norm(np.linalg.pinv(np.asarray(with_it.jac, dtype=np.float64))[6]))
-    return Zero(float(with_it.x[6]), std, before, after)
+    shortest = float(np.asarray(rows.distance_m).min())
+    try:
+        without = left(0.0)
+        now, length, step, counted = without, 0.0, float(np.copysign(FIRST_M, without.sum())), 0.0
+        for _ in range(MOST_STEPS):
+            length, before, now = length + step, now, left(length + step)
+            counted = float(before.sum() - now.sum()) / step
+            # Far from where it is right the sum hardly changes: on in larger steps.
+            step = float(now.sum()) / counted if counted > 0.0 else 2.0 * step
+            step = min(step, 0.5 * (shortest - length))
+            if abs(step) < ENOUGH_M:
+                break
+    except CoreError:
+        return None
+    if counted <= 0.0:
+        return None
+    before_m, after_m = (float(np.sqrt(np.square(each).mean())) for each in (without, now))
+    noise = after_m * np.sqrt(len(rows) / (len(rows) - UNKNOWNS))
+    return Zero(length, float(noise / np.sqrt(counted)), before_m, after_m)
 
 
 def _notice(anchor: str, zero: Zero, count: int) -> Notice:

@@ -47,6 +47,13 @@ pub struct Options<'py> {
 impl Options<'_> {
     fn core(&self, problem: &IdentificationProblem, cancel: Cancel) -> PyResult<FieldOptions> {
         let problem = problem.core();
+        let (count, shape) = (problem.chain.joint_count(), self.coupling.as_array().dim());
+        if shape != (count, count) {
+            let (rows, columns) = shape;
+            return Err(CoreError::new_err(format!(
+                "the coupling has shape ({rows}, {columns}), it must be ({count}, {count}): a row of each joint, a column of each reading"
+            )));
+        }
         Ok(FieldOptions {
             degree: self.degree,
             prior: prior(self.prior)?,
