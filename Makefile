@@ -63,7 +63,7 @@ rust-test: $(STAMPS)/tools
 	$(CARGO) test --locked --package truearm-text
 
 py-test: $(STAMPS)/built
-	$(BIN)/python -m pytest --numprocesses auto --dist worksteal
+	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --durations=15
 
 # The measurement cell killed, interrupted and with faults, in full; takes half an hour or more. What it finds is
 # kept in build/trials: python docs/make_trials.py build/trials

@@ -32,7 +32,8 @@ ENDS: Final = 0.1
 BEYOND: Final = 0.5
 """Features are bounded so far beyond what was measured, as a share of its range: another day is warmer."""
 SEED: Final = 0
-AT_ONCE: Final = 500
+AT_ONCE: Final = 128
+"""Configurations between which an interrupt is heard: of thousands of poses so many take half a second."""
 TOGETHER: Final = 3
 """So many joints, those that place the wrist, are tabulated together as well."""
 OPEN_REACH_M: Final = 0.5

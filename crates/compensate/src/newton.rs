@@ -203,47 +203,43 @@ impl<G: Goal<M>, const M: usize> Kernel for Approach<'_, G, M> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> [Lane; 2] {
-        approach::<I, G, M>(self.to, self.search)
+        let Self { to: To { aimed, plan, target, alone }, search, .. } = self;
+        let mut progress = Progress::new();
+        let mut factor = None;
+        search.trial.copy_from_slice(&search.best);
+        for step in 0..=plan.steps {
+            let stale = progress.any_stale();
+            let frame = if stale {
+                aimed.sweep::<I>(&search.trial, alone, &mut search.model)
+            } else {
+                aimed.end::<I>(&search.trial, alone, &mut search.model)
+            };
+            let error = weighted::<I, G, M>(&frame, target, plan.turn_weight);
+            let norm = progress.take::<I, M>(&error, plan, search);
+            if step == plan.steps || !progress.any_open() {
+                break;
+            }
+            if stale {
+                fill_columns::<I, G, M>(aimed, plan, &frame, progress.stale, search);
+                let (joints, model) = (aimed.chain.joint_count(), &search.model);
+                search.bend.take(&model.screws[..joints], &model.inputs[..joints], progress.stale);
+                factor = Some(progress.factor::<I, M>(plan, search));
+            }
+            // Every search begins without a Jacobian.
+            let Some(factor) = &mut factor else { break };
+            let length = step_for::<I, M>(plan, &factor.solve::<I>(&error), search);
+            let straight =
+                Straight { error, norm, length, bent: search.bent::<I, G, M>(aimed, plan, &frame) };
+            progress.find_step::<I, M>(plan, factor, straight, search);
+            search.advance(plan, &progress);
+            progress.foresee(norm, plan, search);
+            if !progress.any_open() {
+                break;
+            }
+            progress.settle();
+        }
+        [progress.left[0].sqrt(), progress.left[1].sqrt() * (1.0 / plan.turn_weight)]
     }
-}
-
-#[inline(always)]
-fn approach<I: Isa, G: Goal<M>, const M: usize>(to: To<'_>, search: &mut Search) -> [Lane; 2] {
-    let To { aimed, plan, target, alone } = to;
-    let mut progress = Progress::new();
-    let mut factor = None;
-    search.trial.copy_from_slice(&search.best);
-    for step in 0..=plan.steps {
-        let stale = progress.any_stale();
-        let frame = if stale {
-            aimed.sweep::<I>(&search.trial, alone, &mut search.model)
-        } else {
-            aimed.end::<I>(&search.trial, alone, &mut search.model)
-        };
-        let error = weighted::<I, G, M>(&frame, target, plan.turn_weight);
-        let norm = progress.take::<I, M>(&error, plan, search);
-        if step == plan.steps || !progress.any_open() {
-            break;
-        }
-        if stale {
-            fill_columns::<I, G, M>(aimed, plan, &frame, progress.stale, search);
-            let joints = aimed.chain.joint_count();
-            search.bend.take(&search.model.screws[..joints], &search.model.inputs[..joints], progress.stale);
-            factor = Some(progress.factor::<I, M>(plan, search));
-        }
-        // Every search begins without a Jacobian.
-        let Some(factor) = &mut factor else { break };
-        let length = step_for::<I, M>(plan, &factor.solve::<I>(&error), search);
-        let straight = Straight { error, norm, length, bent: search.bent::<I, G, M>(aimed, plan, &frame) };
-        progress.find_step::<I, M>(plan, factor, straight, search);
-        search.advance(plan, &progress);
-        progress.foresee(norm, plan, search);
-        if !progress.any_open() {
-            break;
-        }
-        progress.settle();
-    }
-    [progress.left[0].sqrt(), progress.left[1].sqrt() * (1.0 / plan.turn_weight)]
 }
 
 impl Progress {

@@ -3,15 +3,25 @@
 //! faer's results do not depend on the number of threads for the routines used here except when it solves
 //! for a single right-hand side, which is therefore always done sequentially.
 
+use std::ops::Range;
+
 use faer::diag::Diag;
 use faer::linalg::cholesky::llt::{factor, inverse};
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::linalg::qr::no_pivoting::solve::{solve_lstsq_in_place, solve_lstsq_in_place_scratch};
 use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
+
+use crate::{Cancel, EstimateError};
+
+/// Rows up to which a matrix is factored at once: in some tenths of a second.
+const AT_ONCE: usize = 2048;
+/// Columns that are factored or solved for between two looks at a request to stop.
+const PANEL: usize = 256;
 
 /// The lower Cholesky factor L of a matrix A = L L^T, (n, n).
 #[derive(Debug, Clone)]
@@ -23,14 +33,42 @@ pub struct Cholesky {
 impl Cholesky {
     /// Factors the lower triangle of `matrix`; `None` when it is not positive definite.
     pub fn new(mut matrix: Mat<f64>, par: Par) -> Option<Self> {
+        factor_in_place(matrix.as_mut(), par)?;
+        Some(Self { lower: matrix, par })
+    }
+
+    /// The same with a look at `cancel` between parts of the work, which takes seconds where the matrix is large.
+    ///
+    /// # Errors
+    /// [`EstimateError::Cancelled`].
+    pub fn heeding(mut matrix: Mat<f64>, par: Par, cancel: &Cancel) -> Result<Option<Self>, EstimateError> {
         let n = matrix.nrows();
-        let scratch = factor::cholesky_in_place_scratch::<f64>(n, par, Default::default());
-        let mut memory = faer::dyn_stack::MemBuffer::new(scratch);
-        let stack = faer::dyn_stack::MemStack::new(&mut memory);
-        factor::cholesky_in_place(matrix.as_mut(), Default::default(), par, stack, Default::default())
-            .ok()?;
-        let finite = (0..n).all(|i| matrix[(i, i)].is_finite());
-        finite.then_some(Self { lower: matrix, par })
+        cancel.check()?;
+        if n <= AT_ONCE {
+            return Ok(Self::new(matrix, par));
+        }
+        for start in (0..n).step_by(PANEL) {
+            cancel.check()?;
+            let (width, left) = (PANEL.min(n - start), n - start);
+            let rest = matrix.as_mut().submatrix_mut(start, start, left, left);
+            let (mut corner, _, mut below, behind) = rest.split_at_mut(width, width);
+            if factor_in_place(corner.rb_mut(), par).is_none() {
+                return Ok(None);
+            }
+            solve_lower_triangular_in_place(corner.rb(), below.rb_mut().transpose_mut(), par);
+            triangular::matmul(
+                behind,
+                BlockStructure::TriangularLower,
+                Accum::Add,
+                below.rb(),
+                BlockStructure::Rectangular,
+                below.rb().transpose(),
+                BlockStructure::Rectangular,
+                -1.0,
+                par,
+            );
+        }
+        Ok(Some(Self { lower: matrix, par }))
     }
 
     /// Rows of the matrix.
@@ -87,6 +125,38 @@ impl Cholesky {
         out
     }
 
+    /// Blocks of A^-1 on its diagonal, of ascending ranges of rows, with a look at `cancel` between parts of the work.
+    ///
+    /// # Errors
+    /// [`EstimateError::Cancelled`].
+    pub fn inverse_blocks(
+        &self,
+        ranges: &[Range<usize>],
+        cancel: &Cancel,
+    ) -> Result<Vec<Mat<f64>>, EstimateError> {
+        let mut blocks = Vec::with_capacity(ranges.len());
+        let mut left = ranges;
+        while let Some(first) = left.first() {
+            cancel.check()?;
+            let start = first.start;
+            let together = left.iter().take_while(|range| range.end <= start + PANEL).count().max(1);
+            let (now, later) = left.split_at(together);
+            let (rows, columns) = (self.len() - start, now[together - 1].end - start);
+            // Columns of L^-1, which are zero above the diagonal.
+            let mut root = Mat::<f64>::identity(rows, columns);
+            let below = self.lower.as_ref().submatrix(start, start, rows, rows);
+            solve_lower_triangular_in_place(below, root.as_mut(), self.par);
+            blocks.extend(now.iter().map(|range| {
+                let own = root.as_ref().subcols(range.start - start, range.len());
+                let mut block = Mat::zeros(range.len(), range.len());
+                matmul(block.as_mut(), Accum::Replace, own.transpose(), own, 1.0, Par::Seq);
+                block
+            }));
+            left = later;
+        }
+        Ok(blocks)
+    }
+
     /// Overwrites the lower triangle of `out` (n, n) with that of A^-1.
     pub fn inverse_lower(&self, out: MatMut<f64>) {
         let mut memory =
@@ -94,6 +164,16 @@ impl Cholesky {
         let stack = faer::dyn_stack::MemStack::new(&mut memory);
         inverse::inverse(out, self.lower.as_ref(), self.par, stack);
     }
+}
+
+/// Overwrites the lower triangle of a matrix with its factor; None when it is not positive definite.
+fn factor_in_place(mut matrix: MatMut<f64>, par: Par) -> Option<()> {
+    let n = matrix.nrows();
+    let scratch = factor::cholesky_in_place_scratch::<f64>(n, par, Default::default());
+    let mut memory = faer::dyn_stack::MemBuffer::new(scratch);
+    let stack = faer::dyn_stack::MemStack::new(&mut memory);
+    factor::cholesky_in_place(matrix.rb_mut(), Default::default(), par, stack, Default::default()).ok()?;
+    (0..n).all(|i| matrix[(i, i)].is_finite()).then_some(())
 }
 
 /// Factors Q R of a matrix (m, n) with orthonormal Q, found and used by one thread.

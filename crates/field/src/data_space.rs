@@ -27,6 +27,7 @@ pub struct DataSpace {
     pub model: Model,
     excited: Vec<Excited>,
     pub(crate) projection: Projection,
+    cancel: Cancel,
 }
 
 impl DataSpace {
@@ -43,8 +44,8 @@ impl DataSpace {
         let mut matrix = Mat::zeros(rows, rows);
         write_covariance(training, &model.by_column, &model.hyper, &kernels, matrix.as_mut());
         cancel.check()?;
-        let projection = Projection::new(training, matrix)?;
-        Ok(Self { model, excited, projection })
+        let projection = Projection::new(training, matrix, cancel)?;
+        Ok(Self { model, excited, projection, cancel: cancel.clone() })
     }
 
     /// Constants, field and set-up from residuals (R,).
@@ -126,19 +127,19 @@ impl DataSpace {
     /// What each pose's residuals (R,) would be if it had taken no part.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
         let training = &self.model.training;
         let alpha = self.alpha(residual, &self.setup_step(residual));
-        let inverse = self.projection.factor.inverse();
+        let ranges: Vec<Range<usize>> = (0..training.pose_count()).map(|pose| training.rows(pose)).collect();
+        let inverses = self.projection.factor.inverse_blocks(&ranges, &self.cancel)?;
         let root = self.projection.root();
         let mut out = LeaveOneOut::zeros(training.row_count());
-        for pose in 0..training.pose_count() {
-            let range = training.rows(pose);
+        for (pose, (range, inverse)) in ranges.into_iter().zip(inverses).enumerate() {
             let (start, count) = (range.start, range.len());
             let block = Mat::from_fn(count, count, |i, j| {
                 let setup: f64 = (0..root.nrows()).map(|k| root[(k, start + i)] * root[(k, start + j)]).sum();
-                inverse[(start + i, start + j)] - setup
+                inverse[(i, j)] - setup
             });
             let error = FieldError::NotPositiveDefinite { rows: count };
             let precision = Cholesky::new(block, faer::Par::Seq).ok_or(error)?;

@@ -155,7 +155,7 @@ impl<'a> Evidence<'a> {
         let kernels = Continuous::new(self.training, &self.pairings, hyper);
         let mut covariance = Mat::zeros(self.by_column.rows, self.by_column.rows);
         write_covariance(self.training, &self.by_column, hyper, &kernels, covariance.as_mut());
-        Projection::new(self.training, covariance)
+        Projection::new(self.training, covariance, self.cancel)
     }
 
     /// P r and the logarithm of the restricted likelihood.
@@ -179,7 +179,7 @@ impl<'a> Evidence<'a> {
 
     /// From the covariance's lower triangle and room for P.
     fn restricted(&self, covariance: Mat<f64>, mut projected: Mat<f64>) -> Result<Restricted, FieldError> {
-        let projection = Projection::new(self.training, covariance)?;
+        let projection = Projection::new(self.training, covariance, self.cancel)?;
         let root = projection.root();
         let (alpha, value) = self.explained(&projection, &root);
         let Projection { factor, .. } = projection;

@@ -4,6 +4,7 @@
 //! `P = K^-1 - K^-1 S (S^T K^-1 S)^-1 S^T K^-1` (Patterson and Thompson 1971).
 
 use faer::{Mat, MatRef};
+use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, parallelism};
 
 use crate::FieldError;
@@ -23,10 +24,10 @@ impl Projection {
     /// From the lower triangle of the covariance (R, R) of a training set's rows.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
-    pub fn new(training: &Training, covariance: Mat<f64>) -> Result<Self, FieldError> {
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
+    pub fn new(training: &Training, covariance: Mat<f64>, cancel: &Cancel) -> Result<Self, FieldError> {
         let error = || FieldError::NotPositiveDefinite { rows: training.row_count() };
-        let factor = Cholesky::new(covariance, parallelism()).ok_or_else(error)?;
+        let factor = Cholesky::heeding(covariance, parallelism(), cancel)?.ok_or_else(error)?;
         let setup = setup_columns(training);
         let mut spread = setup.to_owned();
         factor.solve(spread.as_mut());

@@ -50,9 +50,10 @@ fn add_gram(normal: &mut Mat<f64>, rows: MatRef<f64>, sign: f64) {
     );
 }
 
-fn factored(normal: &Mat<f64>) -> Result<Cholesky, FieldError> {
+fn factored(normal: &Mat<f64>, cancel: &Cancel) -> Result<Cholesky, FieldError> {
     let rows = normal.nrows();
-    Cholesky::new(normal.clone(), parallelism()).ok_or(FieldError::NotPositiveDefinite { rows })
+    let factor = Cholesky::heeding(normal.clone(), parallelism(), cancel)?;
+    factor.ok_or(FieldError::NotPositiveDefinite { rows })
 }
 
 impl WeightSpace {
@@ -73,7 +74,7 @@ impl WeightSpace {
             add_gram(&mut normal, batch.rows, 1.0);
             Ok(())
         })?;
-        let factor = factored(&normal)?;
+        let factor = factored(&normal, cancel)?;
         Ok(Self { model, unknowns, width, normal, factor, cancel: cancel.clone() })
     }
 
@@ -98,7 +99,7 @@ impl WeightSpace {
                 },
             )?;
         }
-        self.factor = factored(&self.normal)?;
+        self.factor = factored(&self.normal, &self.cancel)?;
         Ok(self)
     }
 
