@@ -9,6 +9,7 @@ import pytest
 import truearm as ta
 from tests.test_doubts import notice_of
 from truearm.conventions import Convention, conventions_of
+from truearm.nominal_misfit import NominalArm, Seen
 from truearm.parameters import ALPHA, A, D
 from truearm.simulation import VirtualArm
 
@@ -19,8 +20,8 @@ def measured_otherwise(name, **otherwise):
     arm = VirtualArm(convention.robot(robot), seed=4)
     table = arm.measure_table(arm.poses(60))
     data = ta.Measurements.from_dataframe(table, joints=robot.joints)
-    readings, points = convention.measured(data.readings, data.targets[:, 0])
-    return robot, replace(data, readings=readings, targets=points[:, None])
+    seen = convention.measured(Seen.of(data, 0))
+    return robot, replace(data, readings=seen.readings, targets=seen.points[:, None])
 
 
 @pytest.mark.parametrize(
@@ -164,3 +165,14 @@ def test_of_many_joints_few_zeros_and_directions_are_tried_together():
     assert max(one.changes for one in tried if not one.mirrored) <= 5
     assert max(len(one.zeros) for one in tried) == 3
     assert len(tried) == len(set(tried)) < 30_000
+
+
+def test_points_that_nobody_trusts_pull_no_frame():
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=4)
+    table = arm.measure_table(arm.poses(40)).assign(sigma_mm=0.05)
+    table.loc[:5, ["x", "y", "z"]] += 1.0
+    told = table.assign(sigma_mm=np.where(np.arange(40) < 6, 1000.0, 0.05))
+    trusted, doubted = (Seen.of(ta.Measurements.from_dataframe(each), 0) for each in (table, told))
+    nominal = NominalArm.of(arm.robot)
+    assert nominal.misfit_m(doubted) < 0.003
+    assert nominal.misfit_m(trusted) > 0.05

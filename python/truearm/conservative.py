@@ -33,7 +33,8 @@ BEYOND: Final = 0.5
 """Features are bounded so far beyond what was measured, as a share of its range: another day is warmer."""
 SEED: Final = 0
 AT_ONCE: Final = 128
-"""Configurations between which an interrupt is heard: of thousands of poses so many take half a second."""
+"""Configurations, or up to twice as many, between which an interrupt is heard: of thousands of poses half a
+second."""
 TOGETHER: Final = 3
 """So many joints, those that place the wrist, are tabulated together as well."""
 OPEN_REACH_M: Final = 0.5

@@ -14,7 +14,7 @@ from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, some_rows
+from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.parameters import ALPHA, KINDS, THETA, A, D
 from truearm.robot import Robot
 from truearm.robot_data import Convention as Rows
@@ -109,13 +109,13 @@ class Convention:
     def _rows(self, robot: Robot) -> Rows:
         return OTHER_ROWS[robot.convention] if self.other_rows else robot.convention
 
-    def measured(self, readings: Floats, points: Floats) -> tuple[Floats, Floats]:
-        """Readings (n, N) and points (n, 3) in the columns and the frame of this convention."""
+    def measured(self, seen: Seen) -> Seen:
+        """What was measured in the columns and the frame of this convention."""
         if self.exchanged:
-            own = readings.copy()
-            own[:, self.exchanged] = readings[:, self.exchanged[::-1]]
-            readings = own
-        return readings, points * MIRROR if self.mirrored else points
+            readings = seen.readings.copy()
+            readings[:, self.exchanged] = seen.readings[:, self.exchanged[::-1]]
+            seen = replace(seen, readings=readings)
+        return replace(seen, points=seen.points * MIRROR) if self.mirrored else seen
 
     def words(self, robot: Robot) -> str:
         """What is otherwise, and what the robot file then says."""
@@ -183,11 +183,10 @@ def fits_otherwise(task: Task, data: Measurements) -> list[Notice]:
     if len(rows) < FEWEST_ROWS:
         return []
 
-    points = rows.targets[:, target]
+    seen = Seen.of(rows, target)
 
     def misfit(convention: Convention) -> float:
-        measured = convention.measured(rows.readings, points)
-        return convention.arm(robot).misfit_m(*measured, task.threads)
+        return convention.arm(robot).misfit_m(convention.measured(seen), task.threads)
 
     before = misfit(Convention())
     found = {convention: misfit(convention) for convention in conventions_of(robot) if convention.changes}

@@ -108,15 +108,21 @@ def core_set(
 
 
 def measured_points(
-    values: Floats, points: Floats, turned: Floats | None = None, *, group: int = 0
+    values: Floats,
+    points: Floats,
+    turned: Floats | None = None,
+    *,
+    group: int = 0,
+    sigma_m: Floats | None = None,
 ) -> MeasurementSet:
-    """Points measured at joint values, without a sigma of their own, as the core reads them.
+    """Points measured at joint values as the core reads them.
 
     Args:
         values: Joint values (n, N).
         points: (n, T, 3), or (n, 3) of one target.
         turned: world_from_target rotations (n, 3, 3); None where orientation is not measured.
         group: Number of the set-up.
+        sigma_m: Their own sigma (n,), NaN where there is none; None for none at all.
     """
     count = len(values)
     return MeasurementSet(
@@ -125,7 +131,7 @@ def measured_points(
             "group": np.full(count, group, dtype=np.int64),
             "targets": np.ascontiguousarray(points.reshape(count, -1, 3)),
             "rotations": None if turned is None else np.ascontiguousarray(turned),
-            "sigma": np.zeros(count),
+            "sigma": np.zeros(count) if sigma_m is None else np.nan_to_num(sigma_m, nan=0.0),
             "weight": np.ones(count),
             "distances": [],
         }

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import CoreError, fit_constant
+from truearm._core import CoreError, Setup, fit_constant
 from truearm.core_set import anchor_names, core_set
 from truearm.errors import Notice, count_of
 from truearm.fitting import Task, fit_options
@@ -59,47 +59,58 @@ def zero_notices(task: Task, data: Measurements, models: Sequence[ArmModel]) -> 
 
     Constants may have taken a part of that length over: it is told by that of the models it fits best.
     """
-    if data.anchor is None or data.distance_m is None:
+    if data.anchor is None or data.distance_m is None or not task.selection.distances:
         return []
     found = []
-    for anchor in anchor_names(data):
-        for group in task.groups:
+    for number, anchor in enumerate(anchor_names(data)):
+        for index, group in enumerate(task.groups):
             rows = data.select((data.anchor == anchor) & (data.group == group) & np.isfinite(data.distance_m))
             if len(rows) >= FEWEST:
-                zeros = [zero for model in models if (zero := _zero(task, rows, model)) is not None]
-                zero = min(zeros, key=lambda each: each.after_m, default=None)
+                zeros = (_zero(task, rows, model, (index, number)) for model in models)
+                known = (zero for zero in zeros if zero is not None)
+                zero = min(known, key=lambda each: each.after_m, default=None)
                 found += [_notice(anchor, zero, len(rows))] if zero is not None and zero.is_sure else []
     return found
 
 
-def _zero(task: Task, rows: Measurements, model: ArmModel) -> Zero | None:
-    """That of rows of one set-up with distances to one anchor; None where they tell no length.
+def _zero(task: Task, rows: Measurements, model: ArmModel, place: tuple[int, int]) -> Zero | None:
+    """That of rows of one set-up, by its number, with distances to one anchor, by its number.
 
     Residuals add up to nothing where the length is right: with the fixed point and the target found anew for
-    each length, their sum is half of what the sum of squares falls by it. The secant method finds it.
+    each length, their sum is half of what the sum of squares falls by it. The secant method finds it. All
+    rows count alike, whatever their sigma.
+
+    Returns:
+        None where no length that is shorter than all distances does.
     """
-    own = replace(task, groups=rows.groups)
+    group, anchor = place
+    own, setup = replace(task, groups=rows.groups), model.setup
+    options = fit_options(task.threads, parameters=model.constants)
+    frame, targets, turned = (part[[group]] for part in (setup.frames, setup.targets, setup.rotations))
+    options["start"] = Setup(frame, targets, turned, setup.anchors[[anchor]])
 
     def left(length_m: float) -> Floats:
-        shorter = replace(rows, distance_m=np.asarray(rows.distance_m) - length_m)
+        shorter = replace(rows, distance_m=np.asarray(rows.distance_m) - length_m, sigma_m=None)
         problem = own.problem(core_set(own.arm.robot, shorter, own.selection, own.groups), [])
-        return fit_constant(problem, fit_options(own.threads, parameters=model.constants)).residuals
+        fit = fit_constant(problem, options)
+        options["start"] = fit.setup
+        return fit.residuals
 
     shortest = float(np.asarray(rows.distance_m).min())
     try:
         without = left(0.0)
-        now, length, step, counted = without, 0.0, float(np.copysign(FIRST_M, without.sum())), 0.0
+        now, length, step = without, 0.0, float(np.copysign(FIRST_M, without.sum()))
         for _ in range(MOST_STEPS):
+            step = min(step, 0.5 * (shortest - length))
             length, before, now = length + step, now, left(length + step)
-            counted = float(before.sum() - now.sum()) / step
+            counted = float(before.sum() - now.sum()) / step if step else 0.0
             # Far from where it is right the sum hardly changes: on in larger steps.
             step = float(now.sum()) / counted if counted > 0.0 else 2.0 * step
-            step = min(step, 0.5 * (shortest - length))
-            if abs(step) < ENOUGH_M:
+            if counted > 0.0 and abs(step) < ENOUGH_M:
                 break
+        else:
+            return None
     except CoreError:
-        return None
-    if counted <= 0.0:
         return None
     before_m, after_m = (float(np.sqrt(np.square(each).mean())) for each in (without, now))
     noise = after_m * np.sqrt(len(rows) / (len(rows) - UNKNOWNS))

@@ -46,7 +46,7 @@ def otherwise_read(quaternions: Floats) -> Iterator[tuple[list[str], str, Floats
 
 
 def usual_first(kinds: tuple[str, str]) -> tuple[int, int]:
-    """The least comes first of what numbers were taken for and what they are then."""
+    """A key to sort by: what numbers were taken for, then what they are; the usual kinds first."""
     taken, meant = kinds
     return (*MOVING, *FIXED, VECTOR).index(taken), (*FIXED, *MOVING, VECTOR).index(meant)
 

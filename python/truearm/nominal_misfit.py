@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from truearm._core import Chain, ConstantFit, CoreError, Problem, Setup, fit_constant, residuals
 from truearm.core_set import measured_points
 from truearm.fitting import fit_options
+from truearm.measurements import Measurements
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -22,6 +23,31 @@ FEWEST_ROWS: Final = 12
 def some_rows(rows: Rows, most: int = MOST_ROWS) -> Rows:
     """At most so many of row indices, spread evenly."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, most).astype(np.int64))]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Points of one set-up, n of them, and where they were measured.
+
+    Attributes:
+        readings: Joint readings (n, N).
+        points: The points (n, 3), m; NaN where none was measured.
+        sigma_m: Their own sigma (n,); None where there is none.
+    """
+
+    readings: Floats
+    points: Floats
+    sigma_m: Floats | None = None
+
+    @classmethod
+    def of(cls, data: Measurements, target: int) -> "Seen":
+        """The points of a target, index from 0."""
+        return cls(data.readings, data.targets[:, target], data.sigma_m)
+
+    def select(self, rows: Rows) -> "Seen":
+        """Some of them, by their indices."""
+        sigma = None if self.sigma_m is None else self.sigma_m[rows]
+        return Seen(self.readings[rows], self.points[rows], sigma)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,44 +69,40 @@ class NominalArm:
         """That of a robot."""
         return cls(robot.flange_chain, robot.table, robot.coupling)
 
-    def setup(self, readings: Floats, points: Floats, threads: int | None = None) -> Setup | None:
+    def setup(self, seen: Seen, threads: int | None = None) -> Setup | None:
         """Frame and target with which the arm fits points best; None where they cannot be found.
 
-        Args:
-            readings: Joint readings (n, N) of one set-up.
-            points: The points that were measured there (n, 3), m; NaN where none was.
-            threads: Threads at the most.
+        `threads` are those at the most.
         """
-        fit = self._fit(readings, points, threads)
+        fit = self._fit(seen, threads)
         return None if fit is None else fit.setup
 
-    def distances_m(self, readings: Floats, points: Floats, setup: Setup) -> Floats:
+    def distances_m(self, seen: Seen, setup: Setup) -> Floats:
         """Distances (n,) of points, in m, from where the arm with this frame and target has them.
 
-        They are NaN in rows without the point. The arguments are those of `setup`.
+        They are NaN in rows without the point.
         """
-        return _distances(residuals(self._problem(readings, points), self.table, setup), points)
+        return _distances(residuals(self._problem(seen), self.table, setup), seen.points)
 
-    def misfit_m(self, readings: Floats, points: Floats, threads: int | None = None) -> float:
+    def misfit_m(self, seen: Seen, threads: int | None = None) -> float:
         """Median distance of points, in m, from where the arm, its frame and target fitted, has them.
-
-        The arguments are those of `setup`.
 
         Returns:
             The distance; infinity where frame and target cannot be found.
         """
-        fit = self._fit(readings, points, threads)
-        return np.inf if fit is None else float(np.nanmedian(_distances(fit.residuals, points)))
+        fit = self._fit(seen, threads)
+        return np.inf if fit is None else float(np.nanmedian(_distances(fit.residuals, seen.points)))
 
-    def _fit(self, readings: Floats, points: Floats, threads: int | None) -> ConstantFit | None:
+    def _fit(self, seen: Seen, threads: int | None) -> ConstantFit | None:
         try:
-            return fit_constant(self._problem(readings, points), fit_options(threads))
+            return fit_constant(self._problem(seen), fit_options(threads))
         except CoreError:
             return None
 
-    def _problem(self, readings: Floats, points: Floats) -> Problem:
+    def _problem(self, seen: Seen) -> Problem:
         """That of frame and target alone."""
-        return Problem(self.chain, measured_points(readings @ self.coupling.T, points), [], False)
+        values = seen.readings @ self.coupling.T
+        return Problem(self.chain, measured_points(values, seen.points, sigma_m=seen.sigma_m), [], False)
 
 
 def _distances(left: Floats, points: Floats) -> Floats:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
 from truearm.mixed_units import check_mixed_units
-from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, some_rows
+from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.robot import Robot
 from truearm.turning_sense import FIT, MISFIT
 from truearm.unit_change import check_one_unit
@@ -189,8 +189,8 @@ def _fits_much_better(converted: Measurements, given: Measurements, robot: Robot
     if seen.sum() < FEWEST_ROWS:
         return False
     rows = some_rows(np.flatnonzero(seen))
-    arm, points = NominalArm.of(robot), given.targets[rows, target]
-    now, then = (arm.misfit_m(each.readings[rows], points) for each in (given, converted))
+    arm = NominalArm.of(robot)
+    now, then = (arm.misfit_m(Seen.of(each, target).select(rows)) for each in (given, converted))
     return then * FIT_BETTER < now
 
 
@@ -275,9 +275,9 @@ def _check_inches(rows: Measurements, robot: Robot, found: str, where: str) -> N
 
 def _misfit(rows: Measurements, robot: Robot, factor: float) -> float:
     """How far points times `factor` are from those of the nominal arm, over their spread."""
-    points = factor * rows.targets[:, rows.most_held()]
-    misfit = NominalArm.of(robot).misfit_m(rows.readings, points)
-    return misfit / max(_spread(points), ALIKE_RAD_OR_M)
+    seen = Seen.of(rows, rows.most_held())
+    seen = replace(seen, points=factor * seen.points)
+    return NominalArm.of(robot).misfit_m(seen) / max(_spread(seen.points), ALIKE_RAD_OR_M)
 
 
 def _check_distances(measurements: Measurements, robot: Robot) -> None:

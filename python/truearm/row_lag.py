@@ -1,6 +1,6 @@
 """Readings that belong to the points of other rows: a log began a row late, or lost one on the way."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -14,7 +14,7 @@ from truearm.errors import Notice, count_of
 from truearm.fitting import Task
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, some_rows
+from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
 
@@ -37,7 +37,7 @@ class _Rows:
 
     robot: Robot
     data: Measurements
-    points: Floats
+    target: int
     threads: int | None
 
     @cached_property
@@ -48,7 +48,7 @@ class _Rows:
     @property
     def seen(self) -> Rows:
         """Rows with a measured point."""
-        return np.flatnonzero(np.isfinite(self.points).all(axis=1))
+        return np.flatnonzero(np.isfinite(self.data.targets[:, self.target]).all(axis=1))
 
     def has_partner(self, rows: Rows, lag: int | Rows) -> NDArray[np.bool_]:
         """Whether there are readings so many rows further on (m,)."""
@@ -60,11 +60,11 @@ class _Rows:
             return None
         some = some_rows(np.arange(len(rows)))
         lags = np.broadcast_to(lag, rows.shape)
-        return self.arm.setup(*self._paired(rows[some], lags[some]), self.threads)
+        return self.arm.setup(self._paired(rows[some], lags[some]), self.threads)
 
     def distances_m(self, rows: Rows, lag: int, setup: Setup) -> Floats:
         """Distances (m,) of the points of rows that have a partner so many rows further on."""
-        return self.arm.distances_m(*self._paired(rows, lag), setup)
+        return self.arm.distances_m(self._paired(rows, lag), setup)
 
     def distances(self, setup: Setup) -> Floats:
         """Distances (lags, n) of all points, in m: infinite without readings, NaN without a point."""
@@ -74,9 +74,10 @@ class _Rows:
             own[rows] = self.distances_m(rows, lag, setup)
         return found
 
-    def _paired(self, rows: Rows, lag: int | Rows) -> tuple[Floats, Floats]:
-        """Points of rows, and before them the readings of those so many further on."""
-        return self.data.readings[rows + lag], self.points[rows]
+    def _paired(self, rows: Rows, lag: int | Rows) -> Seen:
+        """Points of rows with the readings of those so many further on."""
+        seen = Seen.of(self.data, self.target).select(rows)
+        return replace(seen, readings=self.data.readings[rows + lag])
 
 
 def fits_shifted(task: Task, data: Measurements) -> list[Notice]:
@@ -91,8 +92,7 @@ def fits_shifted(task: Task, data: Measurements) -> list[Notice]:
     target = data.most_held(task.selection.targets)
     notices = []
     for group in task.groups:
-        own = data.select(data.group == group)
-        rows = _Rows(task.arm.robot, own, own.targets[:, target], task.threads)
+        rows = _Rows(task.arm.robot, data.select(data.group == group), target, task.threads)
         notices += _of_set_up(rows, data)
     return notices
 

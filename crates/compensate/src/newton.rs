@@ -191,7 +191,7 @@ impl To<'_> {
     }
 }
 
-/// Moves `search.best` to the target; gives what is left of position (m) and orientation (rad).
+/// A search for a goal: moves `search.best` there; its output is what is left of position (m) and orientation (rad).
 struct Approach<'a, G, const M: usize> {
     to: To<'a>,
     search: &'a mut Search,

@@ -55,7 +55,8 @@ impl Cholesky {
             if factor_in_place(corner.rb_mut(), par).is_none() {
                 return Ok(None);
             }
-            solve_lower_triangular_in_place(corner.rb(), below.rb_mut().transpose_mut(), par);
+            let alone = if below.nrows() == 1 { Par::Seq } else { par };
+            solve_lower_triangular_in_place(corner.rb(), below.rb_mut().transpose_mut(), alone);
             triangular::matmul(
                 behind,
                 BlockStructure::TriangularLower,
@@ -145,7 +146,8 @@ impl Cholesky {
             // Columns of L^-1, which are zero above the diagonal.
             let mut root = Mat::<f64>::identity(rows, columns);
             let below = self.lower.as_ref().submatrix(start, start, rows, rows);
-            solve_lower_triangular_in_place(below, root.as_mut(), self.par);
+            let par = if columns == 1 { Par::Seq } else { self.par };
+            solve_lower_triangular_in_place(below, root.as_mut(), par);
             blocks.extend(now.iter().map(|range| {
                 let own = root.as_ref().subcols(range.start - start, range.len());
                 let mut block = Mat::zeros(range.len(), range.len());

@@ -1,7 +1,7 @@
 //! The choice of the instruction set, made once while the program runs.
 //!
-//! A kernel is generic over [`Isa`] and inlined as a whole into one function per instruction set, so that
-//! the compiler vectorises its plain loops with the registers of that set.
+//! A kernel is generic over [`Isa`] and inlined into one function per instruction set, but for what it hands to
+//! [`Isa::call`], so that the compiler vectorises its plain loops with the registers of that set.
 
 use std::sync::OnceLock;
 
