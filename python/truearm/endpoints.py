@@ -25,13 +25,13 @@ class Endpoint:
         flange_from_end: Transform (4, 4).
         world_from_base: Transform (4, 4), or None for the base frame.
         has_orientation: Whether the rotation of `flange_from_end` means anything.
-        was_turned: Whether that rotation was fitted, to a target's measured orientation.
+        turn_is_fitted: Whether that rotation was found by the fit, from a target's measured orientation.
     """
 
     flange_from_end: Floats
     world_from_base: Floats | None = None
     has_orientation: bool = True
-    was_turned: bool = False
+    turn_is_fitted: bool = False
 
     def motions(self, flanges: Floats, *, pose: bool) -> Floats:
         """How the end moves with base and tool as the device saw them, see SetupPlace.motion.
@@ -50,7 +50,7 @@ class Endpoint:
             return moved
         turns = np.broadcast_to(np.eye(3, moved.shape[2], 3), moved.shape)
         moved = np.concatenate([moved, turns], axis=1)
-        if not self.was_turned:
+        if not self.turn_is_fitted:
             return moved
         own = np.concatenate([np.zeros_like(turned), turned @ self.flange_from_end[:3, :3]], axis=1)
         return np.concatenate([moved, own], axis=2)
@@ -114,7 +114,7 @@ def at_target(
     transform[:3, 3] = setup.targets[number, known.index(wanted)]
     if selection.orientation:
         transform[:3, :3] = setup.rotations[number]
-    return Endpoint(transform, world_from_base, selection.orientation, was_turned=selection.orientation)
+    return Endpoint(transform, world_from_base, selection.orientation, turn_is_fitted=selection.orientation)
 
 
 def _group_number(calibration: "Calibration", group: str | None) -> int:

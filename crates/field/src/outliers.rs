@@ -48,7 +48,7 @@ pub fn chi_squared(freedom: f64, normal_quantile: f64) -> f64 {
 /// Judges every pose of a training set by a posterior, which may have been inferred from a part of them, and its solution.
 ///
 /// # Errors
-/// [`FieldError::NotPositiveDefinite`].
+/// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
 pub fn judge(posterior: &Posterior, solution: &Solution, all: &Training) -> Result<Judgement, FieldError> {
     let training = posterior.training();
     let left_out = posterior.leave_one_out(&training.residual)?;

@@ -144,7 +144,7 @@ impl Posterior {
     /// The same posterior with the weights of `all` poses, which its training set may be a part of.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn reweighed(self, all: &Training, cancel: &Cancel) -> Result<Self, FieldError> {
         let own = self.training();
         let took_part = (0..all.pose_count()).filter(|&pose| !own.rows(pose).is_empty());
@@ -166,7 +166,7 @@ impl Posterior {
     /// None in weight space: there rows outnumber weights, amplitudes hardly matter and a second solution costs much.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn widened(&self, degree: usize, cancel: &Cancel) -> Result<Option<Self>, FieldError> {
         let Self::Data(space) = self else { return Ok(None) };
         let model = Model::new(space.model.training.clone(), space.model.hyper.widened(), degree);
@@ -189,7 +189,7 @@ impl Posterior {
     /// Constants, field and set-up from residuals (R,).
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn solve(&self, residual: &[f64]) -> Result<Solution, FieldError> {
         match self {
             Self::Data(space) => Ok(space.solve(residual)),
@@ -200,7 +200,7 @@ impl Posterior {
     /// What each pose's residual would be if it had taken no part.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
         match self {
             Self::Data(space) => space.leave_one_out(residual),

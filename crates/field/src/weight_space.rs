@@ -81,7 +81,7 @@ impl WeightSpace {
     /// The same posterior with other weights of the rows: the changed poses' share is taken out and put in again.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn reweighed(mut self, weight: Vec<f64>) -> Result<Self, FieldError> {
         let training = &self.model.training;
         let differs = |&pose: &usize| training.rows(pose).any(|row| training.weight[row] != weight[row]);
@@ -115,7 +115,7 @@ impl WeightSpace {
     /// Constants, field and set-up from residuals (R,).
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn solve(&self, residual: &[f64]) -> Result<Solution, FieldError> {
         let solution = self.unknowns_of(residual)?;
         let training = &self.model.training;
@@ -177,7 +177,7 @@ impl WeightSpace {
     /// What each pose's residuals (R,) would be if it had taken no part; of large sets exactly for some poses alone.
     ///
     /// # Errors
-    /// [`FieldError::NotPositiveDefinite`].
+    /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
     pub fn leave_one_out(&self, residual: &[f64]) -> Result<LeaveOneOut, FieldError> {
         let training = &self.model.training;
         let solution = column(&self.unknowns_of(residual)?);
