@@ -17,6 +17,8 @@ export PATH := $(BIN):$(if $(CARGO),$(dir $(CARGO)):)$(PATH)
 export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport CONDA_PREFIX
+# Commands start in half the time where what Python compiles of them is kept.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Kernels index their lanes in plain loops, which are sure to be inlined and vectorised.
 CLIPPY := -D warnings -D clippy::too_many_lines -A clippy::needless_range_loop

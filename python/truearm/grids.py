@@ -27,9 +27,9 @@ CHANCE: Final = 0.01
 """How likely as few values as these may fall on some grid at random."""
 OF_A_GAP: Final = 0.5
 """Part of the least gap of a few values below which a step is that of round numbers, and no grid."""
-BIN: Final = 0.02
+BIN: Final = 0.05
 """Deg or mm."""
-MOST_BINS: Final = 1 << 19
+MOST_BINS: Final = 1 << 18
 """Rails of more than ten metres have wider bins."""
 FINER: Final = 8
 """Steps that are tried lie so close that their grids differ by a part of this of a step at the far end."""
@@ -80,16 +80,21 @@ def grid_words(steps: Mapping[int, float], joints: Sequence[str]) -> str:
 
 
 def _step(readings: Floats, finest: float) -> float | None:
-    """The largest step of a grid that readings (n,) stand on, deg or mm; None where there is none."""
-    low, span = float(readings.min()), float(np.ptp(readings))
+    """The largest step of a grid that readings (n,) stand on, deg or mm; None where there is none.
+
+    It is looked for in what lies together: the few that may be off the grid may be far away.
+    """
+    low, high = np.quantile(readings, [(1.0 - SHARE) / 2.0, (1.0 + SHARE) / 2.0])
+    span = float(high - low)
     if span < (FEWEST_VALUES - 1) * finest:
         return None
     wide = max(BIN, span / MOST_BINS)
-    counts = np.bincount(np.rint((readings - low) / wide).astype(np.int64))
+    within = readings[(readings >= low) & (readings <= high)]
+    counts = np.bincount(np.rint((within - low) / wide).astype(np.int64))
     length = 1 << (FINER * len(counts) - 1).bit_length()
-    likeness = np.abs(np.fft.rfft(counts, length)) / len(readings)
-    per_unit = np.arange(len(likeness)) / (length * wide)
-    least, most = (FEWEST_VALUES - 1) / (span + JITTER), 1.0 / finest + per_unit[1]
+    per_unit = np.arange(length // 2 + 1) / (length * wide)
+    likeness = np.abs(np.fft.rfft(counts, length)) / len(within)
+    least, most = (FEWEST_VALUES - 1) / (span + JITTER), 1.0 / finest + 1.0 / span
     tried = np.flatnonzero((likeness > ALIKE) & (per_unit >= least) & (per_unit <= most))
     peaks = [k for k in tried if likeness[k] >= max(likeness[k - 1], likeness[k + 1])]
     fits = (_fitted(readings - low, 1.0 / float(per_unit[k])) for k in peaks)
