@@ -17,7 +17,7 @@ export PATH := $(BIN):$(if $(CARGO),$(dir $(CARGO)):)$(PATH)
 export PIP_QUIET := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport CONDA_PREFIX
-# Commands start in half the time where what Python compiles of them is kept.
+# Commands start sooner where what Python compiles of their modules is kept.
 unexport PYTHONDONTWRITEBYTECODE
 
 # Kernels index their lanes in plain loops, which are sure to be inlined and vectorised.

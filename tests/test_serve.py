@@ -166,7 +166,10 @@ def test_an_order_alone_is_no_set_point(client):
         (b"\xff\xfe\n", "no JSON"),
         (b"[1, 2]\n", "JSON object"),
         (b"[" * 15000 + b"\n", "no JSON"),
-        (b"{}\n", "has q, q_deg or switch"),
+        (b"{}\n", "has q, q_deg, switch or features"),
+        (b'{"features": [21]}\n', "features are an object"),
+        (b'{"features": {"temperature": 21}}\n', "'temperature' is no feature of the calibration"),
+        (b'{"features": {"temperature": "warm"}}\n', "a feature is no number"),
         (b'{"q": [1, 2]}\n', "list of 6 numbers"),
         (b'{"q": "x"}\n', "list of 6 numbers"),
         (b'{"q": [1, 2, 3, 4, 5, true]}\n', "no number"),
@@ -192,6 +195,31 @@ def test_what_is_malformed_costs_the_connection_and_nothing_else(port, line, wor
         with contextlib.suppress(ConnectionError):
             assert client.read() is None
     assert is_served(port)
+
+
+def test_features_may_change(tmp_path):
+    robot = ta.Robot.load("ur5e")
+    arm = VirtualArm(robot, seed=4, imperfections=Imperfections(share=0.5))
+    q = arm.poses(80)
+    mass = np.random.default_rng(1).uniform(0.0, 5.0, len(q))
+    table = arm.measure_table(q).assign(payload_kg=mass)
+    table["z"] -= 1e-4 * mass
+    path = tmp_path / "arm.calib"
+    data = ta.Measurements.from_dataframe(table)
+    ta.calibrate(robot, data, features=("payload_kg",), refit=False).save(path)
+    known = ta.Calibration.load(path)
+    limits = ta.Limits(largest_std_mm=50.0)
+    expected = {
+        loaded: ta.Compensator(known, limits=limits, features={"payload_kg": loaded}).correct(HOME)
+        for loaded in (0.5, 4.5)
+    }
+    options = ("--ramp-s=0.05", "--deadline-s=10", "--largest-std-mm=50", "--feature=payload_kg=0.5")
+    with serving(path, *options) as (port, _), Client(port) as client:
+        assert client.read()["features"] == ["payload_kg"]
+        assert settle(client, {"q": HOME})["q"] == pytest.approx(expected[0.5], abs=1e-9)
+        assert "q" not in client.ask({"features": {"payload_kg": 4.5}})
+        assert settle(client, {"q": HOME})["q"] == pytest.approx(expected[4.5], abs=1e-9)
+        assert "feature" in client.ask({"q": HOME, "features": {"payload_kg": None}})["fault"]
 
 
 @contextlib.contextmanager

@@ -9,6 +9,7 @@ from truearm.simulation import Imperfections, VirtualArm
 from truearm.streaming import CorrectionStream, StreamOptions
 
 CYCLE = 0.004
+OPEN = ta.Limits(largest_std_mm=50.0)
 
 
 def test_what_is_not_stated_is_the_core_s_in_streams_and_bounds():
@@ -97,3 +98,43 @@ def test_it_is_switched_off_and_on(compensator, home):
 def test_options_that_bound_nothing_are_refused(compensator):
     with pytest.raises(ta.UsageError, match="it must be positive"):
         CorrectionStream(compensator, StreamOptions(ramp_s=0.0))
+
+
+@pytest.fixture(scope="module")
+def warm():
+    """A compensator whose calibration depends on the temperature, at 16 deg."""
+    robot = ta.Robot.load("ur5e")
+    arm = VirtualArm(robot, seed=4, imperfections=Imperfections(share=0.5))
+    q = arm.poses(80)
+    temperature = np.random.default_rng(1).uniform(15.0, 30.0, len(q))
+    table = arm.measure_table(q).assign(temperature=temperature)
+    table["y"] += 2e-5 * (temperature - 15.0)
+    data = ta.Measurements.from_dataframe(table)
+    calibration = ta.calibrate(robot, data, features=("temperature",), refit=False)
+    return ta.Compensator(calibration, limits=OPEN, features={"temperature": 16.0})
+
+
+def test_features_change_while_it_runs(warm, home):
+    stream = CorrectionStream(warm, StreamOptions(hold_s=0.02))
+    before = run(stream, home, 1.4)[-1].q
+    assert before == pytest.approx(warm.correct(home), abs=1e-9)
+    stream.set_features({"temperature": 29.0})
+    steps = run(stream, home, 0.4)
+    later = ta.Compensator(warm.calibration, limits=OPEN, features={"temperature": 29.0}).correct(home)
+    assert np.abs(later - before).max() > 1e-5
+    assert steps[-1].q == pytest.approx(later, abs=1e-9)
+    rates = np.diff([step.q for step in steps], axis=0) / CYCLE
+    assert np.abs(rates).max() <= np.radians(6.0) + 1e-9
+    stream.set_features({"temperature": np.nan})
+    held = stream.step(home, CYCLE)
+    assert held.phase == "holding"
+    assert "feature" in str(held.fault)
+    assert held.q == pytest.approx(later, abs=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [{"temperature": 20.0, "temp": 20.0}, {"temperature": "20"}])
+def test_features_that_are_none_change_nothing(warm, wrong):
+    stream = CorrectionStream(warm)
+    with pytest.raises(ta.UsageError, match="is no feature of the calibration|must be a number"):
+        stream.set_features(wrong)
+    assert stream.features == {"temperature": 16.0}

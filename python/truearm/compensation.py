@@ -18,7 +18,14 @@ from truearm.errors import InputError, WorkError
 from truearm.kinds import required
 from truearm.limits import Limits, Task
 from truearm.robot import Robot
-from truearm.solving import as_seed, calibrated_model, core_options, feature_values, plain_model
+from truearm.solving import (
+    as_seed,
+    calibrated_model,
+    core_options,
+    feature_names,
+    feature_values,
+    plain_model,
+)
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -130,8 +137,7 @@ class Compensator:
         self._keeping = Lock()
 
     def __reduce__(self) -> tuple[object, ...]:
-        names = self.calibration.options.features[: len(self._features)]
-        features = dict(zip(names, self._features, strict=True))
+        features = dict(zip(self.feature_names, self._features, strict=True))
         kept = (self.calibration, self.programming, self.task, self._moving, self.limits, features)
         return _compensator, kept
 
@@ -198,6 +204,11 @@ class Compensator:
 
     def _tool(self, tool: ArrayLike | None) -> Floats:
         return self.programming.tool if tool is None else at_tool(self.programming, tool)
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Features that the calibration depends on, in its order."""
+        return feature_names(self.calibration)
 
     @property
     def features(self) -> list[float]:

@@ -81,8 +81,12 @@ def feature_values(calibration: "Calibration", given: Mapping[str, float] | None
     Raises:
         UsageError: If one is missing, or is not needed.
     """
-    names = calibration.options.features if calibration.model.field is not None else ()
-    return [float(value) for value in feature_columns(given, names, 1)[0]]
+    return [float(value) for value in feature_columns(given, feature_names(calibration), 1)[0]]
+
+
+def feature_names(calibration: "Calibration") -> tuple[str, ...]:
+    """Features whose values a calibration needs, in its order."""
+    return calibration.options.features if calibration.model.field is not None else ()
 
 
 def beyond_learnt(calibration: "Calibration", values: Sequence[float]) -> list[str]:

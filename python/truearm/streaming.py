@@ -1,6 +1,6 @@
 """Corrections of a stream of set-points, never applied or dropped at once."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,7 +10,7 @@ from truearm._core import CoreError, Stream
 from truearm.arrays import as_numbers
 from truearm.compensation import Compensator
 from truearm.defaults import DEADLINE_S, HOLD_S, RAMP_S
-from truearm.errors import InputError, UsageError
+from truearm.errors import InputError, UsageError, list_names
 from truearm.kinds import check_number
 from truearm.units import MM_PER_METRE
 
@@ -95,7 +95,7 @@ class CorrectionStream:
         Raises:
             UsageError: If an option is not positive.
         """
-        self._features: Sequence[float] = compensator.features
+        self._features = dict(zip(compensator.feature_names, compensator.features, strict=True))
         self._joints = compensator.programming.joint_count
         try:
             self._core = Stream(compensator.corrector(tool), (options or StreamOptions()).core())
@@ -106,6 +106,30 @@ class CorrectionStream:
     def switch(self, on: bool) -> None:
         """Ramp the correction up or down from now on."""
         self._core.switch(on)
+
+    @property
+    def features(self) -> dict[str, float]:
+        """Values of the features that the calibration depends on, in its order."""
+        return dict(self._features)
+
+    def set_features(self, values: Mapping[str, float]) -> None:
+        """Take present values of features, such as a temperature, from the next set-point on.
+
+        Features that are not among them stay as they are. NaN says that a value is not known: the last
+        correction is then held and ramped down, until all are known again.
+
+        Raises:
+            UsageError: If the calibration depends on no such feature, or a value is no number. All features
+                stay as they are then.
+        """
+        for name, value in values.items():
+            if name not in self._features:
+                raise UsageError(
+                    f"{name!r} is no feature of the calibration",
+                    rule=f"It depends on {list_names(list(self._features)) or 'none'}",
+                )
+            check_number(value, f"the feature {name!r}")
+        self._features |= {name: float(value) for name, value in values.items()}
 
     def step(self, q: ArrayLike | None, elapsed_s: float) -> Streamed:
         """Correct the next set-point.
@@ -124,5 +148,5 @@ class CorrectionStream:
                 f"the readings of a set-point have shape {readings.shape}",
                 rule=f"One number for each of the {self._joints} joints: ({self._joints},)",
             )
-        self.last = Streamed(*self._core.step(readings, self._features, elapsed_s))
+        self.last = Streamed(*self._core.step(readings, list(self._features.values()), elapsed_s))
         return self.last

@@ -85,7 +85,7 @@ fn phase(phase: Phase) -> &'static str {
 fn words(fault: Fault) -> String {
     match fault {
         Fault::NotStarted => "there was no set-point yet".to_owned(),
-        Fault::NotFinite => "the set-point is missing or not finite".to_owned(),
+        Fault::NotFinite => "the set-point or a feature is missing or not finite".to_owned(),
         Fault::Late => "the set-point came after the deadline".to_owned(),
         Fault::Refused(refusal) => refusal.to_string(),
     }

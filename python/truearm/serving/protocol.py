@@ -14,7 +14,7 @@ from truearm.streaming import Streamed
 from truearm.units import MM_PER_METRE
 
 PROTOCOL: Final = 1
-KEYS: Final = ("q", "q_deg", "id", "switch")
+KEYS: Final = ("q", "q_deg", "switch", "features", "id")
 LONGEST_ID: Final = 100
 LARGEST: Final = 1e9
 """Readings beyond it are a mistake of whoever sends them."""
@@ -33,6 +33,7 @@ class Request:
         is_set_point: Whether an answer with readings is wanted.
         in_degrees: Whether readings were and are to be given in deg and mm.
         switch: Whether to ramp the correction up or down; None for neither.
+        features: Values that features have from now on.
         identity: What the answer repeats.
     """
 
@@ -40,6 +41,7 @@ class Request:
     is_set_point: bool
     in_degrees: bool
     switch: bool | None
+    features: dict[str, float]
     identity: str | int | float | None
 
 
@@ -89,12 +91,12 @@ def read_request(line: bytes, units: Units) -> Request:
         raise MalformedError("a request has q or q_deg, not both")
     in_degrees = "q_deg" in content
     is_set_point = in_degrees or "q" in content
-    switch = _switch(content)
-    if not is_set_point and switch is None:
-        raise MalformedError("a request has q, q_deg or switch")
+    if not is_set_point and not {"switch", "features"} & set(content):
+        raise MalformedError("a request has q, q_deg, switch or features")
     values = _readings(content.get("q_deg" if in_degrees else "q"), units.count)
     q = None if values is None else units.si(values, in_degrees=in_degrees)
-    return Request(q, is_set_point, in_degrees, switch, _identity(content.get("id")))
+    orders = _switch(content), _features(content.get("features", {}))
+    return Request(q, is_set_point, in_degrees, *orders, _identity(content.get("id")))
 
 
 def answer(request: Request, streamed: Streamed, units: Units) -> bytes:
@@ -117,22 +119,24 @@ def _readings(value: Any, count: int) -> NDArray[np.float64] | None:  # noqa: AN
         return None
     if not isinstance(value, list) or len(value) != count:
         raise MalformedError(f"readings are a list of {count} numbers, or null")
-    try:
-        return np.array([_number(entry) for entry in value])
-    except OverflowError:
-        raise MalformedError("a reading is too large") from None
+    return np.array([_number(entry, "a reading") for entry in value])
 
 
-def _number(entry: Any) -> float:  # noqa: ANN401
+def _features(value: Any) -> dict[str, float]:  # noqa: ANN401
+    if not isinstance(value, dict):
+        raise MalformedError("features are an object of names and numbers")
+    return {name: _number(entry, "a feature") for name, entry in value.items()}
+
+
+def _number(entry: Any, what: str) -> float:  # noqa: ANN401
     """A number; null stands for one that is not there."""
     if entry is None:
         return math.nan
     if isinstance(entry, bool) or not isinstance(entry, int | float):
-        raise MalformedError("a reading is no number")
-    number = float(entry)
-    if LARGEST < abs(number) < math.inf:
-        raise MalformedError("a reading is too large")
-    return number
+        raise MalformedError(f"{what} is no number")
+    if abs(entry) > LARGEST and entry not in (math.inf, -math.inf):
+        raise MalformedError(f"{what} is too large")
+    return float(entry)
 
 
 def _switch(content: dict[str, Any]) -> bool | None:

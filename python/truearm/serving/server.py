@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Final
 
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 from truearm.robot import Robot
 from truearm.serving.protocol import (
     PROTOCOL,
@@ -117,7 +117,7 @@ class Server:
         """Serve a connection until it ends, or breaks the rules and is told so."""
         try:
             await self._served(reader, writer)
-        except MalformedError as error:
+        except (MalformedError, UsageError) as error:
             self._told(f"{_peer(writer)}: {error}; connection closed")
             await self._say_goodbye(reader, writer, str(error))
         except (OSError, EOFError):
@@ -128,8 +128,8 @@ class Server:
             raise MalformedError(f"more than {self._bounds.connections} connections")
         if self._token is not None:
             await self._check_token(reader, self._token)
-        await self._send(writer, line_of(self._greeting()))
         stream, flood, before = self._make_stream(), Flood(self._bounds.requests_per_s), None
+        await self._send(writer, line_of(self._greeting(list(stream.features))))
         while True:
             line = await self._line(reader)
             now = time.monotonic()
@@ -137,6 +137,7 @@ class Server:
             request = read_request(line, self._units)
             if request.switch is not None:
                 stream.switch(request.switch)
+            stream.set_features(request.features)
             if request.is_set_point:
                 stream.step(request.q, 0.0 if before is None else now - before)
                 before = now
@@ -144,12 +145,13 @@ class Server:
             # A client with many lines in its buffer must not keep the others waiting.
             await asyncio.sleep(0)
 
-    def _greeting(self) -> dict[str, object]:
+    def _greeting(self, features: list[str]) -> dict[str, object]:
         return {
             "truearm": version("truearm"),
             "protocol": PROTOCOL,
             "robot": self._robot.name,
             "joints": list(self._robot.joints),
+            "features": features,
         }
 
     async def _check_token(self, reader: asyncio.StreamReader, token: str) -> None:
