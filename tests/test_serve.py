@@ -51,7 +51,7 @@ def serving(*words):
 
 @pytest.fixture(scope="module")
 def port(calib):
-    with serving(calib, "--ramp-s", "0.05", "--hold-s", "0.02", "--deadline-s", "0.5") as (found, _):
+    with serving(calib, "--ramp-s", "0.05", "--hold-s", "0.02", "--deadline-s", "2") as (found, _):
         yield found
 
 
@@ -134,7 +134,7 @@ def test_what_has_no_correction_holds_the_last_one(client):
 
 def test_a_pause_is_a_missed_deadline(client):
     settle(client, {"q": HOME})
-    time.sleep(0.6)
+    time.sleep(2.2)
     assert client.ask({"q": HOME})["fault"] == "the set-point came after the deadline"
 
 
