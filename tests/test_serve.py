@@ -102,12 +102,13 @@ def is_served(port):
 
 
 def settle(client, request):
+    """The answer once nothing moves: a correction that has just arrived may still have a rate."""
     until = time.monotonic() + 20.0
-    answer = client.ask(request)
-    while answer["phase"] != "on" or answer["lag"] != 0.0:
+    before, answer = client.ask(request), client.ask(request)
+    while answer["phase"] != "on" or answer["lag"] != 0.0 or before["lag"] != 0.0:
         assert time.monotonic() < until, answer
         time.sleep(0.001)
-        answer = client.ask(request)
+        before, answer = answer, client.ask(request)
     return answer
 
 
