@@ -3,13 +3,16 @@
 use std::fmt::Display;
 use std::num::NonZeroUsize;
 use std::ops::Range;
+use std::process;
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use truearm_clearance::ClearanceError;
 use truearm_compensate::CompensateError;
 use truearm_estimate::{Cancel, EstimateError};
@@ -27,6 +30,12 @@ create_exception!(
 
 /// Time between two looks at the signals: a person does not notice it, and it costs nothing measurable.
 const PATIENCE: Duration = Duration::from_millis(50);
+
+/// The process that loaded this module: rayon's common pool has its threads there.
+static LOADED_BY: OnceLock<u32> = OnceLock::new();
+
+/// A process that was forked from it, and the pool that took the place of the common one there.
+static FORKED: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 /// An error of the core that becomes a Python exception.
 pub trait Failure {
@@ -58,7 +67,7 @@ where
     E: Failure + Send,
     F: FnOnce() -> Result<T, E> + Send,
 {
-    py.detach(work).map_err(Failure::into_exception)
+    py.detach(|| on_living_threads(work))?.map_err(Failure::into_exception)
 }
 
 /// Quick work on `count` poses, so many at once: in between signals are looked at, and what their handlers raise is raised.
@@ -93,7 +102,7 @@ where
             let token = cancel.clone();
             let worker = scope.spawn(move || {
                 let _running = running;
-                work(&token)
+                on_living_threads(|| work(&token))
             });
             let mut interrupt = None;
             while ended.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
@@ -109,23 +118,53 @@ where
         return Err(raised);
     }
     match finished {
-        Ok(result) => result.map_err(Failure::into_exception),
+        Ok(result) => result?.map_err(Failure::into_exception),
         Err(panic) => std::panic::resume_unwind(panic),
     }
 }
 
-/// Refuse to start with a setting of the environment that nobody knows.
-pub fn check_environment() -> PyResult<()> {
+/// Note which process has the threads, and refuse to start with a setting of the environment that nobody knows.
+pub fn open() -> PyResult<()> {
+    LOADED_BY.get_or_init(process::id);
     InstructionSet::from_environment().map(|_| ()).map_err(Failure::into_exception)
 }
 
 /// Work on a pool of its own with so many threads, or on the common one; results do not depend on it.
 pub fn with_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> T {
     let useful = thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count.min(useful)).build());
+    let pool = threads.map(|count| ThreadPoolBuilder::new().num_threads(count.min(useful)).build());
     match pool {
         Some(Ok(pool)) => pool.install(work),
         // A pool that cannot be made costs time, not the result.
         Some(Err(_)) | None => work(),
     }
+}
+
+/// Work where rayon has threads. A forked process has none of its parent's: work for the common pool waits there
+/// for ever, so it goes to a pool of the process.
+fn on_living_threads<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let process = process::id();
+    if LOADED_BY.get() == Some(&process) {
+        return Ok(work());
+    }
+    Ok(pool_of(process)?.install(work))
+}
+
+/// The pool of a forked process; that of its own parent is left alone, for it has no threads to end.
+fn pool_of(process: u32) -> PyResult<Arc<ThreadPool>> {
+    let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((owner, pool)) = forked.as_ref() {
+        if *owner == process {
+            return Ok(Arc::clone(pool));
+        }
+    }
+    let made = ThreadPoolBuilder::new().build().map_err(|error| {
+        CoreError::new_err(format!(
+            "a process that was forked cannot start threads: {error}. Start processes with \"spawn\": \
+             multiprocessing.get_context(\"spawn\")"
+        ))
+    })?;
+    let pool = Arc::new(made);
+    std::mem::forget(forked.replace((process, Arc::clone(&pool))));
+    Ok(pool)
 }

@@ -26,7 +26,7 @@ mod text;
 /// The compiled core of truearm: private, wrapped by the Python package.
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    door::check_environment()?;
+    door::open()?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("ANGLE_ARM_M", truearm_estimate::ANGLE_ARM)?;
     module.add("NORMAL_95", truearm_field::QUANTILE_95)?;
