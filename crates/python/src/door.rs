@@ -153,10 +153,10 @@ fn on_living_threads<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
 /// The pool of a forked process; that of its own parent is left alone, for it has no threads to end.
 fn pool_of(process: u32) -> PyResult<Arc<ThreadPool>> {
     let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((owner, pool)) = forked.as_ref() {
-        if *owner == process {
-            return Ok(Arc::clone(pool));
-        }
+    if let Some((owner, pool)) = forked.as_ref()
+        && *owner == process
+    {
+        return Ok(Arc::clone(pool));
     }
     let made = ThreadPoolBuilder::new().build().map_err(|error| {
         CoreError::new_err(format!(
