@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truearm.endpoints import at_tool
 from truearm.errors import InputError, list_names
 from truearm.files import read_text
 from truearm.inverse import Inverse
@@ -85,9 +86,12 @@ class Controller:
 
         Args:
             q: Readings.
-            tool: flange_from_tool (4, 4); the flange itself by default.
+            tool: flange_from_tool (4, 4), or a point (3,); the flange itself by default.
+
+        Raises:
+            InputError: If the readings or the tool are none.
         """
-        flange_tool = np.eye(4) if tool is None else np.asarray(tool, dtype=np.float64)
+        flange_tool = np.eye(4) if tool is None else at_tool(self.robot, tool)
         values = np.atleast_2d(self.robot.joints_from_readings(q))
         poses = self.robot.flange_chain.pose(np.ascontiguousarray(values)) @ flange_tool
         return poses[0] if np.ndim(q) == 1 else poses
@@ -105,7 +109,7 @@ def _read(path: Path, given: str, robot: Robot | None) -> Robot:
         f'a file that ends in "{path.suffix}" is no model of a controller',
         where=given,
         rule=f"Known are a robot file or URDF ({list_names(['.toml', *URDF_ENDINGS])}), UR's kinematics "
-        f"({list_names(YAML_ENDINGS)}) and UR's calibration.conf",
+        f"({list_names(YAML_ENDINGS)}) and UR's calibration.conf; {NOMINAL} is declared by its name",
     )
 
 

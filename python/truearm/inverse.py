@@ -39,6 +39,12 @@ class Inverse:
         back = np.ascontiguousarray(np.linalg.inv(coupling))
         self._solver = Solver(robot.flange_chain, coupling, back, np.ascontiguousarray(robot.limits))
 
+    def __repr__(self) -> str:
+        return f"<Inverse of {self.robot.name}: {self.method}>"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Inverse, (self.robot,)
+
     @property
     def method(self) -> str:
         """How it is solved: "spherical wrist" or "three parallel axes", closed forms, or "numeric"."""
