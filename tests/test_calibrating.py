@@ -3,6 +3,7 @@
 from importlib.metadata import version
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -326,6 +327,16 @@ def test_a_feature_that_matters_is_learnt():
     q = arm.poses(3)
     warm, cold = (calibration.position(q, features={"temperature_C": t}) for t in (35.0, 15.0))
     assert np.linalg.norm(warm - cold, axis=1).mean() > 1e-4
+    tables = pd.DataFrame({"temperature_C": [35.0] * 3}), pd.DataFrame({"temperature_C": [35.0]})
+    assert all(np.array_equal(calibration.position(q, features=each), warm) for each in tables)
+    for hot in ("35", [35.0] * 2, np.full((3, 1), 35.0)):
+        with pytest.raises(ta.InputError, match='the feature "temperature_C"'):
+            calibration.position(q, features={"temperature_C": hot})
+    varying = calibration.variation_std(q, "theta2, a2", features={"temperature_C": 35.0})
+    assert np.array_equal(
+        calibration.variation_std(q, ["theta2", "a2"], features={"temperature_C": 35.0}), varying
+    )
+    assert calibration.variation_std(q[0], "theta2", features={"temperature_C": 35.0}).shape == (1,)
     with pytest.raises(ta.UsageError, match="temperature_C"):
         calibration.position(q)
     with pytest.raises(ta.UsageError, match='"humidity"'):

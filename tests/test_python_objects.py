@@ -13,6 +13,8 @@ import truearm as ta
 from truearm import streaming
 from truearm.compensation import TOOLS_KEPT
 from truearm.framing import find_object, find_tool
+from truearm.inverse import Inverse
+from truearm.proposing import Candidates, next_poses
 from truearm.simulation import VirtualArm
 
 
@@ -82,6 +84,42 @@ def test_what_is_printed_is_short_and_says_what_it_is(robot, data, calibration):
     mean = calibration.validation.holdout["variable"].position.mean
     words = f"<Calibration of UR10: variable, 6 joints, 60 rows, {mean:.3g} mm mean on held-out rows>"
     assert repr(calibration) == words
+    nominal, constant = (
+        calibration.validation.holdout[name].position.mean for name in ("nominal", "constant")
+    )
+    means = f"nominal {nominal:.3g}, constant {constant:.3g}, variable {mean:.3g} mm in the mean"
+    assert repr(calibration.validation) == f"<Validation: 42 training poses, 18 held-out poses; {means}>"
+    assert repr(calibration.held) == '<HeldRows: 18 rows, errors of "nominal", "constant" and "variable">'
+    assert repr(calibration.rows) == "<FittedRows: 60 rows, 0 outliers>"
+    compensator = ta.Compensator(calibration)
+    assert repr(compensator) == "<Compensator of UR10 by the variable model, pose>"
+    far = compensator.joints(data.readings[:3] + 50.0)
+    assert repr(far) == "<Compensated: 3 waypoints, 3 refused>"
+    assert repr(VirtualArm(robot, seed=2)) == "<VirtualArm of UR10: seed 2, 24 erring parameters>"
+    assert repr(Inverse(robot)) == "<Inverse of UR10: three parallel axes>"
+    assert "Asked" not in repr(ta.Frames())
+
+
+def test_what_an_update_prints_counts_each_row_once(calibration, data):
+    found = ta.update(calibration, data.select(range(20)))
+    assert repr(found) == f"<Update of UR10: {found.verdict}, 20 poses, 0 outliers>"
+    mean = found.calibration.validation.holdout["variable"].position.mean
+    words = f"<Calibration of UR10: variable, 6 joints, 20 rows, {mean:.3g} mm mean on left-out rows>"
+    assert repr(found.calibration) == words
+
+
+@pytest.mark.parametrize("again", [sent, copy.copy, copy.deepcopy])
+def test_a_controller_is_sent_after_it_has_solved(again, robot, data):
+    controller = ta.Controller.declared("nominal", robot)
+    poses = controller.pose(data.readings)
+    solved = controller.inverse.near(poses, data.readings)
+    assert np.array_equal(again(controller).inverse.near(poses, data.readings), solved)
+
+
+def test_a_controller_takes_a_tool_as_a_point(robot, data):
+    controller, tool = ta.Controller.nominal(robot), np.eye(4)
+    tool[:3, 3] = 0.0, 0.01, 0.1
+    assert np.array_equal(controller.pose(data.readings, tool[:3, 3]), controller.pose(data.readings, tool))
 
 
 def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
@@ -95,6 +133,7 @@ def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
 
 api: Any = ta
 streams: Any = streaming
+virtual: Any = VirtualArm
 WRONG = {
     "a robot for a calibration": (
         lambda r, d, c: api.evaluate(r, d),
@@ -130,7 +169,10 @@ WRONG = {
         lambda r, d, c: api.compensate_program("a.src", c),
         "Compensator is",
     ),
-    "a tool in words": (lambda r, d, c: c.position(d.readings, tool="gripper"), "the tool is not numbers"),
+    "a tool in words": (
+        lambda r, d, c: c.position(d.readings, tool="gripper"),
+        "entries of the tool are not real numbers",
+    ),
     "a table for a path": (
         lambda r, d, c: api.Measurements.from_dataframe("m.csv"),
         "table is of type str",
@@ -150,11 +192,51 @@ WRONG = {
     ),
     "a touching tool in words": (
         lambda r, d, c: find_object(c, d, "gripper"),
-        "the tool is not numbers",
+        "the entries of the tool are not real numbers",
     ),
     "a tool turned in words": (
         lambda r, d, c: find_tool(c, d, orientation="down"),
-        "the entries of the orientation are not numbers",
+        "the entries of the orientation are not real numbers",
+    ),
+    "a set-up by number": (lambda r, d, c: c.position(d.readings, group=0), 'there is no group "0"'),
+    "features in a list": (lambda r, d, c: c.position(d.readings, features=[1]), "features are of type list"),
+    "poses for a calibration": (
+        lambda r, d, c: next_poses(c, d.readings, 5),
+        "Make them of poses",
+    ),
+    "candidates of two joints": (lambda r, d, c: Candidates(c, d.readings[:1, :2]), r"have shape \(1, 2\)"),
+    "a virtual arm by name": (lambda r, d, c: virtual("ur10"), "the robot is of type str.*Robot.load"),
+    "imperfections in a dict": (lambda r, d, c: virtual(r, imperfections={}), "are of type dict"),
+    "an author by name": (lambda r, d, c: api.Compensator(c).joints(d.readings, author="ur10"), "Robot.load"),
+    "a controller by no name": (lambda r, d, c: api.Controller.declared("nominel", r), "nominal is declared"),
+    "a parameter": (lambda r, d, c: c.variation_std(d.readings, "theta9"), 'parameter "theta9"'),
+    "a number of joints": (
+        lambda r, d, c: api.Measurements.from_dataframe(pd.DataFrame({"q1": [1.0]}), joints=6),
+        "joints is 6. It must be a list of names",
+    ),
+    "kinds of joints": (
+        lambda r, d, c: api.Measurements.from_dataframe(pd.DataFrame({"q1": [1.0]}), joints=["rotary"]),
+        'joints: "rotary" is not known. Either revolute or prismatic',
+    ),
+    "complex readings": (
+        lambda r, d, c: c.position(d.readings + 1j),
+        "real numbers: complex numbers were given",
+    ),
+    "times": (lambda r, d, c: r.position(np.zeros((1, 6), "M8[s]")), "dates were given"),
+    "numbers in words": (lambda r, d, c: r.position([["1"] * 6]), "texts were given"),
+    "masked readings": (
+        lambda r, d, c: c.position(np.ma.masked_greater(d.readings, d.readings[3].max())),
+        "NaN or infinite values in row",
+    ),
+    "a complex waypoint": (
+        lambda r, d, c: api.Compensator(c).correct(d.readings[0] + 0j),
+        "complex numbers were given",
+    ),
+    "complex coordinates": (
+        lambda r, d, c: api.Measurements.from_dataframe(
+            pd.DataFrame({**{f"q{k}": [0.1] for k in range(1, 7)}, "x": [1j], "y": [1.0], "z": [1.0]})
+        ),
+        'column "x" holds "1j" in row 1',
     ),
     "a convention": (
         lambda r, d, c: api.Robot.from_dict({**r.to_dict(), "convention": "craig"}),

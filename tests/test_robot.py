@@ -146,8 +146,8 @@ def test_what_results_cannot_be_written_to_is_told(out: Any, message: str) -> No
         (np.zeros((2, 3, 6)), "shape"),
         (0.0, "shape"),
         ([0, 0, np.nan, 0, 0, 0], "NaN or infinite values in row 0"),
-        (["a"] * 6, "are not numbers"),
-        ([[0] * 6, [0] * 5], "are not numbers"),
+        (["a"] * 6, "are not real numbers"),
+        ([[0] * 6, [0] * 5], "are not real numbers"),
     ],
 )
 def test_readings_are_checked_at_the_door(q: Any, message: str) -> None:
@@ -157,7 +157,7 @@ def test_readings_are_checked_at_the_door(q: Any, message: str) -> None:
 
 @pytest.mark.parametrize("table", ["x", [[1.0], [1.0, 2.0]], {}])
 def test_a_dictionary_without_numbers_is_refused(table: object) -> None:
-    with pytest.raises(InputError, match=r"values of table are not numbers"):
+    with pytest.raises(InputError, match=r"values of table are not real numbers"):
         Robot.from_dict({**Robot.load("ur10").to_dict(), "table": table})
 
 

@@ -68,7 +68,7 @@ def test_what_has_no_correction_holds_the_last_one(compensator, home):
 
 @pytest.mark.parametrize(
     ("bad", "words"),
-    [(np.zeros(5), r"shape \(5,\)"), (np.zeros((1, 6)), r"shape \(1, 6\)"), ("six", "are not numbers")],
+    [(np.zeros(5), r"shape \(5,\)"), (np.zeros((1, 6)), r"shape \(1, 6\)"), ("six", "are not real numbers")],
 )
 def test_what_is_no_set_point_is_an_error_and_changes_nothing(compensator, home, bad, words):
     stream = CorrectionStream(compensator)

@@ -9,6 +9,15 @@ from truearm.errors import InputError, list_rows
 
 RIGID_WITHIN: Final = 1e-8
 """How far R^T R of a rotation may be from the identity, as in the core; a last row may be as far off."""
+NO_REAL_NUMBERS: Final = {
+    "c": "complex numbers",
+    "M": "dates",
+    "m": "lengths of time",
+    "S": "bytes",
+    "U": "texts",
+    "V": "records",
+}
+"""What NumPy would make real numbers of, or break at, by the kind of its type."""
 _IDENTITY: Final = np.eye(3)
 _LAST_ROW: Final = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -30,15 +39,20 @@ class Fault(NamedTuple):
 
 
 def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
-    """`values` as a C-contiguous array; `what` they are is for messages.
+    """`values` as a C-contiguous array, NaN where a mask hides them; `what` they are is for messages.
 
     Raises:
-        InputError: If these are no numbers, or rows of different lengths.
+        InputError: If these are no real numbers, or rows of different lengths.
     """
     try:
-        return np.ascontiguousarray(values, dtype=np.float64)
+        given = np.asanyarray(values)
+        if given.dtype.kind in NO_REAL_NUMBERS:
+            raise TypeError(f"{NO_REAL_NUMBERS[given.dtype.kind]} were given")
+        if isinstance(given, np.ma.MaskedArray):
+            given = np.ma.filled(given.astype(np.float64), np.nan)
+        return np.ascontiguousarray(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{what} are not numbers: {error}") from None
+        raise InputError(f"{what} are not real numbers: {error}") from None
 
 
 def as_rows(values: ArrayLike, columns: int, *, what: str) -> tuple[NDArray[np.float64], bool]:

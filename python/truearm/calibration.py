@@ -23,7 +23,8 @@ from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
-from truearm.inputs import feature_columns
+from truearm.inputs import Features, feature_columns
+from truearm.kinds import words
 from truearm.limits import Task
 from truearm.models import CONSTANT, ArmModel
 from truearm.options import Options
@@ -37,7 +38,6 @@ from truearm.uncertainty import ConstantSpread, Spread, UpdatedSpread, VariableS
 from truearm.validation import Validation
 
 Floats = NDArray[np.float64]
-Features = Mapping[str, ArrayLike]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,9 +46,9 @@ class Calibration:
 
     Joint readings `q` are (n, N), or (N,) for one, and results have the same leading dimension. Where the
     calibration was fitted with features, predictions need `features`: a number, or one for each pose, by
-    name. Without `group`, positions and poses are those of the robot file's tool, or of `tool`, in the
-    robot's base frame. With `group` they are those of the measured `target`, or of `tool`, in that set-up's
-    world. Copying and pickling go by the content of a calibration file.
+    name, also as a DataFrame. Without `group`, positions and poses are those of the robot file's tool, or of
+    `tool`, in the robot's base frame. With `group` they are those of the measured `target`, or of `tool`, in
+    that set-up's world. Copying and pickling go by the content of a calibration file.
 
     Attributes:
         robot: The nominal arm.
@@ -112,10 +112,11 @@ class Calibration:
         return cls(**calibration_content.unpack(arrays, content, where=where), file=data)
 
     def __repr__(self) -> str:
-        joints, rows = self.robot.joint_count, self.validation.n_train + self.validation.n_holdout
-        held = self.validation.holdout.get(self.model_name)
-        error = f", {held.position.mean:.3g} mm mean on held-out rows" if held else ""
-        return f"<Calibration of {self.robot.name}: {self.model_name}, {joints} joints, {rows} rows{error}>"
+        joints, judged = self.robot.joint_count, self.validation
+        held = judged.holdout.get(self.model_name)
+        error = f", {held.position.mean:.3g} mm mean on {judged.judged} rows" if held else ""
+        rows = f"{judged.n_rows} rows{error}"
+        return f"<Calibration of {self.robot.name}: {self.model_name}, {joints} joints, {rows}>"
 
     def __reduce__(self) -> tuple[object, ...]:
         content = self.to_bytes()
@@ -375,33 +376,34 @@ class Calibration:
         return inputs, np.einsum("nii->ni", covariance), self.spread.prior(inputs, jacobian)
 
     def variation_std(
-        self, q: ArrayLike, names: Sequence[str], *, features: Features | None = None
+        self, q: ArrayLike, names: Sequence[str] | str, *, features: Features | None = None
     ) -> Floats:
         """Standard deviation of how much parameters differ from their means over the readings, (n, c), SI.
 
         How parameters vary is known better than their level, which frame and target may take over.
 
         Args:
-            q: Readings (n, N).
-            names: Names of the c parameters, such as "theta2".
+            q: Readings (n, N); of one alone nothing differs.
+            names: Names of the c parameters, such as "theta2", one by one or as one text with commas.
             features: Features by name.
 
         Raises:
             UsageError: If there is no such parameter.
             WorkError: If the rows were left out of the file, or the model does not tell.
         """
-        rows, _ = self._readings(q)
-        count = ROWS_TOGETHER * -(-len(names) // ROWS_TOGETHER)
+        (rows, single), asked = self._readings(q), words(names, "names")
+        count = ROWS_TOGETHER * -(-len(asked) // ROWS_TOGETHER)
         picked = np.zeros((len(rows), count, self.arm.table.size))
-        for k, name in enumerate(names):
+        for k, name in enumerate(asked):
             picked[:, k, self.arm.candidates.column(name)] = 1.0
         if not len(rows):
-            return np.empty((0, len(names)))
+            return np.empty((0, len(asked)))
         together = self.spread.joint(self.field_inputs(rows, features), picked)
         covariance = np.einsum("ikjk->kij", together.reshape(len(rows), count, len(rows), count))
         centred = covariance - covariance.mean(axis=1, keepdims=True)
         variances = np.einsum("kii->ik", centred - centred.mean(axis=2, keepdims=True))
-        return np.asarray(np.sqrt(np.maximum(variances[:, : len(names)], 0.0)))
+        found = np.asarray(np.sqrt(np.maximum(variances[:, : len(asked)], 0.0)))
+        return found[0] if single else found
 
     def _std(self, q: ArrayLike, end: Endpoint, features: Features | None, *, pose: bool) -> Floats:
         rows, single = self._readings(q)

@@ -3,9 +3,11 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Final, TypeVar
+from typing import Final, TypeVar, get_args
 
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.kinds import check_choice, words
+from truearm.robot_data import Joint
 from truearm.units import ANGLE_UNITS, LENGTH_UNITS
 
 JOINT: Final = re.compile(r"q([1-9]\d*)(?:_(rad|deg|m|mm))?")
@@ -74,6 +76,8 @@ class StatedUnits:
         for value, known in ((self.length, LENGTH_UNITS), (self.angle, ANGLE_UNITS)):
             if value is not None and value not in known:
                 raise UsageError(f'"{value}" is no unit here', rule=f"Known are {list_names(known)}")
+        for kind in () if self.joints is None else words(self.joints, "joints"):
+            check_choice(kind, "joints", get_args(Joint))
 
 
 def read_layout(names: Sequence[str], stated: StatedUnits, *, where: str, measured: bool = True) -> Layout:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm._core import CoreError, Corrector, Solver
-from truearm.arrays import as_rows, as_transforms
+from truearm.arrays import as_numbers, as_rows, as_transforms
 from truearm.calibration import Calibration
 from truearm.endpoints import at_tool
-from truearm.errors import InputError, WorkError
+from truearm.errors import InputError, WorkError, count_of
 from truearm.kinds import required
 from truearm.limits import Limits, Task
 from truearm.robot import Robot
@@ -76,6 +76,9 @@ class Compensated:
     std_mm: Floats
     refusals: tuple[Refusal, ...]
 
+    def __repr__(self) -> str:
+        return f"<Compensated: {count_of(len(self.q), 'waypoint')}, {len(self.refusals)} refused>"
+
     @cached_property
     def refused(self) -> NDArray[np.bool_]:
         """Which waypoints are refused, (n,)."""
@@ -136,6 +139,10 @@ class Compensator:
         self._correctors: OrderedDict[tuple[bytes, ...], Corrector] = OrderedDict()
         self._keeping = Lock()
 
+    def __repr__(self) -> str:
+        name, model = self.programming.name, self.calibration.model_name
+        return f"<Compensator of {name} by the {model} model, {self.task}>"
+
     def __reduce__(self) -> tuple[object, ...]:
         features = dict(zip(self.feature_names, self._features, strict=True))
         kept = (self.calibration, self.programming, self.task, self._moving, self.limits, features)
@@ -157,7 +164,8 @@ class Compensator:
             InputError: If the readings or the tool are none, or the author's arm has other joints.
         """
         rows, _ = as_rows(q, self.programming.joint_count, what="joint readings")
-        return self._corrected(np.array(rows), self._tool(tool), {}, author)
+        meant = None if author is None else required(author, Robot, "the author's arm")
+        return self._corrected(np.array(rows), self._tool(tool), {}, meant)
 
     def poses(
         self, base_from_tool: ArrayLike, seed: ArrayLike, *, tool: ArrayLike | None = None
@@ -192,11 +200,11 @@ class Compensator:
             InputError: If the readings or the tool are none.
         """
         try:
-            readings = np.ascontiguousarray(q, dtype=np.float64)
+            readings = as_numbers(q, what="joint readings")
             if readings.ndim != 1:
                 raise ValueError(f"shape {readings.shape}: one waypoint has (N,), joints() takes many")
             corrected, refusal = self._corrector(self._tool(tool)).one(readings, self._features)
-        except (TypeError, ValueError) as error:
+        except ValueError as error:
             raise InputError(str(error), where="joint readings") from None
         if refusal is not None:
             raise WorkError(refusal[1], where="waypoint")

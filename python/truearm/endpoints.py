@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import check_finite, rigid
+from truearm.arrays import as_numbers, check_finite, rigid
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.robot import Robot
 from truearm.rotations import rigid_motion
@@ -64,11 +64,8 @@ def at_tool(robot: Robot, tool: ArrayLike | None) -> Floats:
     """
     if tool is None:
         return robot.tool
-    try:
-        given = np.asarray(tool, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"the tool is not numbers: {error}") from None
-    check_finite(given.reshape(1, -1), what="the tool's numbers")
+    given = as_numbers(tool, what="the entries of the tool")
+    check_finite(given.reshape(1, -1), what="the entries of the tool")
     if given.shape == (3,):
         transform = np.eye(4)
         transform[:3, 3] = given
@@ -123,6 +120,6 @@ def _group_number(calibration: "Calibration", group: str | None) -> int:
         return 0
     if group not in groups:
         what = "no group is named" if group is None else f'there is no group "{group}"'
-        near = "" if group is None else did_you_mean(group, groups)
+        near = "" if group is None else did_you_mean(str(group), groups)
         raise UsageError(what, rule=f"The calibration knows {list_names(groups)}", way_out=near)
     return groups.index(group)

@@ -1,7 +1,7 @@
 """Errors of a calibration on measurements that it has not seen, mostly in a new set-up."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -29,7 +29,7 @@ from truearm.registration import register
 from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
 from truearm.units import MM_PER_METRE
-from truearm.validation import Errors, RowErrors
+from truearm.validation import Errors, RowErrors, means_in_words
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -84,7 +84,11 @@ class Evaluation:
     n_judged: int
     errors: Mapping[str, Errors]
     notices: tuple[Notice, ...] = ()
-    rows: HeldRows | None = field(default=None, repr=False)
+    rows: HeldRows | None = None
+
+    def __repr__(self) -> str:
+        judged = count_of(self.n_judged, "judged row")
+        return f"<Evaluation: {self.n_frame} frame rows, {judged}; {means_in_words(self.errors)}>"
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the notices and the rows."""

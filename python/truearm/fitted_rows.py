@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import gammainccinv
 
 from truearm.core_set import Selection
-from truearm.errors import Notice
+from truearm.errors import Notice, count_of
 from truearm.fitting import Fits
 from truearm.measurements import Measurements
 from truearm.splitting import Split
@@ -49,6 +49,9 @@ class FittedRows:
     distance_m: Floats
     moved: Floats | None = None
     progress: Floats | None = None
+
+    def __repr__(self) -> str:
+        return f"<FittedRows: {count_of(len(self.side), 'row')}, {count_of(len(self.outliers()), 'outlier')}>"
 
     @classmethod
     def of(cls, fits: Fits, side: NDArray[np.int64], selection: Selection) -> "FittedRows":

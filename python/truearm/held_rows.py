@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import count_of, list_names
 from truearm.measurements import Measurements
 from truearm.units import MM_PER_METRE
 from truearm.validation import RowErrors
@@ -35,6 +36,9 @@ class HeldRows:
     rows: NDArray[np.int64]
     sources: NDArray[np.str_]
     errors: Mapping[str, RowErrors]
+
+    def __repr__(self) -> str:
+        return f"<HeldRows: {count_of(len(self), 'row')}, errors of {list_names(self.errors)}>"
 
     def __len__(self) -> int:
         return len(self.readings)

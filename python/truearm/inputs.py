@@ -4,12 +4,14 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import check_finite
+from truearm.arrays import as_numbers, check_finite
 from truearm.errors import InputError, UsageError, list_names
 
 Floats = NDArray[np.float64]
+Features = Mapping[str, ArrayLike] | pd.DataFrame
 
 
 PAYLOAD: Final = "payload"
@@ -21,11 +23,11 @@ def is_payload(feature: str) -> bool:
     return feature.lower().startswith(PAYLOAD)
 
 
-def feature_columns(given: Mapping[str, ArrayLike] | None, names: Sequence[str], count: int) -> Floats:
+def feature_columns(given: Features | None, names: Sequence[str], count: int) -> Floats:
     """Values (count, F) of the named features.
 
     Args:
-        given: A number, or (count,) numbers, by name.
+        given: A number, or (count,) numbers, by name; a table has a column for each.
         names: Names of the F features that are needed.
         count: Number of poses.
 
@@ -33,9 +35,17 @@ def feature_columns(given: Mapping[str, ArrayLike] | None, names: Sequence[str],
         UsageError: If a feature is missing, or one is given that is not needed.
         InputError: If a value is no number, is not finite, or there are too many or too few.
     """
-    known = given or {}
+    known: Mapping[str, ArrayLike] = {}
+    if isinstance(given, Mapping | pd.DataFrame):
+        known = {str(name): values for name, values in given.items()}
+    elif given is not None:
+        raise UsageError(
+            f"the features are of type {type(given).__name__}",
+            rule="Values by name are needed",
+            way_out='Such as features={"temperature_C": 21.5}',
+        )
     if set(known) != set(names):
-        what = list_names(sorted(map(str, known))) or "no features"
+        what = list_names(sorted(known)) or "no features"
         needed = list_names(names) or "none"
         raise UsageError(
             f"{what} given",
@@ -45,13 +55,13 @@ def feature_columns(given: Mapping[str, ArrayLike] | None, names: Sequence[str],
         )
     columns = np.empty((count, len(names)))
     for k, name in enumerate(names):
-        try:
-            columns[:, k] = np.asarray(known[name], dtype=np.float64)
-        except (TypeError, ValueError):
+        values = as_numbers(known[name], what=f'values of the feature "{name}"')
+        if values.shape not in {(1,), (count,)}:
             raise InputError(
                 f'the feature "{name}" has shape {np.shape(known[name])}',
                 rule=f"One number, or {count}: one for each pose",
-            ) from None
+            )
+        columns[:, k] = values
     if columns.size:
         check_finite(columns, what="features")
     return columns

@@ -143,7 +143,7 @@ def table_from_frame(frame: pd.DataFrame, *, where: str) -> Table:
     columns: dict[str, Texts | Floats] = {}
     for name in frame.columns:
         column = frame[name]
-        if pd.api.types.is_numeric_dtype(column):
+        if pd.api.types.is_numeric_dtype(column) and not pd.api.types.is_complex_dtype(column):
             columns[str(name)] = column.to_numpy(dtype=np.float64, na_value=np.nan)
         else:
             columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.str_)

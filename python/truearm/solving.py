@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm._core import ArmModel, CoreError, Solver
 from truearm.arrays import as_rows, as_transforms
 from truearm.endpoints import at_tool
-from truearm.errors import InputError, UsageError, WorkError, list_rows
+from truearm.errors import InputError, UsageError, WorkError, count_of, list_rows
 from truearm.inputs import feature_columns
 from truearm.limits import TASKS, Limits, Task
 from truearm.robot import Robot
@@ -114,7 +114,7 @@ def as_seed(robot: Robot, seed: ArrayLike, count: int) -> Floats:
         return rows.reshape(-1)
     if len(rows) != count:
         raise InputError(
-            f"{len(rows)} seeds for {count} poses",
+            f"{count_of(len(rows), 'seed')} for {count_of(count, 'pose')}",
             rule="One for each, or one for the first: the others then follow each other",
         )
     return rows

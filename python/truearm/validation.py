@@ -101,6 +101,12 @@ class RowErrors:
         return Errors(position, Statistics.of(turned) if len(turned) else None)
 
 
+def means_in_words(models: Mapping[str, Errors]) -> str:
+    """Mean position errors of models by name: "nominal 1.61, constant 0.0931 mm in the mean"."""
+    means = [f"{name} {found.position.mean:.3g}" for name, found in models.items()]
+    return f"{', '.join(means)} mm in the mean"
+
+
 def _measured(errors: Floats) -> Floats:
     """Lengths of the errors (n, k) that are known."""
     return np.asarray(np.linalg.norm(errors[np.isfinite(errors).all(axis=1)], axis=1))
@@ -135,6 +141,15 @@ class Validation:
     left_out: bool = False
     n_planned: int = 0
     drift: DriftDetails | None = None
+
+    def __repr__(self) -> str:
+        trained = f"{self.poses_trained}, " if self.n_train else ""
+        return f"<Validation: {trained}{self.poses_judged}; {means_in_words(self.holdout)}>"
+
+    @property
+    def n_rows(self) -> int:
+        """How many rows there were: those that were left out in turn also trained."""
+        return self.n_holdout if self.left_out else self.n_train + self.n_holdout
 
     @property
     def judged(self) -> str:

@@ -129,7 +129,7 @@ class Frames:
     objects: Mapping[str, Frame] = field(default_factory=dict)
     payloads_kg: Mapping[str, float] = field(default_factory=dict)
     where: str = ""
-    asked: Asked = field(default_factory=Asked)
+    asked: Asked = field(default_factory=Asked, repr=False)
 
     @classmethod
     def load(cls, path: str | Path) -> "Frames":

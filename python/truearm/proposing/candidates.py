@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Problem, linearise, setup_jacobian
+from truearm.arrays import as_rows
 from truearm.calibration import Calibration
 from truearm.core_set import measured_points
 from truearm.errors import UsageError, WorkError, list_names
+from truearm.kinds import required
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -35,7 +37,10 @@ class Candidates:
     features: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        known = self.calibration.groups
+        known = required(self.calibration, Calibration, "the calibration").groups
+        robot = self.calibration.robot
+        rows, _ = as_rows(self.readings, robot.joint_count, what=f"joint readings of {robot.name}")
+        object.__setattr__(self, "readings", rows)
         if self.group is not None and self.group not in known:
             raise UsageError(f'there is no set-up "{self.group}"', rule=f"There are {list_names(known)}")
         if self.calibration.selection.distances:

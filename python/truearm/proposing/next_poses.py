@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from truearm._core import choose_informative
 from truearm.errors import WorkError
+from truearm.kinds import required
 from truearm.proposing.candidates import Candidates
 from truearm.units import MM_PER_METRE
 
@@ -53,7 +54,8 @@ def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPos
 
 
 def check_count(candidates: Candidates, count: int) -> None:
-    """Raise WorkError unless there are `count` candidates."""
+    """Raise WorkError unless there are `count` candidates, UsageError unless they are some."""
+    required(candidates, Candidates, "the candidates")
     if not 0 < count <= len(candidates):
         raise WorkError(
             f"{count} poses are to be chosen from {len(candidates)}",

@@ -12,7 +12,7 @@ from truearm._core import Chain
 from truearm.arrays import as_rows
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed
-from truearm.kinds import whole_numbers
+from truearm.kinds import required, whole_numbers
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.simulation import arm_file
@@ -86,9 +86,10 @@ class VirtualArm:
         Raises:
             InputError: If a name is not a parameter of this robot, or a joint or link is not of it.
         """
-        self.robot = robot
+        self.robot = required(robot, Robot, "the robot")
         self.seed = seed
-        self.imperfections = imperfections or Imperfections()
+        given = Imperfections() if imperfections is None else imperfections
+        self.imperfections = required(given, Imperfections, "the imperfections")
         check_joints(robot, self.imperfections.joint_errors, self.imperfections.deflection)
         rng = np.random.default_rng([seed, 0])
         self.names = tuple(default_parameters(robot) if parameters is None else parameters)
@@ -103,6 +104,9 @@ class VirtualArm:
         outputs = 3 if self.imperfections.non_geometric == "cartesian" else len(self._waving)
         self._harmonics = rng.normal(scale=DRAWN_HARMONIC, size=(2 * len(self._waving), outputs))
         self._harmonics *= self._scale_to_share()
+
+    def __repr__(self) -> str:
+        return f"<VirtualArm of {self.robot.name}: seed {self.seed}, {len(self.names)} erring parameters>"
 
     @classmethod
     def paper(cls, *, seed: int = 0, imperfections: Imperfections | None = None) -> "VirtualArm":

@@ -75,6 +75,10 @@ class Update:
     outliers: tuple[int, ...]
     notices: tuple[Notice, ...] = ()
 
+    def __repr__(self) -> str:
+        poses, outliers = count_of(self.n_poses, "pose"), count_of(len(self.outliers), "outlier")
+        return f"<Update of {self.calibration.robot.name}: {self.verdict}, {poses}, {outliers}>"
+
     @property
     def threshold(self) -> float:
         """Below which the p of each of the two tests counts: half the level."""
