@@ -84,6 +84,10 @@ def test_what_is_printed_is_short_and_says_what_it_is(robot, data, calibration):
     mean = calibration.validation.holdout["variable"].position.mean
     words = f"<Calibration of UR10: variable, 6 joints, 60 rows, {mean:.3g} mm mean on held-out rows>"
     assert repr(calibration) == words
+    off = data.targets.copy()
+    off[4] += 0.02
+    spoilt = ta.calibrate(robot, replace(data, targets=off), model="constant")
+    assert " 60 rows, 1 outlier, " in repr(spoilt)
     nominal, constant = (
         calibration.validation.holdout[name].position.mean for name in ("nominal", "constant")
     )

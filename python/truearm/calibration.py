@@ -17,7 +17,7 @@ from truearm.conservative import conservative_of
 from truearm.core_set import Selection
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.endpoints import Endpoint, at_target, at_tool
-from truearm.errors import Notice, WorkError
+from truearm.errors import Notice, WorkError, count_of
 from truearm.files import as_path, write_whole
 from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
@@ -115,7 +115,9 @@ class Calibration:
         joints, judged = self.robot.joint_count, self.validation
         held = judged.holdout.get(self.model_name)
         error = f", {held.position.mean:.3g} mm mean on {judged.judged} rows" if held else ""
-        rows = f"{judged.n_rows} rows{error}"
+        far = 0 if self.rows is None else len(self.rows.outliers())
+        outliers = f", {count_of(far, 'outlier')}" if far else ""
+        rows = f"{judged.n_rows} rows{outliers}{error}"
         return f"<Calibration of {self.robot.name}: {self.model_name}, {joints} joints, {rows}>"
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -332,9 +334,9 @@ class Calibration:
         """Bounds of the standard deviation of position and rotation, (n, 2), m and rad.
 
         The first is a bound of the root of the sum of the variances of x, y and z, the second of those of the
-        rotation vector. They are never below what `pose_std` says; of variable models the first is mostly
-        two to four times as large, else they are a few percent above. They cost about a thousandth;
-        compensation and controllers judge by them.
+        rotation vector. They are never below what `pose_std` says: the first is mostly one and a half to four
+        times as large for variable models, and up to half as large again for constants alone; the second is
+        a few percent above. They cost about a thousandth; compensation and controllers judge by them.
 
         Raises:
             WorkError: If the file has neither bounds nor the rows to work them out from.
