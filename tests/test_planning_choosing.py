@@ -49,6 +49,12 @@ def test_a_choice_is_better_conditioned_than_its_start(pool):
     assert found.after["kappa_normal"] == pytest.approx(found.after["kappa"] ** 2, rel=1e-6)
 
 
+def test_indices_are_in_one_order():
+    choice = choose(IdentifiedArm(Robot.load("ur10")), np.random.default_rng(0).uniform(-1, 1, (40, 6)), 20)
+    assert list(choice.before) == ["kappa", "kappa_normal", "log_det", "o1", "o2", "o3", "o4", "o5"]
+    assert list(choice.after) == list(choice.before)
+
+
 @pytest.mark.parametrize("criterion", ["o1", "o3", "d"])
 def test_an_index_is_not_lowered(pool, criterion):
     found = choose(WORLD, pool, 15, ChoiceOptions(criterion=criterion, names=PAPER_PARAMETERS))

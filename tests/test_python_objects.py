@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import truearm as ta
-from truearm import streaming
+from truearm import identified, planning, streaming
 from truearm.compensation import TOOLS_KEPT
 from truearm.framing import find_object, find_tool
 from truearm.inverse import Inverse
@@ -61,6 +61,10 @@ def test_robots_measurements_and_calibrations_come_back_whole(again, robot, data
     assert found.to_bytes() == calibration.to_bytes()
     assert np.array_equal(found.position_std(data.readings), calibration.position_std(data.readings))
     assert (found.notices, found.seconds, found.file) == (calibration.notices, calibration.seconds, None)
+
+
+def test_hyper_parameters_are_in_one_order(calibration):
+    assert list(calibration.variable.hyper) == sorted(calibration.variable.hyper)
 
 
 def test_a_calibration_that_was_read_keeps_its_file(calibration, tmp_path):
@@ -138,6 +142,8 @@ def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
 api: Any = ta
 streams: Any = streaming
 virtual: Any = VirtualArm
+plans: Any = planning
+arms: Any = identified
 WRONG = {
     "a robot for a calibration": (
         lambda r, d, c: api.evaluate(r, d),
@@ -207,6 +213,26 @@ WRONG = {
     "poses for a calibration": (
         lambda r, d, c: next_poses(c, d.readings, 5),
         "Make them of poses",
+    ),
+    "poses chosen for a robot": (
+        lambda r, d, c: plans.choose(r, d.readings, 9),
+        "Make it of a robot: truearm.iden",
+    ),
+    "an arm by name": (lambda r, d, c: arms.IdentifiedArm("ur10"), "Robot.load"),
+    "a space by name": (lambda r, d, c: plans.JointSpace("ur10"), "Robot.load"),
+    "a pool of no poses": (
+        lambda r, d, c: plans.draw_pool(plans.JointSpace(r), 0),
+        "count: 0. It must be pos",
+    ),
+    "a pool of half a pose": (
+        lambda r, d, c: plans.draw_pool(plans.JointSpace(r), 0.5),
+        "count is 0.5. It must be a whole",
+    ),
+    "a box upside down": (lambda r, d, c: plans.InBox((0, 0, 1), (1, 1, 0)), "x, y and z in m, the lowest"),
+    "a flat box": (lambda r, d, c: plans.InBox((0, 0), (1, 1)), "x, y and z in m, the lowest"),
+    "a tool to plan with": (
+        lambda r, d, c: plans.accessible(r, d.readings, [], tool=np.zeros(2)),
+        "transform",
     ),
     "candidates of two joints": (lambda r, d, c: Candidates(c, d.readings[:1, :2]), r"have shape \(1, 2\)"),
     "a virtual arm by name": (lambda r, d, c: virtual("ur10"), "the robot is of type str.*Robot.load"),

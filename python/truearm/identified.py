@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Chain
+from truearm.kinds import required
 from truearm.parameters import PARALLEL_WITHIN_DEG, Candidates, candidates
 from truearm.robot import Robot
 
@@ -31,6 +32,9 @@ class IdentifiedArm:
     robot: Robot
     frame: Frame = "free"
     parallel_within_deg: float = PARALLEL_WITHIN_DEG
+
+    def __post_init__(self) -> None:
+        required(self.robot, Robot, "the robot")
 
     @property
     def world_is_known(self) -> bool:

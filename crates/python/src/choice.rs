@@ -1,6 +1,6 @@
 //! `_core.choose_poses` and `_core.observability`.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -89,7 +89,7 @@ pub fn observability(
     py: Python<'_>,
     jacobian: PyReadonlyArray3<'_, f64>,
     columns: Vec<usize>,
-) -> PyResult<HashMap<&'static str, f64>> {
+) -> PyResult<BTreeMap<&'static str, f64>> {
     let values = checked("jacobian", &jacobian, columns.len())?;
     let rows = jacobian.shape()[1];
     let found = quick(py, || observability_of(&values, rows, &columns))?;
@@ -117,8 +117,8 @@ fn checked(name: &str, jacobian: &PyReadonlyArray3<'_, f64>, width: usize) -> Py
     Ok(jacobian.as_array().iter().copied().collect())
 }
 
-fn by_name(found: &Observability) -> HashMap<&'static str, f64> {
-    HashMap::from([
+fn by_name(found: &Observability) -> BTreeMap<&'static str, f64> {
+    BTreeMap::from([
         ("kappa", found.kappa),
         ("kappa_normal", found.kappa_normal),
         ("o1", found.o1),
@@ -138,12 +138,12 @@ impl Choice {
     }
 
     #[getter]
-    fn before(&self) -> HashMap<&'static str, f64> {
+    fn before(&self) -> BTreeMap<&'static str, f64> {
         by_name(&self.core.before)
     }
 
     #[getter]
-    fn after(&self) -> HashMap<&'static str, f64> {
+    fn after(&self) -> BTreeMap<&'static str, f64> {
         by_name(&self.core.after)
     }
 

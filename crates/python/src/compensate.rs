@@ -1,6 +1,6 @@
 //! `_core.ArmModel`, `_core.Corrector` and `_core.Solver`: joints to command.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -160,9 +160,9 @@ impl Corrector {
 
     /// The bounds where nothing is stated, but for those of joints.
     #[staticmethod]
-    fn usual() -> HashMap<&'static str, f64> {
+    fn usual() -> BTreeMap<&'static str, f64> {
         let usual = Limits::default();
-        HashMap::from([
+        BTreeMap::from([
             ("largest_angle", usual.largest_angle),
             ("largest_slide", usual.largest_slide),
             ("largest_shift", usual.largest_shift),

@@ -1,7 +1,7 @@
 //! `_core.fit_field`, `_core.Field` and `_core.Posterior`: CEPs that vary.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -116,7 +116,7 @@ impl FieldFit {
     }
 
     #[getter]
-    fn hyper(&self) -> HashMap<String, Vec<f64>> {
+    fn hyper(&self) -> BTreeMap<String, Vec<f64>> {
         hyper_into(&self.core.hyper)
     }
 

@@ -1,6 +1,6 @@
 //! Hyper-parameters of a field as Python keeps them: lists of numbers by name.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use pyo3::prelude::*;
 use truearm_field::{Hyper, MAJOR_NAME, Product, UNRIPPLED, UPRIGHT, WRIST_NAME, Wave};
@@ -84,9 +84,9 @@ fn joint_from(stored: f64) -> PyResult<usize> {
     Ok(stored as usize)
 }
 
-/// To values by name.
-pub fn hyper_into(hyper: &Hyper) -> HashMap<String, Vec<f64>> {
-    let mut values = HashMap::from([
+/// To values by name, in the order of their names.
+pub fn hyper_into(hyper: &Hyper) -> BTreeMap<String, Vec<f64>> {
+    let mut values = BTreeMap::from([
         ("constant".to_owned(), hyper.constant.to_vec()),
         ("own".to_owned(), vec![hyper.own]),
         ("own_length".to_owned(), vec![hyper.own_length]),

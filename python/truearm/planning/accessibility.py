@@ -8,7 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.errors import InputError
+from truearm.arrays import as_numbers
+from truearm.endpoints import at_tool
+from truearm.errors import InputError, UsageError
 from truearm.joint_axes import axes_at_zero
 from truearm.planning.configurations import link_frames
 from truearm.robot import Robot
@@ -93,12 +95,12 @@ def accessible(
         robot: The nominal arm.
         readings: Poses.
         rules: Any of this module's, or functions of Places.
-        tool: Transform (4, 4) from flange to tool; the robot's own by default.
+        tool: Transform (4, 4) from flange to tool, or a point (3,); the robot's own by default.
 
     Raises:
-        InputError: If a rule answers with another shape than (n,).
+        InputError: If a rule answers with another shape than (n,), or the tool is none.
     """
-    flange_from_tool = robot.tool if tool is None else np.asarray(tool, dtype=np.float64)
+    flange_from_tool = at_tool(robot, tool)
     allowed = np.ones(len(readings), dtype=np.bool_)
     for rule in rules:
         rows = np.flatnonzero(allowed)
@@ -134,6 +136,14 @@ class InBox:
 
     low: ArrayLike
     high: ArrayLike
+
+    def __post_init__(self) -> None:
+        low, high = (as_numbers(side, what="the sides of a box") for side in (self.low, self.high))
+        if low.shape != (3,) or high.shape != (3,) or not (low <= high).all():
+            raise UsageError(
+                f"a box from {low.tolist()} to {high.tolist()}",
+                rule="x, y and z in m, the lowest and then the highest",
+            )
 
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""

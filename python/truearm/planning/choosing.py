@@ -12,6 +12,7 @@ from truearm.core_set import known_setup, measured_points
 from truearm.endpoints import at_tool
 from truearm.errors import UsageError, WorkError, list_names
 from truearm.identified import IdentifiedArm
+from truearm.kinds import required
 from truearm.parameters import THETA, D
 
 Floats = NDArray[np.float64]
@@ -92,6 +93,7 @@ def choose(
         UsageError: If there is no such parameter.
         WorkError: If the pool is smaller than the choice, or the choice too small to determine the unknowns.
     """
+    required(arm, IdentifiedArm, "the arm")
     chosen = options or ChoiceOptions()
     if len(readings) < count:
         raise WorkError(

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truearm import kinds
 from truearm.errors import WorkError
 from truearm.planning.accessibility import Rule, accessible
 from truearm.planning.spaces import Space
@@ -42,7 +44,7 @@ class PoolOptions:
     Attributes:
         rules: What makes a pose accessible; all must hold.
         seed: Seed of the draw, one number or several.
-        tool: Transform (4, 4) from flange to tool; the robot's own by default.
+        tool: Transform (4, 4) from flange to tool, or a point (3,); the robot's own by default.
     """
 
     rules: Sequence[Rule] = ()
@@ -64,7 +66,12 @@ def draw_pool(
         count: How many.
         options: Rules and seed.
         box: Lowest and highest coordinates (D,) of the region; the whole space by default.
+
+    Raises:
+        UsageError: If none are asked for.
     """
+    kinds.check_number(count, "count", Integral)
+    kinds.check_positive(count, "count")
     chosen = options or PoolOptions()
     low, high = (space.low, space.high) if box is None else map(np.asarray, box)
     rng = np.random.default_rng(chosen.seed)

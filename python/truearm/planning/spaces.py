@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.errors import UsageError
+from truearm.kinds import required
 from truearm.planning.configurations import Configuration
 from truearm.planning.positioning import PositionInverse
 from truearm.robot import Robot
@@ -68,6 +69,7 @@ class JointSpace:
     held: Floats | None = None
 
     def __post_init__(self) -> None:
+        required(self.robot, Robot, "the robot")
         if any(not 1 <= joint <= self.robot.joint_count for joint in self.joints):
             raise UsageError(f"joints {list(self.joints)}", rule=f"It has 1 to {self.robot.joint_count}")
         limits = self.robot.limits[self._columns]
