@@ -158,7 +158,7 @@ def test_measured_points_give_the_tip(exact, tmp_path):
     found = find_tool(model, data, orientation=TOOL[:3, :3])
     assert np.abs(found.transform - TOOL).max() < 1e-9
     assert not found.covariance[3:].any()
-    with pytest.raises(WorkError, match="only points of the tool were measured"):
+    with pytest.raises(WorkError, match="only points of the tool were measured.*orientation=np.eye"):
         find_tool(model, data)
 
 

@@ -12,6 +12,7 @@ import pytest
 import truearm as ta
 from truearm import identified, planning, streaming
 from truearm.compensation import TOOLS_KEPT
+from truearm.exporting import export
 from truearm.framing import find_object, find_tool
 from truearm.inverse import Inverse
 from truearm.proposing import Candidates, next_poses
@@ -106,6 +107,25 @@ def test_what_is_printed_is_short_and_says_what_it_is(robot, data, calibration):
     assert repr(VirtualArm(robot, seed=2)) == "<VirtualArm of UR10: seed 2, 24 erring parameters>"
     assert repr(Inverse(robot)) == "<Inverse of UR10: three parallel axes>"
     assert "Asked" not in repr(ta.Frames())
+    pool = planning.draw_pool(planning.JointSpace(robot), 20)
+    assert repr(pool) == "<Pool: 20 poses, 100.0 % of the draws could be measured>"
+    exported = export(calibration, "dh-csv")
+    lines, notes = len(exported.text.splitlines()), len(exported.notes)
+    assert repr(exported) == f"<Exported as dh-csv: {lines} lines, {notes} notes>"
+    tool = repr(find_tool(calibration, data, orientation=np.eye(3)))
+    assert tool.startswith("<IdentifiedFrame: tool at ")
+    assert tool.endswith(" mm, from 60 measured points of it>")
+
+
+def test_a_rewritten_program_prints_what_was_changed(robot, calibration, tmp_path):
+    path = tmp_path / "path.csv"
+    path.write_text("q1,q2,q3,q4,q5,q6\n0.3,-1.2,1.5,-0.8,1.1,0.4\n0.31,-1.2,1.5,-0.8,1.1,0.4\n")
+    compensator = ta.Compensator(calibration, limits=ta.Limits(largest_mm=20.0, largest_std_mm=10.0))
+    rewritten = ta.compensate_program(path, compensator, controller=ta.Controller.nominal(robot))
+    assert repr(rewritten) == "<Rewritten path.csv: 2 of 2 targets changed, 0 kept, 0 listed>"
+    for_controller: Any = robot
+    with pytest.raises(ta.UsageError, match=r"controller is of type Robot.*Controller.nominal\(robot\)"):
+        ta.compensate_program(path, compensator, controller=for_controller)
 
 
 def test_what_an_update_prints_counts_each_row_once(calibration, data):

@@ -14,6 +14,7 @@ WAYS: Final[Mapping[str, str]] = {
     "Calibration": 'Load it: Calibration.load("arm.calib")',
     "Candidates": "Make them of poses: Candidates(calibration, readings)",
     "Compensator": "Make it of a calibration: Compensator(calibration)",
+    "Controller": "Declare it: Controller.nominal(robot), Controller.load(path)",
     "IdentifiedArm": "Make it of a robot: truearm.identified.IdentifiedArm(robot)",
     "Measurements": "Read them: Measurements.read_csv(path), Measurements.from_dataframe(table)",
     "Robot": 'Load it: Robot.load("ur10"), or from a TOML or URDF file',

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, Literal, cast, get_args
 
 from truearm.calibration import Calibration
-from truearm.errors import UsageError, did_you_mean, list_names
+from truearm.errors import UsageError, count_of, did_you_mean, list_names
 from truearm.exporting.constant_part import constant_robot
 from truearm.exporting.field_grid import grid_axes, grid_table, grid_text
 from truearm.exporting.losses import ONLY_ROS, beta_is_lost, coupling_is_lost, field_is_lost
@@ -72,6 +72,10 @@ class Exported:
     difference_m: float | None
     rows: int | None = None
     chain: str = ""
+
+    def __repr__(self) -> str:
+        size = count_of(len(self.text.splitlines()), "line")
+        return f"<Exported as {self.format}: {size}, {count_of(len(self.notes), 'note')}>"
 
 
 def export(

@@ -42,6 +42,10 @@ class IdentifiedFrame:
     how: str
     notices: tuple[Notice, ...] = ()
 
+    def __repr__(self) -> str:
+        x, y, z = MM_PER_METRE * self.transform[:3, 3]
+        return f"<IdentifiedFrame: {self.kind} at {x:.3f} {y:.3f} {z:.3f} mm, from {self.how}>"
+
     @property
     def distances_mm(self) -> Floats:
         """Lengths of the residuals (n,), mm."""

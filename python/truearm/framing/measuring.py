@@ -70,7 +70,11 @@ def _selection(calibration: Calibration, data: Measurements, *, stated: bool) ->
     if len(data.groups) != 1:
         raise WorkError(f"{len(data.groups)} set-ups", rule="A tool is found from one set-up")
     if not selection.orientation and not stated:
-        raise WorkError("only points of the tool were measured", rule="They do not tell how it is turned")
+        raise WorkError(
+            "only points of the tool were measured",
+            rule="They do not tell how it is turned",
+            way_out="Measure that too, or state it: orientation=np.eye(3) where it is turned like the flange",
+        )
     if selection.orientation:
         check_turns(data, calibration.robot)
     return selection

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm import kinds
-from truearm.errors import WorkError
+from truearm.errors import WorkError, count_of
 from truearm.planning.accessibility import Rule, accessible
 from truearm.planning.spaces import Space
 
@@ -32,6 +32,11 @@ class Pool:
     coordinates: Floats
     readings: Floats
     share: float
+
+    def __repr__(self) -> str:
+        return (
+            f"<Pool: {count_of(len(self), 'pose')}, {100 * self.share:.1f} % of the draws could be measured>"
+        )
 
     def __len__(self) -> int:
         return len(self.readings)

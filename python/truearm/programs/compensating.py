@@ -103,10 +103,10 @@ def _declared(given: Controller | str | Path | None, language: Language, author:
     Raises:
         UsageError: If it must be declared and is not, or is of another kind of arm.
     """
-    if isinstance(given, Controller):
-        declared = given
-    else:
+    if given is None or isinstance(given, str | Path):
         declared = declared_controller(None if given is None else str(given), language, author)
+    else:
+        declared = required(given, Controller, "the controller")
     if declared.robot.joints != author.joints:
         raise UsageError(
             f"the controller's model {declared.robot.name} has other joints than {author.name}",

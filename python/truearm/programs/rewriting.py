@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.controller import Controller
-from truearm.errors import Notice, WorkError
+from truearm.errors import Notice, WorkError, count_of
 from truearm.files import make_directory
 from truearm.inverse import Inverse
 from truearm.kinds import check_values, required
@@ -188,6 +188,11 @@ class Rewritten:
     deviating: tuple[Deviating, ...] = ()
     notices: tuple[Notice, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        done = f"{int(self.changed.sum())} of {count_of(len(self.changed), 'target')} changed"
+        name = self.program.sources[0].path.name
+        return f"<Rewritten {name}: {done}, {len(self.kept)} kept, {len(self.listed)} listed>"
 
     def with_facts(self, facts: Mapping[str, Any], notices: Sequence[Notice]) -> "Rewritten":
         """The same with facts for the report, and more notices."""
