@@ -89,14 +89,10 @@ def test_what_is_printed_is_short_and_says_what_it_is(robot, data, calibration):
     mean = calibration.validation.holdout["variable"].position.mean
     words = f"<Calibration of UR10: variable, 6 joints, 60 rows, {mean:.3g} mm mean on held-out rows>"
     assert repr(calibration) == words
-    off = data.targets.copy()
-    off[4] += 0.02
-    spoilt = ta.calibrate(robot, replace(data, targets=off), model="constant")
-    assert " 60 rows, 1 outlier, " in repr(spoilt)
     nominal, constant = (
         calibration.validation.holdout[name].position.mean for name in ("nominal", "constant")
     )
-    means = f"nominal {nominal:.3g}, constant {constant:.3g}, variable {mean:.3g} mm in the mean"
+    means = f"nominal {nominal:.3g} mm, constant {constant:.3g} mm, variable {mean:.3g} mm in the mean"
     assert repr(calibration.validation) == f"<Validation: 42 training poses, 18 held-out poses; {means}>"
     assert repr(calibration.held) == '<HeldRows: 18 rows, errors of "nominal", "constant" and "variable">'
     assert repr(calibration.rows) == "<FittedRows: 60 rows, 0 outliers>"
@@ -115,6 +111,15 @@ def test_what_is_printed_is_short_and_says_what_it_is(robot, data, calibration):
     tool = repr(find_tool(calibration, data, orientation=np.eye(3)))
     assert tool.startswith("<IdentifiedFrame: tool at ")
     assert tool.endswith(" mm, from 60 measured points of it>")
+
+
+def test_what_a_spoilt_calibration_prints_says_so(robot, data):
+    off = data.targets.copy()
+    off[4] += 0.02
+    spoilt = ta.calibrate(robot, replace(data, targets=off), model="constant")
+    assert " 60 rows, 1 outlier, " in repr(spoilt)
+    lost = ta.calibrate(robot, replace(data, targets=data.targets[::-1]), model="constant", drift="none")
+    assert "e+" not in repr(lost) + repr(lost.validation)
 
 
 def test_a_rewritten_program_prints_what_was_changed(robot, calibration, tmp_path):
@@ -157,6 +162,11 @@ def test_a_compensator_keeps_the_correctors_of_few_tools(calibration):
         compensator.corrector([0.0, 0.001 * k, 0.2])
         assert compensator.corrector([0.0, 0.0, 0.1]) is first
     assert len(compensator._correctors) == TOOLS_KEPT
+
+
+def counted_from_zero(robot):
+    table = VirtualArm(robot, seed=2).measure_table(np.zeros((3, 6)))
+    return table.rename(columns={f"q{k + 1}": f"q{k}" for k in range(6)})
 
 
 api: Any = ta
@@ -263,6 +273,10 @@ WRONG = {
     "a number of joints": (
         lambda r, d, c: api.Measurements.from_dataframe(pd.DataFrame({"q1": [1.0]}), joints=6),
         "joints is 6. It must be a list of names",
+    ),
+    "joints counted from zero": (
+        lambda r, d, c: api.evaluate(c, api.Measurements.from_dataframe(counted_from_zero(r))),
+        'Joints are counted from 1: rename "q0"',
     ),
     "kinds of joints": (
         lambda r, d, c: api.Measurements.from_dataframe(pd.DataFrame({"q1": [1.0]}), joints=["rotary"]),

@@ -25,6 +25,7 @@ from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.inputs import Features, feature_columns
 from truearm.kinds import words
+from truearm.lengths import length_mm
 from truearm.limits import Task
 from truearm.models import CONSTANT, ArmModel
 from truearm.options import Options
@@ -114,7 +115,7 @@ class Calibration:
     def __repr__(self) -> str:
         joints, judged = self.robot.joint_count, self.validation
         held = judged.holdout.get(self.model_name)
-        error = f", {held.position.mean:.3g} mm mean on {judged.judged} rows" if held else ""
+        error = f", {length_mm(held.position.mean, 3)} mean on {judged.judged} rows" if held else ""
         far = 0 if self.rows is None else len(self.rows.outliers())
         outliers = f", {count_of(far, 'outlier')}" if far else ""
         rows = f"{judged.n_rows} rows{outliers}{error}"

@@ -1,6 +1,7 @@
 """Measurements: joint readings and what was measured at them."""
 
 import hashlib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -336,11 +337,14 @@ class Measurements:
     def require_joint_count(self, count: int | None) -> None:
         """Raise InputError unless there are `count` joints; None asks for nothing."""
         if count is not None and self.joint_count != count:
+            zero = next((name for name in self.features if re.fullmatch("q0(_[a-z]+)?", str(name))), None)
             raise InputError(
                 f"there are {self.joint_count} joint columns",
                 where=", ".join(self.files),
                 rule=f"The robot has {count} joints",
-                way_out="Name the robot that was measured, or correct the columns",
+                way_out="Name the robot that was measured, or correct the columns"
+                if zero is None
+                else f'Joints are counted from 1: rename "{zero}" and those after it',
             )
 
     def content(self) -> pd.DataFrame:

@@ -13,6 +13,7 @@ from truearm.core_set import Selection, core_set, first_measured
 from truearm.details import DriftDetails
 from truearm.errors import InputError, count_of
 from truearm.identified import IdentifiedArm
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 
 Floats = NDArray[np.float64]
@@ -102,9 +103,9 @@ class RowErrors:
 
 
 def means_in_words(models: Mapping[str, Errors]) -> str:
-    """Mean position errors of models by name: "nominal 1.61, constant 0.0931 mm in the mean"."""
-    means = [f"{name} {found.position.mean:.3g}" for name, found in models.items()]
-    return f"{', '.join(means)} mm in the mean"
+    """Mean position errors of models by name: "nominal 1.61 mm, constant 0.0931 mm in the mean"."""
+    means = [f"{name} {length_mm(found.position.mean, 3)}" for name, found in models.items()]
+    return f"{', '.join(means)} in the mean"
 
 
 def _measured(errors: Floats) -> Floats:
