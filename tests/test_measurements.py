@@ -350,3 +350,47 @@ def test_distances_that_nothing_names_lead_to_one_anchor() -> None:
     assert data.anchor.tolist() == ["anchor 1"] * 3
     assert [notice.kind for notice in data.notices] == ["one_anchor"]
     assert not Measurements.from_dataframe(wire.assign(anchor="box")).notices
+
+
+BY_HAND: dict[str, Any] = {
+    "readings": np.linspace(0.0, 1.0, 18).reshape(3, 6),
+    "targets": np.linspace(1.0, 2.0, 9).reshape(3, 1, 3),
+    "orientations": None,
+    "sigma_m": None,
+    "group": np.array(["a", "a", "b"]),
+    "features": pd.DataFrame(index=range(3)),
+    "sources": np.array(["hand"] * 3),
+    "rows": np.arange(1, 4),
+}
+
+
+def test_arrays_of_any_kind_make_the_same_measurements() -> None:
+    lists = {name: value.tolist() for name, value in BY_HAND.items() if isinstance(value, np.ndarray)}
+    plain, listed = Measurements(**BY_HAND), Measurements(**{**BY_HAND, **lists})
+    assert listed.hash() == plain.hash()
+    assert listed.row_names(np.array([True, False, True])) == "rows 1 and 3"
+    single = Measurements(**{**BY_HAND, "readings": np.asfortranarray(BY_HAND["readings"], dtype=np.float32)})
+    assert single.readings.dtype == np.float64
+    assert single.readings.flags.c_contiguous
+    hidden = np.ma.masked_less(BY_HAND["targets"], 1.1)
+    assert np.isnan(Measurements(**{**BY_HAND, "targets": hidden}).targets[0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("readings", None, r"readings: shape \(\). It must be \(n, N\)"),
+        ("readings", np.zeros(6), r"readings: shape \(6,\). It must be \(n, N\)"),
+        ("readings", np.zeros((3, 6), complex), "readings are not real numbers"),
+        ("targets", np.zeros((3, 3)), r"targets: shape \(3, 3\). It must be \(n, T, 3\)"),
+        ("targets", np.zeros((3, 1, 2)), r"targets: shape \(3, 1, 2\)"),
+        ("targets", np.zeros((2, 1, 3)), "targets: 2 rows. There are 3 readings"),
+        ("orientations", np.zeros((3, 3)), r"orientations: shape \(3, 3\). It must be \(n, 4\)"),
+        ("sigma_m", 1e-4, r"sigma_m: shape \(\). It must be \(n,\)"),
+        ("group", "a", r"group: shape \(\). It must be \(n,\)"),
+        ("rows", [1.0, 2.0, 3.0], "rows: values of type float64. They must be whole numbers"),
+    ],
+)  # fmt: skip
+def test_arrays_of_another_shape_are_told_theirs(name: str, value: object, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Measurements(**{**BY_HAND, name: value})

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from truearm.arrays import as_row_numbers
+from truearm.arrays import as_numbers, as_row_numbers
 from truearm.columns import StatedUnits
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
 from truearm.files import as_path
@@ -34,6 +34,25 @@ CONTENT: Final = (
     "pair",
 )
 PER_ROW: Final = (*CONTENT, "purpose", "sources", "rows", "default_group", "tables")
+NUMBERS: Final = {
+    "readings": ("N",),
+    "targets": ("T", 3),
+    "orientations": (4,),
+    "sigma_m": (),
+    "distance_m": (),
+}
+"""What each row of the fields of numbers is made of; a letter stands for any number."""
+WHOLE: Final = ("rows", "tables")
+OPTIONAL: Final = (
+    "orientations",
+    "sigma_m",
+    "distance_m",
+    "anchor",
+    "pair",
+    "purpose",
+    "default_group",
+    "tables",
+)
 GROUPS_SHOWN: Final = 3
 
 
@@ -63,6 +82,9 @@ class Measurements:
             nothing is called so.
         tables: Number of the table that each row was read from (n,), made of what the table held; None where
             it is not asked for, as no set-up is called after a file.
+
+    Raises:
+        InputError: If a field holds no such values, has another shape, or rows for other poses.
     """
 
     readings: Floats
@@ -83,9 +105,9 @@ class Measurements:
     tables: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
+        self._freeze()
         if not self.joint_units:
             object.__setattr__(self, "joint_units", ("",) * self.joint_count)
-        self._freeze()
         if self.tables is None and self.default_group is not None:
             object.__setattr__(self, "tables", _frozen(identities(self)))
 
@@ -93,9 +115,10 @@ class Measurements:
         """Check that arrays and features have a row for each pose, and make them own and read-only."""
         for name in PER_ROW:
             value = getattr(self, name)
-            if value is not None:
-                self._check_length(name, value)
-                object.__setattr__(self, name, _frozen(value))
+            if value is not None or name not in OPTIONAL:
+                array = _as_array(name, value)
+                object.__setattr__(self, name, _frozen(array))
+                self._check_length(name, array)
         self._check_length("features", required(self.features, pd.DataFrame, "the table of features"))
         object.__setattr__(self, "features", self.features.reset_index(drop=True))
 
@@ -387,6 +410,30 @@ def _concatenate(parts: Sequence[Measurements]) -> Measurements:
         default_group=_joined_words([(part.default_group, len(part)) for part in parts]),
         tables=_joined_tables(parts),
     )
+
+
+def _as_array(name: str, value: ArrayLike) -> NDArray[Any]:
+    """The array of a field with a row for each pose: numbers, whole numbers or names.
+
+    Raises:
+        InputError: If it is no such array, or rows have another shape.
+    """
+    array: NDArray[Any] = as_numbers(value, what=name) if name in NUMBERS else np.asarray(value)
+    row = NUMBERS.get(name, ())
+    pairs = zip(array.shape[1:], row, strict=False)
+    if np.ndim(value) != 1 + len(row) or any(want not in (have, "N", "T") for have, want in pairs):
+        raise InputError(
+            f"shape {np.shape(value)}",
+            where=name,
+            rule=f"It must be ({', '.join(str(size) for size in ('n', *row))}{'' if row else ','})",
+        )
+    if name in NUMBERS:
+        return array
+    if name not in WHOLE:
+        return array.astype(np.str_, copy=False)
+    if array.dtype.kind not in "iu":
+        raise InputError(f"values of type {array.dtype}", where=name, rule="They must be whole numbers")
+    return array.astype(np.int64, copy=False)
 
 
 def _frozen(values: NDArray[Any]) -> NDArray[Any]:
