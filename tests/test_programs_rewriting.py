@@ -52,6 +52,12 @@ def test_a_rewritten_program_bears_a_mark_and_is_refused_next_time():
     assert rewritten(written, models(ABB), force=True).changed.sum() == 2
 
 
+def test_what_is_told_goes_up_to_the_last_target():
+    told = []
+    rewrite(program_of(TWO), models(ABB), Choices(), tell=lambda *words: told.append(words))
+    assert told == [("targets", 0, 2), ("targets", 2, 2)]
+
+
 def test_refused_targets_stop_with_their_lines():
     with pytest.raises(WorkError, match=r"(?s)1 of 6 targets.*line 12, pb: too far") as caught:
         rewritten(program_of(TWO), models(ABB, refuse=(1,)))

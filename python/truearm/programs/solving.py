@@ -77,7 +77,7 @@ def solve_targets(
         uses: How its targets are used.
         robot: The programming model.
         inverse: Its inverse kinematics.
-        tell: Called now and then with how many Cartesian targets are solved, and how many there are.
+        tell: Called now and then with how many moves to Cartesian targets are done, and how many there are.
     """
     solver = _Solver(program, uses, robot, inverse)
     solver.take_joints()
@@ -158,39 +158,43 @@ class _Solver:
 
     def take_poses(self, tell: Callable[[int, int], None]) -> None:
         """Cartesian targets, in the order of the moves, each near its seed or where the arm stands."""
-        possible = self._possible(tell)
-        if not possible:
+        poses = self._flange_poses()
+        moves = self.program.moves
+        moved = np.flatnonzero(moves.moving & np.isin(moves.target, list(poses)))
+        if len(moved) == 0:
             return
         self.q = np.require(self.q, requirements="W")
+        for start in range(0, len(moved), AT_ONCE):
+            tell(start, len(moved))
+            self._take_some(moved[start : start + AT_ONCE], poses)
+        tell(len(moved), len(moved))
+
+    def _take_some(self, moved: Integers, poses: dict[int, Floats]) -> None:
+        """The targets of these moves, all of which are in `poses`."""
         moves = self.program.moves
-        moved = np.flatnonzero(moves.moving)
-        columns = (column[moved].tolist() for column in (moves.target, moves.near, moves.motion))
-        for move, target, near, motion in zip(moved.tolist(), *columns, strict=True):
-            if target in possible:
-                came = _Came(self._known(near), motion_is_straight(motion), self.program.nearest.get(move))
-                self._take(target, possible[target], came)
+        targets, nears, motions = (column[moved] for column in (moves.target, moves.near, moves.motion))
+        possible = self._possible(np.unique(targets), poses)
+        columns = (column.tolist() for column in (moved, targets, nears, motions))
+        for move, target, near, motion in zip(*columns, strict=True):
+            came = _Came(self._known(near), motion_is_straight(motion), self.program.nearest.get(move))
+            self._take(target, possible[target], came)
 
     def _known(self, target: int) -> Floats | None:
         """The readings of a target; None where they are not known."""
         unknown = target == NOWHERE or target in self.program.unsure or np.isnan(self.q[target, 0])
         return None if unknown else self.q[target]
 
-    def _possible(self, tell: Callable[[int, int], None]) -> dict[int, _Possible]:
-        """What the readings of each Cartesian target can be."""
-        poses = self._flange_poses()
-        numbers = np.array(list(poses), dtype=np.int64)
-        found: dict[int, _Possible] = {}
+    def _possible(self, some: Integers, poses: dict[int, Floats]) -> dict[int, _Possible]:
+        """What the readings of the targets `some` can be, with the poses of the flange at them."""
         if self.robot.joint_count > DETERMINED and self.program.configuration is None:
             nothing = np.empty((0, self.robot.joint_count))
-            return {number: _Possible(nothing, None, None, pose) for number, pose in poses.items()}
-        for start in range(0, len(numbers), AT_ONCE):
-            tell(start, len(numbers))
-            some = numbers[start : start + AT_ONCE]
-            branches = self.inverse.branches(np.stack([poses[number] for number in some.tolist()]))
-            named = self._named(some, branches)
-            for row, number in enumerate(some.tolist()):
-                reached = branches[row][np.isfinite(branches[row]).all(axis=1)]
-                found[number] = _Possible(reached, *named.get(row, (None, None)))
+            return {number: _Possible(nothing, None, None, poses[number]) for number in some.tolist()}
+        branches = self.inverse.branches(np.stack([poses[number] for number in some.tolist()]))
+        named = self._named(some, branches)
+        found: dict[int, _Possible] = {}
+        for row, number in enumerate(some.tolist()):
+            reached = branches[row][np.isfinite(branches[row]).all(axis=1)]
+            found[number] = _Possible(reached, *named.get(row, (None, None)))
         return found
 
     def _named(self, some: Integers, branches: Floats) -> dict[int, tuple[Floats, Bools]]:
@@ -317,30 +321,20 @@ class _Solver:
 
 def the_nearest(candidates: Floats, before: Floats | None) -> Floats | None:
     """The one of the candidates (k, N) that is meant: the only one, or clearly the nearest to `before`."""
-    distinct = candidates if len(candidates) == 1 else _distinct(candidates)
-    if len(distinct) == 1:
-        return np.asarray(distinct[0])
-    if before is None:
+    distances = None if before is None else np.abs(candidates - before).max(axis=1)
+    found: Floats = candidates[0 if distances is None else distances.argmin()]
+    others = np.abs(candidates - found).max(axis=1) > SAME_RAD
+    if not others.any():
+        return found
+    if distances is None or distances.min() > NEARER * distances[others].min():
         return None
-    distances = np.abs(distinct - before).max(axis=1)
-    order = np.argsort(distances, kind="stable")
-    if distances[order[0]] > NEARER * distances[order[1]]:
-        return None
-    return np.asarray(distinct[order[0]])
+    return found
 
 
 def is_nearest(found: Floats, candidates: Floats, before: Floats) -> bool:
     """Whether none of the candidates (k, N) is nearer to `before` than `found`."""
     nearest = np.abs(candidates - before).max(axis=1).min()
     return bool(np.abs(found - before).max() <= nearest + SAME_RAD)
-
-
-def _distinct(candidates: Floats) -> Floats:
-    kept: list[Floats] = []
-    for candidate in candidates:
-        if all(np.abs(candidate - other).max() > SAME_RAD for other in kept):
-            kept.append(candidate)
-    return np.array(kept)
 
 
 def are_singular(robot: Robot, q: Floats) -> Bools:
