@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from tests.stages import Stages
 from truearm.cli import main
 from truearm.simulation import VirtualArm
 
@@ -54,6 +55,13 @@ def test_json_is_all_that_is_printed(to, capsys):
     assert found["file"] == f"{to}.out"
     assert found["difference_m"] < 1e-9
     assert Path(found["file"]).is_file()
+
+
+def test_progress_is_told_of(monkeypatch):
+    stages = Stages()
+    monkeypatch.setattr("truearm.cli.export.told_stages", lambda: stages)
+    assert main(["export", "constant.calib", "--to", "dh-csv", "-o", "told.csv"]) == 0
+    assert stages.names == ["exporting"]
 
 
 def test_samples(capsys):

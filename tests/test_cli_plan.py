@@ -10,6 +10,7 @@ import pytest
 
 import truearm as ta
 from tests.cell_support import cell_text
+from tests.stages import Stages
 from truearm.cell import Cell
 from truearm.cell.ordering import motion_seconds, paper_order, short_order, there_and_back
 from truearm.cell.poses_file import Poses
@@ -169,6 +170,26 @@ def test_poses_are_proposed_from_a_calibration(asked, purpose, said, calib, here
         assert expected == sorted(expected, reverse=True)
     else:
         assert set(found["noticed"]) >= {"joint2", "joint3"}
+
+
+def test_progress_is_told_while_poses_are_proposed(calib, here, monkeypatch):
+    stages = Stages()
+    monkeypatch.setattr("truearm.cli.plan.told_stages", lambda: stages)
+    assert main(["plan", "--next", "2", "--from", calib, "-o", "a.csv"]) == 0
+    assert stages.names == ["choosing poses"]
+
+
+def test_a_picture_that_fails_leaves_the_one_before(calib, here, monkeypatch):
+    def torn(_figure, place, **_how):
+        (place.write if hasattr(place, "write") else Path(place).write_bytes)(b"torn")
+        raise MemoryError
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", torn)
+    picture = here / "a.png"
+    picture.write_bytes(b"before")
+    asked = ["plan", "--next", "2", "--from", calib, "-o", "a.csv", "--picture", str(picture)]
+    assert main(asked) == 1
+    assert picture.read_bytes() == b"before"
 
 
 def test_too_few_poses_to_tell_anything_are_named(calib, here, capsys):

@@ -1,5 +1,6 @@
 """A plan as a list of poses, and as a picture."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -50,4 +51,6 @@ def draw(plan: Plan | Proposed, path: Path) -> None:
         axes.set_aspect("equal")
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), frameon=False)
-    figure.savefig(path)
+    drawn = BytesIO()
+    figure.savefig(drawn, format=path.suffix.removeprefix("."))
+    write_whole(path, drawn.getvalue())

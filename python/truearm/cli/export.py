@@ -7,6 +7,8 @@ import typer
 
 from truearm.cli.arguments import AsJson, CalibFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest
+from truearm.cli.interrupt import ends_promptly
+from truearm.cli.progress import told_stages
 from truearm.errors import count_of, typed
 from truearm.files import refuse_own_input
 
@@ -73,7 +75,8 @@ def command(
         features=features_of(feature or ()) or None,
         with_std=std,
     )
-    made = export(Calibration.load(calibration), to, output, options)
+    with ends_promptly(), told_stages()("exporting"):
+        made = export(Calibration.load(calibration), to, output, options)
     if as_json:
         found = {"format": made.format, "file": str(output), "notes": list(made.notes)}
         print_json(found | {"difference_m": made.difference_m, "rows": made.rows})

@@ -66,7 +66,6 @@ def command(
     """
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import PlanOptions, plan_poses
-    from truearm.cell.plan_files import draw, write
 
     _check_words(criterion, order)
     _check_counts({"--next": next_count, "--acceptance": acceptance, "--count": count})
@@ -90,11 +89,10 @@ def command(
     arm = _arm_of(robot, known_cell)
     number = count or option.COUNT
     options = PlanOptions(number, criterion, seed, order, sigma_mm, rules)  # type: ignore[arg-type]
-    with ends_promptly(), told_stages()("choosing poses"):
-        plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
-    write(plan, output)
-    if picture is not None:
-        draw(plan, picture)
+    with ends_promptly():
+        with told_stages()("choosing poses"):
+            plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
+        _save(plan, output, picture)
     _print(plan, output, order, arm.joints, as_json=as_json)
     if not as_json and cell is not None:
         suggest(f"truearm measure {typed(cell)} {typed(output)} --dry-run")
@@ -187,7 +185,6 @@ class _Asked:
 def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -> None:
     from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
-    from truearm.cell.plan_files import draw, write
     from truearm.cell.proposed import (
         ProposalOptions,
         check_same_arm,
@@ -211,10 +208,9 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
     number = asked.next_count or asked.acceptance or 0
     options = ProposalOptions(number, asked.seed, asked.order, asked.group, asked.rules)
     with ends_promptly():
-        proposed = choose(calibration, options, cell=cell)
-    write(proposed, output)
-    if picture is not None:
-        draw(proposed, picture)
+        with told_stages()("choosing poses"):
+            proposed = choose(calibration, options, cell=cell)
+        _save(proposed, output, picture)
     if as_json:
         print_json({"poses": str(output), "order": asked.order, **proposed.to_dict()})
         return
@@ -225,6 +221,15 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
         suggest(f"truearm update {typed(asked.calibration)} {NEW_FILE}", when=MEASURED)
     else:
         _suggest_again(calibrate_again(calibration, asked.robot, NEW_FILE), asked.calibration)
+
+
+def _save(plan: "Plan | Proposed", output: Path, picture: Path | None) -> None:
+    """Write the poses, and draw them where a picture is asked for."""
+    from truearm.cell.plan_files import draw, write
+
+    write(plan, output)
+    if picture is not None:
+        draw(plan, picture)
 
 
 def _suggest_again(again: Again, calibration: Path) -> None:
