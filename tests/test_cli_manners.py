@@ -229,6 +229,22 @@ def test_what_does_not_end_by_itself_is_taken_away_with_its_stage():
     progress("targets", 5, 5)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii", "latin-1"])
+def test_names_that_stdout_cannot_print_are_escaped(encoding):
+    found = ["Γ", os.fsdecode(b"caf\xe9")]
+    code = f"""
+from truearm.cli import console
+console.say_all()
+console.say({found[1]!r})
+console.print_json({found!r})
+"""
+    environment = os.environ | {"PYTHONIOENCODING": encoding}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=environment)
+    said, _, printed = done.stdout.decode(encoding).partition("\n")
+    assert said == "caf\\udce9"
+    assert json.loads(printed) == found
+
+
 def test_warnings_have_no_colour_in_a_log(capsys):
     console.warn([Notice("limits", "careful")])
     assert capsys.readouterr().err == "Warning: careful\n"

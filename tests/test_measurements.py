@@ -1,5 +1,6 @@
 """Measurements: what is in the file is what is fitted, in SI."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from truearm.errors import InputError, UsageError
+from truearm.files import write_whole
 from truearm.measurements import Measurements
 
 HEADER = "q1,q2,x,y,z"
@@ -394,3 +396,14 @@ def test_arrays_of_any_kind_make_the_same_measurements() -> None:
 def test_arrays_of_another_shape_are_told_theirs(name: str, value: object, words: str) -> None:
     with pytest.raises(InputError, match=words):
         Measurements(**{**BY_HAND, name: value})
+
+
+def test_a_file_whose_name_is_no_text_names_its_set_up_readably(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"caf\xe9.csv")
+    path.write_text("q1,x,y,z\n0.1,1,2,3\n0.2,1,2,3\n")
+    read = Measurements.read_csv(path)
+    assert read.groups == ["caf\ufffd"]
+    assert len(read.hash()) == 64
+    assert Measurements.read_files([path]).groups == Measurements.read_touches(path).groups == read.groups
+    write_whole(path, path.name)
+    assert path.read_text() == "caf\\udce9.csv"

@@ -36,6 +36,11 @@ def as_path(given: object) -> Path:
     raise UsageError(f"the file is of type {type(given).__name__}", rule="A path is needed, as text or Path")
 
 
+def name_in_text(name: str) -> str:
+    """The name of a file as UTF-8 text can hold it: bytes of it that are none stand as U+FFFD."""
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
 def read_bytes(path: Path) -> bytes:
     """The content of a file.
 
@@ -115,7 +120,8 @@ def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
 
     What is renamed is on the disk, so that after a loss of power each file is the old one or the new one. A
     link is followed, and a file that is replaced keeps its permissions. What is no file, such as a pipe or
-    /dev/stdout, is written to at the end and not replaced.
+    /dev/stdout, is written to at the end and not replaced. Text is written as UTF-8; bytes of names of files
+    that are none are escaped, as in JSON.
 
     Raises:
         InputError: If a directory does not exist or may not be written to, or is what a path names, or a
@@ -126,7 +132,7 @@ def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
     path = Path()
     try:
         for path, content in contents:
-            data = content.encode() if isinstance(content, str) else content
+            data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
             if _is_stream(path):
                 streams.append((path, data))
             else:

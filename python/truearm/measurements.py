@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from truearm.arrays import as_numbers, as_row_numbers
 from truearm.columns import StatedUnits
 from truearm.errors import InputError, Notice, UsageError, list_names, list_rows
-from truearm.files import as_path
+from truearm.files import as_path, name_in_text
 from truearm.kinds import required
 from truearm.measured_fields import read_fields
 from truearm.reading import read_csv_table, table_from_frame
@@ -206,7 +206,9 @@ class Measurements:
         """
         stated = StatedUnits(length_unit, angle_unit, joints)
         file = as_path(path)
-        read = cls(**read_fields(read_csv_table(file), stated, default_group=file.stem, measured=False))
+        read = cls(
+            **read_fields(read_csv_table(file), stated, default_group=name_in_text(file.stem), measured=False)
+        )
         read.require_joint_count(None if joints is None else len(joints))
         return read
 
@@ -248,7 +250,7 @@ class Measurements:
 
     @classmethod
     def _read(cls, path: Path, stated: StatedUnits, *, group: str) -> "Measurements":
-        return cls(**read_fields(read_csv_table(path), stated, default_group=group))
+        return cls(**read_fields(read_csv_table(path), stated, default_group=name_in_text(group)))
 
     @classmethod
     def from_dataframe(

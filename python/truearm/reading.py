@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, list_rows, typed
-from truearm.files import UTF_16, ZIP, decode_text, read_bytes
+from truearm.files import UTF_16, ZIP, decode_text, name_in_text, read_bytes
 
 Floats = NDArray[np.float64]
 Texts = NDArray[np.str_]
@@ -159,7 +159,7 @@ def read_csv_table(path: Path) -> Table:
         InputError: If the file is missing, empty, no CSV, or has lines of other lengths; says what it
             looks like and how to bring it in.
     """
-    where = str(path)
+    where = name_in_text(str(path))
     content = read_bytes(path)
     if content.startswith(ZIP):
         raise InputError(

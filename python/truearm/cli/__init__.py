@@ -51,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: Words behind `truearm`; those of the process by default.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
+    console.say_all()
     try:
         return build(COMMANDS, HELP)(given)
     except (Exception, KeyboardInterrupt) as error:

@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from io import TextIOWrapper
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,6 +21,12 @@ FAILED: Final = 1
 USAGE: Final = 2
 INTERRUPTED: Final = 130
 WIDTH: Final = 80
+
+
+def say_all() -> None:
+    """Let stdout print any text: characters that its encoding has not are escaped, as on stderr."""
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def say(text: str = "") -> None:
@@ -59,7 +66,8 @@ def on_terminal() -> bool:
 
 def print_json(value: Any, *, on_one_line: bool = False) -> None:  # noqa: ANN401
     """Print a value as JSON on stdout; NaN and infinity are errors of the caller."""
-    say(json.dumps(value, indent=None if on_one_line else 2, ensure_ascii=False, allow_nan=False))
+    escaped = sys.stdout.encoding != "utf-8"
+    say(json.dumps(value, indent=None if on_one_line else 2, ensure_ascii=escaped, allow_nan=False))
 
 
 def print_table(
