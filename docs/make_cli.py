@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 from truearm.cli import COMMANDS, main
-from truearm.cli.lazy import Entry
+from truearm.cli.entry import Entry
 
 PAGE = Path(__file__).parent / "reference" / "cli.md"
 HEAD = """# Command line

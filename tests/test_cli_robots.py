@@ -1,6 +1,7 @@
 """The command line: what it loads, prints, and answers to what it cannot do."""
 
 import json
+import os
 import subprocess
 import sys
 import types
@@ -9,7 +10,8 @@ import numpy as np
 import pytest
 
 from truearm.cli import COMMANDS, console, main
-from truearm.cli.lazy import Entry, build
+from truearm.cli.entry import Entry
+from truearm.cli.lazy import build
 from truearm.errors import InputError, Notice, UsageError, WorkError
 from truearm.library import library_names
 from truearm.robot import Robot
@@ -281,13 +283,26 @@ def test_commands_take_their_options_from_their_module(monkeypatch, capsys):
 def test_interrupts_end_the_process_with_130(tmp_path):
     script = tmp_path / "run.py"
     script.write_text(
-        "import os, signal, sys, types\nfrom truearm import cli\nfrom truearm.cli.lazy import Entry\n"
+        "import os, signal, sys, types\nfrom truearm import cli\nfrom truearm.cli.entry import Entry\n"
         "def command() -> None:\n    os.kill(os.getpid(), signal.SIGINT)\n    import time; time.sleep(30)\n"
         "sys.modules['waiting'] = types.SimpleNamespace(command=command)\n"
         "cli.COMMANDS = (Entry('wait', 'waiting', 'Wait.'),)\nsys.exit(cli.main(['wait']))\n"
     )
     done = subprocess.run(
         [sys.executable, str(script)], capture_output=True, text=True, check=False, timeout=20
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "Interrupted.\n")
+
+
+def test_interrupts_end_a_program_that_is_still_being_imported(tmp_path):
+    (tmp_path / "typer.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    done = subprocess.run(
+        [sys.executable, "-c", "import sys; from truearm.cli import main; sys.exit(main(['robots']))"],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=20,
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "Interrupted.\n")
 

@@ -2,7 +2,7 @@
 
 To add a command, write a module with a function `command` whose signature and docstring are its
 options and its help, and name it in :data:`COMMANDS`. What is heavy is imported inside of functions: neither
-help nor completion may wait for it.
+help nor completion may wait for it, and Ctrl-C ends a command that is still being imported as any other.
 """
 
 import sys
@@ -11,7 +11,7 @@ from typing import Final
 
 from truearm.cli import console
 from truearm.cli.display import DISPLAY
-from truearm.cli.lazy import Entry, build
+from truearm.cli.entry import Entry
 
 COMMANDS: Final = (
     Entry("demo", "truearm.cli.demo", "The whole way on a virtual arm."),
@@ -53,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     console.say_all()
     try:
+        from truearm.cli.lazy import build
+
         return build(COMMANDS, HELP)(given)
     except (Exception, KeyboardInterrupt) as error:
         DISPLAY.clear()

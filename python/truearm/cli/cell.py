@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from truearm.cli.lazy import Entry
+from truearm.cli.entry import Entry
 
 HELP: Final = """Cell files to begin with, a check of a cell's devices, and a virtual cell.
 

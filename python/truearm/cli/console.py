@@ -8,8 +8,6 @@ from io import TextIOWrapper
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final
 
-import typer
-
 from truearm.errors import Notice, TruearmError, UsageError
 
 if TYPE_CHECKING:
@@ -56,7 +54,7 @@ def suggest(*commands: str, when: str = "Try next:") -> None:
 def warn(notices: Iterable[Notice]) -> None:
     """Print notices on stderr."""
     for notice in notices:
-        tell(f"{_coloured('Warning:', typer.colors.YELLOW)} {notice}")
+        tell(f"{_coloured('Warning:', 'yellow')} {notice}")
 
 
 def on_terminal() -> bool:
@@ -123,14 +121,16 @@ def exit_status(error: BaseException) -> int | None:
 
 
 def _tell_error(text: str) -> None:
-    tell(f"{_coloured('Error:', typer.colors.RED)} {text}")
+    tell(f"{_coloured('Error:', 'red')} {text}")
 
 
 def _coloured(word: str, colour: str) -> str:
     """The word in colour where stderr is a terminal and nobody asked for none (https://no-color.org)."""
-    return (
-        typer.style(word, fg=colour, bold=True) if on_terminal() and not os.environ.get("NO_COLOR") else word
-    )
+    if not on_terminal() or os.environ.get("NO_COLOR"):
+        return word
+    from typer import style
+
+    return style(word, fg=colour, bold=True)
 
 
 def _console() -> "Console":

@@ -3,7 +3,6 @@
 import inspect
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
 from typing import Annotated, Any, Final
@@ -12,23 +11,11 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from truearm.cli.arguments import offer_choices
+from truearm.cli.entry import Entry
 
 INTERRUPTED_BY_TYPER: Final = 130
 EXAMPLES: Final = re.compile(r"\n\n(?=Examples:\n)")
 AS_IT_STANDS: Final = "\n\n\b\n"
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A command of the table: its name, its module, and one line of help.
-
-    The module has a function `command`, or a table COMMANDS of commands below it, whose help its docstring
-    `HELP` is. The lines below "Examples:" of a help text are shown as they stand.
-    """
-
-    name: str
-    module: str
-    summary: str
 
 
 class LazyCommand(TyperCommand):

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from truearm.cli.lazy import Entry
+from truearm.cli.entry import Entry
 
 HELP: Final = """Look into a measurement session, or export its measurements.
 

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from truearm.cli.lazy import Entry
+from truearm.cli.entry import Entry
 
 HELP: Final = """Simulations and comparisons that anybody can run again.
 
