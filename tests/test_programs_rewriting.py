@@ -206,6 +206,13 @@ def long_line(target="p1"):
     return program_of(f"MoveJ p0,v100,fine,tG;\n    MoveL {target},v100,fine,tG;", data)
 
 
+def test_the_lines_that_may_need_waypoints_are_counted():
+    told = []
+    choices = Choices(spacing=Spacing.of(0.1, 10.0))
+    rewrite(long_line(), models(ABB), choices, tell=lambda *words: told.append(words))
+    assert told[-2:] == [("lines", 0, 1), ("lines", 1, 1)]
+
+
 def test_waypoints_are_inserted_until_the_line_is_straight_enough():
     given = models(ABB)
     given = type(given)(given.programming, given.inverse, given.controller, Wavy(np.zeros(6)))

@@ -1,6 +1,6 @@
 """Waypoints on long straight moves, where the arm's error varies between the ends."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -123,19 +123,28 @@ class Densifier:
         self._robot, self._inverse, self._compensator = models
         self._deviation_mm: dict[int, float] = {}
 
-    def insert(self, nominal: Floats, changed: Bools) -> Inserted:
-        """Waypoints for every linear move between two changed targets, (t, N) readings and (t,)."""
+    def insert(self, nominal: Floats, changed: Bools, tell: Callable[[int, int], None]) -> Inserted:
+        """Waypoints for every linear move between two changed targets.
+
+        Args:
+            nominal: Readings of all targets, (t, N).
+            changed: Which are changed, (t,).
+            tell: Called with how many of these moves are done, and how many there are.
+        """
         moves = self._program.moves
         ends = np.stack([moves.before, moves.target], axis=1)
         lines = (moves.motion == Motion.LINEAR) & (moves.before != NOWHERE) & changed[ends].all(axis=1)
         stepped: list[list[LinearStep]] = []
         why: dict[int, str] = {}
-        for move in np.flatnonzero(lines).tolist():
+        numbers = np.flatnonzero(lines).tolist()
+        for done, move in enumerate(numbers):
+            tell(done, len(numbers))
             found = self._between(move, ends[move], nominal[ends[move]])
             if isinstance(found, str):
                 why[move] = found
             elif found:
                 stepped.append(found)
+        tell(len(numbers), len(numbers))
         texts = self._program.language.linear_steps(self._program, stepped) if stepped else StepTexts()
         why.update(dict.fromkeys(texts.impossible, texts.why))
         deviating = (

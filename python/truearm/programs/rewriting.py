@@ -267,7 +267,7 @@ def rewrite(
     known: Bools = np.isfinite(np.einsum("ij->i", solved.q))
     known[list(solved.reasons)] = False
     known &= uses.moved
-    state = _State(program, uses, models, solved.q, known)
+    state = _State(program, uses, models, solved.q, known, tell)
     state.reasons.update(solved.reasons)
     state.compensate()
     kept = state.settle(choices)
@@ -283,6 +283,7 @@ class _State:
     models: Models
     nominal: Floats
     known: Bools
+    tell: Tell
     reasons: dict[int, str] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
     codes: set[int] = field(default_factory=set)
@@ -450,7 +451,8 @@ class _State:
         models, controller = self.models, self.models.controller
         encoder = Encoder(self.program, self.uses, controller.robot, controller.inverse)
         of_models = (models.programming, models.inverse, models.compensator)
-        return Densifier(self.program, of_models, encoder, spacing).insert(self.nominal, changed)
+        densifier = Densifier(self.program, of_models, encoder, spacing)
+        return densifier.insert(self.nominal, changed, lambda done, all_: self.tell("lines", done, all_))
 
     def _forget(self, unchanged: Bools) -> None:
         if not unchanged.any():
