@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from truearm.cli import main
 from truearm.errors import InputError
 from truearm.files import make_directory, read_bytes, write_all, write_whole
 
@@ -116,3 +117,27 @@ def test_a_directory_is_made_with_those_above_it_and_no_file_is_one(tmp_path):
     (tmp_path / "file").write_text("a file")
     with pytest.raises(InputError, match=r"file: a file is in the way\. A directory is needed"):
         make_directory(tmp_path / "file")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["export", "a.calib", "--to", "dh-csv", "-o"],
+        ["strip", "a.calib", "-o"],
+        ["report", "a.calib", "-o"],
+        ["compensate", "a.calib", "p.script", "-o"],
+        ["compensate", "a.calib", "p.script", "-o", "out/", "--report"],
+        ["plan", "ur10", "-o"],
+        ["plan", "ur10", "--picture"],
+    ],
+    ids=" ".join,
+)
+def test_a_place_that_takes_no_file_is_told_before_the_work(words, tmp_path, monkeypatch, capsys):
+    def begin(_given):
+        raise AssertionError("the work has begun")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("truearm.calibration.Calibration.load", begin)
+    monkeypatch.setattr("truearm.robot.Robot.load", begin)
+    assert main([*words, "nowhere/a.html"]) == 1
+    assert capsys.readouterr().err == "Error: nowhere: there is no such directory.\n"

@@ -190,16 +190,25 @@ def _is_stream(path: Path) -> bool:
     return own or (path.exists() and not path.is_dir() and not path.is_file())
 
 
-def _beside(path: Path, data: bytes) -> Path:
-    """A neighbour of a file that holds what is to come into it."""
+def check_place(path: Path) -> None:
+    """Check before long work that a file may come to a place.
+
+    Raises:
+        InputError: If a directory is there, or there is no directory for it.
+    """
     if path.is_dir():
         raise InputError("this is a directory", where=str(path), rule="A file is to be written")
+    if not path.parent.exists():
+        raise InputError("there is no such directory", where=str(path.parent))
+
+
+def _beside(path: Path, data: bytes) -> Path:
+    """A neighbour of a file that holds what is to come into it."""
+    check_place(path)
     neighbour = path.with_name(f".{secrets.token_hex(8)}")
     mode = stat.S_IMODE(path.stat().st_mode) if path.exists() else None
     try:
         handle = os.open(neighbour, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666 if mode is None else 0o600)
-    except FileNotFoundError:
-        raise InputError("there is no such directory", where=str(path.parent)) from None
     except PermissionError:
         raise InputError("no permission to write here", where=str(path.parent)) from None
     try:

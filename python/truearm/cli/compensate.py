@@ -16,7 +16,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM, LEAST_SPACING_MM
 from truearm.errors import UsageError, typed
-from truearm.files import refuse_own_input, refuse_same, write_whole
+from truearm.files import check_place, refuse_own_input, refuse_same, write_whole
 
 OnRefusal = Literal["stop", "keep-nominal"]
 
@@ -131,8 +131,11 @@ def _check_outputs(
 ) -> None:
     """Raise UsageError where nothing is to be written, or what is read or written would be written over."""
     if report is not None:
+        check_place(report)
         refuse_own_input(report, *program, *others)
     if output is not None:
+        if not (output.endswith("/") or Path(output).is_dir()):
+            check_place(Path(output))
         refuse_own_input(Path(output), *others)
         refuse_same(Path(output), report, option="--report")
     if output is None and not dry_run:

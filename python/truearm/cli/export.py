@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.errors import count_of, typed
-from truearm.files import refuse_own_input
+from truearm.files import check_place, refuse_own_input
 
 READ_AS_ROBOT: Final = ("dh-toml", "urdf")
 
@@ -67,6 +67,7 @@ def command(
     from truearm.exporting import Options, export
     from truearm.exporting.field_grid import features_of
 
+    check_place(output)
     refuse_own_input(output, calibration, None if urdf is None else str(urdf))
     options = Options(
         urdf=urdf,
