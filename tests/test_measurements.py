@@ -407,3 +407,9 @@ def test_a_file_whose_name_is_no_text_names_its_set_up_readably(tmp_path: Path) 
     assert Measurements.read_files([path]).groups == Measurements.read_touches(path).groups == read.groups
     write_whole(path, path.name)
     assert path.read_text() == "caf\\udce9.csv"
+
+
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/null"])
+def test_devices_are_refused_before_they_are_read(device: str) -> None:
+    with pytest.raises(InputError, match=f"{device}: this is a device. A file or a pipe is needed"):
+        Measurements.read_csv(device)

@@ -42,12 +42,15 @@ def name_in_text(name: str) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file.
+    """The content of a file or of a pipe.
 
     Raises:
-        InputError: If there is no such file, it is a directory, or it cannot or may not be read.
+        InputError: If there is no such file, it is a directory or a device, which may have no end, or it
+            cannot or may not be read.
     """
     try:
+        if path.is_char_device() or path.is_block_device():
+            raise InputError("this is a device", where=str(path), rule="A file or a pipe is needed")
         return path.read_bytes()
     except FileNotFoundError:
         raise InputError("there is no such file", where=str(path)) from None
