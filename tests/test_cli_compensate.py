@@ -128,6 +128,8 @@ TO_X = ["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "nominal"]
         (["arm.calib", "demo.mod", "-o", "x.mod"], 2, "--controller"),
         (["arm.calib", "demo.mod", "--controller", "nominal"], 2, "no output"),
         (["arm.calib", "demo.mod", "-o", "demo.mod", "--controller", "nominal"], 2, "the program itself"),
+        (["none.calib", "demo.mod", "-o", ".", "--controller", "nominal"], 2, "the program itself"),
+        ([*TO_X, "--feature", "t=1", "--feature", "t=2"], 2, '"t" has two values'),
         (["arm.calib", "none.mod", "-o", "x.mod", "--controller", "nominal"], 1, "no such file"),
         (["arm.calib", "demo.xyz", "-o", "x.mod", "--controller", "nominal"], 2, "--language"),
         (["arm.calib", "demo.mod", "-o", "x.mod", "--controller", "none.toml"], 1, "none.toml"),

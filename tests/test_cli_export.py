@@ -77,7 +77,7 @@ def test_samples(capsys):
         (["constant.calib", "--to", "field-csv"], 1, "this calibration has no field"),
         (["constant.calib", "--to", "xml"], 2, 'there is no format "xml"'),
         (["constant.calib", "--to", "dh-csv", "--std"], 2, "It belongs to --to field-csv"),
-        (["arm.calib", "--to", "field-csv", "--feature", "warm"], 1, '"warm" is no feature'),
+        (["arm.calib", "--to", "field-csv", "--feature", "warm"], 2, "NAME=VALUE"),
         (["arm.calib", "--to", "field-csv", "--feature", "temperature=20"], 2, "features"),
         (["missing.calib", "--to", "urdf"], 1, "missing.calib: there is no such file"),
     ],

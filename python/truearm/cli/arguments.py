@@ -1,13 +1,14 @@
 """Arguments and options that several commands have, and what a shell offers for them."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final, TypeAlias, get_type_hints
 
 import typer
 from typer.models import ParameterInfo
 
+from truearm.errors import UsageError
 from truearm.library import library_names
 
 CHOICE: Final = re.compile(r"[a-z0-9][a-z0-9_-]*")
@@ -70,6 +71,28 @@ Feature: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=VALUE", help="Value of a feature that the calibration needs; repeat."),
 ]
+
+
+def features_of(stated: Sequence[str] | None) -> dict[str, float]:
+    """Values by name of the words of :data:`Feature`, such as "temperature=21.5".
+
+    Raises:
+        UsageError: If one is not NAME=VALUE with a number, or a feature has two values.
+    """
+    found: dict[str, float] = {}
+    for text in stated or ():
+        name, _, value = (part.strip() for part in text.partition("="))
+        try:
+            number = float(value)
+        except ValueError:
+            rule = "It must be NAME=VALUE with a number, such as temperature=21.5"
+            raise UsageError(f'"{text}"', where="--feature", rule=rule) from None
+        if name in found:
+            raise UsageError(f'"{name}" has two values', where="--feature", rule="A feature has one")
+        found[name] = number
+    return found
+
+
 LargestMm: TypeAlias = Annotated[float, typer.Option(help="Largest shift of the tool.")]
 LargestDeg: TypeAlias = Annotated[float, typer.Option(help="Largest turn of the tool.")]
 LargestStdMm: TypeAlias = Annotated[

@@ -9,7 +9,15 @@ import typer
 
 import truearm as ta
 from truearm.cli import compensate_options as option
-from truearm.cli.arguments import AsJson, CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm
+from truearm.cli.arguments import (
+    AsJson,
+    CalibFile,
+    Feature,
+    LargestDeg,
+    LargestMm,
+    LargestStdMm,
+    features_of,
+)
 from truearm.cli.console import print_json, say, suggest, warn
 from truearm.cli.given import given_options
 from truearm.cli.interrupt import ends_promptly
@@ -80,7 +88,7 @@ def command(
         task=_one_of("--task", task, Task),
         moving=_joints(moving),
         limits=limits,
-        features=_features(feature),
+        features=features_of(feature),
     )
     with ends_promptly(), told_stages()("compensation"):
         done = ta.compensate_program(
@@ -108,12 +116,8 @@ def command(
 
 def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> list[Path]:
     """The program's files, where there is something to write, and the report."""
-    from truearm.programs.outputs import output_paths
     from truearm.programs.report import report_of
 
-    if output is not None:
-        for path in output_paths(done.program, Path(output)):
-            refuse_same(path, report, option="--report")
     paths = [] if output is None or not done.changed.any() else done.save(output)
     if report is not None:
         content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
@@ -130,6 +134,8 @@ def _check_outputs(
     dry_run: bool,
 ) -> None:
     """Raise UsageError where nothing is to be written, or what is read or written would be written over."""
+    from truearm.programs.outputs import output_paths
+
     if report is not None:
         check_place(report)
         refuse_own_input(report, *program, *others)
@@ -137,7 +143,8 @@ def _check_outputs(
         if not (output.endswith("/") or Path(output).is_dir()):
             check_place(Path(output))
         refuse_own_input(Path(output), *others)
-        refuse_same(Path(output), report, option="--report")
+        for path in output_paths(program, Path(output)):
+            refuse_same(path, report, option="--report")
     if output is None and not dry_run:
         raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
 
@@ -165,15 +172,4 @@ def _joints(given: str | None) -> list[int] | None:
     except ValueError:
         raise UsageError(
             f'"{given}"', where="--moving", rule="It must be numbers of joints with commas, such as 1,2,3"
-        ) from None
-
-
-def _features(given: list[str] | None) -> dict[str, float] | None:
-    if not given:
-        return None
-    try:
-        return {name.strip(): float(value) for name, value in (one.split("=", 1) for one in given)}
-    except ValueError:
-        raise UsageError(
-            f'"{" ".join(given)}"', where="--feature", rule="It must be NAME=VALUE with a number"
         ) from None

@@ -5,7 +5,7 @@ from typing import Annotated, Final
 
 import typer
 
-from truearm.cli.arguments import AsJson, CalibFile
+from truearm.cli.arguments import AsJson, CalibFile, features_of
 from truearm.cli.console import print_json, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
@@ -65,7 +65,6 @@ def command(
     """
     from truearm.calibration import Calibration
     from truearm.exporting import Options, export
-    from truearm.exporting.field_grid import features_of
 
     check_place(output)
     refuse_own_input(output, calibration, None if urdf is None else str(urdf))
@@ -73,7 +72,7 @@ def command(
         urdf=urdf,
         kinematics_hash=kinematics_hash,
         grid=grid,
-        features=features_of(feature or ()) or None,
+        features=features_of(feature) or None,
         with_std=std,
     )
     with ends_promptly(), told_stages()("exporting"):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truearm.cli.arguments import CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm
+from truearm.cli.arguments import CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm, features_of
 from truearm.cli.console import print_json, say, tell
 from truearm.defaults import DEADLINE_S, HOLD_S, LARGEST_DEG, LARGEST_MM, LARGEST_STD_MM, RAMP_S
 from truearm.errors import InputError, UsageError
@@ -66,7 +66,7 @@ def command(
     token = _token(address, token_file)
     known = Calibration.load(calibration)
     limits = Limits(largest_mm=largest_mm, largest_deg=largest_deg, largest_std_mm=largest_std_mm)
-    compensator = Compensator(known, limits=limits, features=_features(feature or []))
+    compensator = Compensator(known, limits=limits, features=features_of(feature))
     options = StreamOptions(ramp_s=ramp_s, hold_s=hold_s, deadline_s=deadline_s)
     tool = _tool(tool_mm)
     CorrectionStream(compensator, options, tool=tool)
@@ -135,16 +135,3 @@ def _tool(text: str | None) -> list[float] | None:
     if len(point) != 3:
         raise UsageError(f'"{text}"', where="--tool-mm", rule="Three numbers in mm, such as 0,0,120.5")
     return point
-
-
-def _features(words: list[str]) -> dict[str, float]:
-    found = {}
-    for word in words:
-        name, mark, value = word.partition("=")
-        try:
-            found[name] = float(value)
-        except ValueError:
-            mark = ""
-        if not mark:
-            raise UsageError(f'"{word}"', where="--feature", rule="A name and a number: temperature=21.5")
-    return found

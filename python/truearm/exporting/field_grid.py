@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from truearm.calibration import Calibration
-from truearm.errors import InputError, UsageError, WorkError
+from truearm.errors import UsageError, WorkError
 from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import UNLIMITED, flange_poses
 from truearm.parameters import KINDS
@@ -253,19 +253,3 @@ def _corrections(added: Floats) -> dict[str, Floats]:
         for k, (kind, unit) in enumerate(zip(KINDS, units, strict=True))
     }
     return {name: values for name, values in columns.items() if values.any()}
-
-
-def features_of(stated: Sequence[str]) -> dict[str, float]:
-    """Features by name of ["temperature=21.5", ...].
-
-    Raises:
-        InputError: If one is not NAME=NUMBER.
-    """
-    found: dict[str, float] = {}
-    for text in stated:
-        name, _, value = text.partition("=")
-        try:
-            found[name.strip()] = float(value)
-        except ValueError:
-            raise InputError(f'"{text}" is no feature', where="--feature", rule="NAME=NUMBER") from None
-    return found

@@ -5,11 +5,10 @@ from pathlib import Path
 
 from truearm.errors import UsageError
 from truearm.files import followed, write_all
-from truearm.programs.program import Program
 
 
-def output_paths(program: Program, output: Path) -> list[Path]:
-    """The path of each file: `output` for the first, the same with the others' endings for them.
+def output_paths(sources: Sequence[Path], output: Path) -> list[Path]:
+    """The path of each file of a program: `output` for the first, the same with the others' endings for them.
 
     An output that is a directory gets files of the same names.
 
@@ -17,11 +16,11 @@ def output_paths(program: Program, output: Path) -> list[Path]:
         UsageError: If a file would be written over the program itself.
     """
     if output.is_dir():
-        paths = [output / source.path.name for source in program.sources]
+        paths = [output / source.name for source in sources]
     else:
-        paths = [output, *(output.with_suffix(source.path.suffix) for source in program.sources[1:])]
-    for path, source in zip(paths, program.sources, strict=True):
-        if followed(path) == followed(source.path):
+        paths = [output, *(output.with_suffix(source.suffix) for source in sources[1:])]
+    for path, source in zip(paths, sources, strict=True):
+        if followed(path) == followed(source):
             raise UsageError(
                 "the output is the program itself",
                 where=str(path),
