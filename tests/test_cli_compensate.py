@@ -78,6 +78,7 @@ def test_the_true_tool_goes_where_the_author_meant(arm, folder):
         )
         assert np.linalg.norm(truth[:3, 3] - wanted[:3, 3]) < 0.5 * missed
     assert report["counts"]["changed"] == 4
+    assert sum('"corrected"' in line for line in Path("hit.json").read_text().splitlines()) == 4
     assert report["controller"] == {"kind": "nominal", "source": ""}
     assert TABLE[0, 3] == 0.3
 

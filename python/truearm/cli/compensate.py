@@ -1,6 +1,5 @@
 """`truearm compensate`: rewrite a program so that the calibrated arm goes where its author meant."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -116,12 +115,11 @@ def command(
 
 def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> list[Path]:
     """The program's files, where there is something to write, and the report."""
-    from truearm.programs.report import report_of
+    from truearm.programs.report import report_of, report_text
 
     paths = [] if output is None or not done.changed.any() else done.save(output)
     if report is not None:
-        content = json.dumps(report_of(done, paths), indent=1, ensure_ascii=False, allow_nan=False)
-        write_whole(report, f"{content}\n")
+        write_whole(report, report_text(report_of(done, paths)))
     return paths
 
 

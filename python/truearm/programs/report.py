@@ -1,7 +1,8 @@
 """What a rewriting did, for programs that read it and for people."""
 
 import difflib
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,20 @@ def report_of(done: Rewritten, outputs: Sequence[Path] = ()) -> dict[str, Any]:
         ],
         "notices": [{"kind": notice.kind, "message": notice.message} for notice in done.notices],
     }
+
+
+def report_text(report: Mapping[str, Any]) -> str:
+    """A report as JSON with a line for each key and each target; NaN and infinity raise ValueError."""
+    lines = []
+    for key, value in report.items():
+        entries = [_one_line(entry) for entry in value] if isinstance(value, list) else []
+        text = "[\n  " + ",\n  ".join(entries) + "\n ]" if entries else _one_line(value)
+        lines.append(f" {_one_line(key)}: {text}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _one_line(value: Any) -> str:  # noqa: ANN401 - a JSON value
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def counts(done: Rewritten) -> dict[str, int]:
