@@ -293,6 +293,18 @@ def test_a_report_never_takes_the_place_of_a_file_that_belongs_to_the_program(ca
     assert Path("part.dat").read_text() == "DEFDAT part\nENDDAT\n"
 
 
+def test_a_directory_that_is_made_may_be_called_as_the_program_and_take_the_report():
+    Path("part.src").write_text("DEF part()\nPTP {A1 0,A2 10,A3 -20,A4 0,A5 30,A6 0}\nEND\n")
+    Path("part.dat").write_text("DEFDAT part\nENDDAT\n")
+    words = ["compensate", "arm.calib", "part.src", "--controller", "nominal", "--on-refusal", "keep-nominal"]
+    assert main([*words, "-o", "part/", "--report", "part/report.json"]) == 0
+    assert {path.name for path in Path("part").iterdir()} == {"part.src", "part.dat", "report.json"}
+
+
+def test_a_dry_run_writes_nothing_and_may_name_any_output():
+    assert run("--dry-run", "-o", "nowhere/out.mod") == 0
+
+
 def test_a_least_spacing_says_nothing_alone(capsys):
     assert run("--dry-run", "--least-spacing-mm", "5") == 2
     assert "Give --densify-mm as well" in capsys.readouterr().err

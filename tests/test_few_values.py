@@ -78,6 +78,13 @@ def test_a_few_values_are_told_with_the_way_out_and_in_the_report():
     assert "few_values" not in kinds
 
 
+@pytest.mark.parametrize("away", [[133.0], [171.3, 172.9, -160.2]])
+def test_a_grid_is_seen_beside_poses_that_are_far_off_it(away):
+    rng = np.random.default_rng(3)
+    degrees = np.append(10.0 * rng.integers(-6, 7, 200), away)
+    assert grid_steps(np.deg2rad(degrees)[:, None], ["revolute"])[1] == pytest.approx(10.0, abs=1e-3)
+
+
 def test_grids_of_long_rails_and_of_values_far_away_are_looked_for_in_wider_bins():
     rng = np.random.default_rng(0)
     rail = np.append(1.5 * rng.integers(0, 41, 400), 60.0)

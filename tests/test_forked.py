@@ -2,6 +2,11 @@
 
 import subprocess
 import sys
+from multiprocessing import get_all_start_methods
+
+import pytest
+
+pytestmark = pytest.mark.skipif("fork" not in get_all_start_methods(), reason="nothing is forked here")
 
 PROGRAM = """
 from concurrent.futures import ProcessPoolExecutor

@@ -39,7 +39,7 @@ class Fault(NamedTuple):
 
 
 def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
-    """`values` as a C-contiguous array, NaN where a mask hides them; `what` they are is for messages.
+    """`values` as a C-contiguous array, NaN where a masked array hides them; `what` they are is for messages.
 
     Raises:
         InputError: If these are no real numbers, or rows of different lengths.
@@ -51,7 +51,7 @@ def as_numbers(values: ArrayLike, *, what: str) -> NDArray[np.float64]:
         if isinstance(given, np.ma.MaskedArray):
             given = np.ma.filled(given.astype(np.float64), np.nan)
         return np.ascontiguousarray(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{what} are not real numbers: {error}") from None
 
 

@@ -381,7 +381,7 @@ class Calibration:
     def variation_std(
         self, q: ArrayLike, names: Sequence[str] | str, *, features: Features | None = None
     ) -> Floats:
-        """Standard deviation of how much parameters differ from their means over the readings, (n, c), SI.
+        """Standard deviation of how much parameters differ from their means over the readings, SI.
 
         How parameters vary is known better than their level, which frame and target may take over.
 

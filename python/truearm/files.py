@@ -45,8 +45,8 @@ def read_bytes(path: Path) -> bytes:
     """The content of a file or of a pipe.
 
     Raises:
-        InputError: If there is no such file, it is a directory or a device, which may have no end, or it
-            cannot or may not be read.
+        InputError: If there is no such file, it is a directory or a device (a terminal, too, or one without
+            an end), or it cannot or may not be read.
     """
     try:
         if path.is_char_device() or path.is_block_device():
@@ -197,10 +197,12 @@ def check_place(path: Path) -> None:
     """Check before long work that a file may come to a place.
 
     Raises:
-        InputError: If a directory is there, or there is no directory for it.
+        InputError: If a directory is there, or there is none for it.
     """
     if path.is_dir():
         raise InputError("this is a directory", where=str(path), rule="A file is to be written")
+    if path.parent.exists() and not path.parent.is_dir():
+        raise InputError("this is a file", where=str(path.parent), rule="A directory is needed")
     if not path.parent.exists():
         raise InputError("there is no such directory", where=str(path.parent))
 

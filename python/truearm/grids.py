@@ -97,7 +97,7 @@ def _step(readings: Floats, finest: float) -> float | None:
     least, most = (FEWEST_VALUES - 1) / (span + JITTER), 1.0 / finest + 1.0 / span
     tried = np.flatnonzero((likeness > ALIKE) & (per_unit >= least) & (per_unit <= most))
     peaks = [k for k in tried if likeness[k] >= max(likeness[k - 1], likeness[k + 1])]
-    fits = (_fitted(readings - low, 1.0 / float(per_unit[k])) for k in peaks)
+    fits = (_fitted(within - low, readings - low, 1.0 / float(per_unit[k])) for k in peaks)
     found = next((fit for fit in fits if fit[1] > ALIKE), None)
     if found is None:
         return None
@@ -107,11 +107,21 @@ def _step(readings: Floats, finest: float) -> float | None:
     return step if share >= SHARE and varied and likely < CHANCE else None
 
 
-def _fitted(places: Floats, step: float) -> tuple[float, float, NDArray[np.int64]]:
-    """The step that fits places (n,) best, what share stand on its grid, and how many on each value."""
-    turned = np.exp(2j * np.pi * places / step).mean()
-    numbers = np.rint(places / step - np.angle(turned) / (2.0 * np.pi))
-    basis = np.stack([np.ones_like(numbers), numbers], axis=1)
-    fitted = np.linalg.lstsq(basis, places)[0]
-    on = np.abs(places - basis @ fitted) <= JITTER
-    return float(fitted[1]), float(on.mean()), np.unique(numbers[on], return_counts=True)[1]
+def _fitted(within: Floats, places: Floats, step: float) -> tuple[float, float, NDArray[np.int64]]:
+    """The step that fits places `within` (m,) best, what share of all (n,) stand there, and how many on each.
+
+    Those that are off the grid pull at the first line through it; the second is through the others.
+    """
+    turned = np.exp(2j * np.pi * within / step).mean()
+    first, on = step * float(np.angle(turned)) / (2.0 * np.pi), np.ones(len(within), dtype=np.bool_)
+    for _ in range(2):
+        numbers = np.rint((within - first) / step)
+        basis = np.stack([np.ones_like(numbers), numbers], axis=1)
+        if np.ptp(numbers[on]) == 0.0:
+            return step, 0.0, np.empty(0, dtype=np.int64)
+        first, step = np.linalg.lstsq(basis[on], within[on])[0].tolist()
+        left = np.abs(within - first - step * numbers)
+        on = left <= max(2.0 * JITTER, float(np.median(left)))
+    numbers = np.rint((places - first) / step)
+    stands = np.abs(places - first - step * numbers) <= JITTER
+    return step, float(stands.mean()), np.unique(numbers[stands], return_counts=True)[1]

@@ -115,8 +115,8 @@ class CorrectionStream:
     def set_features(self, values: Mapping[str, float]) -> None:
         """Take present values of features, such as a temperature, from the next set-point on.
 
-        Features that are not among them stay as they are. NaN says that a value is not known: the last
-        correction is then held and ramped down, until all are known again.
+        Features that are not among them stay as they are. NaN or infinity says that a
+        value is not known: the last correction is then held and ramped down, until all are known again.
 
         Raises:
             UsageError: If the calibration depends on no such feature, or a value is no number. All features

@@ -60,7 +60,8 @@ impl<E: Worded> Failure for E {
     }
 }
 
-/// Work of at most some tens of milliseconds, or that needs no interrupt: on this thread, without the lock.
+/// Work of at most some tens of milliseconds, or that needs no interrupt: without the lock, and on this thread but for processes
+/// that were forked.
 pub fn quick<T, E, F>(py: Python<'_>, work: F) -> PyResult<T>
 where
     T: Send,
@@ -151,12 +152,11 @@ fn on_living_threads<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
 }
 
 /// The pool of a forked process; that of its own parent is left alone, for it has no threads to end.
+///
+/// It is made without the lock, which a process that is forked meanwhile would find locked for ever.
 fn pool_of(process: u32) -> PyResult<Arc<ThreadPool>> {
-    let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((owner, pool)) = forked.as_ref()
-        && *owner == process
-    {
-        return Ok(Arc::clone(pool));
+    if let Some(pool) = known_pool(process, &FORKED.lock().unwrap_or_else(PoisonError::into_inner)) {
+        return Ok(pool);
     }
     let made = ThreadPoolBuilder::new().build().map_err(|error| {
         CoreError::new_err(format!(
@@ -164,7 +164,16 @@ fn pool_of(process: u32) -> PyResult<Arc<ThreadPool>> {
              multiprocessing.get_context(\"spawn\")"
         ))
     })?;
+    let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(pool) = known_pool(process, &forked) {
+        return Ok(pool);
+    }
     let pool = Arc::new(made);
     std::mem::forget(forked.replace((process, Arc::clone(&pool))));
     Ok(pool)
+}
+
+/// The pool that is kept, if it is of this process.
+fn known_pool(process: u32, kept: &Option<(u32, Arc<ThreadPool>)>) -> Option<Arc<ThreadPool>> {
+    kept.as_ref().filter(|(owner, _)| *owner == process).map(|(_, pool)| Arc::clone(pool))
 }

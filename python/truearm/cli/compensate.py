@@ -134,17 +134,20 @@ def _check_outputs(
     """Raise UsageError where nothing is to be written, or what is read or written would be written over."""
     from truearm.programs.outputs import output_paths
 
-    if report is not None:
-        check_place(report)
-        refuse_own_input(report, *program, *others)
-    if output is not None:
-        if not (output.endswith("/") or Path(output).is_dir()):
-            check_place(Path(output))
-        refuse_own_input(Path(output), *others)
-        for path in output_paths(program, Path(output)):
-            refuse_same(path, report, option="--report")
     if output is None and not dry_run:
         raise UsageError("no output is named", way_out="Give -o OUT, or --dry-run to see what would change")
+    planned = None if dry_run else output
+    made = Path(planned) if planned is not None and planned.endswith("/") else None
+    if report is not None:
+        if report.parent != made:
+            check_place(report)
+        refuse_own_input(report, *program, *others)
+    if planned is not None:
+        if made is None and not Path(planned).is_dir():
+            check_place(Path(planned))
+        refuse_own_input(Path(planned), *others)
+        for path in output_paths(program, planned):
+            refuse_same(path, report, option="--report")
 
 
 def _suggest(asked: str, calibration: Path, *, dry_run: bool) -> None:

@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+from codecs import lookup
 from collections.abc import Iterable, Sequence
 from io import TextIOWrapper
 from textwrap import fill
@@ -23,7 +24,7 @@ WIDTH: Final = 80
 
 def say_all() -> None:
     """Let stdout print any text: characters that its encoding has not are escaped, as on stderr."""
-    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors in ("strict", "surrogateescape"):
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
@@ -64,7 +65,7 @@ def on_terminal() -> bool:
 
 def print_json(value: Any, *, on_one_line: bool = False) -> None:  # noqa: ANN401
     """Print a value as JSON on stdout; NaN and infinity are errors of the caller."""
-    escaped = sys.stdout.encoding != "utf-8"
+    escaped = lookup(sys.stdout.encoding or "utf-8").name != "utf-8"
     say(json.dumps(value, indent=None if on_one_line else 2, ensure_ascii=escaped, allow_nan=False))
 
 

@@ -7,18 +7,19 @@ from truearm.errors import UsageError
 from truearm.files import followed, write_all
 
 
-def output_paths(sources: Sequence[Path], output: Path) -> list[Path]:
+def output_paths(sources: Sequence[Path], output: str | Path) -> list[Path]:
     """The path of each file of a program: `output` for the first, the same with the others' endings for them.
 
-    An output that is a directory gets files of the same names.
+    An output that is a directory, or will be one, as a slash at its end says, gets files of the same names.
 
     Raises:
         UsageError: If a file would be written over the program itself.
     """
-    if output.is_dir():
-        paths = [output / source.name for source in sources]
+    place = Path(output)
+    if place.is_dir() or str(output).endswith("/"):
+        paths = [place / source.name for source in sources]
     else:
-        paths = [output, *(output.with_suffix(source.suffix) for source in sources[1:])]
+        paths = [place, *(place.with_suffix(source.suffix) for source in sources[1:])]
     for path, source in zip(paths, sources, strict=True):
         if followed(path) == followed(source):
             raise UsageError(

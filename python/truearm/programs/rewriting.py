@@ -226,7 +226,7 @@ class Rewritten:
         self.refuse_unchanged()
         if str(output).endswith("/"):
             make_directory(Path(output))
-        paths = output_paths([source.path for source in self.program.sources], Path(output))
+        paths = output_paths([source.path for source in self.program.sources], output)
         write_outputs(paths, self.contents)
         return paths
 
