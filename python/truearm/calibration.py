@@ -390,6 +390,9 @@ class Calibration:
             names: Names of the c parameters, such as "theta2", one by one or as one text with commas.
             features: Features by name.
 
+        Returns:
+            (n, c), or (c,) for readings (N,); rad and m.
+
         Raises:
             UsageError: If there is no such parameter.
             WorkError: If the rows were left out of the file, or the model does not tell.

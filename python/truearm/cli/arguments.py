@@ -71,6 +71,11 @@ Feature: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(metavar="NAME=VALUE", help="Value of a feature that the calibration needs; repeat."),
 ]
+LargestMm: TypeAlias = Annotated[float, typer.Option(help="Largest shift of the tool.")]
+LargestDeg: TypeAlias = Annotated[float, typer.Option(help="Largest turn of the tool.")]
+LargestStdMm: TypeAlias = Annotated[
+    float, typer.Option(help="Largest standard deviation of the tool's position.")
+]
 
 
 def features_of(stated: Sequence[str] | None) -> dict[str, float]:
@@ -91,13 +96,6 @@ def features_of(stated: Sequence[str] | None) -> dict[str, float]:
             raise UsageError(f'"{name}" has two values', where="--feature", rule="A feature has one")
         found[name] = number
     return found
-
-
-LargestMm: TypeAlias = Annotated[float, typer.Option(help="Largest shift of the tool.")]
-LargestDeg: TypeAlias = Annotated[float, typer.Option(help="Largest turn of the tool.")]
-LargestStdMm: TypeAlias = Annotated[
-    float, typer.Option(help="Largest standard deviation of the tool's position.")
-]
 
 
 def offer_choices(function: Callable[..., Any]) -> None:
