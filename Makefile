@@ -36,7 +36,7 @@ done
 endef
 PYTHON ?= $(shell $(FIND_PYTHON))
 
-.PHONY: help setup demo test trials check check-capi check-report bench docs site figures rust-test py-test clean
+.PHONY: help setup demo test trials check check-capi check-report bench docs site figures py-check rust-check rust-test py-test clean
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
@@ -72,11 +72,17 @@ py-test: $(STAMPS)/built
 trials: $(STAMPS)/built
 	TRUEARM_TRIALS=full $(BIN)/python -m pytest tests/test_cell_trials.py -s $(TRIALS)
 
+# Types take one core, what is in Rust more: side by side.
 check: $(STAMPS)/built
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target py-check rust-check
+
+py-check: $(STAMPS)/built
 	$(BIN)/ruff check $(PY_PATHS)
 	$(BIN)/ruff format --check $(PY_PATHS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+rust-check: $(STAMPS)/built
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(RUST_WHOLE) --all-targets -- $(CLIPPY)
 

@@ -92,6 +92,16 @@ def test_help_and_completion_import_neither_numpy_nor_the_core():
     assert done.returncode == 0, done.stderr
 
 
+def test_what_a_controller_loads_goes_without_scipy():
+    script = (
+        "import sys\nfrom truearm import Calibration, Compensator, evaluate\n"
+        "import truearm.cli.evaluate, truearm.cli.export, truearm.cli.serve\n"
+        "assert 'truearm._core' in sys.modules and 'scipy' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 def completed(line, folder):
     """What bash offers at the end of a line, as its completion would find it."""
     script = (

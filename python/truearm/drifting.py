@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import pdist
 
 from truearm._core import FieldFit, Setup, find_drift
 from truearm.defaults import NO_DRIFT
@@ -95,6 +94,8 @@ class Drift:
 
     def spans(self, data: Measurements) -> dict[str, float]:
         """How far apart each set-up that moved has been, at the most, m."""
+        from scipy.spatial.distance import pdist  # noqa: PLC0415 - seldom needed, and slow to import
+
         spans = {}
         for group in data.groups:
             own = self.moved[data.group == group]

@@ -1,15 +1,16 @@
 """Orientations made from Euler angles or rotation vectors that were taken for those of another kind."""
 
-import warnings
 from collections.abc import Iterator
 from itertools import product
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from truearm.rotations import quaternion_from_euler, quaternion_from_rotation_vector
+from truearm.rotations import euler_from_rotation, quaternion_from_euler, quaternion_from_rotation_vector
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 
@@ -33,6 +34,8 @@ def otherwise_read(quaternions: Floats) -> Iterator[tuple[list[str], str, Floats
         What they were taken for, k kinds, and what they are then: "XYZ" about moving axes, "xyz" about fixed
         ones, or "rotation vector"; and the quaternions (k, n, 4), w first.
     """
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - seldom needed, and slow to import
+
     rotation = Rotation.from_quat(quaternions[:, [1, 2, 3, 0]])
     read = [(taken, numbers) for taken in (*MOVING, VECTOR) for numbers in _numbers(rotation, taken)]
     for meant in (*FIXED, *MOVING):
@@ -72,7 +75,7 @@ def twin(order: str) -> str:
     return order[::-1].swapcase()
 
 
-def _numbers(rotation: Rotation, kind: str) -> tuple[Floats, Floats]:
+def _numbers(rotation: "Rotation", kind: str) -> tuple[Floats, Floats]:
     """Three numbers (n, 3), rad, that make the orientations, and three others."""
     if kind == VECTOR:
         vectors = rotation.as_rotvec()
@@ -81,10 +84,7 @@ def _numbers(rotation: Rotation, kind: str) -> tuple[Floats, Floats]:
         turned = angle > LEAST_TURN
         axes = np.where(turned, vectors, [1.0, 0.0, 0.0]) / np.where(turned, angle, 1.0)
         return vectors, (angle - TURN) * axes
-    with warnings.catch_warnings():
-        # Where the first and the third axis are parallel any of their angles will do.
-        warnings.simplefilter("ignore", UserWarning)
-        first, middle, last = rotation.as_euler(kind).T  # type: ignore[call-overload]  # `kind` is one of its names
+    first, middle, last = euler_from_rotation(rotation, kind).T
     other = -middle if kind[0] == kind[2] else np.pi - middle
     return (
         np.column_stack([first, middle, last]),

@@ -5,7 +5,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammainccinv
 
 from truearm.core_set import Selection
 from truearm.errors import Notice, count_of
@@ -105,6 +104,13 @@ def _marks(data: Measurements) -> list[bytes]:
     return [readings.tobytes() + own[:count].tobytes() for readings, own, count in rows]
 
 
+def overwhelming(freedom: NDArray[np.int64]) -> Floats:
+    """Sums (n,) that so many squares (n,), in units of their variances, surpass with OVERWHELMING odds."""
+    from scipy.special import gammainccinv  # noqa: PLC0415 - slow to import
+
+    return np.asarray(2.0 * gammainccinv(freedom / 2.0, OVERWHELMING))
+
+
 def sides(count: int, split: Split) -> NDArray[np.int64]:
     """For each of `count` rows on which side of the split it stands."""
     side = np.full(count, UNUSED, dtype=np.int64)
@@ -132,5 +138,4 @@ def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> Float
         variance[:, -3:] = orientation**2
     squares = (residual**2 / variance).sum(axis=1)
     freedom = np.maximum((residual != 0.0).sum(axis=1), 1)
-    limit = 2.0 * gammainccinv(freedom / 2.0, OVERWHELMING)
-    return np.asarray(squares / limit)
+    return np.asarray(squares / overwhelming(freedom))

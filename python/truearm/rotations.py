@@ -3,33 +3,41 @@
 Quaternions are w x y z and of unit length, matrices act on column vectors, all batches come first.
 """
 
-from typing import Final
+import warnings
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from truearm.errors import UsageError
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 UNIT_TOLERANCE: Final = 1e-3
 
 
 def matrix_from_quaternion(quaternion_wxyz: ArrayLike) -> NDArray[np.float64]:
-    """Rotation matrices (..., 3, 3) of quaternions (..., 4), w first."""
-    q = np.asarray(quaternion_wxyz, dtype=np.float64)
-    flat = q.reshape(-1, 4)[:, [1, 2, 3, 0]]
-    return Rotation.from_quat(flat).as_matrix().reshape(*q.shape[:-1], 3, 3)
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4), w first, of any length but zero."""
+    given = np.asarray(quaternion_wxyz, dtype=np.float64)
+    w, x, y, z = np.moveaxis(given / np.linalg.norm(given, axis=-1, keepdims=True), -1, 0)
+    rows = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
     """Quaternions (..., 4), w first and w >= 0, of rotation matrices (..., 3, 3)."""
     m = np.asarray(matrix, dtype=np.float64)
-    return _wxyz(Rotation.from_matrix(m.reshape(-1, 3, 3))).reshape(*m.shape[:-2], 4)
+    return _wxyz(_rotation().from_matrix(m.reshape(-1, 3, 3))).reshape(*m.shape[:-2], 4)
 
 
 def rotation_onto(direction: ArrayLike) -> NDArray[np.float64]:
     """A rotation matrix (3, 3) whose z axis is a unit vector (3,)."""
-    return np.asarray(Rotation.align_vectors(np.asarray(direction), [0.0, 0.0, 1.0])[0].as_matrix())
+    return np.asarray(_rotation().align_vectors(np.asarray(direction), [0.0, 0.0, 1.0])[0].as_matrix())
 
 
 def rigid_motion(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -55,7 +63,7 @@ def quaternion_from_euler(angles: ArrayLike, sequence: str) -> NDArray[np.float6
         UsageError: If the sequence is not three axes in one case, or repeats an axis next to itself.
     """
     check_euler_sequence(sequence)
-    return _wxyz(Rotation.from_euler(sequence, np.asarray(angles, dtype=np.float64)))
+    return _wxyz(_rotation().from_euler(sequence, np.asarray(angles, dtype=np.float64)))
 
 
 def check_euler_sequence(sequence: str) -> None:
@@ -70,9 +78,40 @@ def check_euler_sequence(sequence: str) -> None:
         )
 
 
+def matrix_from_euler(angles: ArrayLike, sequence: str) -> NDArray[np.float64]:
+    """Rotation matrices (..., 3, 3) of Euler angles (..., 3), as in quaternion_from_euler."""
+    given = np.asarray(angles, dtype=np.float64)
+    return np.asarray(_rotation().from_euler(sequence, given).as_matrix())
+
+
+def matrix_from_rotation_vector(vectors: ArrayLike) -> NDArray[np.float64]:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad."""
+    return np.asarray(_rotation().from_rotvec(np.asarray(vectors, dtype=np.float64)).as_matrix())
+
+
+def rotation_vector_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
+    """Rotation vectors (..., 3) in rad, at most half a turn long, of rotation matrices (..., 3, 3)."""
+    return np.asarray(_rotation().from_matrix(np.asarray(matrix, dtype=np.float64)).as_rotvec())
+
+
+def euler_from_matrix(matrices: NDArray[np.float64], sequence: str) -> NDArray[np.float64]:
+    """Euler angles (n, 3) in rad of rotation matrices (n, 3, 3), the middle one in its first half turn.
+
+    Where the first and the third axis are parallel, which leaves one of their angles open, the third is zero.
+    """
+    return euler_from_rotation(_rotation().from_matrix(matrices), sequence)
+
+
+def euler_from_rotation(rotation: "Rotation", sequence: str) -> NDArray[np.float64]:
+    """As euler_from_matrix, of SciPy's rotations."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # parallel axes
+        return np.asarray(rotation.as_euler(sequence))  # type: ignore[call-overload]  # a sequence by its letters
+
+
 def quaternion_from_rotation_vector(vectors: ArrayLike) -> NDArray[np.float64]:
     """Quaternions (n, 4), w first, of rotation vectors (n, 3) in rad."""
-    return _wxyz(Rotation.from_rotvec(np.asarray(vectors, dtype=np.float64)))
+    return _wxyz(_rotation().from_rotvec(np.asarray(vectors, dtype=np.float64)))
 
 
 def transform_from_parts(xyz: ArrayLike, quaternion_wxyz: ArrayLike) -> NDArray[np.float64]:
@@ -92,6 +131,13 @@ def rigid_inverse(transform: ArrayLike) -> NDArray[np.float64]:
     return inverse
 
 
-def _wxyz(rotation: Rotation) -> NDArray[np.float64]:
+def _rotation() -> "type[Rotation]":
+    """SciPy's rotations, which most commands do without."""
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import
+
+    return Rotation
+
+
+def _wxyz(rotation: "Rotation") -> NDArray[np.float64]:
     q = np.atleast_2d(rotation.as_quat())[:, [3, 0, 1, 2]]
     return np.where(q[:, :1] < 0.0, -q, q)

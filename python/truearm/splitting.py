@@ -8,8 +8,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from truearm import kinds
 from truearm.columns import VALIDATE
@@ -298,20 +296,31 @@ def _first_of_kin(data: Measurements) -> Rows:
         _, pair = np.unique(data.pair, return_inverse=True)
         alone = data.pair == ""
         links.append(np.where(alone, len(pair) + np.arange(count), pair))
-    kin = links[0]
-    for other in links[1:]:
-        kin = _components(kin, other)
+    kin = np.arange(count)
+    for labels in links:
+        kin = _components(kin, labels)
     _, first, index = np.unique(kin, return_index=True, return_inverse=True)
     return np.asarray(first[index.reshape(-1)], dtype=np.int64)
 
 
 def _components(a: Rows, b: Rows) -> Rows:
     """Labels (n,) of rows connected by equal labels in `a` (n,) or in `b` (n,)."""
+    if _all_differ(b):
+        return a
+    if _all_differ(a):
+        return b
+    from scipy.sparse import coo_array  # noqa: PLC0415 - seldom needed, and slow to import
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
     _, b = np.unique(b, return_inverse=True)
     nodes = int(a.max()) + 1 + int(b.max()) + 1
     edges = coo_array((np.ones(len(a)), (a, b + int(a.max()) + 1)), shape=(nodes, nodes))
     _, labels = connected_components(edges, directed=False)
     return np.asarray(labels[a], dtype=np.int64)
+
+
+def _all_differ(labels: Rows) -> bool:
+    return len(np.unique(labels)) == len(labels)
 
 
 def _together(held: Mask, rows: Rows, first_of: Rows) -> Mask:

@@ -5,12 +5,11 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from truearm.cell.cell_file import Cell
 from truearm.errors import WorkError
 from truearm.registration import register
-from truearm.rotations import rigid_inverse
+from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -96,7 +95,7 @@ def _check_against_guess(cell: Cell, found: Registration) -> None:
         return
     off = rigid_inverse(world.transform()) @ found.world_from_base
     shift_mm = MM_PER_METRE * float(np.linalg.norm(off[:3, 3]))
-    turn_deg = float(np.degrees(np.linalg.norm(Rotation.from_matrix(off[:3, :3]).as_rotvec())))
+    turn_deg = float(np.degrees(np.linalg.norm(rotation_vector_from_matrix(off[:3, :3]))))
     if shift_mm > UNLIKELY * world.uncertain_mm or turn_deg > UNLIKELY * world.uncertain_deg:
         raise WorkError(
             f"the frame is {shift_mm:.1f} mm and {turn_deg:.2f} deg from the cell file's: implausible",

@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from truearm.cell import ur_packets
 from truearm.cell.channels import Channel, ConnectionEndedError, open_tcp, tcp_address
@@ -29,6 +28,7 @@ from truearm.cell.protocols import Managed
 from truearm.cell.schema import Positive, Section, TcpPort
 from truearm.errors import InputError
 from truearm.robot import Robot
+from truearm.rotations import rotation_vector_from_matrix
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ class UniversalRobots(Managed):
 
     def move_pose(self, base_from_tool: Floats) -> None:
         """See Robot. The controller's own inverse kinematics and tool centre point are used."""
-        turn = Rotation.from_matrix(base_from_tool[:3, :3]).as_rotvec()
+        turn = rotation_vector_from_matrix(base_from_tool[:3, :3])
         numbers = [*base_from_tool[:3, 3], *turn]
         self._move(f"p[{','.join(f'{value:.6f}' for value in numbers)}]", None)
 

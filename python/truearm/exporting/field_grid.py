@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from truearm.calibration import Calibration
 from truearm.errors import UsageError, WorkError
@@ -17,6 +16,7 @@ from truearm.exporting.losses import LINK_ORDER, as_comments
 from truearm.exporting.parity import UNLIMITED, flange_poses
 from truearm.parameters import KINDS
 from truearm.robot import Robot
+from truearm.rotations import rotation_vector_from_matrix
 from truearm.summary import WAVE, describe_blocks, waves_in_words
 from truearm.units import MM_PER_METRE, to_si
 
@@ -240,7 +240,7 @@ def _ranges(calibration: Calibration) -> list[tuple[float, float]]:
 
 def _shifts(nominal: Floats, calibrated: Floats) -> Floats:
     """Translation in mm and rotation vector in mrad (n, 6), base frame."""
-    turns = Rotation.from_matrix(calibrated[:, :3, :3] @ nominal[:, :3, :3].transpose(0, 2, 1)).as_rotvec()
+    turns = rotation_vector_from_matrix(calibrated[:, :3, :3] @ nominal[:, :3, :3].transpose(0, 2, 1))
     return np.asarray(np.hstack([calibrated[:, :3, 3] - nominal[:, :3, 3], turns]) * MM_PER_METRE)
 
 

@@ -7,7 +7,6 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from truearm.dh_from_axes import Axis
 from truearm.errors import WorkError
@@ -15,7 +14,7 @@ from truearm.exporting.losses import is_directed
 from truearm.exporting.new_urdf import set_origin
 from truearm.joint_axes import axes_at_zero
 from truearm.robot_data import RobotData
-from truearm.rotations import rigid_inverse
+from truearm.rotations import matrix_from_euler, matrix_from_rotation_vector, rigid_inverse
 from truearm.urdf import MOVING
 from truearm.urdf_names import UrdfNames
 
@@ -102,7 +101,7 @@ def _onto(frame: Floats, direction: Floats, target: Axis) -> Floats:
     z, across = target.direction_in_base, np.cross(direction, target.direction_in_base)
     sine = float(np.linalg.norm(across))
     angle = math.atan2(sine, float(direction @ z))
-    turn = Rotation.from_rotvec(across * (angle / sine if sine > 0.0 else 0.0)).as_matrix()
+    turn = matrix_from_rotation_vector(across * (angle / sine if sine > 0.0 else 0.0))
     moved = np.eye(4)
     moved[:3, :3] = turn @ frame[:3, :3]
     between = frame[:3, 3] - target.point_in_base
@@ -141,7 +140,7 @@ def _product(joints: Sequence[ET.Element]) -> Floats:
 def _origin(joint: ET.Element) -> Floats:
     frame, element = np.eye(4), joint.find("origin")
     if element is not None:
-        frame[:3, :3] = Rotation.from_euler("xyz", _three(element.get("rpy", "0 0 0"))).as_matrix()
+        frame[:3, :3] = matrix_from_euler(_three(element.get("rpy", "0 0 0")), "xyz")
         frame[:3, 3] = _three(element.get("xyz", "0 0 0"))
     return frame
 

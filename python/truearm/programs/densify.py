@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
 
 from truearm.errors import Notice, count_of
 from truearm.inverse import Inverse
@@ -18,7 +17,7 @@ from truearm.programs.listing import listed_move
 from truearm.programs.program import LinearStep, Listed, Program, StepTexts
 from truearm.programs.tables import NOWHERE, Motion
 from truearm.robot import Robot
-from truearm.rotations import rigid_inverse
+from truearm.rotations import matrix_from_rotation_vector, rigid_inverse, rotation_vector_from_matrix
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -260,7 +259,9 @@ def _line(ends: Floats, least_m: float) -> Floats | None:
     along = np.linspace(0.0, 1.0, count + 1)
     poses = np.tile(np.eye(4), (count + 1, 1, 1))
     poses[:, :3, 3] = ends[0, :3, 3] + along[:, None] * (ends[1, :3, 3] - ends[0, :3, 3])
-    poses[:, :3, :3] = Slerp([0.0, 1.0], Rotation.from_matrix(ends[:, :3, :3]))(along).as_matrix()
+    first, last = ends[:, :3, :3]
+    turn = rotation_vector_from_matrix(first.T @ last)
+    poses[:, :3, :3] = first @ matrix_from_rotation_vector(along[:, None] * turn)
     return poses
 
 

@@ -11,12 +11,16 @@ from typing import Annotated, Any, Final, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
-from scipy.spatial.transform import Rotation
 
 from truearm.errors import InputError
 from truearm.files import as_path, parsed, read_text
 from truearm.programs.environment import Frame, Transform
-from truearm.rotations import UNIT_TOLERANCE, transform_from_parts
+from truearm.rotations import (
+    UNIT_TOLERANCE,
+    matrix_from_euler,
+    matrix_from_rotation_vector,
+    transform_from_parts,
+)
 
 Kind = Literal["tool", "object"]
 Written = TypeVar("Written", bound=Hashable)
@@ -58,9 +62,9 @@ class Placement(_Section):
         quaternion = self.quaternion_wxyz or (1.0, 0.0, 0.0, 0.0)
         transform = transform_from_parts(np.array(self.xyz) * unit_m, quaternion)
         if self.euler_zyx_deg is not None:
-            transform[:3, :3] = Rotation.from_euler("ZYX", self.euler_zyx_deg, degrees=True).as_matrix()
+            transform[:3, :3] = matrix_from_euler(np.deg2rad(self.euler_zyx_deg), "ZYX")
         if self.rotation_vector_rad is not None:
-            transform[:3, :3] = Rotation.from_rotvec(self.rotation_vector_rad).as_matrix()
+            transform[:3, :3] = matrix_from_rotation_vector(self.rotation_vector_rad)
         return transform
 
 

@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from truearm.programs.lexing import NUMBER, Reader, Token, tokens
 from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Number
+from truearm.rotations import matrix_from_euler
 
 Transform = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ class Structure:
             return None
         x, y, z, a, b, c = (self.numbers[name].value for name in POSE)
         frame = np.eye(4)
-        frame[:3, :3] = Rotation.from_euler("ZYX", [a, b, c], degrees=True).as_matrix()
+        frame[:3, :3] = matrix_from_euler(np.deg2rad([a, b, c]), "ZYX")
         frame[:3, 3] = np.array([x, y, z]) * 1e-3
         return frame
 

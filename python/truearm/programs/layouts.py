@@ -1,15 +1,20 @@
 """How the numbers of a target stand for joint readings or for a pose, and back."""
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from truearm.rotations import matrix_from_quaternion, quaternion_from_matrix
+from truearm.rotations import (
+    euler_from_matrix,
+    matrix_from_euler,
+    matrix_from_quaternion,
+    matrix_from_rotation_vector,
+    quaternion_from_matrix,
+    rotation_vector_from_matrix,
+)
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -147,8 +152,7 @@ class EulerPose:
     def to_poses(self, values: Floats) -> Floats:
         """As in PoseLayout."""
         angles = np.deg2rad(values[:, 3:6][:, self.columns])
-        matrices = Rotation.from_euler("ZYX", angles).as_matrix()
-        return _poses(values[:, :3] * 1e-3, matrices)
+        return _poses(values[:, :3] * 1e-3, matrix_from_euler(angles, "ZYX"))
 
     def from_poses(self, poses: Floats, near: Floats) -> Floats:
         """As in PoseLayout: of the two triples of angles and their full turns the one nearest to `near`."""
@@ -207,11 +211,11 @@ class RotationVectorPose:
 
     def to_poses(self, values: Floats) -> Floats:
         """As in PoseLayout."""
-        return _poses(values[:, :3], Rotation.from_rotvec(values[:, 3:6]).as_matrix())
+        return _poses(values[:, :3], matrix_from_rotation_vector(values[:, 3:6]))
 
     def from_poses(self, poses: Floats, near: Floats) -> Floats:
         """As in PoseLayout: the vector, lengthened by full turns, that is nearest to `near`."""
-        vectors = Rotation.from_matrix(poses[:, :3, :3]).as_rotvec()
+        vectors = rotation_vector_from_matrix(poses[:, :3, :3])
         lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
         axes = np.divide(vectors, lengths, out=_unit(near[:, 3:6]), where=lengths > 0.0)
         turns = np.round((np.sum(near[:, 3:6] * axes, axis=1, keepdims=True) - lengths) / FULL_TURN)
@@ -232,9 +236,7 @@ def _unit(vectors: Floats) -> Floats:
 
 def _nearest_angles(matrices: Floats, near: Floats) -> Floats:
     """Angles (n, 3) about z, y and x of rotation matrices (n, 3, 3), those nearest to `near`."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # gimbal lock: handled below
-        first = Rotation.from_matrix(matrices).as_euler("ZYX")
+    first = euler_from_matrix(matrices, "ZYX")
     second = np.stack([first[:, 0] + np.pi, np.pi - first[:, 1], first[:, 2] + np.pi], axis=1)
     locked = np.cos(first[:, 1]) < LOCKED
     first[locked] = _locked(first[locked], near[locked])

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from truearm.programs.environment import Transform
 from truearm.programs.folding import constant
@@ -22,6 +21,7 @@ from truearm.programs.rapid_values import (
 )
 from truearm.programs.source import Source
 from truearm.programs.tables import Number, TargetTable
+from truearm.rotations import matrix_from_euler
 
 OF_JOINTS, OF_POSES = 0, 1
 TARGET_KINDS: Final = {"robtarget": OF_POSES, "jointtarget": OF_JOINTS}
@@ -146,7 +146,7 @@ class RapidTargets:
         if function == "offs":
             return Meant(inner.targets, moved @ inner.before, inner.after, inner.problem)
         order = [angles.get(name, 0.0) for name in ("rx", "ry", "rz")]
-        moved[:3, :3] = Rotation.from_euler("XYZ", order, degrees=True).as_matrix()
+        moved[:3, :3] = matrix_from_euler(np.deg2rad(order), "XYZ")
         return Meant(inner.targets, inner.before, inner.after @ moved, inner.problem)
 
     def _why_not(self, given: Sequence[Argument]) -> str:

@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
-from scipy.special import gammainccinv
 
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import Use, select
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
-from truearm.fitted_rows import OVERWHELMING, known_rows
+from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
@@ -333,7 +332,7 @@ def _without_outliers(calibration: Calibration, all_rows: _Rows) -> tuple[_Rows,
     while len(out) <= MOST_OUTLIERS * len(whole.data):
         found = estimate(rows.scene, rows.scatter, rows.start, whole.unknowns.free)
         squares, freedom = surprise(found, whole.unknowns.std, whole.unknowns.free)
-        score = squares / (2.0 * gammainccinv(freedom / 2.0, OVERWHELMING))
+        score = squares / overwhelming(freedom)
         worst = int(np.argmax(score))
         if score[worst] <= 1.0:
             return rows, out

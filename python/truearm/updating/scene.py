@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
-from scipy.spatial.transform import Rotation
 
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
@@ -15,7 +14,7 @@ from truearm.core_set import Selection, core_set, rotations
 from truearm.fitting import FRAME_UNKNOWNS, Task, core_errors, fit_options
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
-from truearm.rotations import rigid_inverse
+from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
 from truearm.uncertainty import noises_of
 from truearm.updating.unknowns import OPEN, Unknowns, is_part_of
 
@@ -222,11 +221,11 @@ class Scene:
         parts = []
         if not self.task.arm.world_is_known:
             between = rigid_inverse(before.frames[number]) @ now.frames[k]
-            parts += [between[:3, 3], Rotation.from_matrix(between[:3, :3]).as_rotvec()]
+            parts += [between[:3, 3], rotation_vector_from_matrix(between[:3, :3])]
         parts.append((now.targets[k] - before.targets[number]).reshape(-1))
         if self._turns:
             turn = before.rotations[number].T @ now.rotations[k]
-            parts.append(Rotation.from_matrix(turn).as_rotvec())
+            parts.append(rotation_vector_from_matrix(turn))
         return np.concatenate(parts)
 
     def _known_setup_jacobian(self, state: State) -> Floats | None:
