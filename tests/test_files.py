@@ -129,6 +129,9 @@ def test_a_directory_is_made_with_those_above_it_and_no_file_is_one(tmp_path):
         ["compensate", "a.calib", "p.script", "-o", "out/", "--report"],
         ["plan", "ur10", "-o"],
         ["plan", "ur10", "--picture"],
+        ["import", "raw.csv", "-o"],
+        ["frame", "a.calib", "touches.csv", "--tool", "t", "-o"],
+        ["session", "export", "session.db", "-o"],
     ],
     ids=" ".join,
 )

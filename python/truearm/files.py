@@ -197,7 +197,7 @@ def check_place(path: Path) -> None:
     """Check before long work that a file may come to a place.
 
     Raises:
-        InputError: If a directory is there, or there is none for it.
+        InputError: If a directory is there, or there is none for it that takes files.
     """
     if path.is_dir():
         raise InputError("this is a directory", where=str(path), rule="A file is to be written")
@@ -205,6 +205,19 @@ def check_place(path: Path) -> None:
         raise InputError("this is a file", where=str(path.parent), rule="A directory is needed")
     if not path.parent.exists():
         raise InputError("there is no such directory", where=str(path.parent))
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError("no permission to write here", where=str(path.parent))
+
+
+def check_output(output: Path, *inputs: Path | str | None) -> None:
+    """Check before long work that a file may be written: as check_place, and as refuse_own_input.
+
+    Raises:
+        InputError: If it cannot come there.
+        UsageError: If it is one of the inputs.
+    """
+    check_place(output)
+    refuse_own_input(output, *inputs)
 
 
 def _beside(path: Path, data: bytes) -> Path:

@@ -54,10 +54,10 @@ def command(
 
     from truearm.cell.virtual.launch import VirtualCell
     from truearm.cli.until_interrupted import until_interrupted
-    from truearm.files import parsed, read_text, refuse_own_input, write_whole
+    from truearm.files import check_output, parsed, read_text, write_whole
 
     content = parsed(read_text(cell), where=str(cell))
-    refuse_own_input(target, cell, *_named_in(content, cell.parent))
+    check_output(target, cell, *_named_in(content, cell.parent))
     section = dict(content.get("simulate", {}))
     faults = {**section.get("faults", {}), **changes.pop("faults", {})}  # type: ignore[dict-item]
     content["simulate"] = {**section, **changes, **({"faults": faults} if faults else {})}

@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.errors import count_of, typed
-from truearm.files import check_place, refuse_own_input
+from truearm.files import check_output
 
 READ_AS_ROBOT: Final = ("dh-toml", "urdf")
 
@@ -66,8 +66,7 @@ def command(
     from truearm.calibration import Calibration
     from truearm.exporting import Options, export
 
-    check_place(output)
-    refuse_own_input(output, calibration, None if urdf is None else str(urdf))
+    check_output(output, calibration, None if urdf is None else str(urdf))
     options = Options(
         urdf=urdf,
         kinematics_hash=kinematics_hash,

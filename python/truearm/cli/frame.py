@@ -54,10 +54,12 @@ def command(
     """
     from truearm.calibration import Calibration
     from truearm.cli.frame_finding import print_frame, stated_orientation, touching_tool
+    from truearm.files import check_place
     from truearm.framing import find_object, find_tool, write_frame
     from truearm.measurements import Measurements
 
     kind, name = _asked(tool, work_object)
+    check_place(output)
     known = Calibration.load(calibration)
     data = Measurements.read_touches(
         touches, length_unit=length_unit, angle_unit=angle_unit, joints=known.robot.joints

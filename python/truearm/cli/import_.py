@@ -8,7 +8,7 @@ from truearm.cli import import_options as option
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, say_wrapped, suggest
 from truearm.errors import UsageError, count_of, typed
-from truearm.files import refuse_own_input, write_whole
+from truearm.files import check_output, write_whole
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def command(
 
     stated = (with_names, with_delimiter, with_decimal, with_skip_lines, with_sheet, with_encoding)
     other = _other(second or [], asked=any(mark is not None for mark in stated))
-    refuse_own_input(output, raw, other)
+    check_output(output, raw, other)
     marks = Marks(
         _delimiter(delimiter, "--delimiter"),
         decimal,

@@ -14,7 +14,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import THERE_AND_BACK
 from truearm.errors import Notice, UsageError, count_of, list_names, list_rows, typed
-from truearm.files import check_place, refuse_own_input, refuse_same
+from truearm.files import check_output, refuse_same
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
@@ -145,12 +145,10 @@ def _check_counts(asked: Mapping[str, int | None]) -> None:
 
 def _check_outputs(output: Path, picture: Path | None, *inputs: Path | str | None) -> None:
     """Raise UsageError where what is read would be written over, or a picture has no known format."""
-    check_place(output)
-    refuse_own_input(output, *inputs)
+    check_output(output, *inputs)
     if picture is None:
         return
-    check_place(picture)
-    refuse_own_input(picture, *inputs)
+    check_output(picture, *inputs)
     refuse_same(output, picture, option="--picture")
     if picture.suffix.lower() not in PICTURES:
         rule = f"Its name ends in {list_names(PICTURES, 'or')}"

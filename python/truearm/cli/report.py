@@ -11,7 +11,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
 from truearm.errors import UsageError, count_of, typed
-from truearm.files import check_place, write_whole
+from truearm.files import check_output, write_whole
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -70,7 +70,7 @@ def command(
     target = _beside(calibration) if output is None else output
     if target.suffix.lower() not in (PAGE, PRINT):
         raise UsageError(f"{target}", where="-o", rule=f"A report is a page ({PAGE}) or a PDF ({PRINT})")
-    check_place(target)
+    check_output(target, calibration, *(measurements or []))
     if target.suffix.lower() == PRINT:
         browser()
     known, files = Calibration.load(calibration), measurements or []

@@ -32,13 +32,13 @@ def command(
     from truearm.cell.session import Session
     from truearm.cli.naming import name_of
     from truearm.errors import WorkError
-    from truearm.files import refuse_own_input, write_whole
+    from truearm.files import check_output, write_whole
     from truearm.robot import Robot
 
     target = output or DEFAULT
     if output is None and target.exists():
         raise UsageError(f"{target} is there already", way_out=f"To write over it name it: -o {target}")
-    refuse_own_input(target, session)
+    check_output(target, session)
     with Session(session, writing=False) as known:
         table, arm = accepted_table(known), Robot.from_dict(known.meta("arm"))
         moved, unchecked = moved_poses(known, table), unchecked_poses(known)

@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, suggest
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import serve_commands
 from truearm.cli.progress import told_stages
-from truearm.files import check_place, refuse_own_input
+from truearm.files import check_output
 
 
 def command(
@@ -27,8 +27,7 @@ def command(
     """
     from truearm.calibration import Calibration
 
-    check_place(output)
-    refuse_own_input(output, calibration)
+    check_output(output, calibration)
     known = Calibration.load(calibration)
     with ends_promptly(), told_stages()("bounding the standard deviation"):
         known.save(output, with_rows=False)
