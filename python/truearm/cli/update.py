@@ -179,7 +179,7 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
 def _verdict(found: "Update") -> str:
     """What was found, in a sentence or two."""
     from truearm.reporting.numbers import listed
-    from truearm.updating.untested import untested_joints, way_out_of_keeping
+    from truearm.update_words import untested_joints, way_out_of_keeping
 
     untested = untested_joints(found.to_dict())
     if found.verdict == "holds":
@@ -200,8 +200,7 @@ def _verdict(found: "Update") -> str:
 
 def _print(found: "Update") -> None:
     from truearm.reporting.numbers import listed, probability
-    from truearm.updating.moved import follows_words
-    from truearm.updating.untested import untested_words
+    from truearm.update_words import follows_words, untested_words
 
     say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {_verdict(found)}")
     print_table(

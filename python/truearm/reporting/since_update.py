@@ -8,8 +8,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
-from truearm.updating.moved import follows_words
-from truearm.updating.untested import untested_joints, untested_words
+from truearm.update_words import follows_words, untested_joints, untested_words
 from truearm.validation import Validation
 
 VERDICTS: Final = {

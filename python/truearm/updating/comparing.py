@@ -16,6 +16,7 @@ from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
 from truearm.turning_sense import check_turns
+from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
@@ -24,7 +25,6 @@ from truearm.updating.scene import Scene, State
 from truearm.updating.some_poses import some_poses
 from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
 from truearm.updating.unknowns import Unknowns
-from truearm.updating.untested import way_out_of_keeping
 from truearm.updating.updated import updated
 from truearm.updating.validating import errors_at_left_out, left_out_errors
 from truearm.validation import Errors

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import WorkError
+from truearm.update_words import way_out_of_keeping
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Linear, Scene, State
-from truearm.updating.untested import way_out_of_keeping
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -67,14 +67,6 @@ class Offset:
         return asdict(self)
 
 
-def follows_words(joint: int, followed: int) -> str:
-    """That one motor explains the changes of two coupled joints, counted from 1, in a sentence."""
-    return (
-        f"Joint {joint} is coupled to joint {followed}, and its change is what that of joint {followed} "
-        f"makes of its reading: one motor was re-mastered or slipped, that of joint {followed}."
-    )
-
-
 @dataclass(frozen=True)
 class Motion:
     """How far a frame or a tool moved.

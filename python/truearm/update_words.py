@@ -1,4 +1,4 @@
-"""The joints that an update did not test for a change, and what would have to be known, in sentences."""
+"""What an update found out about joints, and what it could not test, in sentences."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -8,6 +8,14 @@ OPTIONS: Final = {
     "tool": ("--keep-tool", "the target sits where it sat"),
 }
 """Of what a joint may be confounded with: the option that keeps it, and when that is right."""
+
+
+def follows_words(joint: int, followed: int) -> str:
+    """That one motor explains the changes of two coupled joints, counted from 1, in a sentence."""
+    return (
+        f"Joint {joint} is coupled to joint {followed}, and its change is what that of joint {followed} "
+        f"makes of its reading: one motor was re-mastered or slipped, that of joint {followed}."
+    )
 
 
 def untested_joints(told: Mapping[str, Any]) -> str:
