@@ -186,6 +186,8 @@ def test_what_does_not_fit_the_arm_is_refused():
         two_links(joint_errors=(JointError(7),))
     with pytest.raises(InputError, match="3 compliances"):
         two_links(deflection=Deflection((1.0, 1.0, 1.0)))
+    with pytest.raises(InputError, match=r"noise_mm is -0.1\. Zero or more"):
+        two_links(noise_mm=-0.1)
     with pytest.raises(InputError, match="payload"):
         two_links().true_position([0, 0], conditions=Conditions(payload_kg=1.0))
     with pytest.raises(InputError, match="temperature"):

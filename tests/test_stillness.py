@@ -1,5 +1,7 @@
 """Joints that stood still in all measured poses are told, wherever the calibration is used."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -101,3 +103,20 @@ def test_proposed_poses_keep_a_joint_where_it_stood(locked):
     proposed = propose_acceptance(locked, options)
     assert proposed.poses.readings[:, 5] == pytest.approx(0.25)
     assert np.ptp(proposed.poses.readings[:, 0]) > 0.1
+
+
+def test_a_plan_says_which_joints_it_keeps(locked, tmp_path, capsys):
+    locked.save(tmp_path / "arm.calib")
+    words = [
+        "plan",
+        "--acceptance",
+        "4",
+        "--from",
+        str(tmp_path / "arm.calib"),
+        "-o",
+        str(tmp_path / "p.csv"),
+    ]
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["kept"] == {"6": pytest.approx(np.degrees(0.25))}
+    assert main(words) == 0
+    assert "Kept: joint 6 at 14.32 deg" in " ".join(capsys.readouterr().out.split())

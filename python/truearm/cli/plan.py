@@ -18,7 +18,6 @@ from truearm.files import check_output, refuse_same
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
-    from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import Plan
     from truearm.cell.proposed import Proposed
@@ -188,6 +187,7 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
     from truearm.cell.proposed import (
         ProposalOptions,
         check_same_arm,
+        kept_still,
         propose_acceptance,
         propose_next,
     )
@@ -211,11 +211,13 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
         with told_stages()("choosing poses"):
             proposed = choose(calibration, options, cell=cell)
         _save(proposed, output, picture)
+    kept = kept_still(calibration)
     if as_json:
-        print_json({"poses": str(output), "order": asked.order, **proposed.to_dict()})
+        by_joint = {str(joint): at for joint, at in kept.items()}
+        print_json({"poses": str(output), "order": asked.order, **proposed.to_dict(), "kept": by_joint})
         return
     _print_proposed(proposed, output, calibration.robot.joints)
-    _print_still(calibration)
+    _print_still(kept, calibration.robot.joints)
     _print_features(calibration.options.features)
     if asked.acceptance is not None:
         suggest(f"truearm update {typed(asked.calibration)} {NEW_FILE}", when=MEASURED)
@@ -266,14 +268,12 @@ def _print_proposed(proposed: "Proposed", output: Path, joints: "tuple[str, ...]
     print_table(("offset of joint in deg (mm), tool in mm (worst direction)", ""), rows)
 
 
-def _print_still(calibration: "Calibration") -> None:
-    from truearm.cell.proposed import kept_still
+def _print_still(kept: Mapping[int, float], joints: Sequence[str]) -> None:
     from truearm.stillness import still_words
 
-    still = kept_still(calibration)
-    if still:
+    if kept:
         say_wrapped(
-            f"Kept: {still_words(still, calibration.robot.joints)}, as in all measurements. For poses in "
+            f"Kept: {still_words(kept, joints)}, as in all measurements. For poses in "
             "which every joint moves: truearm plan ROBOT -n N"
         )
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ConfigDict
 
+from truearm.errors import InputError
+
 Point = tuple[float, float, float]
 
 STANDARD_GRAVITY: Final = 9.80665
@@ -148,6 +150,12 @@ class Imperfections:
     joint_errors: tuple[JointError, ...] = ()
     deflection: Deflection | None = None
     thermal: Thermal | None = None
+
+    def check_sizes(self) -> None:
+        """Raise InputError where a standard deviation or a share is below zero or no number."""
+        for name in ("share", "noise_mm", "noise_mrad", "repeatability_mm", "repeatability_deg"):
+            if not 0.0 <= (size := getattr(self, name)) < float("inf"):
+                raise InputError(f"{name} is {size:g}", where="imperfections", rule="Zero or more")
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,12 +84,14 @@ class VirtualArm:
                 of all links by default.
 
         Raises:
-            InputError: If a name is not a parameter of this robot, or a joint or link is not of it.
+            InputError: If a name is not a parameter of this robot, a joint or link is not of it, or a
+                standard deviation is below zero.
         """
         self.robot = required(robot, Robot, "the robot")
         self.seed = seed
         given = Imperfections() if imperfections is None else imperfections
         self.imperfections = required(given, Imperfections, "the imperfections")
+        self.imperfections.check_sizes()
         check_joints(robot, self.imperfections.joint_errors, self.imperfections.deflection)
         rng = np.random.default_rng([seed, 0])
         self.names = tuple(default_parameters(robot) if parameters is None else parameters)
