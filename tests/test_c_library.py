@@ -101,9 +101,14 @@ class Library:
 @pytest.fixture(scope="module")
 def library(root):
     found = [*root.glob("target/*/libtruearm.so"), *root.glob("target/*/deps/libtruearm.so")]
-    if not found:
-        pytest.skip("the C library is not built: cargo build -p truearm-capi")
-    return max(found, key=lambda path: path.stat().st_mtime)
+    newest = max(found, key=modified, default=None)
+    if newest is None or modified(newest) < max(map(modified, root.glob("crates/*/src/**/*.rs"))):
+        pytest.skip("the C library is not built from these sources: cargo build --release -p truearm-capi")
+    return newest
+
+
+def modified(path):
+    return path.stat().st_mtime
 
 
 @pytest.fixture(scope="module")
