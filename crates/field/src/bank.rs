@@ -62,7 +62,7 @@ impl Bank {
         }
         let sag = sag.map(|block| {
             let payloads = block.grid.inputs.iter().skip(levers.joint_count()).map(|&input| (input, 1.0));
-            Sag { levers: levers.carrying(payloads), outputs: block.outputs, weights: block.weights }
+            Sag::restored(levers.carrying(payloads), block.outputs, block.weights)
         });
         let bank = Self { input_count, parameter_count, blocks, sag };
         bank.check()?;

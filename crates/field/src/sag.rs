@@ -5,12 +5,15 @@
 //! known apart: the block has one number for each pair of joints, rad for each metre of lever. Levers are those of the
 //! nominal arm, and up is the z axis of the base unless another direction is given.
 //!
+//! The centre of gravity of what hangs on the flange need not lie where a link ends: each joint has three numbers more, for
+//! the levers of a typical link's length along the flange's axes.
+//!
 //! A payload is a weight that an input tells: it multiplies levers, which have weights of their own for it. That these follow
-//! all links, not the last alone, lets its centre of gravity lie anywhere on the line from one's end to the next one's.
+//! all links, not the last alone, lets the links bend.
 
 use truearm_kinematics::{
-    Chain, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose, SharedParameters,
-    dispatch, lever_count,
+    BESIDE, Chain, Isa, Kernel, KinematicsError, Lane, LaneParameters, LeverScratch, OnePose,
+    SharedParameters, dispatch, lever_count,
 };
 
 use crate::bank::Block;
@@ -29,6 +32,8 @@ pub struct Levers {
     /// The arm in a base frame whose z axis is up.
     chain: Chain,
     nominal: SharedParameters,
+    /// How far beside the end levers are taken, m.
+    beside_m: f64,
     up: [f64; 3],
     payloads: Vec<Payload>,
 }
@@ -71,13 +76,21 @@ pub struct Loads {
     levers: Levers,
     /// Parameter that each joint's loads drive, (J,).
     pub outputs: Vec<usize>,
-    /// Of each of the arm's levers its weight and those of the same joint behind it, (L,).
+    /// Of each of the arm's levers its weight and those of the same joint's links behind it, (L,); of those beside the end
+    /// their weights for each metre.
     heights: Vec<f64>,
     /// The same of each payload, with its input.
     payloads: Vec<(usize, Vec<f64>)>,
 }
 
 impl Sag {
+    /// From stored values; those of files that know nothing beside the end have no weights there.
+    pub(crate) fn restored(levers: Levers, outputs: Vec<usize>, weights: Vec<f64>) -> Self {
+        let outputs = levers.with_beside(outputs, |output| output);
+        let weights = levers.with_beside(weights, |_| 0.0);
+        Self { levers, outputs, weights }
+    }
+
     /// How it is stored: as a block over all joints and payloads without cells.
     pub fn stored(&self) -> Block {
         let payloads = self.levers.payloads.iter().map(|payload| payload.input);
@@ -96,7 +109,15 @@ impl Levers {
     /// Of an arm as it was meant to be, standing upright.
     pub fn new(chain: &Chain) -> Self {
         let nominal = SharedParameters::new(&chain.nominal());
-        Self { nominal, arm: chain.clone(), chain: chain.clone(), up: UPRIGHT, payloads: Vec::new() }
+        let beside_m = typical_length(chain);
+        Self {
+            nominal,
+            arm: chain.clone(),
+            chain: chain.clone(),
+            beside_m,
+            up: UPRIGHT,
+            payloads: Vec::new(),
+        }
     }
 
     /// The same with payloads: inputs, and of each how much is expected to bend the arm as a link does.
@@ -138,7 +159,8 @@ impl Levers {
         self.payloads.iter().map(|payload| payload.input + 1).fold(self.joint_count(), usize::max)
     }
 
-    /// Number of levers, L: for each joint those of all links from its own on; once for the arm, once for each payload.
+    /// Number of levers, L: for each joint those of all links from its own on, and those beside the end; once for the arm,
+    /// once for each payload.
     pub fn len(&self) -> usize {
         lever_count(self.joint_count()) * (1 + self.payloads.len())
     }
@@ -151,14 +173,38 @@ impl Levers {
     /// Joint of each lever, (L,).
     pub fn joints(&self) -> impl Iterator<Item = usize> {
         let count = self.joint_count();
-        let own = move |_| (0..count).flat_map(move |j| std::iter::repeat_n(j, count - j));
+        let own = move |_| (0..count).flat_map(move |j| std::iter::repeat_n(j, count - j + BESIDE));
         (0..=self.payloads.len()).flat_map(own)
     }
 
-    /// The first of the arm's levers about each joint, and how many there are.
+    /// The first of the arm's levers about each joint, and how many links it carries.
     fn first_levers(&self) -> impl Iterator<Item = (usize, usize)> {
         let joints = self.joint_count();
         (0..joints).map(move |j| (lever_count(joints) - lever_count(joints - j), joints - j))
+    }
+
+    /// The levers beside the end among the arm's, (L,): for each joint the last ones.
+    fn beside(&self) -> impl Iterator<Item = usize> {
+        self.first_levers().flat_map(|(first, links)| first + links..first + links + BESIDE)
+    }
+
+    /// Values of levers, (L,), where `values` may lack those beside the end: `beside` makes them from a joint's last one.
+    fn with_beside<T: Copy>(&self, values: Vec<T>, beside: impl Fn(T) -> T) -> Vec<T> {
+        let joints = self.joint_count();
+        let own = lever_count(joints) - BESIDE * joints;
+        if values.len() != own * (1 + self.payloads.len()) {
+            return values;
+        }
+        let mut all = Vec::with_capacity(self.len());
+        for mut left in values.chunks_exact(own) {
+            for links in (1..=joints).rev() {
+                let (of_joint, others) = left.split_at(links);
+                all.extend_from_slice(of_joint);
+                all.extend([beside(of_joint[links - 1]); BESIDE]);
+                left = others;
+            }
+        }
+        all
     }
 
     /// Levers of one configuration, (L,), given its inputs, (I,): those for a payload times that.
@@ -169,6 +215,9 @@ impl Levers {
         }
         let mut out = vec![Lane::ZERO; lever_count(self.joint_count())];
         dispatch(At { levers: self, scratch: &mut scratch, out: &mut out });
+        for lever in self.beside() {
+            out[lever] = out[lever] * self.beside_m;
+        }
         let shares = self.payloads.iter().map(|payload| values[payload.input] / payload.unit);
         let share = |share: f64| out.iter().map(move |lane| share * lane.0[0]);
         std::iter::once(1.0).chain(shares).flat_map(share).collect()
@@ -186,6 +235,12 @@ impl Levers {
             one: OnePose::new(&self.nominal),
         }
     }
+}
+
+/// Mean length of the links of an arm, m.
+fn typical_length(chain: &Chain) -> f64 {
+    let lengths = chain.links().iter().map(|link| link.a.hypot(link.d));
+    lengths.sum::<f64>() / chain.joint_count().max(1) as f64
 }
 
 struct At<'a> {
@@ -212,7 +267,7 @@ pub fn alike(joints: usize, a: &[f64], b: &[f64], out: &mut [f64]) {
     for (a, b) in a.chunks_exact(own).zip(b.chunks_exact(own)) {
         let mut pairs = a.iter().zip(b);
         for (j, sum) in out.iter_mut().enumerate().take(joints) {
-            *sum += pairs.by_ref().take(joints - j).map(|(x, y)| x * y).sum::<f64>();
+            *sum += pairs.by_ref().take(joints - j + BESIDE).map(|(x, y)| x * y).sum::<f64>();
         }
     }
 }
@@ -224,11 +279,12 @@ impl Loads {
         let (arm, carried) = sag.weights.split_at(own);
         let heights = |weights: &[f64]| {
             let mut heights = weights.to_vec();
-            for (first, count) in sag.levers.first_levers() {
-                for k in (first..first + count - 1).rev() {
+            for (first, links) in sag.levers.first_levers() {
+                for k in (first..first + links - 1).rev() {
                     heights[k] += heights[k + 1];
                 }
             }
+            sag.levers.beside().for_each(|lever| heights[lever] *= sag.levers.beside_m);
             heights
         };
         let payloads = sag.levers.payloads.iter().zip(carried.chunks_exact(own));

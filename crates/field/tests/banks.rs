@@ -351,3 +351,27 @@ fn a_sag_that_no_fit_makes_is_refused() {
     elsewhere[1] = 5;
     assert!(matches!(restored(&[0, 1, 2, 3, 4, 5], &elsewhere), Err(FieldError::Block { .. })));
 }
+
+#[test]
+fn a_sag_that_knows_nothing_beside_the_end_has_no_weights_there() {
+    let arm = six_axes(Truth::RIGID);
+    let (levers, parameters) = (Levers::new(&arm.chain), arm.chain.parameter_count());
+    let restored = |outputs: Vec<usize>, weights: Vec<f64>| {
+        let grid = Grid { inputs: vec![0, 1, 2, 3, 4, 5, 7], axes: Vec::new() };
+        let block = Block { name: "sag".to_owned(), grid, outputs, weights, reading: None };
+        Bank::restored(8, parameters, vec![block], levers.clone()).unwrap().sag.unwrap()
+    };
+    let (mut outputs, mut weights, mut links_alone) = (Vec::new(), Vec::new(), (Vec::new(), Vec::new()));
+    for joint in (0..6).cycle().take(12) {
+        for link in joint..6 {
+            let weight = 1e-4 * f64::from(u8::try_from(10 * joint + link).unwrap());
+            outputs.push(5 * joint);
+            weights.push(weight);
+            links_alone.0.push(5 * joint);
+            links_alone.1.push(weight);
+        }
+        outputs.extend([5 * joint; 3]);
+        weights.extend([0.0; 3]);
+    }
+    assert_eq!(restored(links_alone.0, links_alone.1), restored(outputs, weights));
+}

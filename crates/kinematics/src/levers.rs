@@ -7,9 +7,13 @@ use crate::lane::Lane;
 use crate::parameters::LaneParameters;
 use crate::sweep::Axes;
 
-/// Number of levers of so many joints: one for each joint with itself and with each one behind it.
+/// Directions from the end in which a load's centre of gravity may lie beside it.
+pub const BESIDE: usize = 3;
+
+/// Number of levers of so many joints: one for each joint with itself and with each one behind it, and [`BESIDE`] more for
+/// each joint.
 pub const fn lever_count(joints: usize) -> usize {
-    joints * (joints + 1) / 2
+    joints * (joints + 1) / 2 + BESIDE * joints
 }
 
 /// What levers are worked out in.
@@ -19,13 +23,19 @@ pub struct LeverScratch {
     frames: Vec<[[Lane; 3]; 2]>,
     /// Way from each joint's origin to the next one's or to the end, along x and y.
     ways: Vec<[Lane; 2]>,
+    /// The x, y and z axis of the end, along x and y.
+    beside: [[Lane; 2]; BESIDE],
 }
 
 impl LeverScratch {
     /// Room for a chain.
     pub fn new(chain: &Chain) -> Self {
         let joints = chain.joint_count();
-        Self { frames: vec![[[Lane::ZERO; 3]; 2]; joints], ways: vec![[Lane::ZERO; 2]; joints] }
+        Self {
+            frames: vec![[[Lane::ZERO; 3]; 2]; joints],
+            ways: vec![[Lane::ZERO; 2]; joints],
+            beside: [[Lane::ZERO; 2]; BESIDE],
+        }
     }
 }
 
@@ -35,7 +45,8 @@ impl Chain {
     ///
     /// `out` holds [`lever_count`] lanes: for each joint j and each k from j on the derivative, by joint j, of the
     /// height (z in the base frame, m) at which the link that joint k moves ends; m/rad, for a prismatic joint m/m.
-    /// A weight there loads joint j with so much of itself.
+    /// A weight there loads joint j with so much of itself. Behind those of joint j come the derivatives of what a metre
+    /// along the end's x, y and z axis adds to the height: what the weight does that hangs so far beside the end.
     #[inline(always)]
     pub fn levers<I: Isa>(
         &self,
@@ -53,13 +64,17 @@ impl Chain {
                 out[at] = lift::<I>(self.slides(j), &scratch.frames[j][0], &arm, 1.0);
                 at += 1;
             }
+            for way in &scratch.beside {
+                out[at] = lift::<I>(self.slides(j), &scratch.frames[j][0], way, 0.0);
+                at += 1;
+            }
         }
     }
 
     /// Sums of the levers of each joint, each times its weight, into `out`, J lanes; else as for [`Chain::levers`].
     ///
-    /// `heights` are sums of weights, in the order of levers: for each joint j and each k from j on the weights of joint
-    /// j's levers from k on.
+    /// `heights` are in the order of levers: for each joint j and each k from j on the sum of the weights of joint j's
+    /// levers from k on, and behind them those of the levers beside the end.
     #[inline(always)]
     pub fn loads<I: Isa>(
         &self,
@@ -88,9 +103,9 @@ impl Chain {
         self.find_ways::<I, SLIDES>(joints, parameters, scratch);
         let mut heights = heights;
         for (j, out) in out.iter_mut().enumerate().take(self.joint_count()) {
-            let (own, rest) = heights.split_at(scratch.ways.len() - j);
+            let (own, rest) = heights.split_at(scratch.ways.len() - j + BESIDE);
             let mut arm = [Lane::ZERO; 2];
-            for (way, weight) in scratch.ways[j..].iter().zip(own) {
+            for (way, weight) in scratch.ways[j..].iter().chain(&scratch.beside).zip(own) {
                 arm[0] = I::mul_add(way[0], Lane::splat(*weight), arm[0]);
                 arm[1] = I::mul_add(way[1], Lane::splat(*weight), arm[1]);
             }
@@ -107,12 +122,16 @@ impl Chain {
         parameters: LaneParameters<'_>,
         scratch: &mut LeverScratch,
     ) {
-        let LeverScratch { frames, ways } = scratch;
+        let LeverScratch { frames, ways, beside } = scratch;
         let mut seen = Frames::<SLIDES> { columns: self.joint_columns(), link: 0, next: 0, frames };
         let end = self.walk::<I, _>(joints, parameters, &mut seen);
         for (j, way) in ways.iter_mut().enumerate() {
             let (tip, point) = (frames.get(j + 1).map_or(&end.position, |frame| &frame[1]), &frames[j][1]);
             *way = [tip[0] - point[0], tip[1] - point[1]];
+        }
+        for (k, way) in beside.iter_mut().enumerate() {
+            let axis = end.axis(k);
+            *way = [axis[0], axis[1]];
         }
     }
 }

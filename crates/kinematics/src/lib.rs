@@ -37,7 +37,7 @@ pub use exponential::exp;
 pub use frame::LaneFrame;
 pub use isa::{InstructionSet, Isa, Kernel, dispatch, dispatch_on};
 pub use lane::{LANES, Lane, Pick, Short};
-pub use levers::{LeverScratch, lever_count};
+pub use levers::{BESIDE, LeverScratch, lever_count};
 pub use one_pose::OnePose;
 pub use parameters::{LaneParameters, Parameters, SharedParameters, is_length};
 pub use rows::{lane_room, load_lanes, store_lanes};

@@ -5,8 +5,8 @@ mod common;
 
 use common::{mixed, reference, six_axis, spread};
 use truearm_kinematics::{
-    Chain, Convention, InstructionSet, Isa, Joint, Kernel, Lane, LaneFrame, LaneParameters, LeverScratch,
-    Link, OnePose, Screw, SharedParameters, Transform, dispatch_on, lever_count,
+    BESIDE, Chain, Convention, InstructionSet, Isa, Joint, Kernel, Lane, LaneFrame, LaneParameters,
+    LeverScratch, Link, OnePose, Screw, SharedParameters, Transform, dispatch_on, lever_count,
 };
 
 const STEP: f64 = 1e-5;
@@ -57,6 +57,16 @@ fn levers_are_derivatives_of_heights() {
                 assert!((found[at].0[3] - wanted).abs() < 1e-9, "joint {j}, link {k}");
                 at += 1;
             }
+            for axis in 0..BESIDE {
+                let added = |by: f64| {
+                    let mut q = q.clone();
+                    q[j] += by;
+                    reference(&chain, &q, &chain.nominal()).rotation[6 + axis]
+                };
+                let wanted = (added(STEP) - added(-STEP)) / (2.0 * STEP);
+                assert!((found[at].0[3] - wanted).abs() < 1e-9, "joint {j}, axis {axis}");
+                at += 1;
+            }
         }
     }
 }
@@ -86,9 +96,11 @@ fn loads_are_weighted_sums_of_levers() {
         for set in InstructionSet::ALL {
             let levers = dispatch_on(set, Levers(&chain, &lanes));
             let (mut heights, mut wanted, mut at) = (Vec::new(), Vec::new(), 0);
-            for own in (1..=count).rev() {
+            for links in (1..=count).rev() {
+                let own = links + BESIDE;
                 let weights = &weights[at..at + own];
-                heights.extend((0..own).map(|k| weights[k..].iter().sum::<f64>()));
+                heights.extend((0..links).map(|k| weights[k..links].iter().sum::<f64>()));
+                heights.extend(&weights[links..]);
                 wanted.push(weights.iter().zip(&levers[at..]).map(|(w, g)| w * g.0[2]).sum::<f64>());
                 at += own;
             }

@@ -12,6 +12,7 @@ use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
 use crate::training::Training;
+use truearm_kinematics::lever_count;
 
 /// Every derivative against central differences of fourth order. The step is long because an undetermined set-up
 /// direction (a SCARA's height) leaves the value seven digits.
@@ -95,7 +96,7 @@ fn gradient_and_value_with_a_payload() {
 fn levers_of_a_payload_are_those_of_the_arm_in_proportion_to_the_largest() {
     let training = loaded(6);
     let own = training.levers_of(0).len() / 2;
-    assert_eq!(own, 21);
+    assert_eq!(own, lever_count(6));
     for pose in 0..6 {
         let (arm, payload) = training.levers_of(pose).split_at(own);
         let share = [0.0, 0.5, 1.0][pose % 3];
