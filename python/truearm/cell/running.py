@@ -9,12 +9,11 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from typing import Final
 
 from truearm.cell.measuring import Process
+from truearm.interrupts import LOOKS_EVERY_S, Asked, asked_by
 
-LOOKS_EVERY_S: Final = 0.05
 ENDS_WITHIN_S: Final = 1.6
 INTERRUPTED: Final = 130
 
@@ -36,11 +35,11 @@ def run(process: Process) -> str:
             failure.append(error)
 
     worker = threading.Thread(target=work, daemon=True)
-    with _interrupts() as interrupted:
+    with asked_by(_signals(), Asked()) as asked:
         worker.start()
-        while worker.is_alive() and not interrupted.is_set():
+        while worker.is_alive() and not asked:
             worker.join(LOOKS_EVERY_S)
-        if interrupted.is_set():
+        if asked:
             _end(process, worker)
             raise KeyboardInterrupt
     if failure:
@@ -60,21 +59,6 @@ def _end(process: Process, worker: threading.Thread) -> None:
             sys.stderr.write("Interrupted.\n")
             sys.stderr.flush()
         os._exit(INTERRUPTED)
-
-
-@contextlib.contextmanager
-def _interrupts() -> Iterator[threading.Event]:
-    """An event that Ctrl-C, a request to end and the end of the terminal set, in the main thread."""
-    event = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield event
-        return
-    before = {number: signal.signal(number, lambda _number, _frame: event.set()) for number in _signals()}
-    try:
-        yield event
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _signals() -> list[signal.Signals]:

@@ -1,7 +1,6 @@
 """`truearm cell simulate`: the devices of a cell file as virtual ones that speak the real protocols."""
 
 import sys
-import threading
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -70,7 +69,7 @@ def command(
             measure = f"truearm measure {typed(target)} poses.csv -o session.db"
             suggest(measure, when="Try next, in another terminal:")
         sys.stdout.flush()
-        until_interrupted(threading.Event())
+        until_interrupted()
     tell("The virtual cell has ended.")
 
 

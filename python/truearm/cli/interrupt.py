@@ -4,13 +4,14 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
 from typing import Final, NoReturn
 
 from truearm.cli.console import INTERRUPTED, tell
 from truearm.cli.display import put_away
+from truearm.interrupts import LOOKS_EVERY_S, Asked, asked_by
 
 GRACE_S: Final = 0.6
 
@@ -20,28 +21,24 @@ def ends_promptly(kept: Callable[[], str] | None = None) -> Iterator[None]:
     """Around long work: Ctrl-C raises KeyboardInterrupt, and ends the process if that takes too long.
 
     Files are written whole or not at all, so that ending at any moment leaves no half-written one. What
-    `kept` says is told then: what is there already, and how to go on.
+    `kept` says is told then: what is there already, and how to go on. Further ones meanwhile change nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    ended = threading.Event()
-
-    def interrupted(_number: int, _frame: FrameType | None) -> None:
-        threading.Thread(target=_end_unless, args=(ended, kept), daemon=True).start()
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, interrupted)
+    asked = Asked(raises=True)
+    watch = _Watch(asked, kept)
+    threading.Thread(target=watch.run, daemon=True).start()
     try:
-        yield
+        with asked_by((signal.SIGINT,), asked):
+            yield
     except KeyboardInterrupt:
-        ended.set()
+        watch.ended = True
         if kept is not None:
             _tell(kept)
         raise
     finally:
-        ended.set()
-        signal.signal(signal.SIGINT, before)
+        watch.ended = True
 
 
 def end_at_once() -> NoReturn:
@@ -59,8 +56,23 @@ def _tell(kept: Callable[[], str] | None) -> None:
         tell(kept())
 
 
-def _end_unless(ended: threading.Event, kept: Callable[[], str] | None) -> None:
-    if not ended.wait(GRACE_S):
-        _tell(kept)
-        tell("Interrupted.")
-        os._exit(INTERRUPTED)
+class _Watch:
+    """Ends the process where work goes on for long after it was asked to end.
+
+    Attributes:
+        ended: Whether the work is over. An attribute rather than an Event, whose lock a signal may come into.
+    """
+
+    def __init__(self, asked: Asked, kept: Callable[[], str] | None) -> None:
+        self._asked, self._kept = asked, kept
+        self.ended = False
+
+    def run(self) -> None:
+        """Look until the work is over; in a thread of its own, begun before the work."""
+        while not self.ended:
+            since = self._asked.since
+            if since is not None and time.monotonic() - since > GRACE_S:
+                _tell(self._kept)
+                tell("Interrupted.")
+                os._exit(INTERRUPTED)
+            time.sleep(LOOKS_EVERY_S)

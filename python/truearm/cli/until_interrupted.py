@@ -1,17 +1,13 @@
 """Waiting for Ctrl-C, or for a request to end, as the end of a service and no error."""
 
 import signal
-import threading
+import time
+
+from truearm.interrupts import LOOKS_EVERY_S, Asked, asked_by
 
 
-def until_interrupted(ended: threading.Event) -> None:
-    """Wait until Ctrl-C, a request to end, or `ended`."""
-    before = {
-        number: signal.signal(number, lambda _number, _frame: ended.set())
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        ended.wait()
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def until_interrupted() -> None:
+    """Wait until Ctrl-C, or a request to end."""
+    with asked_by((signal.SIGINT, signal.SIGTERM), Asked()) as asked:
+        while not asked:
+            time.sleep(LOOKS_EVERY_S)
