@@ -2,7 +2,7 @@
 
 import json
 import sqlite3
-from contextlib import closing, contextmanager
+from contextlib import closing
 from itertools import islice
 from unittest.mock import Mock
 
@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import truearm as ta
+from tests.recorded import CELL, COUNT, Recorded
 from truearm.cell import Cell
 from truearm.cell.accepted import accepted_table, measurements_of
 from truearm.cell.checks import unsure_steps
@@ -22,58 +23,6 @@ from truearm.cell.session import Session
 from truearm.cell.summary import summary_of
 from truearm.cli import main
 from truearm.errors import InputError, WorkError
-from truearm.simulation import VirtualArm
-
-COUNT = 20
-CELL = """
-name = "recorded"
-arm = "ur10e"
-robot = { driver = "playback" }
-sensor = { driver = "playback", file = "FILE" }
-[process]
-contacts = 1
-stretch = 0
-registration_mm = 300
-"""
-
-
-class KilledError(Exception):
-    """What ends a process in the middle."""
-
-
-class Recorded:
-    """A recording of an arm, and one of the same with the instrument 20 mm elsewhere."""
-
-    def __init__(self, folder):
-        self.folder, self.session = folder, folder / "session.db"
-        arm = VirtualArm(ta.Robot.load("ur10e"), seed=1)
-        self.poses = Poses(arm.poses(COUNT), np.zeros(COUNT, dtype=np.int64), ("",) * COUNT)
-        table = arm.measure_table(self.poses.readings)
-        table.to_csv(folder / "there.csv", index=False)
-        table.assign(x=table["x"] + 0.02).to_csv(folder / "moved.csv", index=False)
-
-    def measure(self, recording="there", *, until="", text=CELL):
-        """Measure until something is told, or to the end; what was told, and how it ended."""
-        told: list[str] = []
-
-        def tell(progress):
-            told.append(progress.text)
-            if until and progress.text.startswith(until):
-                raise KilledError
-
-        cell = Cell.from_toml(text.replace("FILE", str(self.folder / f"{recording}.csv")))
-        with open_session(self.session, cell, self.poses) as session:
-            end = Process(cell, session, tell).run()
-        return told, end
-
-    def killed(self, recording="there", **options):
-        with pytest.raises(KilledError):
-            self.measure(recording, **options)
-
-    @contextmanager
-    def read(self):
-        with Session(self.session, writing=False) as session:
-            yield session
 
 
 @pytest.fixture
@@ -124,12 +73,6 @@ def test_steps_that_are_left_keep_their_readings_and_remarks(recorded):
             assert session.rows("SELECT step FROM events WHERE message = 'remark'") == [(step.step + 1,)]
 
 
-def without(recorded, poses):
-    """A recording that lacks some poses."""
-    table = pd.read_csv(recorded.folder / "there.csv")
-    table.drop(index=poses).to_csv(recorded.folder / "without.csv", index=False)
-
-
 def contacts(recorded):
     with recorded.read() as session:
         return [step.pose for step in session.steps("registration")]
@@ -137,7 +80,7 @@ def contacts(recorded):
 
 def test_a_check_that_cannot_be_measured_does_not_let_a_session_go_on(recorded):
     recorded.killed(until="pose 8 stored")
-    without(recorded, contacts(recorded))
+    recorded.without(contacts(recorded))
     with pytest.raises(WorkError, match="the first contact could not be measured again"):
         recorded.measure("without")
     assert recorded.measure()[1] == DONE
@@ -146,7 +89,7 @@ def test_a_check_that_cannot_be_measured_does_not_let_a_session_go_on(recorded):
 def test_another_contact_is_checked_where_the_first_cannot_be_measured_again(recorded):
     recorded.killed(until="pose 8 stored")
     first, second, *_ = contacts(recorded)
-    without(recorded, [first])
+    recorded.without([first])
     told, end = recorded.measure("without")
     assert end == DONE
     assert told[0].startswith(f"check {first + 1} skipped")

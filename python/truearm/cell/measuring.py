@@ -24,6 +24,7 @@ from truearm.cell.device_errors import (
     RefusedError,
     StoppedError,
 )
+from truearm.cell.in_a_row import Far, Unseen
 from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Expected, Reading, checked_reading
@@ -85,6 +86,7 @@ class Process:
         self._prediction = Prediction(cell)
         self._halted, self._ended = threading.Event(), threading.Event()
         self._crew = Crew(cell, session.add_event, self._halted)
+        self._unseen, self._far = Unseen(session), Far()
         self._recoveries = self._given_up = 0
         self._total = session.rows("SELECT count(*) FROM steps")[0][0]
         self._poses = session.rows("SELECT count(*) FROM steps WHERE kind = 'pose'")[0][0]
@@ -100,7 +102,8 @@ class Process:
 
         Raises:
             StoppedError: If `halt` was called.
-            WorkError: If the frame is implausible, the cell drifts, or a device fails for good.
+            WorkError: If the frame is implausible, the cell drifts, the target is lost, or a device fails for
+                good.
         """
         self._resume()
         end = self._end()
@@ -144,11 +147,14 @@ class Process:
                 if step.kind == "pose" and not self._prediction.is_registered:
                     self._register()
                 measured = self._do(step)
+                # Steps behind a new check count on from it.
                 if step.kind == "check" and self._checks_elsewhere(step):
-                    # Steps behind it count on from the new one.
                     break
                 if step.kind == "pose" and measured and self._after_pose():
                     return ACCURATE
+                if self._far.asks_for_check() and self._session.check_next():
+                    self._total += 1
+                    break
             else:
                 return DONE
 
@@ -178,13 +184,32 @@ class Process:
                     return False
                 placed = False
                 continue
-            self._recoveries = self._given_up = 0
+            self._works(reading)
             readings.append(_stored(len(readings) + 1, reading))
             verdict = judge(readings, point, rules)
             self._keep(step, reading, joints, point, verdict, len(readings))
             placed = reading.valid and not verdict.suspicious
         self._tell(step, verdict)
-        return verdict.decision == "accept"
+        return self._counted(step, verdict, readings)
+
+    def _works(self, reading: Reading) -> None:
+        """Devices work where there is a reading, and the target is seen where it is valid."""
+        self._recoveries = self._given_up = 0
+        if reading.valid:
+            self._unseen.seen()
+
+    def _counted(self, step: Step, verdict: Verdict, readings: list[Stored]) -> bool:
+        """Count a step that is done with among those before it; whether it is measured.
+
+        Raises:
+            WorkError: If the target was not seen at too many in a row.
+        """
+        if not any(reading.valid for reading in readings):
+            self._unseen.given_up(step)
+        measured = verdict.decision == "accept"
+        if step.kind == "pose" and measured:
+            self._far.accepted(far=verdict.suspicious)
+        return measured
 
     def _known_of(self, step: Step) -> list[Stored]:
         """Readings that a former process left."""

@@ -235,6 +235,16 @@ class Session:
             (time.time(), step, kind, message),
         )
 
+    def take_back(self, step: int, kind: str, message: str) -> None:
+        """Take outcomes and readings of a step, and of those behind, out of the file; an event at it says why.
+
+        The session goes on at this step.
+        """
+        with self.together():
+            for table in ("outcomes", "readings"):
+                self._write(f"DELETE FROM {table} WHERE step >= ?", (step,))  # noqa: S608 - one of two names
+            self.add_event(kind, message, step)
+
     def registration(self) -> tuple[Floats, float] | None:
         """world_from_base (4, 4) and its residual in mm; None before it is found."""
         row = self._db.execute("SELECT world_from_base, residual_mm FROM registration").fetchone()

@@ -1,0 +1,88 @@
+"""What is counted in a row: poses at which the target is not seen, and poses far from their prediction."""
+
+from typing import Final
+
+from truearm.cell.session import Session, Step
+from truearm.errors import WorkError
+
+UNSEEN_IN_A_ROW: Final = 5
+FAR_IN_A_ROW: Final = 3
+UNSEEN: Final = "unseen"
+"""Kind of the event at the first of the poses that were taken back."""
+TAKEN_BACK_BEFORE: Final = "SELECT 1 FROM events WHERE kind = ? AND step BETWEEN ? AND ? LIMIT 1"
+LAST_REASON: Final = (
+    "SELECT reason FROM readings WHERE step <= ? AND reason != '' ORDER BY step DESC, attempt DESC LIMIT 1"
+)
+NOUNS: Final = {"registration": "contacts for the frame", "pose": "poses"}
+WAYS_OUT: Final = {
+    "registration": "See to the target and the line of sight, and to [target] and [world] in the cell file. "
+    "Then the same command measures these contacts again",
+    "pose": "See to the target and the line of sight. Then the same command measures these poses again, and "
+    "skips those that it does not see then either",
+}
+
+
+class Unseen:
+    """Poses in a row that were given up without any valid reading.
+
+    One of them may be hidden; many say that the target is lost, and would use up all that are left. Checks,
+    and poses that a device refuses, are no part of such a row and do not end it.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._kind = ""
+        self._steps: list[int] = []
+
+    def seen(self) -> None:
+        """A reading was valid."""
+        self._steps.clear()
+
+    def given_up(self, step: Step) -> None:
+        """A step was given up without any valid reading.
+
+        Where it is the fifth in a row, their outcomes and readings are taken out of the session, which goes
+        on at the first of them. Poses of which one was taken back before stay skipped, and counting begins
+        anew.
+
+        Raises:
+            WorkError: If they were taken out.
+        """
+        if step.kind not in NOUNS:
+            return
+        if step.kind != self._kind:
+            self._kind, self._steps = step.kind, []
+        self._steps.append(step.step)
+        if len(self._steps) < UNSEEN_IN_A_ROW:
+            return
+        first, self._steps = self._steps[0], []
+        taken_back = self._session.rows(TAKEN_BACK_BEFORE, (UNSEEN, first, step.step))
+        if taken_back and step.kind == "pose":
+            return
+        reasons = self._session.rows(LAST_REASON, (step.step,))
+        said = f"; the last: {reasons[0][0]}" if reasons else ""
+        what = f"{UNSEEN_IN_A_ROW} {NOUNS[step.kind]} in a row had no valid reading{said}"
+        self._session.take_back(first, UNSEEN, what)
+        raise WorkError(what, where=step.kind, way_out=WAYS_OUT[step.kind])
+
+
+class Far:
+    """Poses in a row that were accepted though they are far from where they were predicted.
+
+    An arm that is worse than expected does that, and so does one that was moved: a check tells them apart.
+    """
+
+    def __init__(self) -> None:
+        self._count, self._is_known = 0, False
+
+    def accepted(self, *, far: bool) -> None:
+        """A pose was accepted, far from its prediction or near it."""
+        self._count = self._count + 1 if far else 0
+        self._is_known = self._is_known and far
+
+    def asks_for_check(self) -> bool:
+        """Whether the first contact is to be checked now; once until a pose is near its prediction again."""
+        if self._is_known or self._count < FAR_IN_A_ROW:
+            return False
+        self._is_known = True
+        return True

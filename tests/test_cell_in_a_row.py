@@ -1,0 +1,159 @@
+"""Poses in a row: a target that is lost uses up none, and what is far from its prediction is looked into."""
+
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+
+from tests.recorded import COUNT, Recorded
+from truearm.cell.checks import unsure_steps
+from truearm.cell.in_a_row import UNSEEN, UNSEEN_IN_A_ROW, Far
+from truearm.cell.measuring import DONE
+from truearm.cell.playback import PlaybackSensor
+from truearm.cell.reading import Reading
+from truearm.cell.summary import summary_of
+from truearm.errors import WorkError
+
+A_METRE = np.array([1.0, 0.0, 0.0])
+LOST = "5 poses in a row had no valid reading; the last: the beam is broken"
+
+
+class Seen(Recorded):
+    """A recording of which nothing is seen at some poses, and some are elsewhere, once pose 8 is measured.
+
+    Attributes:
+        unseen: Poses, from 0, at which nothing is seen.
+        elsewhere: Poses, from 0, that are a metre from where they were recorded.
+        at_once: Whether that is so from the beginning.
+    """
+
+    def __init__(self, folder, monkeypatch):
+        super().__init__(folder)
+        self.unseen, self.elsewhere, self.at_once = set(), set(), False
+        measure = PlaybackSensor.measure
+
+        def measured(sensor):
+            reading, pose = measure(sensor), int(sensor._rows[0])
+            if self.at_once or self.begun():
+                if pose in self.unseen:
+                    return Reading(None, 1e-5, time.time(), False, "-", "the beam is broken")
+                if pose in self.elsewhere:
+                    return dataclasses.replace(reading, point_in_world=reading.point_in_world + A_METRE)
+            return reading
+
+        monkeypatch.setattr(PlaybackSensor, "measure", measured)
+
+    def begun(self):
+        with self.read() as session:
+            return session.measured_poses() >= 8
+
+    def summary(self):
+        with self.read() as session:
+            return summary_of(session)
+
+    def skipped(self):
+        return [each["pose"] - 1 for each in self.summary()["skipped"]]
+
+    def first_contact(self):
+        with self.read() as session:
+            return session.steps("registration")[0].pose
+
+
+@pytest.fixture
+def seen(tmp_path, monkeypatch):
+    return Seen(tmp_path, monkeypatch)
+
+
+def test_a_target_that_is_lost_uses_up_no_poses(seen):
+    seen.unseen = set(range(COUNT))
+    with pytest.raises(WorkError, match=f"{LOST}.*measures these poses again, and skips"):
+        seen.measure()
+    with seen.read() as session:
+        assert session.measured_poses() == 8
+        step = session.next_step()
+        assert step is not None
+        assert (step.kind, step.pose) == ("pose", 8)
+        assert session.readings_of(step.step) == []
+        assert session.rows("SELECT step FROM events WHERE kind = ?", (UNSEEN,)) == [(step.step,)]
+    # It is still lost, which the check tells before any pose is tried.
+    with pytest.raises(WorkError, match="the first contact could not be measured again"):
+        seen.measure()
+    seen.unseen = set()
+    assert seen.measure()[1] == DONE
+    assert seen.summary()["measured"] == COUNT
+    assert seen.skipped() == []
+
+
+def test_poses_that_are_not_seen_then_either_are_skipped(seen):
+    seen.unseen = set(range(8, 20))
+    for _ in range(2):
+        with pytest.raises(WorkError, match=LOST):
+            seen.measure()
+    assert seen.skipped() == list(range(8, 13))
+    assert seen.first_contact() < 8
+    assert seen.measure()[1] == DONE
+    assert seen.skipped() == list(range(8, 20))
+
+
+def test_a_few_that_are_hidden_are_skipped_at_once(seen):
+    seen.unseen = {*range(8, 12), *range(13, 17)}
+    assert seen.measure()[1] == DONE
+    assert seen.skipped() == sorted(seen.unseen)
+
+
+def test_what_a_device_refuses_in_between_is_no_end_of_the_row_and_is_tried_again(seen):
+    seen.unseen = set(range(8, 20))
+    seen.without([10, 11])
+    with pytest.raises(WorkError, match=LOST):
+        seen.measure("without")
+    assert seen.summary()["open"] == COUNT - 8
+    seen.unseen = set()
+    assert seen.measure()[1] == DONE
+    assert seen.summary()["measured"] == COUNT
+
+
+def test_contacts_for_the_frame_are_never_skipped_so(seen):
+    seen.at_once, seen.unseen = True, set(range(COUNT))
+    for _ in range(3):
+        with pytest.raises(WorkError, match="5 contacts for the frame in a row had no valid reading"):
+            seen.measure()
+        with seen.read() as session:
+            assert session.rows("SELECT count(*) FROM outcomes") == [(0,)]
+    seen.unseen = set()
+    assert seen.measure()[1] == DONE
+    assert seen.summary()["measured"] == COUNT
+
+
+def test_an_instrument_that_moves_is_noticed_after_three_poses(seen):
+    seen.elsewhere = set(range(COUNT))
+    with pytest.raises(WorkError, match=r"the first contact is now 1000\.00 mm from where it was"):
+        seen.measure()
+    with seen.read() as session:
+        assert session.measured_poses() == 11
+        (steps,) = unsure_steps(session)
+        poses = {step.step: step.pose for step in session.steps("pose")}
+    assert [poses[step] for step in steps if step in poses][-3:] == [8, 9, 10]
+    seen.elsewhere = set()
+    assert seen.measure()[1] == DONE
+
+
+def test_an_arm_that_is_worse_than_expected_is_checked_once_each_time(seen):
+    seen.elsewhere = {*range(8, 13), *range(15, 20)}
+    told, end = seen.measure()
+    assert end == DONE
+    assert seen.first_contact() < 8
+    kinds = [text.split()[0] for text in told if " stored" in text]
+    assert kinds[8:] == [
+        *["pose"] * 11, "check", *["pose"] * 7, "check", *["pose"] * 2, "check"
+    ]  # fmt: skip
+    assert seen.summary()["checks"] == {"measured": 3, "skipped": 0}
+
+
+def test_a_check_is_asked_for_once_until_a_pose_is_near_its_prediction():
+    far, asked = Far(), []
+    for each in "fff ff nff fffn fff".replace(" ", ""):
+        far.accepted(far=each == "f")
+        asked.append(far.asks_for_check())
+    assert [k for k, each in enumerate(asked) if each] == [2, 8, 14]
+    assert UNSEEN_IN_A_ROW == 5
