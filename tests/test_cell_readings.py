@@ -56,6 +56,18 @@ def test_a_point_that_is_not_finite_is_a_reading_that_failed():
     assert "not finite" in checked.reason
 
 
+@pytest.mark.parametrize("sigma_m", [0.0, None, -1.0, np.nan, np.inf, "none", 10**400])
+def test_where_nothing_was_measured_its_standard_deviation_does_not_matter(sigma_m, tmp_path):
+    failed = changed(point_in_world=None, valid=False, reason="no target", sigma_m=sigma_m)
+    checked = checked_reading(failed)
+    assert (checked.valid, checked.reason, checked.sigma_m) == (False, "no target", 0.0)
+    assert checked_reading(dataclasses.replace(failed, sigma_m=1e-5)).sigma_m == 1e-5
+    with Session.create(tmp_path / "s.db", [Step(0, "pose", 0, "", 0, np.zeros(6))], {}) as session:
+        session.add_reading(0, 1, checked, np.zeros(6), np.zeros(3))
+    with pytest.raises(DeviceError, match="sigma_m is "):
+        checked_reading(changed(sigma_m=sigma_m))
+
+
 @pytest.mark.parametrize(
     ("reading", "message"),
     [

@@ -46,7 +46,7 @@ class Reading:
 
     Attributes:
         point_in_world: The point (3,), m; None where nothing was measured.
-        sigma_m: Standard deviation of each coordinate.
+        sigma_m: Standard deviation of each coordinate, m: above 0. It does not matter where `valid` is False.
         time_s: When, in seconds since the epoch.
         valid: Whether the instrument vouches for it.
         raw: What the device said, as it came.
@@ -75,7 +75,8 @@ def is_column(name: str) -> bool:
 def checked_reading(reading: object) -> Reading:
     """What a driver gave as a reading, with Python's own numbers and arrays of float64.
 
-    Numbers of numpy and lists are taken as well. A point that is not finite is not valid.
+    Numbers of numpy and lists are taken as well. A point that is not finite is not valid. Of a reading that is
+    not valid, sigma_m becomes 0 where it is no number above 0.
 
     Raises:
         MalformedReadingError: If it is no reading, or a part of it is not what Reading says.
@@ -97,9 +98,7 @@ def checked_reading(reading: object) -> Reading:
     time_s = _number(reading.time_s, "time_s")
     if not math.isfinite(time_s):
         raise _wrong(f"time_s is {time_s:g}", "It is in seconds since the epoch")
-    sigma_m = _number(reading.sigma_m, "sigma_m")
-    if not 0.0 < sigma_m < math.inf:
-        raise _wrong(f"sigma_m is {sigma_m:g}", "It is above 0, in m")
+    sigma_m = _sigma_m(reading.sigma_m, valid=valid)
     pose, celsius, features = reading.pose_in_world, reading.temperature_c, reading.features
     pose = None if pose is None or not valid else _pose(pose)
     celsius = None if celsius is None else _number(celsius, "temperature_c")
@@ -135,10 +134,23 @@ def _array(value: Any, shape: tuple[int, ...], what: str) -> Floats:  # noqa: AN
     return found
 
 
+def _sigma_m(value: Any, *, valid: bool) -> float:  # noqa: ANN401 - whatever a driver gave
+    """A standard deviation; 0 where nothing was measured and it is none."""
+    try:
+        sigma_m = _number(value, "sigma_m")
+        if not 0.0 < sigma_m < math.inf:
+            raise _wrong(f"sigma_m is {sigma_m:g}", "It is above 0, in m")
+    except MalformedReadingError:
+        if valid:
+            raise
+        return 0.0
+    return sigma_m
+
+
 def _number(value: Any, what: str) -> float:  # noqa: ANN401 - whatever a driver gave
     try:
         number = None if isinstance(value, str | bytes) else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = None
     if number is None:
         raise _wrong(f"{what} is {_shown(value)}", "It is a number")

@@ -236,7 +236,7 @@ class Session:
         )
 
     def take_back(self, step: int, kind: str, message: str) -> None:
-        """Take outcomes and readings of a step, and of those behind, out of the file; an event at it says why.
+        """Take outcomes and readings of a step, and of those behind, out of the file; an event says why.
 
         The session goes on at this step.
         """
