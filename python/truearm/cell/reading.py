@@ -75,8 +75,8 @@ def is_column(name: str) -> bool:
 def checked_reading(reading: object) -> Reading:
     """What a driver gave as a reading, with Python's own numbers and arrays of float64.
 
-    Numbers of numpy and lists are taken as well. A point that is not finite is not valid. Of a reading that is
-    not valid, sigma_m becomes 0 where it is no number above 0.
+    Numbers of numpy and lists are taken as well. A point that is not finite is not valid. In a reading that
+    is not valid sigma_m becomes 0 where it is no number above 0.
 
     Raises:
         MalformedReadingError: If it is no reading, or a part of it is not what Reading says.

@@ -24,7 +24,7 @@ from truearm.cell.rv_m2 import RvM2
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.universal_robots import UniversalRobots
 from truearm.cell.virtual.faults import Faults
-from truearm.cell.virtual.line_devices import VirtualLineRobot, VirtualTracker
+from truearm.cell.virtual.line_devices import VirtualLineRobot, VirtualTracker, check_faults
 from truearm.cell.virtual.rv_m2 import VirtualRvM2
 from truearm.cell.virtual.serving import Machine, Stream, serve
 from truearm.cell.virtual.state import STOPPED, Shared
@@ -66,7 +66,7 @@ class VirtualCell:
         """Check the file; nothing is started yet.
 
         Raises:
-            InputError: If the file is wrong, or a driver has no virtual counterpart.
+            InputError: If the file is wrong, a driver has no virtual counterpart, or a fault is not possible.
         """
         self._text, self._where, self._folder, self._processes = text, where, folder.resolve(), processes
         self.content: dict[str, Any] = parsed(text, where=where)
@@ -76,6 +76,8 @@ class VirtualCell:
                 raise InputError(
                     "this driver has no virtual counterpart", where=f"{where}, {device}", rule=f"{KNOWN} have"
                 )
+        if isinstance(cell.sensor_settings, LineSensor.Settings):
+            check_faults(cell.sensor_settings, cell.file.simulate, where)
         self._cell = cell
         self._ending = threading.Event()
         self._stack = ExitStack()

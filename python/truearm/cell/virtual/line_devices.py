@@ -6,11 +6,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.cell.cell_file import SimulateSection
 from truearm.cell.line_robot import LineRobot
 from truearm.cell.line_sensor import LineSensor
-from truearm.cell.patterns import expression_for
+from truearm.cell.patterns import expression_for, numbers_in
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.world import ROOM_C, World
+from truearm.errors import InputError
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
@@ -77,6 +79,7 @@ class VirtualTracker:
     def __init__(self, world: World, settings: LineSensor.Settings) -> None:
         self._world, self._settings = world, settings
         self.terminator = settings.terminator
+        self._missed = line_without_point(settings, world.settings) or ""
         self._next = 0.0
 
     def restart(self) -> None:
@@ -100,16 +103,55 @@ class VirtualTracker:
         return None if self._settings.trigger is not None else self._next
 
     def _line(self, now: float) -> str:
-        point = self._world.tracked(now) / to_si(1.0, self._settings.length_unit)
-        sigma = to_si(self._world.settings.tracker_mm, "mm") / to_si(1.0, self._settings.length_unit)
+        point = self._world.tracked(now)
+        if point is None:
+            return self._missed
         stopped = self._world.shared.flag(STOPPED)
-        values = dict(zip("xyz", point.tolist(), strict=True)) | {
-            "sigma": sigma,
-            "temperature": ROOM_C,
-            "ok": float(not stopped),
-        }
-        template = self._world.settings.answer
-        return answer_for(self._settings.answer, values) if template is None else template.format(**values)
+        return _answer_of(self._settings, self._world.settings, point, ok=not stopped)
+
+
+def line_without_point(settings: LineSensor.Settings, simulate: SimulateSection) -> str | None:
+    """What a virtual tracker says where it does not see its target; None where its lines cannot say that.
+
+    It is a line with `ok` 0, else one that matches `nothing`.
+    """
+    line = _answer_of(settings, simulate, np.zeros(3), ok=False)
+    found = numbers_in(re.compile(settings.answer), line)
+    if found is not None and found.get("ok") == 0.0:
+        return line
+    if settings.nothing is None:
+        return None
+    line = answer_for(settings.nothing, {})
+    return line if re.search(settings.nothing, line) else None
+
+
+def check_faults(settings: LineSensor.Settings, simulate: SimulateSection, where: str) -> None:
+    """See that a virtual tracker can say that it does not see its target, if it is to.
+
+    Raises:
+        InputError: If it cannot.
+    """
+    missed = simulate.faults.missed
+    if missed > 0.0 and line_without_point(settings, simulate) is None:
+        raise InputError(
+            f"missed is {missed:g}, and no line of this sensor says that there is no point",
+            where=f"{where}, simulate, faults",
+            rule="A group ok in `answer`, or a pattern `nothing` that is a plain line, says that",
+            way_out="Give one of them in [sensor], or leave out missed",
+        )
+
+
+def _answer_of(settings: LineSensor.Settings, simulate: SimulateSection, point: Floats, *, ok: bool) -> str:
+    """The line that tells a point (3,), m."""
+    unit_m = to_si(1.0, settings.length_unit)
+    values = dict(zip("xyz", (point / unit_m).tolist(), strict=True)) | {
+        "sigma": to_si(simulate.tracker_mm, "mm") / unit_m,
+        "temperature": ROOM_C,
+        "ok": float(ok),
+    }
+    return (
+        answer_for(settings.answer, values) if simulate.answer is None else simulate.answer.format(**values)
+    )
 
 
 GROUP: Final = re.compile(r"\(\?P<(\w+)>(?:[^()\\]|\\.|\[[^\]]*\]|\((?:[^()\\]|\\.)*\))*\)")

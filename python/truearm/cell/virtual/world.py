@@ -100,15 +100,15 @@ class World:
         counts = np.rint(panel.counts_of(seen) / READ_OUT_COUNTS) * READ_OUT_COUNTS
         return Touch(float(seen[2]), np.clip(counts, 0.0, panel.counts))
 
-    def tracked(self, now: float) -> Floats:
-        """The target (3,) as a tracker sees it, m."""
+    def tracked(self, now: float) -> Floats | None:
+        """The target (3,) as a tracker sees it, m; None where it does not."""
         faults, rng = self.settings.faults, self._noise(now)
         count = self.shared.count(CONTACTS)
         point = self.pin(now)[0] + to_si(self.settings.tracker_mm, "mm") * rng.normal(size=3)
         point[0] += to_si(faults.drift_mm_per_contact, "mm") * count
         if rng.uniform() < faults.outlier:
             point += to_si(faults.outlier_mm, "mm") * _direction(rng, 3)
-        return point
+        return None if rng.uniform() < faults.missed else point
 
     def watch(self, now: float) -> None:
         """Look whether the motions under way will make link and column meet; then everything stops."""
