@@ -7,7 +7,7 @@ import json
 import secrets
 import sqlite3
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from truearm.cell.reading import Reading
+from truearm.cell.session_checks import check_values, unreadable, value_of
 from truearm.cell.session_schema import SCHEMA, VERSION
 from truearm.errors import InputError, WorkError
 from truearm.rotations import quaternion_from_matrix
@@ -91,7 +92,8 @@ class Session:
             lock: Its lock, where this process holds it already; given back when the session is closed.
 
         Raises:
-            InputError: If there is none, or it is no session of this layout.
+            InputError: If there is none, it is no session of this layout, it is damaged, or values in it were
+                changed to what they cannot be.
             WorkError: If another process is writing to it.
         """
         if not path.is_file():
@@ -111,6 +113,7 @@ class Session:
         )
         try:
             self._check_version()
+            check_values(self.rows, path)
             if writing:
                 self._write("PRAGMA journal_mode=WAL")
                 self._write("PRAGMA synchronous=FULL")
@@ -167,9 +170,9 @@ class Session:
             self._lock.release()
 
     def meta(self, key: str) -> Any:  # noqa: ANN401 - a JSON value
-        """A value of the head of the file."""
-        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-        return None if row is None else json.loads(row[0])
+        """A value of the head of the file; None where there is none, or it is no JSON."""
+        found = self.rows("SELECT value FROM meta WHERE key = ?", (key,))
+        return value_of(found[0][0]) if found else None
 
     def has_meta(self, key: str) -> bool:
         """Whether the head of the file holds a value; sessions of before hold fewer."""
@@ -194,7 +197,7 @@ class Session:
 
     def readings_of(self, step: int) -> list[Stored]:
         """All readings of a step, in the order of their attempts."""
-        rows = self._db.execute(
+        rows = self.rows(
             "SELECT attempt, valid, x_m, y_m, z_m, sigma_m FROM readings WHERE step = ? ORDER BY attempt",
             (step,),
         )
@@ -247,8 +250,8 @@ class Session:
 
     def registration(self) -> tuple[Floats, float] | None:
         """world_from_base (4, 4) and its residual in mm; None before it is found."""
-        row = self._db.execute("SELECT world_from_base, residual_mm FROM registration").fetchone()
-        return None if row is None else (np.array(json.loads(row[0])), row[1])
+        found = self.rows("SELECT world_from_base, residual_mm FROM registration")
+        return (np.array(json.loads(found[0][0])), found[0][1]) if found else None
 
     def set_registration(self, world_from_base: Floats, residual_mm: float, poses: int) -> None:
         """Keep where the base stands."""
@@ -262,9 +265,16 @@ class Session:
         row = (measured, model, mean_mm, p95_mm, expected_mm, time.time())
         self._write("INSERT OR REPLACE INTO stretches VALUES (?, ?, ?, ?, ?, ?)", row)
 
-    def rows(self, query: str, values: Sequence[Any] = ()) -> list[tuple[Any, ...]]:
-        """Rows of a query that reads."""
-        return self._db.execute(query, values).fetchall()
+    def rows(self, query: str, values: Sequence[Any] | Mapping[str, Any] = ()) -> list[tuple[Any, ...]]:
+        """Rows of a query that reads.
+
+        Raises:
+            InputError: If the file is damaged, or cannot be read.
+        """
+        try:
+            return self._db.execute(query, values).fetchall()
+        except sqlite3.DatabaseError as error:
+            raise unreadable(error, self.path) from None
 
     def measured_poses(self) -> int:
         """How many poses of the list are measured."""
@@ -294,10 +304,10 @@ class Session:
         Returns:
             Whether there is such a step now; not where all contacts were tried in this row of checks.
         """
-        other = self._db.execute(OTHER_CONTACT, {"step": step}).fetchone()
-        if other is None:
+        other = self.rows(OTHER_CONTACT, {"step": step})
+        if not other:
             return False
-        self._insert_check(step + 1, other)
+        self._insert_check(step + 1, other[0])
         return True
 
     def _insert_check(self, step: int, contact: tuple[Any, ...]) -> None:
@@ -327,6 +337,7 @@ class Session:
 
         Raises:
             WorkError: If that fails, as on a full disk.
+            InputError: If the file is damaged.
         """
         try:
             self._db.execute(query, values)
@@ -337,12 +348,21 @@ class Session:
                 where=str(self.path),
                 way_out="What it says is stored is there. Make room, then the same command goes on",
             ) from None
+        except sqlite3.IntegrityError:
+            raise
+        except sqlite3.DatabaseError as error:
+            self._keeps = False
+            raise unreadable(error, self.path) from None
 
     def _check_version(self) -> None:
-        try:
-            version = self.meta("version")
-        except sqlite3.DatabaseError as error:
-            raise InputError(f"this is no session file: {error}", where=str(self.path)) from None
+        tables = {name for (name,) in self.rows("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if "meta" not in tables:
+            raise InputError(
+                "this is no session file: it has no table meta",
+                where=str(self.path),
+                rule="truearm measure makes them",
+            )
+        version = self.meta("version")
         if version != VERSION:
             raise InputError(
                 f"layout {version}",

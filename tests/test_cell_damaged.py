@@ -1,0 +1,143 @@
+"""Session files that were damaged, or changed by hand: one line that says what is wrong, and no traceback."""
+
+import sqlite3
+import time
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from tests.recorded import CELL, Recorded
+from truearm.cell.accepted import accepted_table
+from truearm.cell.session import Session, Step
+from truearm.cell.summary import summary_of
+from truearm.cli import main
+from truearm.errors import InputError
+
+PAGE = 4096
+CHECKED_WITHIN_S = 5.0
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A session that is over, which nobody changes, and the cell and poses that it is of."""
+    recorded = Recorded(tmp_path_factory.mktemp("finished"))
+    recorded.measure()
+    folder = recorded.folder
+    (folder / "cell.toml").write_text(CELL.replace("FILE", str(folder / "there.csv")))
+    rows = [",".join(map(repr, map(float, row))) for row in recorded.poses.readings]
+    (folder / "poses.csv").write_text("\n".join(["q1,q2,q3,q4,q5,q6", *rows]) + "\n")
+    return recorded
+
+
+@pytest.fixture
+def copied(finished, tmp_path):
+    place = tmp_path / "session.db"
+    place.write_bytes(finished.session.read_bytes())
+    return place
+
+
+def all_read(place):
+    with Session(place, writing=False) as session:
+        summary_of(session)
+        accepted_table(session)
+
+
+def told_by_commands(place, finished, capsys):
+    """What commands say of a file that they refuse."""
+    given = [finished.folder / "cell.toml", finished.folder / "poses.csv", "-o", place]
+    said = []
+    for words in (["session", "show", place], ["session", "export", place, "-o", place.parent / "out.csv"],
+                  ["measure", *given]):  # fmt: skip
+        assert main([str(word) for word in words]) == 1
+        said.append(" ".join(capsys.readouterr().err.split()))
+    return said
+
+
+def test_whichever_page_is_damaged_there_is_an_error_and_nothing_else(finished, copied):
+    whole, refused = copied.read_bytes(), 0
+    pages = len(whole) // PAGE
+    assert pages > 5
+    for page in range(1, pages):
+        for filling in (b"\xa5", b"\0", b"\x0d", b"9"):
+            copied.write_bytes(whole[: page * PAGE] + PAGE * filling + whole[(page + 1) * PAGE :])
+            try:
+                all_read(copied)
+            except InputError as error:
+                refused += "the session file is damaged" in str(error)
+    assert refused > pages
+
+
+def test_commands_say_that_a_file_is_damaged_and_what_can_be_done(finished, copied, capsys):
+    whole = copied.read_bytes()
+    middle = len(whole) // PAGE // 2 * PAGE
+    copied.write_bytes(whole[:middle] + PAGE * b"\xa5" + whole[middle + PAGE :])
+    for said in told_by_commands(copied, finished, capsys):
+        assert f"{copied.name}: the session file is damaged: " in said
+        assert ".recover" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("steps SET readings = 'none' WHERE step = 9", "steps, step 9: readings is 'none'"),
+        ("steps SET readings = '[1, 2]' WHERE step = 9", "readings is '[1, 2]'"),
+        ("steps SET readings = '[1, 2, 3, 4, 5, \"six\"]' WHERE step = 0", "a list of numbers, one a joint"),
+        ("steps SET pose = 'x' WHERE step = 9", "pose is 'x'"),
+        ("outcomes SET attempts = '[1' WHERE step = 9", "outcomes, step 9: attempts is '[1'"),
+        ("outcomes SET attempts = '1' WHERE step = 9", "attempts is '1'"),
+        ("outcomes SET attempts = '[7]' WHERE step = 9", "of attempts of that step whose readings are valid"),
+        ("outcomes SET attempts = '[]' WHERE step = 9", "attempts is '[]'"),
+        ("registration SET world_from_base = 'here'", "registration: world_from_base is 'here'"),
+        ("registration SET world_from_base = '[[1, 2], [3]]'", "4 rows of 4 numbers"),
+        ("registration SET residual_mm = 'small'", "residual_mm is 'small'"),
+        ("readings SET x_m = 'far' WHERE step = 9", "readings, step 9: x_m is 'far'"),
+        ("readings SET z_m = NULL WHERE step = 9", "z_m is None"),
+        ("readings SET qx = 'x' WHERE step = 9", "qx is 'x'"),
+        ("readings SET sigma_m = 'some' WHERE step = 9", "sigma_m is 'some'"),
+        ("readings SET joints = '{}' WHERE step = 9", "joints is '{}'"),
+        ("readings SET features = '[1]' WHERE step = 9", "features is '[1]'"),
+        ("readings SET raw = x'00ff' WHERE step = 9", "raw is "),
+        ("meta SET value = '' WHERE key = 'target'", "meta: target is ''"),
+        ("meta SET value = '3' WHERE key = 'arm'", "meta: arm is '3'"),
+        ("meta SET value = '\"far\"' WHERE key = 'drift_mm'", "meta: drift_mm is"),
+        ("meta SET value = 'one' WHERE key = 'version'", "layout None"),
+    ],
+)
+def test_values_changed_to_what_they_cannot_be_are_told(change, message, finished, copied, capsys):
+    with closing(sqlite3.connect(copied, isolation_level=None)) as database:
+        database.execute(f"UPDATE {change}")
+    with pytest.raises(InputError) as error:
+        all_read(copied)
+    assert message in str(error.value)
+    if "attempts" in change:
+        for said in told_by_commands(copied, finished, capsys):
+            assert "attempts is" in said
+
+
+def test_features_that_are_no_number_are_kept_and_read(copied):
+    with closing(sqlite3.connect(copied, isolation_level=None)) as database:
+        database.execute('UPDATE readings SET features = \'{"humidity": NaN, "dust": Infinity}\'')
+    all_read(copied)
+
+
+def test_ten_thousand_poses_are_checked_in_a_moment(tmp_path):
+    count, place = 10_000, tmp_path / "session.db"
+    steps = [Step(k, "pose", k, "", 0, np.linspace(0.1, 0.9, 6) + k) for k in range(count)]
+    Session.create(place, steps, {}).close()
+    joints = str(np.linspace(0.1, 0.9, 6).tolist())
+    with closing(sqlite3.connect(place)) as database:
+        for attempt in (1, 2):
+            row = (attempt, 0.0, joints, *[0.1] * 3, *[None] * 4, 1e-5, 1, "", *[0.1] * 3, None, "{}", "")
+            database.executemany(
+                f"INSERT INTO readings VALUES ({','.join('?' * 20)})", [(k, *row) for k in range(count)]
+            )
+        database.executemany(
+            "INSERT INTO outcomes VALUES (?, 'measured', '', '[1, 2]', 0.0)", [(k,) for k in range(count)]
+        )
+        database.commit()
+    began = time.monotonic()
+    with Session(place, writing=False) as session:
+        took_s = time.monotonic() - began
+        assert session.measured_poses() == count
+    assert took_s < CHECKED_WITHIN_S
