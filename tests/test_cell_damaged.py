@@ -141,3 +141,18 @@ def test_ten_thousand_poses_are_checked_in_a_moment(tmp_path):
         took_s = time.monotonic() - began
         assert session.measured_poses() == count
     assert took_s < CHECKED_WITHIN_S
+
+
+def test_a_session_with_a_step_that_has_no_outcome_is_not_complete(copied, capsys):
+    assert main(["session", "show", str(copied)]) == 0
+    assert "The session is complete" in capsys.readouterr().out
+    with closing(sqlite3.connect(copied, isolation_level=None)) as database:
+        database.execute("DELETE FROM outcomes WHERE step = 12")
+    with Session(copied, writing=False) as session:
+        found = summary_of(session)
+        assert session.next_step() is None
+    assert (found["open"], found["complete"]) == (1, False)
+    assert main(["session", "show", str(copied)]) == 0
+    shown = capsys.readouterr().out
+    assert "19 of 20 poses measured, 0 skipped, 1 open" in shown
+    assert "The session is complete" not in shown

@@ -33,7 +33,7 @@ def summary_of(session: Session) -> dict[str, Any]:
         "poses": sum(count for (kind, _), count in counts.items() if kind == "pose"),
         "measured": counts.get(("pose", "measured"), 0),
         "open": counts.get(("pose", "open"), 0),
-        "complete": session.next_step() is None,
+        "complete": not any(outcome == "open" for _, outcome in counts),
         "skipped": [{"pose": pose + 1, "reason": reason} for pose, reason in skipped],
         "checks": {outcome: counts.get(("check", outcome), 0) for outcome in ("measured", "skipped")},
         "unchecked": unchecked_poses(session),
