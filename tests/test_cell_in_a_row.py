@@ -30,7 +30,9 @@ class Seen(Recorded):
 
     def __init__(self, folder, monkeypatch):
         super().__init__(folder)
-        self.unseen, self.elsewhere, self.at_once = set(), set(), False
+        self.unseen: set[int] = set()
+        self.elsewhere: set[int] = set()
+        self.at_once = False
         measure = PlaybackSensor.measure
 
         def measured(sensor):

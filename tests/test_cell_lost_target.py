@@ -7,6 +7,7 @@ import pytest
 
 from tests.cell_support import cell_text, poses_of, virtual, write_poses
 from truearm.cell import Cell
+from truearm.cell.line_sensor import LineSensor
 from truearm.cell.session import Session
 from truearm.cell.summary import summary_of
 from truearm.cell.virtual.launch import VirtualCell
@@ -35,6 +36,7 @@ def tracker(missed=0.0, **sensor):
 )
 def test_a_virtual_tracker_says_that_it_sees_nothing_as_its_lines_can(sensor, line):
     cell = Cell.from_toml(tracker(**sensor))
+    assert isinstance(cell.sensor_settings, LineSensor.Settings)
     assert line_without_point(cell.sensor_settings, cell.file.simulate) == line
 
 
