@@ -20,17 +20,13 @@ class Asked:
 
     Attributes:
         since: When it was asked for first, by the clock of `time.monotonic`; None before.
+        raises: Whether the first request raises KeyboardInterrupt. Further ones do not: they would cut short
+            what tidies up behind it.
     """
 
     def __init__(self, *, raises: bool = False) -> None:
-        """Nothing is asked for yet.
-
-        Args:
-            raises: Whether the first request raises KeyboardInterrupt. Further ones do not: they would cut
-                short what tidies up behind it.
-        """
         self.since: float | None = None
-        self._raises = raises
+        self.raises = raises
 
     def __bool__(self) -> bool:
         return self.since is not None
@@ -45,7 +41,7 @@ class Asked:
         if self.since is not None:
             return
         self.since = time.monotonic()
-        if self._raises:
+        if self.raises:
             raise KeyboardInterrupt
 
 
@@ -61,5 +57,7 @@ def asked_by(numbers: Sequence[int], asked: Asked) -> Iterator[Asked]:
             signal.signal(number, asked)
         yield asked
     finally:
+        # What comes from here on is noted only, so that all handlers are put back.
+        asked.raises = False
         for number, handler in before.items():
             signal.signal(number, handler)

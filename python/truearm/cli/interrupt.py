@@ -32,6 +32,8 @@ def ends_promptly(kept: Callable[[], str] | None = None) -> Iterator[None]:
     try:
         with asked_by((signal.SIGINT,), asked):
             yield
+        if asked:
+            raise KeyboardInterrupt
     except KeyboardInterrupt:
         watch.ended = True
         if kept is not None:
