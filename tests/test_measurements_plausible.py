@@ -330,3 +330,55 @@ def test_points_that_lie_apart_at_equal_readings_are_told(apart: float, told: bo
     found = [notice.message for notice in notices if notice.kind == "apart_at_equal_readings"]
     assert bool(found) == told
     assert all("rows 1 and 2" in words and "--map target=COLUMN" in words for words in found)
+
+
+def elbow_below(count: int = 40) -> tuple[Robot, Floats]:
+    """Readings of an arm whose joint 3 turns from -110 to 70 deg, far from zero in all rows, as joint 4."""
+    robot = Robot.load("abb-irb-120")
+    q = readings(robot, count)
+    q[:, 2] = np.radians(-92.0) + 0.1 * q[:, 2]
+    q[:, 3] = np.radians(92.0) + 0.3 * q[:, 3]
+    return robot, q
+
+
+def stated(robot: Robot, true: Floats, read: Floats) -> Measurements:
+    """Points of the true readings beside those of the file, in no unit."""
+    columns = {f"q{k + 1}": read[:, k] for k in range(robot.joint_count)}
+    return Measurements.from_dataframe(table(robot, true).assign(**columns))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda q: q * [1, 1, -1, 1, 1, 1], "with joint 3 the other way round"),
+        (lambda q: q[:, [0, 1, 3, 2, 4, 5]], "joints 3 and 4 exchanged"),
+    ],
+)
+def test_joints_the_other_way_or_exchanged_are_no_degrees(change, words) -> None:
+    """Points deny degrees: the readings stand, with a warning, and the calibration tells what fits."""
+    robot, q = elbow_below()
+    notices = check_against(stated(robot, q, change(q)), robot)
+    assert {notice.kind for notice in notices} == {"limits"}
+    assert words in str(notices[0])
+    assert "all readings are within the limits" in str(notices[0])
+
+
+def test_too_few_points_deny_no_degrees() -> None:
+    robot, q = elbow_below(10)
+    read = q * [1, 1, -1, 1, 1, 1]
+    largest = np.abs(read[:, 2]).max()
+    assert np.abs(read).max() > largest, "another joint reads more, within its limits"
+    with pytest.raises(InputError) as caught:
+        check_against(stated(robot, q, read), robot)
+    assert f"readings of joint 3 up to {largest:.4g} rad, whose limits are -1.92 to 1.222 rad" in str(
+        caught.value
+    )
+    assert "--angle-unit deg" in str(caught.value)
+    assert "with joint 3 the other way round all readings are within the limits" in str(caught.value)
+
+
+def test_degrees_of_joints_the_other_way_stay_an_error() -> None:
+    robot, q = elbow_below()
+    q = np.radians(11.0) * q / np.abs(q).max()
+    with pytest.raises(InputError, match="give --angle-unit deg"):
+        check_against(stated(robot, q, np.degrees(q * [1, -1, -1, 1, 1, 1])), robot)

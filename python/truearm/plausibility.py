@@ -11,6 +11,7 @@ from truearm.measurements import Measurements
 from truearm.mixed_units import check_mixed_units
 from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.robot import Robot
+from truearm.stated_in_degrees import check_degrees, otherwise_notices, outside_limits
 from truearm.turning_sense import FIT, MISFIT
 from truearm.unit_change import check_one_unit
 from truearm.units import MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
@@ -19,12 +20,9 @@ from truearm.visits import pose_numbers
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-MAX_READING_RAD: Final = 4.0 * np.pi
-"""Beyond two turns either way, and beyond its limits, a reading stated in no unit is taken for degrees."""
 ALIKE_RAD_OR_M: Final = 1e-4
 MOST: Final = 0.5
 """Part of the poses that have to be repeated."""
-LIMIT_TOLERANCE: Final = 1e-6
 SPREAD_FACTOR: Final = 30.0
 """Between the factor that a long tool may stretch the poses by and the 1000 of a wrong unit."""
 TOOL_ALLOWANCE_M: Final = 0.1
@@ -88,9 +86,9 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
         raise InputError("the measurements have no rows", rule="What is measured is at least one pose")
     measurements.require_joint_count(robot.joint_count)
     _check_kinds(measurements, robot)
-    _check_degrees(measurements, robot)
+    check_degrees(measurements, robot)
     _check_strokes(measurements, robot)
-    return _limit_notices(measurements, robot)
+    return [*otherwise_notices(measurements, robot), *_limit_notices(measurements, robot)]
 
 
 def check_points(measurements: Measurements, robot: Robot) -> None:
@@ -114,33 +112,13 @@ def _check_kinds(measurements: Measurements, robot: Robot) -> None:
             )
 
 
-def _check_degrees(measurements: Measurements, robot: Robot) -> None:
-    revolute = np.array([kind == "revolute" for kind in robot.joints])
-    unstated = revolute & (np.array(measurements.joint_units) == "")
-    readings = measurements.readings
-    outside = _outside(readings, robot.limits) & unstated
-    far = outside & (np.abs(readings) > MAX_READING_RAD)
-    as_degrees = np.where(unstated, readings * RADIANS_PER_DEGREE, readings)
-    fits = not (_outside(as_degrees, robot.limits) & unstated).any()
-    if far.any() or (outside.any(axis=1).mean() > 0.5 and fits):
-        rows = far.any(axis=1) if far.any() else outside.any(axis=1)
-        raise InputError(
-            f"joint readings up to {np.abs(readings[:, unstated]).max():.4g} rad in "
-            f"{measurements.row_names(rows)}, beyond what {robot.name} can reach",
-            where=", ".join(measurements.files),
-            rule="Revolute joints are in radians unless their columns say so (q1_deg)",
-            way_out="If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ..."
-            + ("" if far.any() else "; if they are radians, they are of another arm: name that one"),
-        )
-
-
 def _check_strokes(measurements: Measurements, robot: Robot) -> None:
     prismatic = np.array([kind == "prismatic" for kind in robot.joints])
     unstated: Mask = prismatic & np.isin(np.array(measurements.joint_units), ("", "m"))
     readings = measurements.readings
-    outside: Mask = np.asarray((_outside(readings, robot.limits) & unstated).any(axis=1))
+    outside: Mask = np.asarray((outside_limits(readings, robot.limits) & unstated).any(axis=1))
     as_millimetres = np.where(unstated, readings / MM_PER_METRE, readings)
-    if outside.mean() > 0.5 and not (_outside(as_millimetres, robot.limits) & unstated).any():
+    if outside.mean() > 0.5 and not (outside_limits(as_millimetres, robot.limits) & unstated).any():
         columns = ", ".join(f"q{joint + 1}_mm" for joint in np.flatnonzero(unstated))
         raise InputError(
             f"joint readings up to {np.abs(readings[:, unstated]).max():.4g} m in "
@@ -161,7 +139,7 @@ def _check_slides(measurements: Measurements, robot: Robot) -> None:
     readings, (low, high) = measurements.readings, robot.limits.T
     span, times = np.ptp(readings, axis=0), np.where(slides, MM_PER_METRE, 1.0)
     short = slides & np.isfinite(high - low) & (span > 0.0) & (span * SPREAD_FACTOR < high - low)
-    if not short.any() or _outside(readings * times, robot.limits)[:, short].any():
+    if not short.any() or outside_limits(readings * times, robot.limits)[:, short].any():
         return
     found = np.flatnonzero(short)
     converted = replace(measurements, readings=readings * np.where(short, MM_PER_METRE, 1.0))
@@ -326,13 +304,9 @@ def _spread(points: Floats) -> float:
     return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
 
 
-def _outside(readings: Floats, limits: Floats) -> Mask:
-    return (readings < limits[:, 0] - LIMIT_TOLERANCE) | (readings > limits[:, 1] + LIMIT_TOLERANCE)
-
-
 def _limit_notices(measurements: Measurements, robot: Robot) -> list[Notice]:
     notices = []
-    outside = _outside(measurements.readings, robot.limits)
+    outside = outside_limits(measurements.readings, robot.limits)
     for joint in np.flatnonzero(outside.any(axis=0)):
         rows = outside[:, joint]
         values = measurements.readings[rows, joint]

@@ -1,0 +1,127 @@
+"""Readings that look like degrees read as radians, or are of joints that turn the other way."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.errors import InputError, Notice, list_rows
+from truearm.measurements import Measurements
+from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
+from truearm.robot import Robot
+from truearm.turning_sense import MISFIT
+from truearm.units import RADIANS_PER_DEGREE
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MAX_READING_RAD: Final = 4.0 * np.pi
+"""Beyond two turns either way, and beyond its limits, a reading stated in no unit is taken for degrees."""
+LIMIT_TOLERANCE: Final = 1e-6
+MOST_OUTSIDE: Final = 0.5
+"""Part of the rows outside the limits from which something is wrong with all of them."""
+MOST_WAYS: Final = 2
+
+
+def outside_limits(readings: Floats, limits: Floats) -> Mask:
+    """Which readings (n, N) lie beyond limits (N, 2)."""
+    below, above = readings < limits[:, 0] - LIMIT_TOLERANCE, readings > limits[:, 1] + LIMIT_TOLERANCE
+    return np.asarray(below | above)
+
+
+def check_degrees(measurements: Measurements, robot: Robot) -> None:
+    """Check that readings stated in no unit are radians.
+
+    Joints that are counted the other way, or exchanged, leave the limits too: where that explains all
+    readings, and points deny that they are degrees, they stand, and `otherwise_notices` tells it.
+
+    Raises:
+        InputError: If they look like degrees.
+    """
+    revolute = np.array([kind == "revolute" for kind in robot.joints])
+    unstated = revolute & (np.array(measurements.joint_units) == "")
+    readings = measurements.readings
+    outside = outside_limits(readings, robot.limits) & unstated
+    far = outside & (np.abs(readings) > MAX_READING_RAD)
+    as_degrees = np.where(unstated, readings * RADIANS_PER_DEGREE, readings)
+    fits = not (outside_limits(as_degrees, robot.limits) & unstated).any()
+    if not far.any() and not (outside.any(axis=1).mean() > MOST_OUTSIDE and fits):
+        return
+    otherwise = "" if far.any() else _within_otherwise(readings, robot)
+    if otherwise and _denied(replace(measurements, readings=as_degrees), robot):
+        return
+    found = far if far.any() else outside
+    joint = int(np.where(found, np.abs(readings), 0.0).max(axis=0).argmax())
+    largest = np.abs(readings[found[:, joint], joint]).max()
+    low, high = robot.limits[joint]
+    raise InputError(
+        f"readings of joint {joint + 1} up to {largest:.4g} rad, whose limits are {low:.4g} to {high:.4g} "
+        f"rad, in {measurements.row_names(found.any(axis=1))}, beyond what {robot.name} can reach",
+        where=", ".join(measurements.files),
+        rule="Revolute joints are in radians unless their columns say so (q1_deg)",
+        way_out="If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ..."
+        + (f"; {otherwise}: if so, put that right in the robot file or in the data" if otherwise else "")
+        + ("" if far.any() else "; if they are radians, they are of another arm: name that one"),
+    )
+
+
+def otherwise_notices(measurements: Measurements, robot: Robot) -> list[Notice]:
+    """A warning where most rows are outside the limits, and would be within if joints were otherwise."""
+    if outside_limits(measurements.readings, robot.limits).any(axis=1).mean() <= MOST_OUTSIDE:
+        return []
+    otherwise = _within_otherwise(measurements.readings, robot)
+    if not otherwise:
+        return []
+    message = (
+        f"More than half of the rows are outside the limits of joints; {otherwise}. Jog these joints: which "
+        "way they turn (direction in the robot file), and which column is whose, has to be as on the arm."
+    )
+    return [Notice("limits", message)]
+
+
+def _within_otherwise(readings: Floats, robot: Robot) -> str:
+    """In words, how joints would have to turn, or be exchanged, for all readings (n, N) to be within limits.
+
+    Returns:
+        The words; "" where that does not help.
+    """
+    beyond = np.flatnonzero(outside_limits(readings, robot.limits).any(axis=0))
+    turned = readings.copy()
+    turned[:, beyond] *= -1.0
+    ways = []
+    if not outside_limits(turned, robot.limits).any():
+        ways.append(f"{list_rows(beyond + 1, 'joint')} the other way round")
+    ways += [
+        f"joints {first + 1} and {second + 1} exchanged" for first, second in _exchanges(readings, robot)
+    ]
+    named = " or ".join(f"with {way}" for way in ways[:MOST_WAYS])
+    return f"{named} all readings are within the limits" if named else ""
+
+
+def _exchanges(readings: Floats, robot: Robot) -> Iterator[tuple[int, int]]:
+    """Pairs of joints of a kind whose readings are within the limits of one another, with all others."""
+    beyond = np.asarray(outside_limits(readings, robot.limits).any(axis=0))
+    for first, second in combinations(range(robot.joint_count), 2):
+        pair = [first, second]
+        if robot.joints[first] != robot.joints[second] or beyond.sum() != beyond[pair].sum():
+            continue
+        exchanged = outside_limits(readings[:, pair[::-1]], robot.limits[pair])
+        if not exchanged.any():
+            yield first, second
+
+
+def _denied(converted: Measurements, robot: Robot) -> bool:
+    """Whether points of the first set-up tell that readings so converted are not those of the nominal arm."""
+    if converted.target_count == 0:
+        return False
+    target = converted.most_held()
+    points = converted.targets[:, target]
+    seen = np.asarray(np.isfinite(points).all(axis=1)) & (converted.group == converted.groups[0])
+    if seen.sum() < FEWEST_ROWS:
+        return False
+    some = Seen.of(converted, target).select(some_rows(np.flatnonzero(seen)))
+    spread = np.median(np.linalg.norm(some.points - np.median(some.points, axis=0), axis=1))
+    return bool(NominalArm.of(robot).misfit_m(some) > MISFIT * spread)
