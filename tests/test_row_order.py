@@ -84,6 +84,17 @@ def test_no_cause_is_named_where_the_poses_change_too(changes):
     assert DriftDetails.from_dict(details.to_dict()) == details
 
 
+@pytest.mark.parametrize("changes", [False, True])
+def test_steps_farther_than_anything_slips_are_another_place_where_the_poses_change_too(changes):
+    details = DriftDetails(
+        {"A": 5e3}, {"constant": 0.2}, {"A": (Jump("row 120 and row 121", 4.9e3, changes),)}
+    )
+    (notice,) = drift_notices(details)
+    assert notice.kind == "another_place"
+    assert "column `group`" in str(notice)
+    assert ("far from its nominal one" in str(notice)) == changes
+
+
 def test_a_step_between_sorted_poses_and_their_repeats_is_not_put_down_to_a_slip():
     robot = VirtualArm.paper(seed=4).robot
     arm = VirtualArm.paper(seed=4)

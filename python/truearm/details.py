@@ -138,8 +138,11 @@ class DriftDetails:
 
     @property
     def other_places(self) -> dict[str, list[Jump]]:
-        """Of each set-up the jumps to another place of instrument or target; only set-ups with some."""
-        found = {group: [jump for jump in own if jump.is_another_place] for group, own in self.slips.items()}
+        """Of each set-up the jumps to another place of instrument or target; only set-ups with some.
+
+        Poses that change as well do not explain so much.
+        """
+        found = {group: [jump for jump in own if jump.is_another_place] for group, own in self.jumps.items()}
         return {group: own for group, own in found.items() if own}
 
     def way(self, group: str) -> str:

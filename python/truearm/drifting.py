@@ -292,12 +292,18 @@ def drift_notices(details: DriftDetails | None) -> list[Notice]:
 def _reason(details: DriftDetails) -> tuple[str, str]:
     """The kind of a notice, and why a set-up moves so."""
     if details.other_places:
-        where = "; ".join(jump.between for own in details.other_places.values() for jump in own)
+        jumps = [jump for own in details.other_places.values() for jump in own]
+        where = "; ".join(jump.between for jump in jumps)
+        or_else = (
+            " As the poses change there too, an arm that is far from its nominal one may look like that."
+            if all(jump.poses_change for jump in jumps)
+            else ""
+        )
         return ANOTHER_PLACE, (
             f"Nothing that is touched slips so far: instrument or target was put elsewhere ({where}), and "
-            "what it was turned by is left in. Give the rows before and after names of their own in a column "
-            "`group`, or files of their own, and calibrate again: each then has a frame and a tool of its "
-            "own. As it is, the shift alone is known."
+            f"what it was turned by is left in.{or_else} Give the rows before and after names of their own "
+            "in a column `group`, or files of their own, and calibrate again: each then has a frame and a "
+            "tool of its own. As it is, the shift alone is known."
         )
     if details.slips:
         return "drift", "Something gave way there: a target or a tripod that was touched, play in a joint."
