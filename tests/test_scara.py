@@ -31,3 +31,20 @@ def test_a_scara_s_target_stays_near_its_flange_and_the_flange_is_known_better()
         nominal.append(rigidly_off(arm.robot.pose(q)[:, :3, 3], true))
         calibrated.append(rigidly_off(found.position(q, tool=np.zeros(3)), true))
     assert np.mean(calibrated) < 0.7 * np.mean(nominal)
+
+
+def test_distances_between_poses_say_nothing_of_a_scara_s_target_along_its_axes():
+    """The target stays near the flange there, and what the poses determine is found."""
+    for seed in range(2):
+        arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=seed)
+        table = arm.measure_table(arm.poses(200))
+        points = table[["x", "y", "z"]].to_numpy()
+        table["pair"] = [f"p{k // 2}" for k in range(200)]
+        table["distance"] = np.repeat(np.linalg.norm(points[::2] - points[1::2], axis=1), 2)
+        data = ta.Measurements.from_dataframe(table.drop(columns=["x", "y", "z"]), joints=arm.robot.joints)
+        found = ta.calibrate(arm.robot, data, model="constant", refit=False)
+        assert {"theta2", "a1", "a2"} <= set(found.identifiability.determined)
+        for model in found.models.values():
+            assert np.abs(model.setup.targets).max() < 0.3
+        errors = found.validation.holdout
+        assert errors["constant"].position.mean < 0.3 * errors["nominal"].position.mean

@@ -19,7 +19,7 @@ from truearm._core import (
     fit_constant,
     fit_field,
 )
-from truearm.core_set import Selection, core_set, distance_count
+from truearm.core_set import Selection, anchor_names, core_set, distance_count
 from truearm.errors import InputError, UsageError, WorkError, count_of, list_names
 from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
@@ -207,9 +207,10 @@ class _Constants:
 
 def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> _Constants:
     with task.stages("finding frame and tool"), core_errors(data):
-        nominal = fit_constant(
-            task.problem(measured, []), fit_options(task.threads, robust=task.options.robust)
-        )
+        # Pairs say nothing of a target along the axes of a SCARA: what is known of its reach keeps it there.
+        prior = task.options.prior if task.selection.distances and not anchor_names(data) else None
+        options = fit_options(task.threads, prior=prior, robust=task.options.robust)
+        nominal = fit_constant(task.problem(measured, []), options)
     with task.stages("asking what the poses determine"):
         found = identify(task.arm, measured, nominal.setup)
         _check_enough(task, data, found.total_rank)
