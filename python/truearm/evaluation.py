@@ -26,6 +26,7 @@ from truearm.models import CONSTANT, NOMINAL, ArmModel
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
 from truearm.registration import register
+from truearm.solving import rows_beyond_learnt
 from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
 from truearm.units import MM_PER_METRE
@@ -125,7 +126,7 @@ def evaluate(
     notices = check_against(data, calibration.robot)
     data, together = points_together(data.deduplicated())
     notices += together
-    notices += known_rows(calibration.learned_from, data)
+    notices += [*known_rows(calibration.learned_from, data), *rows_beyond_learnt(calibration, data)]
     selection = select(data, chosen.use, chosen.judge_target)
     if selection.distances:
         raise InputError(

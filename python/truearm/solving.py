@@ -1,7 +1,7 @@
 """Models of an arm in the core's terms, and readings for poses: inverse kinematics from a seed."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from truearm._core import ArmModel, CoreError, Solver
 from truearm.arrays import as_rows, as_transforms
 from truearm.endpoints import at_tool
-from truearm.errors import InputError, UsageError, WorkError, count_of, list_rows
+from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_rows
 from truearm.inputs import feature_columns
 from truearm.limits import TASKS, Limits, Task
+from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.uncertainty import ConstantSpread
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
+
+FEATURE_RANGE: Final = "feature_range"
 
 
 def plain_model(robot: Robot) -> ArmModel:
@@ -89,18 +92,40 @@ def feature_names(calibration: "Calibration") -> tuple[str, ...]:
     return calibration.options.features if calibration.model.field is not None else ()
 
 
-def beyond_learnt(calibration: "Calibration", values: Sequence[float]) -> list[str]:
-    """In words, which features (F,) lie beyond those that a calibration learned from, and these."""
-    rows = calibration.learned_from if values else None
-    if rows is None:
+def beyond_learnt(calibration: "Calibration", values: ArrayLike) -> list[str]:
+    """In words, which features lie beyond those that a calibration learned from, and these.
+
+    Args:
+        calibration: What learned.
+        values: Features (F,) in its order, or those of each row (n, F).
+    """
+    names, rows = feature_names(calibration), calibration.learned_from
+    if rows is None or not names:
         return []
     found = []
-    for name, value in zip(calibration.options.features, values, strict=False):
+    for name, given in zip(names, np.atleast_2d(np.asarray(values, dtype=np.float64)).T, strict=True):
         learnt = rows.data.features[name]
         low, high = float(learnt.min()), float(learnt.max())
-        if not low <= value <= high:
-            found.append(f"{name} = {value:.10g} lies beyond {low:.10g} to {high:.10g}, where it was learnt")
+        beyond = given[(given < low) | (given > high)]
+        if len(beyond):
+            ends = dict.fromkeys(f"{end:.10g}" for end in (beyond.min(), beyond.max()))
+            where = f"{name} = {' to '.join(ends)}"
+            found.append(f"{where} lies beyond {low:.10g} to {high:.10g}, where it was learnt")
     return found
+
+
+def beyond_notices(calibration: "Calibration", values: ArrayLike) -> list[Notice]:
+    """Warnings of features, (F,) or (n, F), that lie beyond those that a calibration learned from."""
+    found = beyond_learnt(calibration, values)
+    return [Notice(FEATURE_RANGE, f"{each}: corrections are guesses there.") for each in found]
+
+
+def rows_beyond_learnt(calibration: "Calibration", data: Measurements) -> list[Notice]:
+    """The same of the features that measurements hold; none where one of them is missing."""
+    names = list(feature_names(calibration))
+    if not set(names) <= set(data.features.columns):
+        return []
+    return beyond_notices(calibration, data.features[names].to_numpy(np.float64))
 
 
 def as_seed(robot: Robot, seed: ArrayLike, count: int) -> Floats:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from truearm.cli.arguments import CalibFile, Feature, LargestDeg, LargestMm, LargestStdMm, features_of
-from truearm.cli.console import print_json, say, tell
+from truearm.cli.console import print_json, say, tell, warn
 from truearm.defaults import DEADLINE_S, HOLD_S, LARGEST_DEG, LARGEST_MM, LARGEST_STD_MM, RAMP_S
 from truearm.errors import InputError, UsageError
 from truearm.files import read_text
@@ -61,6 +61,7 @@ def command(
     from truearm.compensation import Compensator
     from truearm.limits import Limits
     from truearm.serving import Server
+    from truearm.solving import beyond_notices
     from truearm.streaming import CorrectionStream, StreamOptions
 
     token = _token(address, token_file)
@@ -70,6 +71,7 @@ def command(
     options = StreamOptions(ramp_s=ramp_s, hold_s=hold_s, deadline_s=deadline_s)
     tool = _tool(tool_mm)
     CorrectionStream(compensator, options, tool=tool)
+    warn(beyond_notices(known, compensator.features))
     server = Server(
         known.robot, lambda: CorrectionStream(compensator, options, tool=tool), token=token, told=tell
     )

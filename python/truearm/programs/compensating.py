@@ -5,7 +5,7 @@ from pathlib import Path
 
 from truearm.compensation import Compensator
 from truearm.controller import Controller
-from truearm.errors import Notice, UsageError
+from truearm.errors import UsageError
 from truearm.inverse import Inverse
 from truearm.kinds import required
 from truearm.programs.declaring import declared_controller, refuse_another_arm, refuse_contradiction
@@ -23,7 +23,7 @@ from truearm.programs.notices import (
 from truearm.programs.program import Language
 from truearm.programs.rewriting import Choices, Models, Rewritten, Tell, read_program, rewrite
 from truearm.robot import Robot
-from truearm.solving import beyond_learnt
+from truearm.solving import beyond_learnt, beyond_notices
 
 
 def compensate_program(
@@ -92,7 +92,7 @@ def compensate_program(
             *still_notices(done, calibration),
             *tool_notices(done, calibration),
             *object_notices(done),
-            *(Notice("feature_range", f"{each}: corrections are guesses there.") for each in beyond),
+            *beyond_notices(calibration, compensator.features),
         ],
     )
 

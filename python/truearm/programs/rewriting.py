@@ -358,13 +358,17 @@ class _State:
         keep = f"--on-refusal {KEEP_NOMINAL} leaves such targets as they are where that makes no step"
         again = ". Touches further apart, and more of them, tell tools and work objects better"
         frames = again if FRAMES_UNSURE in self.codes else ""
-        return f"Change them{allow}; {keep}{away}{self._why_unsure()}{frames}"
+        return f"{self._beyond()}Change them{allow}; {keep}{away}{self._why_unsure()}{frames}"
+
+    def _beyond(self) -> str:
+        """Features far off, before all else: what is refused may be nothing but their guesses."""
+        if not self.models.beyond:
+            return ""
+        return f"{'; '.join(self.models.beyond)}: measure there, or give what the arm has. "
 
     def _why_unsure(self) -> str:
-        """What can be done where the calibration is unsure of features far off, or knows positions alone."""
-        if UNSURE in self.codes and self.models.beyond:
-            return f". {'; '.join(self.models.beyond)}: measure there, or give what the arm has"
-        if not (UNSURE in self.codes and self.models.positions_only):
+        """What can be done where the calibration is unsure because it knows positions alone."""
+        if self.models.beyond or not (UNSURE in self.codes and self.models.positions_only):
             return ""
         return (
             ". This calibration knows positions alone, so it is sure of tools near the points that were "
@@ -390,7 +394,7 @@ class _State:
                 + describe(self.program, [self._listed(target, self.refused[target]) for target in steps]),
                 rule="Within linear, circular or blended motion an uncorrected target among corrected ones "
                 "makes a step",
-                way_out="Change these targets or the limits",
+                way_out=f"{self._beyond()}Change these targets or the limits",
             )
         return tuple(listed)
 

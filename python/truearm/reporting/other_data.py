@@ -1,5 +1,7 @@
 """Chapter: the same models judged on other measurements."""
 
+from typing import Final
+
 import numpy as np
 
 from truearm.as_calibrated import NOT_AS_CALIBRATED
@@ -12,15 +14,18 @@ from truearm.reporting.held_errors import cumulative, histogram
 from truearm.reporting.numbers import fixed, short
 from truearm.reporting.parts import Part, Section, Table
 from truearm.reporting.verdict import HEADINGS, STATISTICS
+from truearm.solving import FEATURE_RANGE
 from truearm.units import MM_PER_METRE
+
+WORTH_A_LOOK: Final = (FEATURE_RANGE, *OF_NO_USE, NOT_AS_CALIBRATED)
 
 
 def not_met(facts: Facts) -> list[Advice]:
-    """What to do first where the calibration is of no use on the other measurements, or the arm is not as it
-    was; empty elsewhere.
+    """What to do first where the calibration is of no use on the other measurements, features are beyond what
+    was learnt, or the arm is not as it was; empty elsewhere.
     """
     notices = () if facts.other is None else facts.other.notices
-    why = [notice.message for notice in notices if notice.kind in (*OF_NO_USE, NOT_AS_CALIBRATED)]
+    why = [notice.message for notice in notices if notice.kind in WORTH_A_LOOK]
     words = f"Of {', '.join(facts.other_names)}: {' '.join(why)}"
     return (
         [Advice("other_measurements", "Look at the other measurements first.", words, np.inf)] if why else []

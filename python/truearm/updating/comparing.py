@@ -15,6 +15,7 @@ from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
+from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.turning_sense import check_turns
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
@@ -152,7 +153,7 @@ def update(
     notices = check_against(data, calibration.robot)
     data, together = points_together(data.deduplicated())
     notices += together
-    notices += known_rows(calibration.learned_from, data)
+    notices += [*known_rows(calibration.learned_from, data), *rows_beyond_learnt(calibration, data)]
     data, unused = some_poses(one_row_a_visit(data))
     notices += unused
     task = _task(calibration, data, chosen, stages)
@@ -203,7 +204,7 @@ class _Found:
         scene, start, scatter = self.rows.scene, self.rows.start, self.rows.scatter
         unknowns, level = scene.unknowns, self.options.level
         found = estimate(scene, scatter, start, unknowns.free)
-        _check_plausible(scene, found)
+        _check_plausible(scene, found, notices)
         anew = unknowns.free & unknowns.nuisance
         still = estimate(scene, scatter, scene.unchanged(start), anew)
         judge = Judge(level, scale_freedom(self.calibration))
@@ -350,7 +351,7 @@ def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:
     return [Notice("outliers", text, tuple(data.rows[which].tolist()))]
 
 
-def _check_plausible(scene: Scene, found: Estimate) -> None:
+def _check_plausible(scene: Scene, found: Estimate, notices: Sequence[Notice]) -> None:
     joints = scene.task.arm.robot.joint_count
     std = np.maximum(scene.unknowns.std[:joints], np.finfo(np.float64).tiny)
     ratios = np.abs(found.state.arm[:joints]) / std
@@ -358,10 +359,11 @@ def _check_plausible(scene: Scene, found: Estimate) -> None:
     if ratios[wild] > IMPLAUSIBLE:
         kept = way_out_of_keeping(scene.unknowns.kept)
         check = f"{kept}; check" if kept else "Check"
+        guessed = "".join(f"{notice} " for notice in notices if notice.kind == FEATURE_RANGE)
         raise WorkError(
             f"joint {wild + 1} would be off by {ratios[wild]:.0f} times what is allowed for",
             where=", ".join(scene.data.files),
             rule=f"Up to {IMPLAUSIBLE:g} times --offset-deg is believed",
-            way_out=f"{check} that these are measurements of this arm; after a larger change give a larger "
-            "--offset-deg",
+            way_out=f"{guessed}{check} that these are measurements of this arm; after a larger change give a "
+            "larger --offset-deg",
         )
