@@ -150,7 +150,7 @@ def test_the_frame_is_registered_from_different_poses(cell, poses):
     twice = Poses(np.repeat(poses.readings, 2, axis=0), np.tile([1, -1], 8), ("",) * 16)
     steps = [step for step in steps_of(twice, process) if step.kind == "registration"]
     assert len(np.unique([step.readings for step in steps], axis=0)) == len(steps) == 8
-    with pytest.raises(InputError, match="there are 8 different poses.*Registration needs 9"):
+    with pytest.raises(InputError, match="the list has 8 different poses.*Registration needs 9"):
         steps_of(twice, process.model_copy(update={"registration_poses": 9}))
 
 

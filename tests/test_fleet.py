@@ -151,6 +151,9 @@ def test_finished_arms_are_not_done_again(plant, again):
     other = FIRST.replace('name = "R3"', 'name = "R3"\nseed = 8')
     assert run_fleet(Fleet.from_toml(other, folder=plant), again, workers=1).done_before == 0
     assert run_fleet(Fleet.from_toml(other, folder=plant), again).done_before == 3
+    (again / "R1" / "summary.json").unlink()
+    assert run_fleet(Fleet.from_toml(other, folder=plant), again, workers=1).done_before == 2
+    assert (again / "R1" / "summary.json").is_file()
 
 
 def test_progress_says_that_it_counts_the_arms_that_are_left(plant, again):

@@ -8,7 +8,7 @@ import numpy as np
 from truearm.cell.cell_file import ProcessSection
 from truearm.cell.poses_file import Poses
 from truearm.cell.session import Step
-from truearm.errors import InputError
+from truearm.errors import InputError, count_of
 
 DRAWN: Final = 17
 
@@ -25,7 +25,7 @@ def steps_of(poses: Poses, process: ProcessSection) -> list[Step]:
     drawn = _drawn(poses)[: process.registration_poses]
     if len(drawn) < process.registration_poses:
         raise InputError(
-            f"there are {len(drawn)} different poses",
+            f"the list has {count_of(len(drawn), 'different pose')}",
             rule=f"Registration needs {process.registration_poses}",
             way_out="Give more poses, or lower registration_poses, to 4 at least",
         )

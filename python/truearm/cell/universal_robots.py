@@ -35,6 +35,7 @@ Floats = NDArray[np.float64]
 JOINTS: Final = 6
 THERE_RAD: Final = 2e-4
 DIGITS: Final = 6
+STATE_ASKED: Final = "the request for its state"
 STILL_RAD_S: Final = 1e-3
 SENDINGS: Final = 8
 STOP_RAD_S2: Final = 4.0
@@ -188,7 +189,7 @@ class UniversalRobots(Managed):
             if self._script.is_interrupted:
                 raise stopped(self.name, self.address)
             if time.monotonic() > until:
-                raise silent(self.name, self.address, self._settings.timeout_s, doing="send its state")
+                raise silent(self.name, self.address, self._settings.timeout_s, doing=STATE_ASKED)
             stream.wait()
         if self._script.is_interrupted:
             raise stopped(self.name, self.address)
@@ -247,7 +248,7 @@ class _Stream:
             if state is not None and time.monotonic() - self._came < limit_s:
                 return state
             if time.monotonic() >= until:
-                raise silent(self._device, self._address, limit_s, doing="send its state")
+                raise silent(self._device, self._address, limit_s, doing=STATE_ASKED)
             self.wait()
 
     def wait(self) -> None:

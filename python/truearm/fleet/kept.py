@@ -33,8 +33,9 @@ def kept_row(inputs: Inputs, output: Path) -> Row | None:
         row: Row = content["row"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    has_report = not inputs.entry.section.report or (folder / REPORT_NAME).is_file()
-    return row if has_report and known == (inputs.digest, calibration) else None
+    wanted = [SUMMARY_NAME, *([REPORT_NAME] if inputs.entry.section.report else [])]
+    whole = all((folder / name).is_file() for name in wanted)
+    return row if whole and known == (inputs.digest, calibration) else None
 
 
 def keep(inputs: Inputs, made: ArmMade, output: Path) -> Row:
