@@ -42,7 +42,10 @@ def told(notices):
 
 
 def test_rows_beyond_are_told_with_their_values(known):
-    assert beyond_learnt(known, [[0.0], [8.0]]) == []
+    assert beyond_learnt(known, [[-0.1], [8.1]]) == []
+    assert beyond_learnt(known, [[-3.0], [12.0], [9.0]]) == [
+        "payload_kg = -3 and 9 to 12 lies beyond 0 to 8, where it was learnt"
+    ]
     assert beyond_learnt(known, [[4.0], [12.0], [9.0]]) == [
         "payload_kg = 9 to 12 lies beyond 0 to 8, where it was learnt"
     ]

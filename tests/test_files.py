@@ -10,7 +10,7 @@ import pytest
 
 from truearm.cli import main
 from truearm.errors import InputError
-from truearm.files import make_directory, read_bytes, write_all, write_whole
+from truearm.files import check_place, make_directory, read_bytes, write_all, write_whole
 
 
 def test_a_link_stays_one_and_what_it_leads_to_is_written(tmp_path):
@@ -95,6 +95,18 @@ def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path, mode):
     write_whole(path, "new")
     assert path.read_text() == "new"
     assert path.stat().st_mode & 0o777 == mode
+
+
+def test_streams_and_links_go_where_nothing_may_be_made(tmp_path, monkeypatch):
+    open_to_all, closed = tmp_path / "open", tmp_path / "closed"
+    open_to_all.mkdir()
+    closed.mkdir()
+    (closed / "link").symlink_to(open_to_all / "result.csv")
+    monkeypatch.setattr("os.access", lambda path, _mode: Path(path) == open_to_all)
+    for place in (Path("/dev/stdout"), Path("/dev/null"), closed / "link", open_to_all / "result.csv"):
+        check_place(place)
+    with pytest.raises(InputError, match="closed: no permission to write here"):
+        check_place(closed / "result.csv")
 
 
 @pytest.mark.parametrize("name", ["file/below", "n" * 300])

@@ -194,13 +194,16 @@ def _is_stream(path: Path) -> bool:
 
 
 def check_place(path: Path) -> None:
-    """Check before long work that a file may come to a place.
+    """Check before long work that a file may come to a place; streams and links are as write_all has them.
 
     Raises:
         InputError: If a directory is there, or there is none for it that takes files.
     """
+    if _is_stream(path):
+        return
     if path.is_dir():
         raise InputError("this is a directory", where=str(path), rule="A file is to be written")
+    path = followed(path) if path.is_symlink() else path
     if path.parent.exists() and not path.parent.is_dir():
         raise InputError("this is a file", where=str(path.parent), rule="A directory is needed")
     if not path.parent.exists():

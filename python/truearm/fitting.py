@@ -207,7 +207,8 @@ class _Constants:
 
 def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> _Constants:
     with task.stages("finding frame and tool"), core_errors(data):
-        # Pairs say nothing of a target along the axes of a SCARA: what is known of its reach keeps it there.
+        # Pairs say nothing of a target along the axes of a SCARA: what is known of its reach, which comes
+        # with any prior, keeps it there. Distances from anchors say where it is.
         prior = task.options.prior if task.selection.distances and not anchor_names(data) else None
         options = fit_options(task.threads, prior=prior, robust=task.options.robust)
         nominal = fit_constant(task.problem(measured, []), options)

@@ -51,7 +51,7 @@ def asked_by(numbers: Sequence[int], asked: Asked) -> Iterator[Asked]:
     if threading.current_thread() is not threading.main_thread():
         yield asked
         return
-    before = {number: signal.getsignal(number) for number in numbers}
+    before = {number: signal.getsignal(number) or signal.SIG_DFL for number in numbers}
     try:
         for number in numbers:
             signal.signal(number, asked)

@@ -79,18 +79,18 @@ def check_euler_sequence(sequence: str) -> None:
 
 
 def matrix_from_euler(angles: ArrayLike, sequence: str) -> NDArray[np.float64]:
-    """Rotation matrices (..., 3, 3) of Euler angles (..., 3), as in quaternion_from_euler."""
+    """Rotation matrices (3, 3) or (n, 3, 3) of Euler angles (3,) or (n, 3), as in quaternion_from_euler."""
     given = np.asarray(angles, dtype=np.float64)
     return np.asarray(_rotation().from_euler(sequence, given).as_matrix())
 
 
 def matrix_from_rotation_vector(vectors: ArrayLike) -> NDArray[np.float64]:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) in rad."""
+    """Rotation matrices (3, 3) or (n, 3, 3) of rotation vectors (3,) or (n, 3) in rad."""
     return np.asarray(_rotation().from_rotvec(np.asarray(vectors, dtype=np.float64)).as_matrix())
 
 
 def rotation_vector_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
-    """Rotation vectors (..., 3) in rad, at most half a turn long, of rotation matrices (..., 3, 3)."""
+    """Rotation vectors (3,) or (n, 3), rad, half a turn at the most, of matrices (3, 3) or (n, 3, 3)."""
     return np.asarray(_rotation().from_matrix(np.asarray(matrix, dtype=np.float64)).as_rotvec())
 
 

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 FEATURE_RANGE: Final = "feature_range"
+MARGIN: Final = 0.02
+"""A feature may lie outside of what was learnt by so much of its range: curves go on smoothly there."""
 
 
 def plain_model(robot: Robot) -> ArmModel:
@@ -106,12 +108,19 @@ def beyond_learnt(calibration: "Calibration", values: ArrayLike) -> list[str]:
     for name, given in zip(names, np.atleast_2d(np.asarray(values, dtype=np.float64)).T, strict=True):
         learnt = rows.data.features[name]
         low, high = float(learnt.min()), float(learnt.max())
-        beyond = given[(given < low) | (given > high)]
-        if len(beyond):
-            ends = dict.fromkeys(f"{end:.10g}" for end in (beyond.min(), beyond.max()))
-            where = f"{name} = {' to '.join(ends)}"
-            found.append(f"{where} lies beyond {low:.10g} to {high:.10g}, where it was learnt")
+        margin = MARGIN * (high - low)
+        sides = (given[given < low - margin], given[given > high + margin])
+        values_beyond = " and ".join(_span(side) for side in sides if len(side))
+        if values_beyond:
+            found.append(
+                f"{name} = {values_beyond} lies beyond {low:.10g} to {high:.10g}, where it was learnt"
+            )
     return found
+
+
+def _span(values: Floats) -> str:
+    """From the least to the largest of values (n,), in words."""
+    return " to ".join(dict.fromkeys(f"{end:.10g}" for end in (values.min(), values.max())))
 
 
 def beyond_notices(calibration: "Calibration", values: ArrayLike) -> list[Notice]:

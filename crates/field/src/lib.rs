@@ -6,8 +6,8 @@
 //! (a kernel on its cells), so that fit, evidence and standard deviation are those of exact Gaussian inference.
 //!
 //! Blocks: `constant` (the constants, kernel one), `own` (theta of a revolute joint, d of a prismatic one, over that
-//! joint; where joints are coupled, over a reading, if the evidence has it so), `sag` (the same parameter in proportion to the levers of the links behind the joint), `wave` (the angle of a
-//! joint by a cosine and a sine of some hundred cycles a turn, where gears, encoders or screws leave one),
+//! joint; where joints are coupled, over a reading, if the evidence has it so), `sag` (the same parameter in proportion to the levers
+//! of the links behind the joint, and of what hangs beside the end), `wave` (the angle of a joint by a cosine and a sine of some hundred cycles a turn, where gears, encoders or screws leave one),
 //! `smooth` (all CEPs over each input separately), `major` and `wrist` (all CEPs over at most three joints
 //! together: those that the evidence chooses, and the last three).
 

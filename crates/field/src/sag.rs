@@ -22,6 +22,11 @@ use crate::cells::Grid;
 /// Name of the block.
 pub const SAG_NAME: &str = "sag";
 
+/// A typical link is no shorter, as the joints of a wrist alone would be.
+const SHORTEST_M: f64 = 0.01;
+/// A typical link is no longer, as those of a table with nearly parallel axes would be.
+const LONGEST_M: f64 = 1.0;
+
 /// Up, in the base frame of an arm that stands.
 pub const UPRIGHT: [f64; 3] = [0.0, 0.0, 1.0];
 
@@ -192,7 +197,7 @@ impl Levers {
     fn with_beside<T: Copy>(&self, values: Vec<T>, beside: impl Fn(T) -> T) -> Vec<T> {
         let joints = self.joint_count();
         let own = lever_count(joints) - BESIDE * joints;
-        if values.len() != own * (1 + self.payloads.len()) {
+        if own == 0 || values.len() != own * (1 + self.payloads.len()) {
             return values;
         }
         let mut all = Vec::with_capacity(self.len());
@@ -237,10 +242,10 @@ impl Levers {
     }
 }
 
-/// Mean length of the links of an arm, m.
+/// Mean length of the links of an arm, m, as far as it is one of a link.
 fn typical_length(chain: &Chain) -> f64 {
     let lengths = chain.links().iter().map(|link| link.a.hypot(link.d));
-    lengths.sum::<f64>() / chain.joint_count().max(1) as f64
+    (lengths.sum::<f64>() / chain.links().len().max(1) as f64).clamp(SHORTEST_M, LONGEST_M)
 }
 
 struct At<'a> {

@@ -375,3 +375,34 @@ fn a_sag_that_knows_nothing_beside_the_end_has_no_weights_there() {
     }
     assert_eq!(restored(links_alone.0, links_alone.1), restored(outputs, weights));
 }
+
+#[test]
+fn a_sag_adds_the_sum_of_its_levers_times_their_weights() {
+    let arm = six_axes(Truth::RIGID);
+    let parameters = arm.chain.parameter_count();
+    let levers = Levers::new(&arm.chain).along([0.6, 0.0, 0.8]).unwrap();
+    let carrying = levers.clone().carrying([(7, 1.0)]);
+    let outputs: Vec<usize> = carrying.joints().map(|joint| 5 * joint).collect();
+    let mut random = Random::new(8);
+    let weights: Vec<f64> = outputs.iter().map(|_| 1e-3 * random.normal()).collect();
+    let block = Block {
+        name: "sag".to_owned(),
+        grid: Grid { inputs: vec![0, 1, 2, 3, 4, 5, 7], axes: Vec::new() },
+        outputs: outputs.clone(),
+        weights: weights.clone(),
+        reading: None,
+    };
+    let bank = Bank::restored(8, parameters, vec![block], levers).unwrap();
+    for _ in 0..5 {
+        let values: Vec<f64> = (0..8).map(|_| random.normal()).collect();
+        let mut wanted = vec![0.0; parameters];
+        for ((lever, weight), output) in carrying.at(&values).iter().zip(&weights).zip(&outputs) {
+            wanted[*output] += lever * weight;
+        }
+        let mut found = vec![0.0; parameters];
+        bank.add(&values, &mut found).unwrap();
+        for (found, wanted) in found.iter().zip(&wanted) {
+            assert!((found - wanted).abs() < 1e-12, "{found} is not {wanted}");
+        }
+    }
+}

@@ -8,7 +8,7 @@ from truearm.errors import WorkError
 UNSEEN_IN_A_ROW: Final = 5
 FAR_IN_A_ROW: Final = 3
 UNSEEN: Final = "unseen"
-"""Kind of the event at the first of the poses that were taken back."""
+"""Kind of the event at each of the poses that were taken back."""
 TAKEN_BACK_BEFORE: Final = "SELECT 1 FROM events WHERE kind = ? AND step BETWEEN ? AND ? LIMIT 1"
 LAST_REASON: Final = (
     "SELECT reason FROM readings WHERE step <= ? AND reason != '' ORDER BY step DESC, attempt DESC LIMIT 1"
@@ -25,8 +25,8 @@ WAYS_OUT: Final = {
 class Unseen:
     """Poses in a row that were given up without any valid reading.
 
-    One of them may be hidden; many say that the target is lost, and would use up all that are left. Checks,
-    and poses that a device refuses, are no part of such a row and do not end it.
+    One of them may be hidden; many say that the target is lost, and would use up all that are left. Checks
+    that see nothing, and poses that a device refuses, are no part of such a row and do not end it.
     """
 
     def __init__(self, session: Session) -> None:
@@ -55,14 +55,14 @@ class Unseen:
         self._steps.append(step.step)
         if len(self._steps) < UNSEEN_IN_A_ROW:
             return
-        first, self._steps = self._steps[0], []
-        taken_back = self._session.rows(TAKEN_BACK_BEFORE, (UNSEEN, first, step.step))
+        steps, self._steps = self._steps, []
+        taken_back = self._session.rows(TAKEN_BACK_BEFORE, (UNSEEN, steps[0], step.step))
         if taken_back and step.kind == "pose":
             return
         reasons = self._session.rows(LAST_REASON, (step.step,))
         said = f"; the last: {reasons[0][0]}" if reasons else ""
         what = f"{UNSEEN_IN_A_ROW} {NOUNS[step.kind]} in a row had no valid reading{said}"
-        self._session.take_back(first, UNSEEN, what)
+        self._session.take_back(steps, UNSEEN, what)
         raise WorkError(what, where=step.kind, way_out=WAYS_OUT[step.kind])
 
 

@@ -150,11 +150,12 @@ class Process:
                 # Steps behind a new check count on from it.
                 if step.kind == "check" and self._checks_elsewhere(step):
                     break
-                if step.kind == "pose" and measured and self._after_pose():
-                    return ACCURATE
+                is_accurate = step.kind == "pose" and measured and self._after_pose()
                 if self._far.asks_for_check() and self._session.check_next():
                     self._total += 1
                     break
+                if is_accurate:
+                    return ACCURATE
             else:
                 return DONE
 

@@ -238,15 +238,16 @@ class Session:
             (time.time(), step, kind, message),
         )
 
-    def take_back(self, step: int, kind: str, message: str) -> None:
-        """Take outcomes and readings of a step, and of those behind, out of the file; an event says why.
+    def take_back(self, steps: Sequence[int], kind: str, message: str) -> None:
+        """Take outcomes and readings from the first of `steps` on out of the file; an event at each says why.
 
-        The session goes on at this step.
+        The session goes on at the first.
         """
         with self.together():
             for table in ("outcomes", "readings"):
-                self._write(f"DELETE FROM {table} WHERE step >= ?", (step,))  # noqa: S608 - one of two names
-            self.add_event(kind, message, step)
+                self._write(f"DELETE FROM {table} WHERE step >= ?", (steps[0],))  # noqa: S608 - one of two names
+            for step in steps:
+                self.add_event(kind, message, step)
 
     def registration(self) -> tuple[Floats, float] | None:
         """world_from_base (4, 4) and its residual in mm; None before it is found."""
@@ -348,8 +349,6 @@ class Session:
                 where=str(self.path),
                 way_out="What it says is stored is there. Make room, then the same command goes on",
             ) from None
-        except sqlite3.IntegrityError:
-            raise
         except sqlite3.DatabaseError as error:
             self._keeps = False
             raise unreadable(error, self.path) from None

@@ -62,6 +62,7 @@ def _no_list(column: str, kinds: str, also: str) -> str:
     )
 
 
+OF_STEP: Final = "(SELECT count(*) FROM readings AS own WHERE own.step = readings.step)"
 RULES: Final = (
     Rule("steps", "kind", "kind NOT IN ('registration', 'pose', 'check')", "registration, pose or check"),
     Rule("steps", "pose", f"{_no('integer', 'pose')} OR pose < 0", "a whole number, from 0"),
@@ -73,14 +74,21 @@ RULES: Final = (
         _no_list("readings", "integer real", f"json_array_length(readings) != {JOINTS}"),
         NUMBERS,
     ),
-    Rule("readings", "attempt", _no("integer", "attempt"), "a whole number"),
+    Rule("readings", "step", "step NOT IN (SELECT step FROM steps)", "a step of the session"),
+    Rule(
+        "readings",
+        "attempt",
+        f"{_no('integer', 'attempt')} OR attempt < 1 OR attempt > {OF_STEP}",
+        "a whole number, counted from 1 within its step",
+    ),
     Rule("readings", "valid", "valid NOT IN (0, 1)", "0 or 1"),
     *(
         Rule(
             "readings",
             column,
-            f"typeof({column}) != 'real' AND (valid OR typeof({column}) != 'null')",
-            "a number, or empty where the reading is not valid",
+            f"(typeof({column}) != 'real' AND (valid OR typeof({column}) != 'null')) "
+            f"OR (valid AND abs({column}) = 9e999)",
+            "a finite number, or empty where the reading is not valid",
         )
         for column in ("x_m", "y_m", "z_m")
     ),
@@ -98,6 +106,7 @@ RULES: Final = (
         _no_list("joints", "integer real", f"json_array_length(joints) != {JOINTS}"),
         NUMBERS,
     ),
+    Rule("outcomes", "step", "step NOT IN (SELECT step FROM steps)", "a step of the session"),
     Rule("outcomes", "outcome", "outcome NOT IN ('measured', 'skipped')", "measured or skipped"),
     Rule("outcomes", "reason", _no("text", "reason"), "text"),
     Rule("outcomes", "time_s", _no("real", "time_s"), "a number"),

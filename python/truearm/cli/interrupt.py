@@ -29,18 +29,18 @@ def ends_promptly(kept: Callable[[], str] | None = None) -> Iterator[None]:
     asked = Asked(raises=True)
     watch = _Watch(asked, kept)
     threading.Thread(target=watch.run, daemon=True).start()
-    try:
-        with asked_by((signal.SIGINT,), asked):
+    with asked_by((signal.SIGINT,), asked):
+        try:
             yield
-        if asked:
-            raise KeyboardInterrupt
-    except KeyboardInterrupt:
-        watch.ended = True
-        if kept is not None:
-            _tell(kept)
-        raise
-    finally:
-        watch.ended = True
+            if asked:
+                raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            watch.ended = True
+            if kept is not None:
+                _tell(kept)
+            raise
+        finally:
+            watch.ended = True
 
 
 def end_at_once() -> NoReturn:
@@ -74,7 +74,9 @@ class _Watch:
         while not self.ended:
             since = self._asked.since
             if since is not None and time.monotonic() - since > GRACE_S:
-                _tell(self._kept)
-                tell("Interrupted.")
-                os._exit(INTERRUPTED)
+                try:
+                    _tell(self._kept)
+                    tell("Interrupted.")
+                finally:
+                    os._exit(INTERRUPTED)
             time.sleep(LOOKS_EVERY_S)

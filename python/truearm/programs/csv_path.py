@@ -27,6 +27,7 @@ from truearm.reading import DELIMITERS
 from truearm.robot import Robot
 from truearm.units import to_si
 
+Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 ROTATION: Final = re.compile(r"r([xyz])(?:_(rad|deg))?")
@@ -121,6 +122,7 @@ class _Reader:
             rows = order[first:last]
             width = self.layouts[int(layout[first])].width
             numbers = [column[rows][:, :width] for column in columns[2:]]
+            self._check_turns(self.layouts[int(layout[first])], numbers[0], at[rows])
             targets.extend(0, at[first:last], int(layout[first]), numbers)
         both = len(self._parts) == 2
         motion = np.where(
@@ -149,6 +151,14 @@ class _Reader:
         columns = [np.concatenate(parts) for parts in zip(*found, strict=True)]
         order = np.lexsort((columns[0], columns[1]))
         return order, columns
+
+    def _check_turns(self, layout: Layout, values: Floats, at: Integers) -> None:
+        if isinstance(layout, QuaternionPose):
+            none = np.linalg.norm(values[:, 3:7], axis=1) == 0.0
+            if none.any():
+                self._source.fail(
+                    int(at[none][0]), "a quaternion of length zero", rule="It is a turn: w x y z of length 1"
+                )
 
     def _columns(
         self, part: _Part, places: list[int | None], lines: Integers, width: int

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from truearm.cell.cell_file import SimulateSection
 from truearm.cell.line_robot import LineRobot
 from truearm.cell.line_sensor import LineSensor
-from truearm.cell.patterns import expression_for, numbers_in
+from truearm.cell.patterns import expression_for, filled, numbers_in
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.world import ROOM_C, World
 from truearm.errors import InputError
@@ -126,13 +126,17 @@ def line_without_point(settings: LineSensor.Settings, simulate: SimulateSection)
 
 
 def check_faults(settings: LineSensor.Settings, simulate: SimulateSection, where: str) -> None:
-    """See that a virtual tracker can say that it does not see its target, if it is to.
+    """See that a virtual tracker can answer, and say that it does not see its target, if it is to.
 
     Raises:
         InputError: If it cannot.
     """
     missed = simulate.faults.missed
-    if missed > 0.0 and line_without_point(settings, simulate) is None:
+    try:
+        line = line_without_point(settings, simulate)
+    except InputError as error:
+        raise error.at(f"{where}, simulate, answer") from None
+    if missed > 0.0 and line is None:
         raise InputError(
             f"missed is {missed:g}, and no line of this sensor says that there is no point",
             where=f"{where}, simulate, faults",
@@ -149,9 +153,7 @@ def _answer_of(settings: LineSensor.Settings, simulate: SimulateSection, point: 
         "temperature": ROOM_C,
         "ok": float(ok),
     }
-    return (
-        answer_for(settings.answer, values) if simulate.answer is None else simulate.answer.format(**values)
-    )
+    return answer_for(settings.answer, values) if simulate.answer is None else filled(simulate.answer, values)
 
 
 GROUP: Final = re.compile(r"\(\?P<(\w+)>(?:[^()\\]|\\.|\[[^\]]*\]|\((?:[^()\\]|\\.)*\))*\)")
