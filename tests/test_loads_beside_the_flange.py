@@ -28,8 +28,9 @@ def test_a_payload_beside_the_last_axis_is_no_noise(beside_m):
     for payload_kg in (*LOADS_KG, NEW_KG):
         met = Conditions(payload_kg=payload_kg)
         truth = (arm.world_from_base @ arm.true_pose(fresh, tool=target, conditions=met))[:, :3, 3]
-        known = {"group": group, "target": 1, "features": {"payload_kg": payload_kg}}
-        off_mm = 1e3 * (calibration.position(fresh, **known) - truth)
+        carries = {"payload_kg": payload_kg}
+        found = calibration.position(fresh, group=group, target=1, features=carries)
+        off_mm = 1e3 * (found - truth)
         assert np.linalg.norm(off_mm, axis=1).mean() < 0.035
-        std_mm = 1e3 * calibration.position_std(fresh, **known)
+        std_mm = 1e3 * calibration.position_std(fresh, group=group, target=1, features=carries)
         assert (np.abs(off_mm) < 1.96 * std_mm).mean() > 0.9

@@ -23,8 +23,9 @@ pub struct LeverScratch {
     frames: Vec<[[Lane; 3]; 2]>,
     /// Way from each joint's origin to the next one's or to the end, along x and y.
     ways: Vec<[Lane; 2]>,
-    /// The x, y and z axis of the end, along x and y.
-    beside: [[Lane; 2]; BESIDE],
+    /// The x, y and z axis of the end, along x and y; on the heap as all lanes of scratches are, which may be part of objects
+    /// whose allocator knows no alignment of lanes.
+    beside: Vec<[Lane; 2]>,
 }
 
 impl LeverScratch {
@@ -34,7 +35,7 @@ impl LeverScratch {
         Self {
             frames: vec![[[Lane::ZERO; 3]; 2]; joints],
             ways: vec![[Lane::ZERO; 2]; joints],
-            beside: [[Lane::ZERO; 2]; BESIDE],
+            beside: vec![[Lane::ZERO; 2]; BESIDE],
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Python bindings: convert, release the lock, call, translate errors.
 
+use pyo3::PyClass;
 use pyo3::prelude::*;
 
 mod blocks;
@@ -23,6 +24,14 @@ mod shots;
 mod stream;
 mod text;
 
+/// Python allocates its objects at multiples of so many bytes, whatever their types ask for.
+const PYTHON_ALIGNS: usize = 16;
+
+fn add_class<T: PyClass>(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    const { assert!(align_of::<T>() <= PYTHON_ALIGNS, "lanes within an object have to be on the heap") };
+    module.add_class::<T>()
+}
+
 /// The compiled core of truearm: private, wrapped by the Python package.
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -31,24 +40,24 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("ANGLE_ARM_M", truearm_estimate::ANGLE_ARM)?;
     module.add("NORMAL_95", truearm_field::QUANTILE_95)?;
     module.add("CoreError", module.py().get_type::<door::CoreError>())?;
-    module.add_class::<chain::Chain>()?;
-    module.add_class::<measured::MeasurementSet>()?;
-    module.add_class::<measured::Setup>()?;
-    module.add_class::<estimate::IdentificationProblem>()?;
-    module.add_class::<estimate::ConstantFit>()?;
-    module.add_class::<choice::Choice>()?;
-    module.add_class::<regions::Regions>()?;
-    module.add_class::<regions::RegionalFit>()?;
-    module.add_class::<division::Division>()?;
-    module.add_class::<cmac::Network>()?;
-    module.add_class::<cmac::TrainedNetwork>()?;
-    module.add_class::<cmac::NetworkFit>()?;
-    module.add_class::<conservative::Conservative>()?;
-    module.add_class::<field::FieldFit>()?;
-    module.add_class::<field::Field>()?;
-    module.add_class::<field::Posterior>()?;
-    module.add_class::<inverse::Inverse>()?;
-    module.add_class::<clearance::Clearance>()?;
+    add_class::<chain::Chain>(module)?;
+    add_class::<measured::MeasurementSet>(module)?;
+    add_class::<measured::Setup>(module)?;
+    add_class::<estimate::IdentificationProblem>(module)?;
+    add_class::<estimate::ConstantFit>(module)?;
+    add_class::<choice::Choice>(module)?;
+    add_class::<regions::Regions>(module)?;
+    add_class::<regions::RegionalFit>(module)?;
+    add_class::<division::Division>(module)?;
+    add_class::<cmac::Network>(module)?;
+    add_class::<cmac::TrainedNetwork>(module)?;
+    add_class::<cmac::NetworkFit>(module)?;
+    add_class::<conservative::Conservative>(module)?;
+    add_class::<field::FieldFit>(module)?;
+    add_class::<field::Field>(module)?;
+    add_class::<field::Posterior>(module)?;
+    add_class::<inverse::Inverse>(module)?;
+    add_class::<clearance::Clearance>(module)?;
     module.add_function(wrap_pyfunction!(choice::choose_poses, module)?)?;
     module.add_function(wrap_pyfunction!(regions::regional_ceps, module)?)?;
     module.add_function(wrap_pyfunction!(regions::fill_without_data, module)?)?;
@@ -61,10 +70,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(estimate::linearise, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::setup_jacobian, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::step_setup, module)?)?;
-    module.add_class::<compensate::ArmModel>()?;
-    module.add_class::<compensate::Corrector>()?;
-    module.add_class::<stream::Stream>()?;
-    module.add_class::<compensate::Solver>()?;
+    add_class::<compensate::ArmModel>(module)?;
+    add_class::<compensate::Corrector>(module)?;
+    add_class::<stream::Stream>(module)?;
+    add_class::<compensate::Solver>(module)?;
     module.add_function(wrap_pyfunction!(estimate::fit_constant, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;

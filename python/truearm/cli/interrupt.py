@@ -29,18 +29,18 @@ def ends_promptly(kept: Callable[[], str] | None = None) -> Iterator[None]:
     asked = Asked(raises=True)
     watch = _Watch(asked, kept)
     threading.Thread(target=watch.run, daemon=True).start()
-    with asked_by((signal.SIGINT,), asked):
-        try:
+    try:
+        with asked_by((signal.SIGINT,), asked):
             yield
-            if asked:
-                raise KeyboardInterrupt
-        except KeyboardInterrupt:
-            watch.ended = True
-            if kept is not None:
-                _tell(kept)
-            raise
-        finally:
-            watch.ended = True
+        if asked:
+            raise KeyboardInterrupt
+    except KeyboardInterrupt:
+        watch.ended = True
+        if kept is not None:
+            _tell(kept)
+        raise
+    finally:
+        watch.ended = True
 
 
 def end_at_once() -> NoReturn:

@@ -20,7 +20,7 @@ from truearm.programs.environment import IDENTITY, Environment, Environments, Fr
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, Layout, QuaternionPose, RotationVectorPose
 from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
-from truearm.programs.scanning import Scan
+from truearm.programs.scanning import NumberColumns, Scan
 from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
 from truearm.reading import DELIMITERS
@@ -29,6 +29,8 @@ from truearm.units import to_si
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+VALUES: Final = NumberColumns._fields.index("values")
 
 ROTATION: Final = re.compile(r"r([xyz])(?:_(rad|deg))?")
 _FIELD: Final = re.compile(r'(?:[^,"]|"[^"]*")*')
@@ -122,7 +124,7 @@ class _Reader:
             rows = order[first:last]
             width = self.layouts[int(layout[first])].width
             numbers = [column[rows][:, :width] for column in columns[2:]]
-            self._check_turns(self.layouts[int(layout[first])], numbers[0], at[rows])
+            self._check_turns(self.layouts[int(layout[first])], numbers[VALUES], at[rows])
             targets.extend(0, at[first:last], int(layout[first]), numbers)
         both = len(self._parts) == 2
         motion = np.where(
