@@ -62,18 +62,19 @@ def _no_list(column: str, kinds: str, also: str) -> str:
     )
 
 
+def _joints(table: str, column: str) -> Rule:
+    """A column holds one number for each joint."""
+    bad = _no_list(column, "integer real", f"json_array_length({column}) != {JOINTS}")
+    return Rule(table, column, bad, NUMBERS)
+
+
 OF_STEP: Final = "(SELECT count(*) FROM readings AS own WHERE own.step = readings.step)"
 RULES: Final = (
     Rule("steps", "kind", "kind NOT IN ('registration', 'pose', 'check')", "registration, pose or check"),
     Rule("steps", "pose", f"{_no('integer', 'pose')} OR pose < 0", "a whole number, from 0"),
     Rule("steps", "purpose", _no("text", "purpose"), "text"),
     Rule("steps", "approach", "approach NOT IN (1, -1, 0)", "1, -1 or 0"),
-    Rule(
-        "steps",
-        "readings",
-        _no_list("readings", "integer real", f"json_array_length(readings) != {JOINTS}"),
-        NUMBERS,
-    ),
+    _joints("steps", "readings"),
     Rule("readings", "step", "step NOT IN (SELECT step FROM steps)", "a step of the session"),
     Rule(
         "readings",
@@ -100,12 +101,7 @@ RULES: Final = (
     Rule("readings", "temperature_c", _no("real null", "temperature_c"), "a number, or empty"),
     Rule("readings", "reason", _no("text", "reason"), "text"),
     Rule("readings", "raw", _no("text", "raw"), "text"),
-    Rule(
-        "readings",
-        "joints",
-        _no_list("joints", "integer real", f"json_array_length(joints) != {JOINTS}"),
-        NUMBERS,
-    ),
+    _joints("readings", "joints"),
     Rule("outcomes", "step", "step NOT IN (SELECT step FROM steps)", "a step of the session"),
     Rule("outcomes", "outcome", "outcome NOT IN ('measured', 'skipped')", "measured or skipped"),
     Rule("outcomes", "reason", _no("text", "reason"), "text"),
