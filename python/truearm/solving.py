@@ -95,7 +95,7 @@ def feature_names(calibration: "Calibration") -> tuple[str, ...]:
 
 
 def beyond_learnt(calibration: "Calibration", values: ArrayLike) -> list[str]:
-    """In words, which features lie beyond those that a calibration learned from, and these.
+    """In words, which features lie beyond those that a calibration learned from, by MARGIN, and these.
 
     Args:
         calibration: What learned.

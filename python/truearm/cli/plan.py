@@ -143,7 +143,7 @@ def _check_counts(asked: Mapping[str, int | None]) -> None:
 
 
 def _check_outputs(output: Path, picture: Path | None, *inputs: Path | str | None) -> None:
-    """Raise InputError where no file can come, is read already, or a picture has no known format."""
+    """Raise InputError where no file can come, what is there is read, or a picture has no known format."""
     check_output(output, *inputs)
     if picture is None:
         return
