@@ -25,6 +25,8 @@ CLIPPY := -D warnings -D clippy::too_many_lines -A clippy::needless_range_loop
 
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -path '*/src/*') $(wildcard crates/*/Cargo.toml)
 PY_PATHS := python tests benches docs examples
+# macOS comes with a make that cannot keep the lines of a target together.
+TOGETHER := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 
 # The first interpreter that is new enough and can make a virtual environment.
 define FIND_PYTHON
@@ -40,7 +42,7 @@ PYTHON ?= $(shell $(FIND_PYTHON))
 
 help:
 	@echo 'make setup  make .venv with truearm in it'
-	@echo 'make demo   the paper's cell in small: plan, measure, calibrate, compensate (a minute)'
+	@echo 'make demo   the cell of the paper in small: plan, measure, calibrate, compensate (a minute)'
 	@echo 'make test   Rust and Python tests'
 	@echo 'make trials the measurement cell killed and with faults, in full (TRIALS="-k kill")'
 	@echo 'make check  formatting, lint, types and layers'
@@ -74,7 +76,7 @@ trials: $(STAMPS)/built
 
 # Types take one core, what is in Rust more: side by side.
 check: $(STAMPS)/built
-	$(MAKE) --no-print-directory --jobs=2 --output-sync=target py-check rust-check
+	$(MAKE) --no-print-directory --jobs=2 $(TOGETHER) py-check rust-check
 
 py-check: $(STAMPS)/built
 	$(BIN)/ruff check $(PY_PATHS)

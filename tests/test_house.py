@@ -110,3 +110,15 @@ def test_kernels_are_inlined_into_their_instruction_set():
     plain = [str(path.relative_to(ROOT)) for path, before in found if "#[inline(always)]" not in before]
     assert found
     assert plain == []
+
+
+def test_make_says_what_there_is():
+    make = shutil.which("make")
+    if make is None:
+        pytest.skip("make is not on the path")
+    told = subprocess.run([make, "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    listed = {line.split()[1] for line in told.splitlines()}
+    declared = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert declared is not None
+    steps = {"help", "py-check", "rust-check", "rust-test", "py-test", "clean"}
+    assert listed == set(declared[1].split()) - steps

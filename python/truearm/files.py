@@ -10,6 +10,8 @@ from typing import Any, Final
 
 from truearm.errors import InputError, UsageError
 
+# Windows takes a descriptor for one of text, and turns ends of lines, unless told.
+NEW_FILE: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
 OPEN_HERE: Final = frozenset({Path("/dev/stdout"), Path("/dev/stderr")})
 """Names of what this process has open, whatever that is."""
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
@@ -229,13 +231,13 @@ def _beside(path: Path, data: bytes) -> Path:
     neighbour = path.with_name(f".{secrets.token_hex(8)}")
     mode = stat.S_IMODE(path.stat().st_mode) if path.exists() else None
     try:
-        handle = os.open(neighbour, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666 if mode is None else 0o600)
+        handle = os.open(neighbour, NEW_FILE, 0o666 if mode is None else 0o600)
     except PermissionError:
         raise InputError("no permission to write here", where=str(path.parent)) from None
     try:
         with os.fdopen(handle, "wb") as file:
             if mode is not None:
-                os.fchmod(file.fileno(), mode)
+                neighbour.chmod(mode)
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

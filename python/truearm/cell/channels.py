@@ -5,16 +5,22 @@ import os
 import re
 import select
 import socket
-import termios
 import time
-from typing import Final
+from typing import Final, Protocol
 
 import serial
 
 from truearm.cell.device_errors import PortUnavailableError
 
+try:
+    import termios
+except ImportError:  # Windows
+    TERMINAL_ERRORS: tuple[type[Exception], ...] = ()
+else:
+    TERMINAL_ERRORS = (termios.error,)
+
 # What pyserial raises where a port cannot be opened.
-SERIAL_ERRORS: Final = (serial.SerialException, OSError, termios.error)
+SERIAL_ERRORS: Final[tuple[type[Exception], ...]] = (serial.SerialException, OSError, *TERMINAL_ERRORS)
 
 # The longest a read waits before it looks whether the call was stopped.
 SLICE_S: Final = 0.02
@@ -30,13 +36,104 @@ class ConnectionEndedError(OSError):
     """The other side has gone."""
 
 
+class Wire(Protocol):
+    """What a channel goes through; where it has gone or was closed, OSError or ValueError is raised."""
+
+    def receive(self, wait_s: float) -> bytes | None:
+        """What has come within a time: None where nothing has, empty where the other side has gone."""
+
+    def send(self, data: bytes, wait_s: float) -> int:
+        """How many bytes it has taken within a time."""
+
+    def close(self) -> None:
+        """Be no more; others may still wait for it."""
+
+
+class _Terminal:
+    """A serial port, or a pseudo-terminal, by its descriptor."""
+
+    def __init__(self, port: serial.Serial) -> None:
+        self._port, self._number = port, port.fileno()
+        os.set_blocking(self._number, False)
+
+    def receive(self, wait_s: float) -> bytes | None:
+        """See Wire."""
+        if not select.select([self._number], [], [], wait_s)[0]:
+            return None
+        try:
+            return os.read(self._number, CHUNK)
+        except BlockingIOError:
+            return None
+
+    def send(self, data: bytes, wait_s: float) -> int:
+        """See Wire."""
+        try:
+            return os.write(self._number, data)
+        except BlockingIOError:
+            return os.write(self._number, data) if select.select([], [self._number], [], wait_s)[1] else 0
+
+    def close(self) -> None:
+        """See Wire."""
+        self._number = CLOSED
+        self._port.close()
+
+
+class _Connection:
+    """A TCP connection."""
+
+    def __init__(self, opened: socket.socket) -> None:
+        self._socket = opened
+        opened.setblocking(False)
+
+    def receive(self, wait_s: float) -> bytes | None:
+        """See Wire."""
+        if not select.select([self._socket], [], [], wait_s)[0]:
+            return None
+        try:
+            return self._socket.recv(CHUNK)
+        except BlockingIOError:
+            return None
+
+    def send(self, data: bytes, wait_s: float) -> int:
+        """See Wire."""
+        try:
+            return self._socket.send(data)
+        except BlockingIOError:
+            return self._socket.send(data) if select.select([], [self._socket], [], wait_s)[1] else 0
+
+    def close(self) -> None:
+        """See Wire."""
+        self._socket.close()
+
+
+class _Buffered:
+    """A serial port whose descriptor cannot be waited for, as on Windows: pyserial waits."""
+
+    def __init__(self, port: serial.Serial, limit_s: float) -> None:
+        self._port = port
+        port.timeout, port.write_timeout = SLICE_S, limit_s
+
+    def receive(self, wait_s: float) -> bytes | None:
+        """See Wire; it waits a slice or not at all."""
+        first = self._port.read(1) if wait_s > 0.0 else b""
+        return first + self._port.read(self._port.in_waiting) or None
+
+    def send(self, data: bytes, wait_s: float) -> int:
+        """See Wire; it waits as long as was said at first."""
+        del wait_s
+        return self._port.write(data) or 0
+
+    def close(self) -> None:
+        """See Wire."""
+        self._port.close()
+
+
 class Channel:
     """An open connection, a serial port or a TCP one: what has come, and what is sent, as bytes."""
 
-    def __init__(self, port: serial.Serial | socket.socket, limit_s: float, *, ended: str) -> None:
-        """Take over a port that does not block; `ended` says what it means when it gives nothing."""
-        self._port, self._limit_s, self._ended = port, limit_s, ended
-        self._number = port.fileno()
+    def __init__(self, wire: Wire, limit_s: float, *, ended: str) -> None:
+        """Take over what is open; `ended` says what it means when it gives nothing."""
+        self._wire, self._limit_s, self._ended = wire, limit_s, ended
 
     def read(self, *, wait: bool = True) -> bytes:
         """What has come, after waiting a slice at most, or not at all; empty where nothing has.
@@ -45,16 +142,12 @@ class Channel:
             ConnectionEndedError: If the other side has gone, or the connection was closed.
         """
         try:
-            if not select.select([self._number], [], [], SLICE_S if wait else 0.0)[0]:
-                return b""
-            data = os.read(self._number, CHUNK)
-        except BlockingIOError:
-            return b""
-        except (OSError, ValueError) as error:  # ValueError: closed in mid-wait
+            data = self._wire.receive(SLICE_S if wait else 0.0)
+        except (OSError, ValueError, TypeError) as error:  # ValueError, TypeError: closed in mid-wait
             raise _ended(error) from None
-        if not data:
+        if data == b"":
             raise ConnectionEndedError(self._ended)
-        return data
+        return data or b""
 
     def write(self, data: bytes) -> None:
         """Send all of it.
@@ -62,28 +155,19 @@ class Channel:
         Raises:
             ConnectionEndedError: If the other side has gone, or does not take it within the limit.
         """
-        until = None
+        until = time.monotonic() + self._limit_s
         while data:
             try:
-                data = data[os.write(self._number, data) :]
-            except BlockingIOError:
-                until = until or time.monotonic() + self._limit_s
-                self._wait_to_write(until)
-            except OSError as error:
+                taken = self._wire.send(data, max(0.0, until - time.monotonic()))
+            except (OSError, ValueError, TypeError) as error:  # ValueError, TypeError: closed in mid-wait
                 raise _ended(error) from None
-
-    def _wait_to_write(self, until: float) -> None:
-        try:
-            if select.select([], [self._number], [], max(0.0, until - time.monotonic()))[1]:
-                return
-        except (OSError, ValueError) as error:  # ValueError: closed in mid-wait
-            raise _ended(error) from None
-        raise ConnectionEndedError(f"it could not be sent within {self._limit_s:g} s")
+            if not taken and time.monotonic() > until:
+                raise ConnectionEndedError(f"it could not be sent within {self._limit_s:g} s")
+            data = data[taken:]
 
     def close(self) -> None:
         """End the connection."""
-        self._number = CLOSED
-        self._port.close()
+        self._wire.close()
 
 
 def open_serial(device: str, port: str, baud: int, limit_s: float, *, frame: str = "8N1") -> Channel:
@@ -104,8 +188,8 @@ def open_serial(device: str, port: str, baud: int, limit_s: float, *, frame: str
         opened = serial.Serial(port, baud, bytesize=bits, parity=parity, stopbits=stops, exclusive=True)
     except SERIAL_ERRORS as error:
         raise _unavailable(device, port, error, limit_s) from None
-    os.set_blocking(opened.fileno(), False)
-    return Channel(opened, limit_s, ended="the port is gone")
+    wire = _Terminal(opened) if hasattr(os, "openpty") else _Buffered(opened, limit_s)
+    return Channel(wire, limit_s, ended="the port is gone")
 
 
 def open_tcp(device: str, host: str, port: int, limit_s: float) -> Channel:
@@ -128,8 +212,7 @@ def open_tcp(device: str, host: str, port: int, limit_s: float) -> Channel:
             way_out="Check that the device is on and listens at this port",
         ) from None
     opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    opened.setblocking(False)
-    return Channel(opened, limit_s, ended="the other side closed it")
+    return Channel(_Connection(opened), limit_s, ended="the other side closed it")
 
 
 def open_channel(

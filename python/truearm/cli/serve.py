@@ -14,6 +14,7 @@ from truearm.cli.console import print_json, say, tell, warn
 from truearm.defaults import DEADLINE_S, HOLD_S, LARGEST_DEG, LARGEST_MM, LARGEST_STD_MM, RAMP_S
 from truearm.errors import InputError, UsageError
 from truearm.files import read_text
+from truearm.interrupts import LOOKS_EVERY_S, Asked, asked_by
 
 if TYPE_CHECKING:
     from truearm.serving import Server
@@ -86,15 +87,14 @@ def command(
 
 
 async def _serve(server: "Server", address: str, port: int, listening: Callable[[str, int], None]) -> None:
-    loop, ended = asyncio.get_running_loop(), asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, ended.set)
-    running = await server.start(address, port)
-    listening(*running.sockets[0].getsockname()[:2])
-    try:
-        await ended.wait()
-    finally:
-        running.close()
+    with asked_by((signal.SIGINT, signal.SIGTERM), Asked()) as asked:
+        running = await server.start(address, port)
+        listening(*running.sockets[0].getsockname()[:2])
+        try:
+            while not asked:
+                await asyncio.sleep(LOOKS_EVERY_S)
+        finally:
+            running.close()
 
 
 def _token(address: str, file: Path | None) -> str | None:

@@ -103,6 +103,10 @@ def _wait(running: subprocess.Popen[bytes], program: str) -> None:
 
 def _end(running: subprocess.Popen[bytes]) -> None:
     """End a program and all processes of its group, and wait until they write nothing any more."""
+    if not hasattr(os, "killpg"):  # Windows
+        running.kill()
+        running.wait()
+        return
     end = time.monotonic() + ENDING_S
     with suppress(ProcessLookupError):
         os.killpg(running.pid, signal.SIGKILL)
@@ -123,6 +127,6 @@ def browser_command(program: str, folder: str, arguments: list[str]) -> list[str
         "--hide-scrollbars",
         f"--user-data-dir={folder}/profile",
         f"--virtual-time-budget={DRAWING_MS}",
-        *(["--no-sandbox"] if os.geteuid() == 0 else []),
+        *(["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []),
         *arguments,
     ]

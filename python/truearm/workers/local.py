@@ -123,18 +123,31 @@ class _Crew(Generic[T, R]):
 def _as_children_start(threads: int) -> Iterator[None]:
     """Around the start of a process: it gets its share of native threads, and leaves Ctrl-C to this one."""
     added = {name: str(threads) for name in THREAD_VARIABLES if name not in os.environ}
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     os.environ.update(added)
     try:
-        yield
+        with _interrupts_blocked():
+            yield
     finally:
         for name in added:
             del os.environ[name]
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """While Ctrl-C waits, for ever in processes that are started here; Windows has nothing of the kind."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end_with(lifeline: Connection) -> None:
-    """End this process as soon as the other end of `lifeline` is closed, whoever closes it."""
+    """End this process when the other end of `lifeline` is closed, whoever closes it, and not by Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_wait_for_end, args=(lifeline,), daemon=True).start()
 
 

@@ -53,7 +53,7 @@ PTY_FRAME: Final = "8N1"
 
 
 class VirtualCell:
-    """The devices of a cell file, virtual: a process for each, or a thread where asked for.
+    """The devices of a cell file, virtual: a process for each, or a thread where asked for, or on Windows.
 
     Attributes:
         content: The cell file's values with the addresses at which the virtual devices are.
@@ -68,7 +68,8 @@ class VirtualCell:
         Raises:
             InputError: If the file is wrong, a driver has no virtual counterpart, or a fault is not possible.
         """
-        self._text, self._where, self._folder, self._processes = text, where, folder.resolve(), processes
+        self._text, self._where, self._folder = text, where, folder.resolve()
+        self._processes = processes and hasattr(os, "fork")
         self.content: dict[str, Any] = parsed(text, where=where)
         cell = Cell.from_toml(text, where=where, folder=folder)
         for device, settings in (("robot", cell.robot_settings), ("sensor", cell.sensor_settings)):
@@ -229,8 +230,8 @@ KNOWN: Final = '"rv-m2", "ur", "table-panel" and "line"'
 
 
 def _wire(port: str) -> Wire:
-    """A TCP port where the cell file has one, else a pseudo-terminal."""
-    return TcpWire() if port.startswith("tcp://") else PtyWire()
+    """A TCP port where the cell file has one, or there are no others, else a pseudo-terminal."""
+    return TcpWire() if port.startswith("tcp://") or not hasattr(os, "openpty") else PtyWire()
 
 
 def _at(

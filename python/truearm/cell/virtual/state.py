@@ -1,6 +1,5 @@
 """What the processes of a virtual cell share: the clock, and where arm and table are and go to."""
 
-import fcntl
 import mmap
 import time
 from collections.abc import Iterator
@@ -10,6 +9,8 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from truearm.cell.virtual.exclusive import exclusive
 
 Floats = NDArray[np.float64]
 
@@ -58,11 +59,8 @@ class Shared:
     @contextmanager
     def locked(self) -> Iterator[Floats]:
         """The array, while no other process changes it."""
-        fcntl.flock(self._file, fcntl.LOCK_EX)
-        try:
+        with exclusive(self._file):
             yield self._values
-        finally:
-            fcntl.flock(self._file, fcntl.LOCK_UN)
 
     def count(self, place: int) -> int:
         """Add one at a place; how many there were before."""

@@ -1,10 +1,12 @@
 """The other end of a port: a pseudo-terminal, or a TCP port of this machine."""
 
 import os
-import pty
 import socket
-import tty
+from contextlib import suppress
 from typing import Final, Protocol
+
+with suppress(ImportError):  # Windows
+    import tty
 
 CHUNK: Final = 65536
 
@@ -36,11 +38,11 @@ class Wire(Protocol):
 
 
 class PtyWire:
-    """A pseudo-terminal; the client opens its other end like a serial port."""
+    """A pseudo-terminal; the client opens its other end like a serial port. Windows has none."""
 
     def __init__(self) -> None:
         # The other end is kept open here too, so that a client may come and go.
-        self._own, self._other = pty.openpty()
+        self._own, self._other = os.openpty()
         tty.setraw(self._other)
         os.set_blocking(self._own, False)
         self.address = os.ttyname(self._other)
