@@ -33,9 +33,8 @@ OF_SIGNALS = (
 
 def take_away() -> None:
     """Have these names be missing from here on."""
-    resource_tracker.signal = SimpleNamespace(**vars(signal))
-    for name in MODULES:
-        sys.modules[name] = None
+    vars(resource_tracker)["signal"] = SimpleNamespace(**vars(signal))
+    vars(sys)["modules"].update(dict.fromkeys(MODULES))
     for module, names in ((os, OF_OS), (signal, OF_SIGNALS)):
         for name in names:
             if hasattr(module, name):
