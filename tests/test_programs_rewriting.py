@@ -11,7 +11,7 @@ from tests.test_controller import CONF
 from tests.test_programs_rapid import GO, NOTHING, SEEN, module, numbers, points
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
-from truearm.programs.configuration import nearest_turns, with_turns
+from truearm.programs.configuration import NearestTurns, with_turns
 from truearm.programs.declaring import (
     declared_controller,
     may_differ,
@@ -28,6 +28,7 @@ from truearm.programs.marks import MARK, mark_text
 from truearm.programs.notices import payload_notices
 from truearm.programs.report import report_of, unified_diff
 from truearm.programs.rewriting import Choices, rewrite
+from truearm.programs.solving import LEAST_GAIN, are_singular
 from truearm.programs.source import Source
 from truearm.robot import Robot
 from truearm.robot_data import Payload
@@ -402,8 +403,18 @@ def test_turns_stay_within_limits():
     assert (owners == 0).all()
     assert ((turned >= KUKA.limits[:, 0]) & (turned <= KUKA.limits[:, 1])).all()
     assert len(turned) == 4
-    near = nearest_turns(branch, KUKA, np.array([0.0, 0.0, 0.0, -3.1, 0.0, 5.9]))
+    which, near = NearestTurns(KUKA)(branch, np.array([0.0, 0.0, 0.0, -3.1, 0.0, 5.9]))
     np.testing.assert_allclose(near[0, [3, 5]], [3.1 - 2 * np.pi, -3.0 + 2 * np.pi])
+    assert which.tolist() == [0]
+
+
+def test_branches_beyond_the_limits_are_no_nearest_turns():
+    q = np.zeros((3, 6))
+    q[0, 1], q[1, 3], q[2, 3] = KUKA.limits[1, 1] + 0.1, KUKA.limits[3, 1] - 0.1, KUKA.limits[3, 1] + 0.1
+    before = np.array([0.0, 0.0, 0.0, KUKA.limits[3, 1], 0.0, 0.0])
+    which, near = NearestTurns(KUKA)(q, before)
+    assert which.tolist() == [1, 2]
+    np.testing.assert_allclose(near[:, 3], [q[1, 3], q[2, 3] - 2 * np.pi])
 
 
 @pytest.mark.parametrize(
@@ -453,3 +464,19 @@ def test_a_task_that_needs_the_tool_lists_joint_targets_without_one():
     done = rewritten(program, axis)
     assert done.changed.sum() == 0
     assert any("tOther" in one.reason for one in done.listed)
+
+
+ARMS = {"abb": ABB, "kuka": KUKA, "ur": Robot.load("ur10"), "seven": Robot.load("kuka-iiwa-7")}
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_readings_are_singular_where_a_pose_tells_nothing_of_a_joint(arm):
+    robot = ARMS[arm]
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-3.0, 3.0, (4000, robot.joint_count))
+    q[::2, 4] *= rng.choice([0.0, 1e-3, 1e-2], 2000)
+    least = np.linalg.svd(robot.joint_jacobian(q, pose=True), compute_uv=False)[:, -1]
+    singular = are_singular(robot, q)
+    np.testing.assert_array_equal(singular, least < LEAST_GAIN)
+    assert singular.any()
+    assert not singular.all()

@@ -71,17 +71,30 @@ def with_turns(branches: Floats, robot: RobotData) -> tuple[Integers, Floats]:
     return rows[order], found[order]
 
 
-def nearest_turns(branches: Floats, robot: RobotData, before: Floats) -> Floats:
-    """Readings (k, N) of branches (b, N), each joint at the allowed turn nearest to `before`."""
-    limits = _limits(robot)
-    turning = np.array([joint == "revolute" for joint in robot.joints])
-    turned = np.where(turning, branches + FULL_TURN * np.round((before - branches) / FULL_TURN), branches)
-    for _ in range(2):
-        turned = np.where(turning & (turned < limits[:, 0] - EDGE_RAD), turned + FULL_TURN, turned)
-        turned = np.where(turning & (turned > limits[:, 1] + EDGE_RAD), turned - FULL_TURN, turned)
-    inside = ((turned >= limits[:, 0] - EDGE_RAD) & (turned <= limits[:, 1] + EDGE_RAD)).all(axis=1)
-    found: Floats = turned[inside]
-    return found
+class NearestTurns:
+    """Readings of branches at the turns nearest to others."""
+
+    def __init__(self, robot: RobotData) -> None:
+        low, high = _limits(robot).T
+        self._turn = np.where([kind == "revolute" for kind in robot.joints], FULL_TURN, 0.0)
+        self._per_turn = np.where(self._turn > 0.0, 1.0 / FULL_TURN, 0.0)
+        self._low, self._high = low - EDGE_RAD, high + EDGE_RAD
+
+    def __call__(self, branches: Floats, before: Floats) -> tuple[Integers, Floats]:
+        """Each joint of branches (b, N) at the allowed turn nearest to `before` (N,).
+
+        Returns:
+            Numbers (k,) of the branches that the limits allow, and their readings (k, N).
+        """
+        turned = branches + self._turn * np.rint((before - branches) * self._per_turn)
+        below, above = turned < self._low, turned > self._high
+        if below.any() or above.any():
+            for _ in range(2):
+                turned += self._turn * (turned < self._low)
+                turned -= self._turn * (turned > self._high)
+            (which,) = np.nonzero(((turned >= self._low) & (turned <= self._high)).all(axis=1))
+            return which, turned[which]
+        return np.arange(len(branches)), turned
 
 
 def _turned(rows: Integers, q: Floats, joint: int, limits: Floats) -> tuple[Integers, Floats]:

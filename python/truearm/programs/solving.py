@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
-from truearm.programs.configuration import ANY, meant, nearest_turns, with_turns
+from truearm.programs.configuration import ANY, NearestTurns, meant, with_turns
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
 from truearm.programs.program import Program, motion_is_straight
 from truearm.programs.tables import NOWHERE, all_ones, placed, run_of
@@ -99,13 +99,15 @@ class _Possible:
 
     Attributes:
         branches: One turn of each branch, (b, N).
+        at_singularity: Whether these lie at a singularity, (b,).
         named: Those that its configuration data names, (k, N); None where it has none.
-        singular: Whether these lie at a singularity, (k,).
+        singular: Whether the named ones lie at a singularity, (k,).
         flange: Pose (4, 4) of the flange where infinitely many readings reach it, so that no list holds those
             that are meant; else None.
     """
 
     branches: Floats
+    at_singularity: Bools
     named: Floats | None
     singular: Bools | None
     flange: Floats | None = None
@@ -130,6 +132,7 @@ class _Solver:
 
     def __init__(self, program: Program, uses: Uses, robot: Robot, inverse: Inverse) -> None:
         self.program, self.uses, self.robot, self.inverse = program, uses, robot, inverse
+        self._nearest_turns = NearestTurns(robot)
         self.q: Floats = np.broadcast_to(np.nan, (len(program.targets), robot.joint_count))
         self.reasons: dict[int, str] = {}
         self._unheeded = {int(program.moves.target[move]) for move in program.nearest}
@@ -187,15 +190,19 @@ class _Solver:
     def _possible(self, some: Integers, poses: dict[int, Floats]) -> dict[int, _Possible]:
         """What the readings of the targets `some` can be, with the poses of the flange at them."""
         if self.robot.joint_count > DETERMINED and self.program.configuration is None:
-            nothing = np.empty((0, self.robot.joint_count))
-            return {number: _Possible(nothing, None, None, poses[number]) for number in some.tolist()}
+            nothing = np.empty((0, self.robot.joint_count)), np.empty(0, dtype=bool), None, None
+            return {number: _Possible(*nothing, poses[number]) for number in some.tolist()}
         branches = self.inverse.branches(np.stack([poses[number] for number in some.tolist()]))
         named = self._named(some, branches)
-        found: dict[int, _Possible] = {}
-        for row, number in enumerate(some.tolist()):
-            reached = branches[row][np.isfinite(branches[row]).all(axis=1)]
-            found[number] = _Possible(reached, *named.get(row, (None, None)))
-        return found
+        reached: Bools = np.asarray(np.isfinite(branches).all(axis=2))
+        at_singularity = np.zeros(reached.shape, dtype=bool)
+        at_singularity[reached] = are_singular(self.robot, branches[reached])
+        return {
+            number: _Possible(solutions[finite], singular[finite], *named.get(row, (None, None)))
+            for row, (number, solutions, finite, singular) in enumerate(
+                zip(some.tolist(), branches, reached, at_singularity, strict=True)
+            )
+        }
 
     def _named(self, some: Integers, branches: Floats) -> dict[int, tuple[Floats, Bools]]:
         """By row: readings that the configuration data of the targets `some` names, and whether singular."""
@@ -288,11 +295,12 @@ class _Solver:
         if len(named) == 0:
             return NO_BRANCH
         before = came.before
-        found = the_nearest(named, before)
-        if found is None:
+        place = the_nearest(named, before)
+        if place is None:
             return AMBIGUOUS
+        found: Floats = named[place]
         if came.straight and before is not None and np.abs(found - before).max() > CLOSE_RAD:
-            every = nearest_turns(possible.branches, self.robot, before)
+            _, every = self._nearest_turns(possible.branches, before)
             if not is_nearest(found, every, before):
                 return CONTRADICTS
         return SINGULAR if possible.singular is not None and possible.singular.any() else found
@@ -312,23 +320,23 @@ class _Solver:
         """The readings nearest to those before, where the text does not tell."""
         if before is None:
             return AMBIGUOUS
-        candidates = nearest_turns(possible.branches, self.robot, before)
-        found = the_nearest(candidates, before) if len(candidates) else None
-        if found is None:
+        which, candidates = self._nearest_turns(possible.branches, before)
+        place = the_nearest(candidates, before) if len(candidates) else None
+        if place is None:
             return AMBIGUOUS
-        return SINGULAR if are_singular(self.robot, found[None])[0] else found
+        return SINGULAR if possible.at_singularity[which[place]] else candidates[place]
 
 
-def the_nearest(candidates: Floats, before: Floats | None) -> Floats | None:
+def the_nearest(candidates: Floats, before: Floats | None) -> int | None:
     """The one of the candidates (k, N) that is meant: the only one, or clearly the nearest to `before`."""
     distances = None if before is None else np.abs(candidates - before).max(axis=1)
-    found: Floats = candidates[0 if distances is None else distances.argmin()]
-    others = np.abs(candidates - found).max(axis=1) > SAME_RAD
+    place = 0 if distances is None else int(distances.argmin())
+    others = np.abs(candidates - candidates[place]).max(axis=1) > SAME_RAD
     if not others.any():
-        return found
-    if distances is None or distances.min() > NEARER * distances[others].min():
+        return place
+    if distances is None or distances[place] > NEARER * distances[others].min():
         return None
-    return found
+    return place
 
 
 def is_nearest(found: Floats, candidates: Floats, before: Floats) -> bool:
@@ -342,5 +350,12 @@ def are_singular(robot: Robot, q: Floats) -> Bools:
     if robot.joint_count < 6 or len(q) == 0:
         return np.zeros(len(q), dtype=bool)
     jacobian = robot.joint_jacobian(q, pose=True)
-    gains: Bools = np.linalg.svd(jacobian, compute_uv=False)[:, 5] < LEAST_GAIN
-    return gains
+    doubtful = np.ones(len(q), dtype=bool)
+    if robot.joint_count == 6:
+        # The least gain is at least the reciprocal of the inverse's Frobenius norm; rounding is far from 2.
+        invertible = np.flatnonzero(np.linalg.det(jacobian))
+        norms = np.linalg.norm(np.linalg.inv(jacobian[invertible]), axis=(1, 2))
+        doubtful[invertible] = norms * 2.0 * LEAST_GAIN > 1.0
+    found = np.zeros(len(q), dtype=bool)
+    found[doubtful] = np.linalg.svd(jacobian[doubtful], compute_uv=False)[:, 5] < LEAST_GAIN
+    return found
