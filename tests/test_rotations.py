@@ -67,3 +67,19 @@ def test_shapes_are_kept() -> None:
     assert matrix_from_quaternion(many).shape == (2, 5, 3, 3)
     assert quaternion_from_matrix(matrix_from_quaternion(many)).shape == (2, 5, 4)
     assert matrix_from_quaternion(many[0, 0]).shape == (3, 3)
+
+
+def test_arrays_that_may_not_be_written_to_are_taken() -> None:
+    angles = np.array([[0.1, -0.2, 0.3]])
+    matrices = matrix_from_euler(angles, "xyz")
+    for values in (angles, matrices):
+        values.flags.writeable = False
+    turned = matrix_from_quaternion(quaternion_from_euler(angles, "xyz"))
+    np.testing.assert_allclose(turned, matrices, atol=1e-14)
+    np.testing.assert_allclose(matrix_from_quaternion(quaternion_from_matrix(matrices)), matrices, atol=1e-14)
+    np.testing.assert_allclose(euler_from_matrix(matrices, "xyz"), angles, atol=1e-14)
+    vectors = rotation_vector_from_matrix(matrices)
+    vectors.flags.writeable = False
+    np.testing.assert_allclose(matrix_from_rotation_vector(vectors), matrices, atol=1e-14)
+    turned = matrix_from_quaternion(quaternion_from_rotation_vector(vectors))
+    np.testing.assert_allclose(turned, matrices, atol=1e-14)

@@ -31,7 +31,7 @@ def matrix_from_quaternion(quaternion_wxyz: ArrayLike) -> NDArray[np.float64]:
 
 def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
     """Quaternions (..., 4), w first and w >= 0, of rotation matrices (..., 3, 3)."""
-    m = np.asarray(matrix, dtype=np.float64)
+    m = _own(matrix)
     return _wxyz(_rotation().from_matrix(m.reshape(-1, 3, 3))).reshape(*m.shape[:-2], 4)
 
 
@@ -63,7 +63,7 @@ def quaternion_from_euler(angles: ArrayLike, sequence: str) -> NDArray[np.float6
         UsageError: If the sequence is not three axes in one case, or repeats an axis next to itself.
     """
     check_euler_sequence(sequence)
-    return _wxyz(_rotation().from_euler(sequence, np.asarray(angles, dtype=np.float64)))
+    return _wxyz(_rotation().from_euler(sequence, _own(angles)))
 
 
 def check_euler_sequence(sequence: str) -> None:
@@ -80,18 +80,17 @@ def check_euler_sequence(sequence: str) -> None:
 
 def matrix_from_euler(angles: ArrayLike, sequence: str) -> NDArray[np.float64]:
     """Rotation matrices (3, 3) or (n, 3, 3) of Euler angles (3,) or (n, 3), as in quaternion_from_euler."""
-    given = np.asarray(angles, dtype=np.float64)
-    return np.asarray(_rotation().from_euler(sequence, given).as_matrix())
+    return np.asarray(_rotation().from_euler(sequence, _own(angles)).as_matrix())
 
 
 def matrix_from_rotation_vector(vectors: ArrayLike) -> NDArray[np.float64]:
     """Rotation matrices (3, 3) or (n, 3, 3) of rotation vectors (3,) or (n, 3) in rad."""
-    return np.asarray(_rotation().from_rotvec(np.asarray(vectors, dtype=np.float64)).as_matrix())
+    return np.asarray(_rotation().from_rotvec(_own(vectors)).as_matrix())
 
 
 def rotation_vector_from_matrix(matrix: ArrayLike) -> NDArray[np.float64]:
     """Rotation vectors (3,) or (n, 3), rad, half a turn at the most, of matrices (3, 3) or (n, 3, 3)."""
-    return np.asarray(_rotation().from_matrix(np.asarray(matrix, dtype=np.float64)).as_rotvec())
+    return np.asarray(_rotation().from_matrix(_own(matrix)).as_rotvec())
 
 
 def euler_from_matrix(matrices: NDArray[np.float64], sequence: str) -> NDArray[np.float64]:
@@ -99,7 +98,7 @@ def euler_from_matrix(matrices: NDArray[np.float64], sequence: str) -> NDArray[n
 
     Where the first and the third axis are parallel, which leaves one of their angles open, the third is zero.
     """
-    return euler_from_rotation(_rotation().from_matrix(matrices), sequence)
+    return euler_from_rotation(_rotation().from_matrix(_own(matrices)), sequence)
 
 
 def euler_from_rotation(rotation: "Rotation", sequence: str) -> NDArray[np.float64]:
@@ -111,7 +110,7 @@ def euler_from_rotation(rotation: "Rotation", sequence: str) -> NDArray[np.float
 
 def quaternion_from_rotation_vector(vectors: ArrayLike) -> NDArray[np.float64]:
     """Quaternions (n, 4), w first, of rotation vectors (n, 3) in rad."""
-    return _wxyz(_rotation().from_rotvec(np.asarray(vectors, dtype=np.float64)))
+    return _wxyz(_rotation().from_rotvec(_own(vectors)))
 
 
 def transform_from_parts(xyz: ArrayLike, quaternion_wxyz: ArrayLike) -> NDArray[np.float64]:
@@ -136,6 +135,11 @@ def _rotation() -> "type[Rotation]":
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - slow to import
 
     return Rotation
+
+
+def _own(values: ArrayLike) -> NDArray[np.float64]:
+    """A copy: SciPy before 1.18 takes no array that may not be written to, as the frames of robots are."""
+    return np.array(values, dtype=np.float64)
 
 
 def _wxyz(rotation: "Rotation") -> NDArray[np.float64]:
