@@ -95,6 +95,20 @@ def test_files_are_short(path):
     assert lines <= LONGEST_FILE, "one idea, one file: divide it"
 
 
+def test_least_squares_say_what_counts_as_zero():
+    """NumPy before 2 has another default, and warns of it."""
+    trees = {path: ast.parse(path.read_text()) for path in PYTHON_FILES if "lstsq(" in path.read_text()}
+    calls = [
+        (path, node) for path, tree in trees.items() for node in ast.walk(tree) if isinstance(node, ast.Call)
+    ]
+    silent = [
+        f"{path.relative_to(ROOT)}:{call.lineno}"
+        for path, call in calls
+        if ast.unparse(call.func) == "np.linalg.lstsq" and "rcond" not in {word.arg for word in call.keywords}
+    ]
+    assert silent == []
+
+
 @pytest.mark.parametrize("path", PYTHON_FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_python_functions_are_short(path):
     tree = ast.parse(path.read_text())

@@ -119,7 +119,7 @@ def _fitted(within: Floats, places: Floats, step: float) -> tuple[float, float, 
         basis = np.stack([np.ones_like(numbers), numbers], axis=1)
         if np.ptp(numbers[on]) == 0.0:
             return step, 0.0, np.empty(0, dtype=np.int64)
-        first, step = np.linalg.lstsq(basis[on], within[on])[0].tolist()
+        first, step = np.linalg.lstsq(basis[on], within[on], rcond=None)[0].tolist()
         left = np.abs(within - first - step * numbers)
         on = left <= max(2.0 * JITTER, float(np.median(left)))
     numbers = np.rint((places - first) / step)

@@ -192,7 +192,8 @@ def _contradicted(found: Expected, rows: Rows) -> dict[int, float]:
         if length <= UNUSUAL * usual or length <= FAR * found.lengths_m(rows[[worst]])[0]:
             kept[worst] = True
             break
-    moved = np.linalg.lstsq(jacobian[kept].reshape(-1, jacobian.shape[2]), errors[kept].ravel())[0]
+    columns = jacobian[kept].reshape(-1, jacobian.shape[2])
+    moved = np.linalg.lstsq(columns, errors[kept].ravel(), rcond=None)[0]
     distances = np.linalg.norm(errors - jacobian @ moved, axis=1)
     return {int(rows[k]): float(distances[k]) for k in np.flatnonzero(~kept)}
 

@@ -91,7 +91,7 @@ def _share(poses: Floats) -> float:
     wide = poses[:, np.ptp(poses, axis=0) > 0.0]
     basis = np.column_stack([np.ones(count), (wide - wide.mean(axis=0)) / wide.std(axis=0)])
     numbers = np.arange(count, dtype=np.float64)
-    fitted, _, rank, _ = np.linalg.lstsq(basis, numbers)
+    fitted, _, rank, _ = np.linalg.lstsq(basis, numbers, rcond=None)
     free = count - int(rank)
     if free < 1:
         return 0.0

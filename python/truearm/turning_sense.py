@@ -95,7 +95,7 @@ class _Arm:
             points = _turned_about(self.axis, points, self.flanges)
         unknown = _frame_and_tool(self.flanges)
         wanted = (points - self.flanges[:, :3, 3]).reshape(-1)
-        left = wanted - unknown @ np.linalg.lstsq(unknown, wanted)[0]
+        left = wanted - unknown @ np.linalg.lstsq(unknown, wanted, rcond=None)[0]
         spread = np.linalg.norm(points - points.mean(axis=0), axis=1)
         return float(np.median(np.linalg.norm(left.reshape(-1, AXES), axis=1)) / np.median(spread))
 
@@ -198,7 +198,7 @@ def _turned_about(axis: Floats, points: Floats, flanges: Floats) -> Floats:
     around = points - along
     across = np.cross(axis, around)
     columns = np.column_stack([_frame_and_tool(flanges), -around.reshape(-1), -across.reshape(-1)])
-    found = np.linalg.lstsq(columns, (along - flanges[:, :3, 3]).reshape(-1))[0]
+    found = np.linalg.lstsq(columns, (along - flanges[:, :3, 3]).reshape(-1), rcond=None)[0]
     cosine, sine = found[-2:] / np.hypot(*found[-2:])
     return np.asarray(along + cosine * around + sine * across)
 

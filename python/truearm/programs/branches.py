@@ -119,7 +119,8 @@ def _chain_to(robot: Robot, wrist_in_base: Floats) -> Chain:
 def _meeting(points: Floats, directions: Floats) -> Floats | None:
     """The point where lines meet; None if they do not."""
     across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
-    place: Floats = np.linalg.lstsq(across.sum(axis=0), (across @ points[:, :, None]).sum(axis=0)[:, 0])[0]
+    wanted = (across @ points[:, :, None]).sum(axis=0)[:, 0]
+    place: Floats = np.linalg.lstsq(across.sum(axis=0), wanted, rcond=None)[0]
     apart = np.linalg.norm((across @ (place - points)[:, :, None])[:, :, 0], axis=1)
     return place if apart.max() < MEET_M else None
 
