@@ -92,6 +92,12 @@ def test_help_and_completion_import_neither_numpy_nor_the_core():
     assert done.returncode == 0, done.stderr
 
 
+def test_without_docstrings_help_says_what_a_command_is_for():
+    words = [sys.executable, "-OO", "-m", "truearm", "strip", "--help"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert BY_WORDS["strip",].summary in " ".join(done.stdout.split()), done.stderr
+
+
 def test_what_a_controller_loads_goes_without_scipy():
     script = (
         "import sys\nfrom truearm import Calibration, Compensator, evaluate\n"

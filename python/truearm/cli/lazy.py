@@ -36,7 +36,8 @@ class LazyCommand(TyperCommand):
             return group(module.COMMANDS, _nothing, help_text=module.HELP, name=self._entry.name)
         offer_choices(module.command)
         application = typer.Typer(add_completion=False, rich_markup_mode=None)
-        application.command(self._entry.name, help=_shown(module.command.__doc__))(module.command)
+        text = module.command.__doc__ or self._entry.summary  # python -OO keeps no docstrings
+        application.command(self._entry.name, help=_shown(text))(module.command)
         return typer.main.get_command(application)
 
 
@@ -80,9 +81,9 @@ def build(entries: Sequence[Entry], help_text: str) -> Callable[[list[str]], int
     return run
 
 
-def _shown(text: str | None) -> str:
+def _shown(text: str) -> str:
     """Help as it is shown: paragraphs are filled, lines of examples stay."""
-    return EXAMPLES.sub(AS_IT_STANDS, inspect.cleandoc(text or ""))
+    return EXAMPLES.sub(AS_IT_STANDS, inspect.cleandoc(text))
 
 
 def _nothing() -> None:
