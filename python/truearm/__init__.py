@@ -94,10 +94,12 @@ _HOME: Final = {
 }
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public name
-    if name not in _HOME:
-        raise AttributeError(f"module 'truearm' has no attribute '{name}'")
-    return getattr(import_module(f"truearm.{_HOME[name]}"), name)
+if not TYPE_CHECKING:  # to whom every name would be there
+
+    def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public name
+        if name not in _HOME:
+            raise AttributeError(f"module 'truearm' has no attribute '{name}'")
+        return getattr(import_module(f"truearm.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:
