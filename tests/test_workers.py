@@ -66,7 +66,7 @@ def test_an_error_is_a_value():
     [
         ("bug", "division by zero"),
         ("exits", "SystemExit"),
-        ("unsendable", "pickle"),
+        ("unsendable", "lambda"),
         ("own error", "1 and 2"),
     ],
 )

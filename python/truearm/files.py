@@ -5,6 +5,7 @@ import secrets
 import stat
 import tomllib
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -183,10 +184,11 @@ def followed(path: Path) -> Path:
     Raises:
         InputError: If links lead to themselves.
     """
-    try:
-        return path.resolve()
-    except (OSError, RuntimeError):
-        raise InputError("this link leads to itself", where=str(path)) from None
+    with suppress(OSError, RuntimeError):
+        found = path.resolve()
+        if not found.is_symlink():  # as from Python 3.13 on
+            return found
+    raise InputError("this link leads to itself", where=str(path))
 
 
 def _is_stream(path: Path) -> bool:
