@@ -52,11 +52,12 @@ class Robot(RobotData):
                     rule="A chain is named by its tip link, or by its base link and its tip link",
                 )
             return cls.from_urdf(urdf, base_link=base[0] if base else None, tip_link=tip)
-        if path.suffix.lower() == ".xacro":
+        if Path(urdf).suffix.lower() == ".xacro":
+            xacro = Path(urdf)
             raise InputError(
                 "this is a xacro macro, not a URDF",
                 where=given,
-                way_out=f"Expand it first: xacro {path.name} > {path.stem}.urdf",
+                way_out=f"Expand it first: xacro {xacro.name} > {xacro.stem.removesuffix('.urdf')}.urdf",
             )
         if path.suffix.lower() in TABLE_ENDINGS and is_file(path):
             raise InputError(
@@ -95,7 +96,7 @@ class Robot(RobotData):
         Args:
             path: The URDF. Meshes are not read.
             base_link: Link in whose frame poses are given; the root by default.
-            tip_link: Link that is the flange; the only leaf by default.
+            tip_link: Link that is the flange; by default the only leaf that moves.
 
         Raises:
             InputError: If the file is no URDF, or the chain is not told, or is not serial.

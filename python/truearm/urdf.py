@@ -4,28 +4,28 @@ Meshes, inertias and limits of effort are not read.
 """
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
+from xml.etree import ElementTree as ET
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.dh_from_axes import Axis, dh_from_axes
-from truearm.errors import InputError, did_you_mean, list_names
+from truearm.errors import InputError
 from truearm.files import read_text
 from truearm.robot_checks import MAX_LENGTH_M, NO_LONGER
 from truearm.urdf_checks import check_urdf
+from truearm.urdf_ends import MOVING, Kind, chain_between
+from truearm.urdf_limits import joint_limits
 from truearm.urdf_names import UrdfNames
+from truearm.xml_as_written import xml_as_written
 
 Floats = NDArray[np.float64]
-Kind = Literal["revolute", "prismatic"]
-MOVING: Final[Mapping[str, Kind]] = {
-    "revolute": "revolute",
-    "continuous": "revolute",
-    "prismatic": "prismatic",
-}
+READ: Final = {"origin": ("xyz", "rpy"), "axis": ("xyz",), "limit": ("lower", "upper"), "mimic": ("joint",)}
+"""Elements of a joint that are read, and their attributes."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ class UrdfChain:
 
 
 def read_urdf(path: Path, base_link: str | None = None, tip_link: str | None = None) -> UrdfChain:
-    """The chain from `base_link` (the root by default) to `tip_link` (the only leaf by default).
+    """The chain from `base_link` (the root by default) to `tip_link` (by default the only
+    leaf that moves).
 
     Raises:
         InputError: If the file is no URDF, a link is unknown, several leaves leave the tip open, or
@@ -75,18 +76,8 @@ def urdf_chain(text: str, base_link: str | None, tip_link: str | None, *, where:
 
 def _read(text: str, base_link: str | None, tip_link: str | None) -> UrdfChain:
     robot = _parse(text)
-    joint_to = {joint.child: joint for joint in robot.joints}
-    parents = {joint.parent for joint in robot.joints}
-    links = [link.name for link in robot.links]
-    base = base_link or _only([name for name in links if name not in joint_to], "base_link", links)
-    leaves = [name for name in links if name not in parents]
-    tip = tip_link or _only(leaves, "tip_link", links)
-    for name in (base, tip):
-        if name not in links:
-            hint = did_you_mean(name, links) or f"Its links end in {list_names(leaves)}"
-            raise InputError(f'there is no link "{name}"', rule=hint)
-    joints = _path(joint_to, base, tip)
-    axes, base_from_tip = _axes(joints)
+    base, tip, joints = chain_between([link.name for link in robot.links], robot.joints, base_link, tip_link)
+    axes, base_from_tip = _axes(joints, tip)
     if not axes:
         raise InputError(f'no joint moves between "{base}" and "{tip}"')
     base_transform, table, flange = dh_from_axes(axes, base_from_tip)
@@ -103,7 +94,7 @@ def _read(text: str, base_link: str | None, tip_link: str | None) -> UrdfChain:
         table=table,
         base=base_transform,
         flange=flange,
-        limits=np.array([_limits(joint) for joint in moving]),
+        limits=np.array([joint_limits(joint) for joint in moving]),
     )
 
 
@@ -112,8 +103,9 @@ def _parse(text: str) -> Any:  # noqa: ANN401
     from yourdfpy import URDF  # noqa: PLC0415
 
     check_urdf(text)
+    kinematics = ET.tostring(_kinematics(xml_as_written(text)))
     try:
-        model = URDF.load(io.BytesIO(text.encode()), build_scene_graph=False, load_meshes=False)
+        model = URDF.load(io.BytesIO(kinematics), build_scene_graph=False, load_meshes=False)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"the URDF cannot be read: {error}",
@@ -122,31 +114,22 @@ def _parse(text: str) -> Any:  # noqa: ANN401
     return model.robot
 
 
-def _only(candidates: Sequence[str], argument: str, links: Sequence[str]) -> str:
-    if len(candidates) == 1:
-        return candidates[0]
-    if not candidates:
-        raise InputError(f"its {len(links)} links form no tree")
-    way_out = f'Name one: {argument}=..., or "FILE.urdf#TIP" or "FILE.urdf#BASE,TIP" where a robot is named'
-    raise InputError(
-        f"the chain may {'end' if argument == 'tip_link' else 'start'} at {list_names(candidates, 'or')}",
-        way_out=way_out,
-    )
+def _kinematics(robot: ET.Element) -> ET.Element:
+    """Links and joints without shapes, masses, motors and what other programs add, which are not read."""
+    kept = ET.Element("robot", name=robot.get("name", ""))
+    for link in robot.findall("link"):
+        ET.SubElement(kept, "link", name=link.get("name", ""))
+    for joint in robot.findall("joint"):
+        copy = ET.SubElement(kept, "joint", name=joint.get("name", ""), type=joint.get("type", ""))
+        for name, attributes in {"parent": ("link",), "child": ("link",), **READ}.items():
+            element = joint.find(name)
+            if element is not None:
+                written = {key: element.attrib[key] for key in attributes if key in element.attrib}
+                ET.SubElement(copy, name, written)
+    return kept
 
 
-def _path(joint_to: Mapping[str, Any], base: str, tip: str) -> list[Any]:
-    """Joints from `base` to `tip`, in this order."""
-    joints: list[Any] = []
-    link = tip
-    while link != base:
-        if link not in joint_to or len(joints) > len(joint_to):
-            raise InputError(f'link "{tip}" is not behind link "{base}"')
-        joints.insert(0, joint_to[link])
-        link = joint_to[link].parent
-    return joints
-
-
-def _axes(joints: Sequence[Any]) -> tuple[list[Axis], Floats]:
+def _axes(joints: Sequence[Any], tip: str) -> tuple[list[Axis], Floats]:
     """Axes of the joints that move, and base_from_tip (4, 4), all joints at zero."""
     frame = np.eye(4)
     axes = []
@@ -160,7 +143,8 @@ def _axes(joints: Sequence[Any]) -> tuple[list[Axis], Floats]:
                     f'it follows joint "{joint.mimic.joint}"',
                     where=f'joint "{joint.name}"',
                     rule="Every joint of the chain must move by itself",
-                    way_out="Describe the arm in a robot file with [coupling]",
+                    way_out=f'End the chain before it: "FILE.urdf#{joint.parent}", or describe the arm in a '
+                    "robot file with [coupling]",
                 )
             axes.append(Axis(MOVING[joint.type], frame[:3, 3], frame[:3, :3] @ _direction(joint)))
         elif joint.type != "fixed":
@@ -168,6 +152,9 @@ def _axes(joints: Sequence[Any]) -> tuple[list[Axis], Floats]:
                 f"its type is {joint.type}",
                 where=f'joint "{joint.name}"',
                 rule="The chain may have revolute, continuous, prismatic and fixed joints",
+                way_out=f'Begin the chain behind it: "FILE.urdf#{joint.child},{tip}"'
+                if joint.child != tip
+                else "",
             )
     return axes, frame
 
@@ -189,19 +176,3 @@ def _direction(joint: Any) -> Floats:  # noqa: ANN401
     if joint.axis.shape != (3,) or not 0.0 < length < np.inf:
         raise InputError(f"axis {joint.axis} has no direction", where=f'joint "{joint.name}"')
     return np.asarray(joint.axis / length)
-
-
-def _limits(joint: Any) -> tuple[float, float]:  # noqa: ANN401
-    limit = joint.limit
-    if joint.type == "continuous" or limit is None:
-        return -np.inf, np.inf
-    if limit.lower is None and limit.upper is None:
-        return -np.inf, np.inf
-    lower, upper = limit.lower or 0.0, limit.upper or 0.0
-    if lower >= upper:
-        raise InputError(
-            f"limits {lower:g} to {upper:g}",
-            where=f'joint "{joint.name}"',
-            rule="The lower limit must be below the upper one",
-        )
-    return lower, upper

@@ -6,16 +6,12 @@ from typing import Final
 from xml.parsers import expat
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.errors import InputError, did_you_mean
 
 TRIPLES: Final = ("xyz", "rpy")
-SINGLES: Final = {
-    "limit": ("lower", "upper", "effort", "velocity"),
-    "mimic": ("multiplier", "offset"),
-    "dynamics": ("damping", "friction"),
-}
-"""Attributes of a joint's elements that are one number."""
+LIMITS: Final = ("lower", "upper")
 
 
 @dataclass
@@ -68,9 +64,6 @@ class _Elements:
             raise InputError(f"the XML is a <{name}>", rule="A URDF is a <robot>")
         self._check_expanded(name, attributes)
         self._path.append(name)
-        for triple in TRIPLES:
-            if triple in attributes:
-                self._check_numbers(name, triple, attributes[triple], 3)
         if self._path[1:2] == ["joint"]:
             self._take_joint(name, attributes)
         elif self._path[1:] == ["link"]:
@@ -83,9 +76,12 @@ class _Elements:
         if len(self._path) == 2:
             self.joints.append(_Joint(self.parser.CurrentLineNumber, attributes))
         elif len(self._path) == 3:
-            for single in SINGLES.get(name, ()):
-                if single in attributes:
-                    self._check_numbers(name, single, attributes[single], 1)
+            for triple in TRIPLES if name in ("origin", "axis") else ():
+                if triple in attributes:
+                    self._check_triple(name, triple, attributes[triple])
+            for limit in LIMITS if name == "limit" else ():
+                if limit in attributes:
+                    self._check_limit(name, limit, attributes[limit])
             if name in ("parent", "child"):
                 self.joints[-1].ends[name] = attributes.get("link", "")
 
@@ -100,17 +96,29 @@ class _Elements:
                 way_out="Expand it first: xacro ROBOT.urdf.xacro > ROBOT.urdf",
             )
 
-    def _check_numbers(self, element: str, attribute: str, text: str, count: int) -> None:
-        try:
-            values = np.array([float(word) for word in text.split()])
-        except ValueError:
-            values = np.empty(0)
-        if len(values) != count or not np.isfinite(values).all():
-            wanted = "a finite number" if count == 1 else f"{count} finite numbers"
-            raise InputError(
-                f'{attribute}="{text}" of <{element}> in line {self.parser.CurrentLineNumber}',
-                rule=f"It must be {wanted}",
-            )
+    def _check_triple(self, element: str, attribute: str, text: str) -> None:
+        values = _numbers(text)
+        if len(values) != 3 or not np.isfinite(values).all():
+            self._refuse(element, attribute, text, "3 finite numbers")
+
+    def _check_limit(self, element: str, attribute: str, text: str) -> None:
+        values = _numbers(text)
+        if len(values) != 1 or np.isnan(values).any():
+            self._refuse(element, attribute, text, "a number")
+
+    def _refuse(self, element: str, attribute: str, text: str, wanted: str) -> None:
+        raise InputError(
+            f'{attribute}="{text}" of <{element}> in line {self.parser.CurrentLineNumber}',
+            rule=f"It must be {wanted}",
+        )
+
+
+def _numbers(text: str) -> NDArray[np.float64]:
+    """The numbers of a text, none where a word is not one."""
+    try:
+        return np.array([float(word) for word in text.split()])
+    except ValueError:
+        return np.empty(0)
 
 
 def _check_joint(joint: _Joint, links: list[str]) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from truearm.cli.console import print_json, print_table, say, say_wrapped, warn
-from truearm.errors import Notice
+from truearm.errors import Notice, count_of
 from truearm.robot import Robot
 from truearm.robot_checks import robot_notices
 from truearm.units import MM_PER_METRE
@@ -19,7 +19,7 @@ def show_robot(robot: Robot, *, as_json: bool) -> None:
         content = {**robot.to_dict(), "units": {"length": "m", "angle": "rad"}}
         print_json({**content, "notices": [str(notice) for notice in notices]})
         return
-    say(f"{robot.name}, {robot.joint_count} joints, {robot.convention} Denavit-Hartenberg")
+    say(f"{robot.name}, {count_of(robot.joint_count, 'joint')}, {robot.convention} Denavit-Hartenberg")
     say_wrapped(f"Source: {robot.source or 'not stated'}")
     _print_links(robot)
     for label, transform in (("base", robot.base), ("flange", robot.flange), ("tool", robot.tool)):
