@@ -228,6 +228,22 @@ def test_a_corrected_urdf_keeps_all_but_the_chain(hand_made):
     assert 1e-6 < max(shifts) < 0.01
 
 
+def test_a_corrected_urdf_keeps_the_names_of_other_programs(hand_made, tmp_path):
+    """Prefixes are part of names, declared as gazebo's here or not, as drake's."""
+    path, calibration = hand_made
+    odd = ARM_URDF.replace('<robot name="hand made">', '<robot name="hand made" xmlns:gz="http://gz">')
+    odd = odd.replace('effort="40" velocity="2"/>', 'effort="40" velocity="2" drake:acceleration="9"/>')
+    odd = odd.replace("</robot>", '<gz:plugin gz:file="a.so"><drake:gear ratio="80"/></gz:plugin></robot>')
+    other = tmp_path / "odd.urdf"
+    other.write_text(odd)
+    made = export(calibration, "urdf", options=Options(urdf=f"{other}#mount"))
+    for kept in ('xmlns:gz="http://gz"', '<gz:plugin gz:file="a.so">', '<drake:gear ratio="80" />'):
+        assert kept in made.text
+    assert made.text.count('drake:acceleration="9"') == 3
+    plain = export(calibration, "urdf", options=Options(urdf=f"{path}#mount")).text
+    assert origins_of(re.sub("(drake|gz):", "", made.text)) == origins_of(plain)
+
+
 def origins_of(text):
     """xyz and rpy of each joint by name."""
     found = {}

@@ -15,8 +15,9 @@ from truearm.exporting.new_urdf import set_origin
 from truearm.joint_axes import axes_at_zero
 from truearm.robot_data import RobotData
 from truearm.rotations import matrix_from_euler, matrix_from_rotation_vector, rigid_inverse
-from truearm.urdf import MOVING
+from truearm.urdf_ends import MOVING
 from truearm.urdf_names import UrdfNames
+from truearm.xml_as_written import xml_as_written
 
 Floats = NDArray[np.float64]
 
@@ -46,10 +47,7 @@ def patched_urdf(text: str, names: UrdfNames, robot: RobotData) -> ET.Element:
             rule="The joints of a URDF move one by one",
             way_out="Leave --urdf out: the joints of a new URDF are Denavit-Hartenberg joints",
         )
-    parser = ET.XMLParser(  # noqa: S314  (expat bounds how far entities expand)
-        target=ET.TreeBuilder(insert_comments=True)
-    )
-    root = ET.fromstring(text, parser)  # noqa: S314
+    root = xml_as_written(text)
     path = _path(root, names)
     lines, tip = axes_at_zero(robot)
     signs = np.diag(robot.coupling)
