@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+import truearm as ta
 from truearm.errors import InputError
 from truearm.robot import Robot
 
@@ -143,3 +145,39 @@ def test_the_way_out_of_xacro_has_one_ending() -> None:
 def test_a_file_without_links_says_so() -> None:
     with pytest.raises(InputError, match="it has no links"):
         Robot.from_urdf_text('<robot name="arm"/>')
+
+
+def test_columns_of_an_arm_without_its_gripper_say_how_to_end_the_chain(tmp_path: Path) -> None:
+    table = tmp_path / "m.csv"
+    table.write_text("q1,q2,x,y,z\n0,0,0,0,0\n")
+    robot = Robot.from_urdf_text(arm(GRIPPER), tip_link="left")
+    with pytest.raises(
+        InputError, match=r"2 joint columns. The robot has 3 joints.*as FILE.urdf#BASE,TIP the links"
+    ):
+        ta.Measurements.read_csv(table, joints=robot.joints)
+
+
+@pytest.mark.parametrize(
+    ("rpy", "told"),
+    [
+        ("1.57 0 0", "by up to 0.8 mrad"),
+        ("0 -1.571 3.142", "by up to 0.41 mrad"),
+        ("3.14 0 0", "by up to 1.6 mrad"),
+        ("0 0 1.5707", "by up to 0.096 mrad"),
+        ("1.5708 -1.570796 3.1416", None),
+        ("1.5703 0.5 1", None),
+        ("1.5703124 1.2 1.5e0", None),
+    ],
+)
+def test_rounded_right_angles_are_kept_and_told(rpy: str, told: str | None) -> None:
+    joint = '<origin xyz="0.1 0 0"/>'
+    robot = Robot.from_urdf_text(arm().replace(joint, f'<origin xyz="0.1 0 0" rpy="{rpy}"/>'))
+    expected = Rotation.from_euler("xyz", [float(word) for word in rpy.split()]).as_matrix()
+    np.testing.assert_allclose(robot.pose(np.zeros(2))[:3, :3], expected, atol=1e-12)
+    assert robot.source.partition("; its right angles are rounded, ")[2] == (told or "")
+
+
+def test_rounding_beside_the_chain_is_not_told() -> None:
+    beside = '<link name="eye"/><joint name="e" type="fixed"><parent link="upper"/><child link="eye"/>'
+    robot = Robot.from_urdf_text(arm(f'{beside}<origin rpy="1.57 0 0"/></joint>'), tip_link="hand")
+    assert "rounded" not in robot.source

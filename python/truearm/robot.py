@@ -118,7 +118,7 @@ class Robot(RobotData):
     def _from_chain(cls, chain: UrdfChain, where: str) -> "Robot":
         return cls(
             name=chain.name,
-            source=f"{where}, {chain.names.base_link} to {chain.names.tip_link}",
+            source=_source(chain, where),
             convention="standard",
             joints=chain.joints,
             table=chain.table,
@@ -234,6 +234,13 @@ class Robot(RobotData):
     @cached_property
     def _uncoupled(self) -> bool:
         return bool(np.array_equal(self.coupling, np.eye(self.joint_count)))
+
+
+def _source(chain: UrdfChain, where: str) -> str:
+    ends = f"{where}, {chain.names.base_link} to {chain.names.tip_link}"
+    if not chain.rounded_rad:
+        return ends
+    return f"{ends}; its right angles are rounded, by up to {1e3 * chain.rounded_rad:.2g} mrad"
 
 
 def _target(out: Floats | None, *shape: int, single: bool) -> Floats | None:

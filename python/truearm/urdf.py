@@ -4,7 +4,7 @@ Meshes, inertias and limits of effort are not read.
 """
 
 import io
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -21,6 +21,7 @@ from truearm.urdf_checks import check_urdf
 from truearm.urdf_ends import MOVING, Kind, chain_between
 from truearm.urdf_limits import joint_limits
 from truearm.urdf_names import UrdfNames
+from truearm.urdf_rounding import rounded_by
 from truearm.xml_as_written import xml_as_written
 
 Floats = NDArray[np.float64]
@@ -40,6 +41,7 @@ class UrdfChain:
         base: Transform (4, 4) from the base link to the first row.
         flange: Transform (4, 4) from the last row to the tip link.
         limits: Lowest and highest joint value (N, 2).
+        rounded_rad: By how much right angles of the chain are rounded at most.
     """
 
     name: str
@@ -49,6 +51,7 @@ class UrdfChain:
     base: Floats
     flange: Floats
     limits: Floats
+    rounded_rad: float
 
 
 def read_urdf(path: Path, base_link: str | None = None, tip_link: str | None = None) -> UrdfChain:
@@ -75,7 +78,9 @@ def urdf_chain(text: str, base_link: str | None, tip_link: str | None, *, where:
 
 
 def _read(text: str, base_link: str | None, tip_link: str | None) -> UrdfChain:
-    robot = _parse(text)
+    check_urdf(text)
+    written = xml_as_written(text)
+    robot = _parse(written)
     base, tip, joints = chain_between([link.name for link in robot.links], robot.joints, base_link, tip_link)
     axes, base_from_tip = _axes(joints, tip)
     if not axes:
@@ -95,23 +100,36 @@ def _read(text: str, base_link: str | None, tip_link: str | None) -> UrdfChain:
         base=base_transform,
         flange=flange,
         limits=np.array([joint_limits(joint) for joint in moving]),
+        rounded_rad=rounded_by(_angles(written, {joint.child for joint in joints})),
     )
 
 
-def _parse(text: str) -> Any:  # noqa: ANN401
+def _parse(written: ET.Element) -> Any:  # noqa: ANN401
     """The parser's robot: links and joints with their origins, axes and limits."""
     from yourdfpy import URDF  # noqa: PLC0415
 
-    check_urdf(text)
-    kinematics = ET.tostring(_kinematics(xml_as_written(text)))
     try:
-        model = URDF.load(io.BytesIO(kinematics), build_scene_graph=False, load_meshes=False)
+        model = URDF.load(
+            io.BytesIO(ET.tostring(_kinematics(written))), build_scene_graph=False, load_meshes=False
+        )
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"the URDF cannot be read: {error}",
             rule="Every joint needs a name, a type, a parent, a child and numbers in its attributes",
         ) from None
     return model.robot
+
+
+def _angles(robot: ET.Element, children: Collection[str]) -> list[str]:
+    """What the joints that lead to these links say of roll, pitch and yaw."""
+    joints = [joint for joint in robot.findall("joint") if _link(joint, "child") in children]
+    origins = [origin for joint in joints if (origin := joint.find("origin")) is not None]
+    return [origin.get("rpy", "") for origin in origins]
+
+
+def _link(joint: ET.Element, end: str) -> str:
+    element = joint.find(end)
+    return "" if element is None else element.get("link", "")
 
 
 def _kinematics(robot: ET.Element) -> ET.Element:
