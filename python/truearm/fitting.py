@@ -27,6 +27,7 @@ from truearm.inputs import is_payload
 from truearm.kinds import settle
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
+from truearm.one_turn import one_turn
 from truearm.options import Options
 from truearm.scheme_fitting import SchemeFit, SchemeRows, fit_scheme, well_determined
 from truearm.schemes import SCHEMES
@@ -399,7 +400,7 @@ def _full_rank(task: Task, data: Measurements) -> int:
         return len(task.arm.candidates.constant) + setup_unknowns(task)
     robot, rng = task.arm.robot, np.random.default_rng(0)
     rows = data.select(np.tile(np.arange(len(data)), POSES_PER_ROW))
-    low, high = np.clip(robot.limits, -np.pi, np.pi).T
+    low, high = one_turn(robot)
     readings = rng.uniform(low, high, rows.readings.shape)
     measured = core_set(robot, replace(rows, readings=readings), task.selection, task.groups)
     frames = np.tile(np.eye(4), (len(task.groups), 1, 1))

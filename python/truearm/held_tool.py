@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.one_turn import one_turn
 from truearm.robot import Robot
 from truearm.units import RADIANS_PER_DEGREE
 
@@ -76,5 +77,5 @@ def _spreads(robot: Robot, readings: Floats) -> tuple[Floats, Floats]:
 
 def _drawn(robot: Robot) -> Floats:
     """Readings (DRAWN, N) within the limits, a turn at the most."""
-    low, high = np.clip(robot.limits.T, -np.pi, np.pi)
+    low, high = one_turn(robot)
     return np.random.default_rng(0).uniform(low, high, (DRAWN, robot.joint_count))

@@ -367,8 +367,8 @@ class Measurements:
                 f"there are {self.joint_count} joint columns",
                 where=", ".join(self.files),
                 rule=f"The robot has {count} joints",
-                way_out="Name the robot that was measured, of a URDF as FILE.urdf#BASE,TIP the links that its joints are "
-                "between, or correct the columns"
+                way_out="Name the robot that was measured, of a URDF as FILE.urdf#BASE,TIP the links that "
+                "its joints are between, or correct the columns"
                 if zero is None
                 else f'Joints are counted from 1: rename "{zero}" and those after it',
             )

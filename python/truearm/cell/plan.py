@@ -20,6 +20,7 @@ from truearm.defaults import THERE_AND_BACK
 from truearm.errors import UsageError, WorkError, count_of
 from truearm.identified import IdentifiedArm
 from truearm.kinds import check_values, settle
+from truearm.one_turn import one_turn
 from truearm.planning.accessibility import Rule, accessible, lowest
 from truearm.planning.choosing import (
     CRITERIA,
@@ -46,7 +47,6 @@ MOST_TOLD: Final = 1000
 """Poses of which the expected accuracy is told in a second; of more it takes as long as the choice itself."""
 MOST_DRAWS: Final = 200_000
 OF_CELL: Final = "[world], [target] and the sensor's range in the cell file, at "
-UNLIMITED_RAD: Final = np.pi
 NONE_HELD: Final[Mapping[int, float]] = MappingProxyType({})
 JUDGED_SHARE, REPEATED_SHARE, LEAST_JUDGED, LEAST_REPEATED = 0.25, 0.1, 5, 3
 JOINT_SPEED_RAD_S: Final = 1.0
@@ -246,9 +246,9 @@ def measurable_pool(
 
 
 def _drawn(arm: Robot, seed: int) -> Iterator[Floats]:
-    """Readings (DRAWN_AT_ONCE, N) within the limits, MOST_DRAWS in all."""
+    """Readings (DRAWN_AT_ONCE, N) within the limits and one turn, MOST_DRAWS in all."""
     rng = np.random.default_rng(seed)
-    low, high = np.clip(arm.limits.T, -UNLIMITED_RAD, UNLIMITED_RAD)
+    low, high = one_turn(arm)
     for _ in range(MOST_DRAWS // DRAWN_AT_ONCE):
         yield rng.uniform(low, high, (DRAWN_AT_ONCE, arm.joint_count))
 

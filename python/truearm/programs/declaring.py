@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
+from truearm.one_turn import one_turn
 from truearm.programs.program import Language, Program
 from truearm.robot import Robot
 from truearm.units import MM_PER_METRE
@@ -78,7 +79,7 @@ def refuse_another_arm(controller: Controller, robot: Robot) -> None:
 
 def _apart(one: Robot, other: Robot) -> tuple[float, float]:
     """How far flanges of two arms are from each other at most, mm and deg, at readings within limits."""
-    low, high = np.clip(other.limits, -np.pi, np.pi).T
+    low, high = one_turn(other)
     readings = low + (high - low) * np.random.default_rng(0).random((COMPARED, other.joint_count))
     first, second = (
         robot.flange_chain.pose(np.ascontiguousarray(robot.joints_from_readings(readings)))

@@ -15,6 +15,7 @@ from truearm.evaluation import Evaluation
 from truearm.grids import grid_steps, grid_words
 from truearm.held_rows import HeldRows
 from truearm.models import NOMINAL, ArmModel
+from truearm.one_turn import one_turn
 from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
 from truearm.stillness import still_warning
 from truearm.summary import WAVE, distance_at_floor_mm
@@ -24,7 +25,6 @@ Floats = NDArray[np.float64]
 
 OUTER: Final = 0.01
 """Share of the readings on either side that a joint's usual range leaves out."""
-WIDEST_TURN: Final = np.pi
 DRAWN_FOR_TYPICAL: Final = 0
 ROWS: Final = "rows"
 
@@ -243,10 +243,8 @@ class Facts:
 
     @cached_property
     def reachable(self) -> Floats:
-        """Range of each joint (N, 2): its limits, at most half a turn to either side or what was measured."""
-        limits = self.calibration.robot.limits
-        most = np.where(np.array(self.joints) == "prismatic", 0.5, WIDEST_TURN)
-        low, high = np.maximum(limits[:, 0], -most), np.minimum(limits[:, 1], most)
+        """Range of each joint (N, 2): its limits and a turn at the most, or what was measured."""
+        low, high = one_turn(self.calibration.robot)
         if self.readings is not None:
             low = np.minimum(low, self.readings.min(axis=0))
             high = np.maximum(high, self.readings.max(axis=0))
