@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Mapping
@@ -37,6 +38,8 @@ from truearm.files import parsed
 from truearm.units import RADIANS_PER_DEGREE
 
 DEVICES: Final = ("robot", "sensor")
+# On macOS libraries of the system do not bear forks.
+FORKS: Final = sys.platform == "linux" and hasattr(os, "fork")
 STARTS_WITHIN_S: Final = 60.0
 # Keys of devices that are times, each with the shortest that makes sense, or speeds: they follow the clock.
 TIMES: Final = {
@@ -53,7 +56,7 @@ PTY_FRAME: Final = "8N1"
 
 
 class VirtualCell:
-    """The devices of a cell file, virtual: a process for each, or a thread where asked for, or on Windows.
+    """The devices of a cell file, virtual: a process for each, or a thread where asked for or on other systems than Linux.
 
     Attributes:
         content: The cell file's values with the addresses at which the virtual devices are.
@@ -69,7 +72,7 @@ class VirtualCell:
             InputError: If the file is wrong, a driver has no virtual counterpart, or a fault is not possible.
         """
         self._text, self._where, self._folder = text, where, folder.resolve()
-        self._processes = processes and hasattr(os, "fork")
+        self._processes = processes and FORKS
         self.content: dict[str, Any] = parsed(text, where=where)
         cell = Cell.from_toml(text, where=where, folder=folder)
         for device, settings in (("robot", cell.robot_settings), ("sensor", cell.sensor_settings)):
