@@ -56,7 +56,7 @@ PTY_FRAME: Final = "8N1"
 
 
 class VirtualCell:
-    """The devices of a cell file, virtual: a process for each, or a thread where asked for or on other systems than Linux.
+    """The devices of a cell file, virtual: a process for each, or a thread where asked for or not on Linux.
 
     Attributes:
         content: The cell file's values with the addresses at which the virtual devices are.
