@@ -20,8 +20,8 @@ class Shift:
     Where the author took the arm for another than `robot`, the readings of `robot` for the same flange.
     """
 
-    def __init__(self, by_rad, refuse=(), robot=None):
-        self.by_rad, self.refuse, self.robot = np.asarray(by_rad), refuse, robot
+    def __init__(self, by_rad, refuse=(), robot=None, code=5):
+        self.by_rad, self.refuse, self.robot, self.code = np.asarray(by_rad), refuse, robot, code
 
     def joints(self, q, *, tool=None, author=None):
         assert tool is None or np.shape(tool) == (4, 4)
@@ -32,7 +32,8 @@ class Shift:
         refused = np.zeros(count, dtype=bool)
         refused[[place for place in self.refuse if place < count]] = True
         refusals = [
-            SimpleNamespace(number=place + 1, reason="too far", code=5) for place in np.flatnonzero(refused)
+            SimpleNamespace(number=place + 1, reason="too far", code=self.code)
+            for place in np.flatnonzero(refused)
         ]
         return SimpleNamespace(
             q=np.where(refused[:, None], np.nan, q + self.by_rad),
@@ -46,9 +47,9 @@ class Shift:
         )
 
 
-def models(robot, by_rad=(1e-3, -1e-3, 5e-4, 1e-3, -1e-3, 2e-3), refuse=(), controller=None):
+def models(robot, by_rad=(1e-3, -1e-3, 5e-4, 1e-3, -1e-3, 2e-3), refuse=(), controller=None, code=5):
     """Programming and controller model of an arm, and a stand-in compensator."""
-    shift = Shift(np.zeros(robot.joint_count) + by_rad, refuse, robot)
+    shift = Shift(np.zeros(robot.joint_count) + by_rad, refuse, robot, code)
     return Models(robot, Inverse(robot), controller or Controller.nominal(robot), shift)
 
 

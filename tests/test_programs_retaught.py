@@ -146,11 +146,15 @@ def test_the_whole_change_counts_for_the_bounds(irb):
     assert "--largest-mm" in str(caught.value)
 
 
-def test_what_a_stretched_wrist_cannot_do_is_refused_with_the_reason(irb):
+def test_what_a_stretched_wrist_cannot_do_is_listed_or_refused_with_the_reason(irb):
     _, given = irb
     wrist = module(f"MoveAbsJ {joints_text([10, 10, 20, 0, 0, 0])},v100,fine,tG;")
-    with pytest.raises(WorkError, match="stays|would change|turns the tool"):
-        rewritten(read("a.mod", wrist, ABB, RETAUGHT), given)
+    done = rewritten(read("a.mod", wrist, ABB, RETAUGHT), given)
+    assert not done.changed.any()
+    assert ["singularity" in one.reason for one in done.listed if not one.name.startswith("p")] == [True]
+    nearly = module(f"MoveAbsJ {joints_text([10, 10, 20, 0, 1, 0])},v100,fine,tG;")
+    with pytest.raises(WorkError, match="would change|turns the tool"):
+        rewritten(read("a.mod", nearly, ABB, RETAUGHT), given)
 
 
 def known_within(**variances):

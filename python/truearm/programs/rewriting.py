@@ -24,7 +24,7 @@ from truearm.programs.marks import refuse_marked
 from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.path_steps import step_notices
 from truearm.programs.program import Language, Listed, Program, StepTexts
-from truearm.programs.solving import solve_targets
+from truearm.programs.solving import are_singular, solve_targets
 from truearm.programs.source import Source
 from truearm.programs.tables import placed, run_of
 from truearm.programs.uses import Uses, target_count
@@ -39,6 +39,7 @@ UNSURE: Final = 8
 FRAMES_UNSURE: Final = 0
 """Code of refusals where it is certain enough, but not together with tool and work object."""
 NOT_REACHED: Final = (2, 3)
+STRETCHED: Final = "it lies at a singularity, where no small change of the joints makes the correction"
 ALLOWING: Final = {
     5: "--largest-joint-deg",
     6: "--largest-mm",
@@ -323,13 +324,23 @@ class _State:
         self.correction_mrad = placed(self.correction_mrad, rows, found.correction_mrad)
         self.residual_mm = placed(self.residual_mm, rows, found.residual_mm)
         self.residual_mrad = placed(self.residual_mrad, rows, found.residual_mrad)
-        for refusal in found.refusals:
-            self.refused[int(which[refusal.number - 1])] = refusal.reason
-        self.codes |= {refusal.code for refusal in found.refusals}
+        self._take_refusals(which, found.refusals)
         refused = np.array(found.refused, dtype=bool)
         if found.std_mm is not None:
             refused |= self._judge_std(which, found.std_mm, refused)
         self.corrected[which[refused]] = self.nominal[which[refused]]
+
+    def _take_refusals(self, which: Integers, refusals: Sequence[Refusal]) -> None:
+        """Refused targets; those that no reading near them can meet are listed, as poses there are."""
+        targets = which[[refusal.number - 1 for refusal in refusals]]
+        singular = are_singular(self.models.programming, self.nominal[targets])
+        for target, refusal, stretched in zip(targets.tolist(), refusals, singular.tolist(), strict=True):
+            if stretched and refusal.code in NOT_REACHED:
+                self.reasons[target] = STRETCHED
+                self.known[target] = False
+            else:
+                self.refused[target] = refusal.reason
+                self.codes.add(refusal.code)
 
     def _judge_std(self, which: Integers, std_mm: Floats, refused: Bools) -> Bools:
         """Take over standard deviations of targets, with tool and work object; which are too large."""
