@@ -229,7 +229,7 @@ def test_seeds_of_a_path_are_no_targets(arm, capsys):
 
 
 def test_no_option_is_named_where_none_helps(arm, capsys):
-    wrist, far = np.array([0.1, 0.2, -0.3, 0.4, 0.0, 0.5]), arm.poses(1, seed=5)[0]
+    wrist, far = np.array([0.1, 0.2, -0.3, 0.4, 0.01, 0.5]), arm.poses(1, seed=5)[0]
     np.savetxt("path.csv", [wrist, far], delimiter=",", header="q1,q2,q3,q4,q5,q6", comments="")
     words = ["compensate", "arm.calib", "path.csv", "--controller", "nominal", "-o", "out.csv"]
     assert main([*words, "--largest-joint-deg", "0.5"]) == 1
