@@ -164,7 +164,7 @@ def test_what_is_not_certain_is_listed(robot, statement):
 def test_variables_assigned_twice_or_changed_are_not_constant(robot):
     text = """\
 a = [0, -1.5, 1.5, -1.5, -1.5, 0]
-a = [0, -1.4, 1.5, -1.5, -1.5, 0]
+if x: a = [0, -1.4, 1.5, -1.5, -1.5, 0] end
 b = [0, -1.5, 1.5, -1.5, -1.5, 0]
 b[1] = -1.4
 c = [0, -1.5, 1.5, -1.5, -1.5, 0]
@@ -300,7 +300,12 @@ def test_many_lines_are_read_as_one_is(robot):
     q = rng.uniform(-3, 3, (200, 6))
     line = "  movej([{}, {}, {}, {}, {}, {}], a=1.4, v=1.05, r={})\n"
     texts = [line.format(*(f"{value:.5f}" for value in row), 0.01 * (k % 2)) for k, row in enumerate(q)]
-    texts[100:100] = ["  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n", "  while True:\n", "    sync()\n", "  end\n"]
+    texts[100:100] = [
+        "  set_tcp(p[0, 0, 0.2, 0, 0, 0])\n",
+        "  while True:\n",
+        "    freedrive_mode()\n",
+        "  end\n",
+    ]
     program = read(UR, "def p():\n" + "".join(texts) + "end\n", robot)
     assert len(program.targets) == 200
     assert np.allclose(program.targets.values.reshape(-1, 6), np.round(q, 5), atol=1e-12)

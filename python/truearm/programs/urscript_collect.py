@@ -6,6 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from truearm.programs.environment import Frame
 from truearm.programs.frames import Frames, written_out
 from truearm.programs.program import Listed
@@ -15,6 +17,7 @@ from truearm.programs.urscript_constants import Constants, RunTime
 from truearm.programs.urscript_flow import Step
 from truearm.programs.urscript_lines import MOTIONS, STREAMED, TARGETS, Lines, blend_radius
 from truearm.programs.urscript_places import argument
+from truearm.programs.urscript_scopes import FUNCTIONS, Scopes
 from truearm.programs.urscript_syntax import (
     HEADERS,
     Node,
@@ -51,7 +54,6 @@ HARMLESS: Final = COUNTING | {
 }
 DEFINED: Final = re.compile(rb"\b(?:def|thread|sec)[ \t]+(\w+)")
 PAYLOADS: Final = frozenset({"set_payload", "set_target_payload", "set_payload_mass"})
-FUNCTIONS: Final = frozenset({"def", "thread", "sec"})
 LONGEST_NAME: Final = 48
 TCP: Final = "tcp"
 INSTALLATION: Final = "installation"
@@ -88,6 +90,7 @@ class Collected:
         self.shifted = ""
         self.breaks = array("q")
         self._source = source
+        self._scopes = Scopes()
         self._steps: list[Step] = []
         self._tcps: dict[int, Node | None] = {}
         self._masses: dict[int, Node | None] = {}
@@ -95,6 +98,7 @@ class Collected:
         for start, end in self.lines.rest():
             for statement in statements(source, start, end):
                 self._statement(statement)
+                self._scopes.take(statement)
         self._resolve()
 
     @cached_property
@@ -133,7 +137,7 @@ class Collected:
     def _tool(self, at: int, name: str, frames: Frames) -> Frame:
         node = self._tcps.get(at)
         try:
-            if node is None:
+            if node is None or (node.kind == "name" and not self.constants.once(node.text)):
                 raise RunTime("")
             return frames.tool(name, self.constants.transform(node))
         except RunTime:
@@ -195,7 +199,7 @@ class Collected:
             self.constants.assign(name, None, line)
             self._used(tokens, statement.at)
             return
-        self.constants.assign(name, value, line)
+        self.constants.assign(name, value, line, self._scopes.always)
         self._note(_of_numbers(value), statement.at)
         used = self._used(tokens, None)
         self._made_of[name] = (statement.at, [*used, *self._made_of.get(name, (0, []))[1]])
@@ -273,16 +277,31 @@ class Collected:
 
     def _resolve(self) -> None:
         """What is only known when all was read: calls of the program's own functions, indirect uses."""
+        calls = [(step.name, step.at) for step in self._steps if step.kind == "call"]
+        self.constants.settle(self._scopes, self._scopes.run_alone(calls))
         own = {step.name for step in self._steps if step.kind in FUNCTIONS}
         self._steps = [step for step in self._steps if step.kind != "call" or step.name in own]
-        # The body of an `if` is entered from before it; what follows it, and its other branches, may not be.
-        self.breaks.extend(step.at for step in self._steps if step.kind not in ("tcp", "payload", "if"))
+        self._break(calls)
         moved_to = dict.fromkeys(_names([motion.target for motion in self.motions]), 0)
         self._spread(moved_to, list(moved_to))
         for name, (at, _) in self._made_of.items():
             if name not in moved_to:
                 self.elsewhere.setdefault(name, at)
         self._spread(self.elsewhere, list(self.elsewhere))
+
+    def _break(self, calls: Sequence[tuple[str, int]]) -> None:
+        """Where the arm may come from several places, which is not at what does not move it.
+
+        The body of an `if` is entered from before it; what follows it, and its other branches, may not be.
+        """
+        at = [*self.breaks, *(one.at for one in self.motions)]
+        moving = np.sort(np.concatenate([np.array(at, dtype=np.int64), self.lines.places()]))
+        standing = self._scopes.standing(calls, moving)
+        steps = [step for step in self._steps if step.kind not in ("tcp", "payload", "if")]
+        places = np.array(
+            [step.at for step in steps if step.kind != "call" or step.name in standing.moves], dtype=np.int64
+        )
+        self.breaks.extend(places[~standing.at(places)].tolist())
 
     def _spread(self, places: dict[str, int], pending: list[str]) -> None:
         """What some variables are made of is used where they are."""

@@ -1,14 +1,19 @@
-"""What is constant in a URScript program: variables assigned once, arithmetic, and poses made of poses."""
+"""What is constant in a URScript program: variables where they are used, arithmetic, and poses of poses.
+
+A variable that is assigned several times has one value at each place of a function, if all assignments are
+in that function, outside its branches and loops, and nothing else runs it meanwhile.
+"""
 
 import math
 import operator
-from collections.abc import Callable, Sequence
-from typing import Final
+from collections.abc import Callable, Set
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.programs.layouts import RotationVectorPose
+from truearm.programs.urscript_scopes import Scopes
 from truearm.programs.urscript_syntax import Node
 from truearm.rotations import rigid_inverse
 
@@ -45,39 +50,78 @@ class RunTime(Exception):  # noqa: N818 - nothing is wrong: the target is listed
         self.reason = reason
 
 
+class _Assigned(NamedTuple):
+    """An assignment.
+
+    Attributes:
+        value: What is assigned.
+        function: Function whose every run takes it, as in Scopes; None if none does.
+    """
+
+    value: Node
+    function: int | None
+
+
 class Constants:
     """Variables by name: what each is assigned, or why it is not constant."""
 
     def __init__(self) -> None:
-        self._values: dict[str, Node] = {}
+        self._assigned: dict[str, list[_Assigned]] = {}
+        self._again: dict[str, int] = {}
         self._why_not: dict[str, str] = {}
+        self._scopes = Scopes()
+        self._alone: Set[int] = frozenset()
 
-    def assign(self, name: str, value: Node | None, line: int) -> None:
-        """The program assigns `value` to a variable; None for one that cannot be read."""
-        if name in self._values or name in self._why_not or value is None:
-            self._why_not[name] = f'"{name}" is assigned in line {line} and elsewhere, or is computed'
+    def assign(self, name: str, value: Node | None, line: int, function: int | None = None) -> None:
+        """The program assigns `value` to a variable; None for one that cannot be read.
+
+        Args:
+            name: The variable.
+            value: The expression.
+            line: Line of the assignment.
+            function: Function whose every run takes it; None if none does.
+        """
+        if value is None:
+            self._why_not[name] = _assigned_again(name, line)
         else:
-            self._values[name] = value
+            self._assigned.setdefault(name, []).append(_Assigned(value, function))
+            self._again[name] = line
 
     def change(self, name: str, line: int) -> None:
         """The program changes a variable in place, or it is a parameter of a function."""
         self._why_not[name] = f'"{name}" is changed when the program runs, in line {line}'
 
-    def names(self) -> Sequence[str]:
-        """Variables assigned exactly once."""
-        return [name for name in self._values if name not in self._why_not]
+    def settle(self, scopes: Scopes, alone: Set[int]) -> None:
+        """All was read: which function a place is in, and which functions nothing runs meanwhile."""
+        self._scopes, self._alone = scopes, alone
 
-    def value(self, name: str) -> Node:
-        """What the variable is assigned, once and for all.
+    def value(self, used: Node) -> Node:
+        """What a variable has been assigned where its name stands.
 
         Raises:
-            RunTime: If it is assigned several times, changed, or not assigned in this file.
+            RunTime: If it is assigned several times so that this is not certain, changed, or not assigned in
+                this file.
         """
+        name = used.text
         if name in self._why_not:
             raise RunTime(self._why_not[name])
-        if name not in self._values:
+        assigned = self._assigned.get(name, [])
+        if not assigned:
             raise RunTime(f'"{name}" is not assigned in this file')
-        return self._values[name]
+        return assigned[0].value if len(assigned) == 1 else self._last(used, assigned)
+
+    def once(self, name: str) -> bool:
+        """Whether the program assigns a variable once."""
+        return len(self._assigned.get(name, [])) == 1
+
+    def _last(self, used: Node, assigned: list[_Assigned]) -> Node:
+        """The value of the last assignment before the place where a variable is used."""
+        functions = {one.function for one in assigned}
+        before = [one.value for one in assigned if one.value.end <= used.start]
+        function = functions.pop()
+        if functions or function not in self._alone or self._scopes.of(used.start) != function or not before:
+            raise RunTime(_assigned_again(used.text, self._again[used.text]))
+        return max(before, key=lambda value: value.start)
 
     def literal(self, node: Node, depth: int = 0) -> Node:
         """What `node` stands for, names and constant places in lists followed.
@@ -88,7 +132,7 @@ class Constants:
         if depth > _DEEPEST:
             raise RunTime("variables are assigned one another")
         if node.kind == "name":
-            return self.literal(self.value(node.text), depth + 1)
+            return self.literal(self.value(node), depth + 1)
         if node.kind == "index" and len(node.parts) == 2:
             whole = self.literal(node.parts[0], depth + 1)
             place = self.number(node.parts[1], depth + 1)
@@ -104,7 +148,7 @@ class Constants:
             RunTime: As for :meth:`literal`.
         """
         if node.kind == "name":
-            return self.holder(self.value(node.text)) or node.text
+            return self.holder(self.value(node)) or node.text
         if node.kind == "index" and len(node.parts) == 2:
             whole = self.literal(node.parts[0])
             element = whole.parts[int(self.number(node.parts[1]))]
@@ -189,6 +233,10 @@ COMBINED: Final[dict[str, Callable[[Transform, Transform], Transform]]] = {
     "pose_add": added,
     "pose_sub": subtracted,
 }
+
+
+def _assigned_again(name: str, line: int) -> str:
+    return f'"{name}" is assigned in line {line} and elsewhere, or is computed'
 
 
 def _calculated(work: Callable[[], float]) -> float:

@@ -98,6 +98,14 @@ class Lines:
         for first, last in edges.reshape(-1, 2):
             yield int(self._scan.starts[first]), int(self._scan.starts[last])
 
+    def places(self) -> Integers:
+        """Offsets of the motions that fill their lines."""
+        each = [
+            self._scan.starts[np.flatnonzero(self._scan.kind == number)] + template.at
+            for number, template in self._templates.items()
+        ]
+        return np.concatenate([np.empty(0, dtype=np.int64), *each])
+
     def columns(self) -> Iterator[Columns]:
         """The motions that fill their lines, kind by kind."""
         for number, template in self._templates.items():
