@@ -1,5 +1,6 @@
 """ABB RAPID: a module."""
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -67,7 +68,8 @@ class RAPID(BlendsShortened):
         options = {name for argument in given for name in argument.options}
         if len(given) != 4 or given[0].options or not options <= REPEATED:
             return None
-        if not of_pose(program.layouts[int(program.targets.layout[target_of(program, step)])]):
+        layout = program.layouts[int(program.targets.layout[target_of(program, step)])]
+        if not of_pose(layout) or any(map(math.isnan, step.values)):
             return None
         target, zone = given[0].tokens, given[2].tokens
         cut = [target[0].start - start, target[-1].end - start, zone[0].start - start, zone[-1].end - start]

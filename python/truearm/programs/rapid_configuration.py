@@ -42,12 +42,13 @@ class Confdata:
         return found
 
     def digits_of_text(self, values: Floats) -> Integers:
-        """As in Configuration."""
+        """As in Configuration; data that is not written out leaves all open."""
         found = np.full((len(values), 6), ANY, dtype=np.int64)
-        numbers = values.astype(np.int64)
-        found[:, :3] = numbers[:, :3]
+        written = np.flatnonzero(np.isfinite(values).all(axis=1))
+        numbers = values[written].astype(np.int64)
+        found[written, :3] = numbers[:, :3]
         if self.uses_cfx:
-            found[:, 3:] = (numbers[:, 3:] & WEIGHTS) > 0
+            found[written, 3:] = (numbers[:, 3:] & WEIGHTS) > 0
         return found
 
     def text_of_digits(self, digits: Integers, values: Floats) -> Floats:

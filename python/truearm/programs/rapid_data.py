@@ -22,7 +22,7 @@ from truearm.programs.source import Source
 MOVING: Final = re.compile(r"\s*Move[A-Z]\w*\b(?!\s*(?::=|[.{]))")
 STORAGE: Final = frozenset({"const", "pers", "var"})
 TARGETS: Final = frozenset({"robtarget", "jointtarget"})
-KINDS: Final = TARGETS | {"tooldata", "wobjdata", "loaddata", "pose", "num"}
+KINDS: Final = TARGETS | {"tooldata", "wobjdata", "loaddata", "pose", "num", "confdata", "extjoint"}
 TWICE: Final = "is declared more than once"
 MODULE: Final = ""
 ROUNDS: Final = 20

@@ -406,7 +406,8 @@ class RapidReading:
         """The moves, once it is known which tools and work objects stay what they are."""
         nearest = self._confs.nearest()
         for number, use in enumerate(self._uses):
-            environment = self._environments.number(self._environment(use))
+            problem = self._targets.doubt(use.meant.targets, heeded=nearest.get(number) is not True)
+            environment = self._environments.number(self._environment(use, problem))
             for target in use.meant.targets:
                 if number in nearest:
                     self._nearest[len(self._moves)] = nearest[number]
@@ -419,7 +420,7 @@ class RapidReading:
                     follows=use.follows,
                 )
 
-    def _environment(self, use: _Use) -> Environment:
+    def _environment(self, use: _Use, problem: str) -> Environment:
         state, tool, meant = use.state, use.tool, use.meant
         held = self._frames.tool(tool.tokens)
         placed = self._frames.work_object(tool.options.get("wobj", ()))
@@ -429,7 +430,7 @@ class RapidReading:
             placed.frame,
             state.displacement @ meant.before,
             meant.after,
-            problem=held.problem or placed.problem,
+            problem=held.problem or placed.problem or problem,
             cartesian_problem=meant.problem or state.problem,
             payload_kg=mass if state.load_kg is None or mass is None else mass + state.load_kg,
         )

@@ -20,10 +20,17 @@ from truearm.programs.rapid_values import (
     pose_of,
 )
 from truearm.programs.source import Source
-from truearm.programs.tables import Number, TargetTable
+from truearm.programs.tables import ABSENT, Number, TargetTable
 from truearm.rotations import matrix_from_euler
 
 OF_JOINTS, OF_POSES = 0, 1
+PARTS: Final = {
+    OF_JOINTS: (("robjoint", 6), ("extjoint", 6)),
+    OF_POSES: (("pos", 3), ("orient", 4), ("confdata", 4), ("extjoint", 6)),
+}
+"""Types of a target's components, and how many numbers each has."""
+SHARED: Final = frozenset({"confdata", "extjoint"})
+"""Components that may be named data: they need not be changed for each target."""
 TARGET_KINDS: Final = {"robtarget": OF_POSES, "jointtarget": OF_JOINTS}
 OFFSETS: Final = frozenset({"offs", "reltool"})
 NOT_HERE: Final = "it is not declared in this module"
@@ -52,11 +59,17 @@ class Meant:
 
 
 class RapidTargets:
-    """Finds targets, and keeps each once."""
+    """Finds targets, and keeps each once.
+
+    Attributes:
+        numbers: Of declared targets, by name.
+        shared: Data that components of targets are, by the target's number: their names by their types.
+    """
 
     def __init__(self, declarations: Declarations, source: Source, table: TargetTable) -> None:
         self._declarations, self._source, self._table = declarations, source, table
         self.numbers: dict[str, int] = {}
+        self.shared: dict[int, dict[str, str]] = {}
 
     def meant(self, found: Sequence[Token], depth: int = 0) -> Meant | str:
         """What the tokens of an argument mean, or why they are no target that is known."""
@@ -72,6 +85,22 @@ class RapidTargets:
         if not self._declarations.visible(head):
             return OTHER_ROUTINE
         return self._element(head, found[2:-1]) if len(found) > 1 else self._meant(self.stored(head))
+
+    def doubt(self, targets: Sequence[int], *, heeded: bool) -> str:
+        """Why targets with named components cannot be changed; empty if they can.
+
+        Args:
+            targets: Their numbers.
+            heeded: Whether the controller may heed configuration data where they are gone to.
+        """
+        for target in targets:
+            for kind, name in self.shared.get(target, {}).items():
+                doubt = self._declarations.doubt(name)
+                if doubt:
+                    return f'"{name}" in it {doubt}'
+                if kind == "confdata" and heeded:
+                    return f'its configuration data is "{name}", as that of others may be, and is heeded'
+        return ""
 
     @staticmethod
     def besides(found: Sequence[Token]) -> Sequence[Token]:
@@ -102,14 +131,57 @@ class RapidTargets:
 
     def _add(self, kind: str, value: Value, name: str) -> int | str:
         layout = TARGET_KINDS[kind]
-        numbers = _of_joints(value) if layout == OF_JOINTS else _of_pose(value)
+        shared: dict[str, str] = {}
+        numbers = self._numbers(layout, value, shared)
         if isinstance(numbers, str):
             return numbers
         at = value.at if isinstance(value, Aggregate) else numbers[0].start
         number = self._table.add(0, at, layout, numbers, name)
         if name:
             self.numbers[name] = number
+        if shared:
+            self.shared[number] = shared
         return number
+
+    def _numbers(self, layout: int, value: Value, shared: dict[str, str]) -> list[Number] | str:
+        """The numbers of a target in its layout, or why they are not known; named components in `shared`."""
+        parts = self._parts(value, PARTS[layout], shared)
+        if isinstance(parts, str):
+            return parts
+        if layout == OF_POSES and pose_of(value) is None:
+            return "its quaternion is not of unit length"
+        if any(number.value < UNUSED_AXIS for number in parts[-1]):
+            return EXTERNAL
+        if "confdata" in shared:
+            parts[2] = [ABSENT] * 4
+        return [number for part in parts[:-1] for number in part]
+
+    def _parts(
+        self, value: Value, parts: Sequence[tuple[str, int]], shared: dict[str, str]
+    ) -> list[list[Number]] | str:
+        """Lists of numbers of an aggregate of aggregates, or why it has none."""
+        if not isinstance(value, Number | Aggregate) and [token.kind for token in value] == ["name"]:
+            return f"it is a copy of {value[0].text}, without numbers of its own"
+        if not isinstance(value, Aggregate) or len(value.values) != len(parts):
+            return "it is not written out"
+        found = []
+        for part, (kind, count) in zip(value.values, parts, strict=True):
+            numbers = part.numbers() if isinstance(part, Aggregate) else self._named(part, kind, shared)
+            if numbers is None or len(numbers) != count:
+                return "not all of its components are numbers"
+            found.append(numbers)
+        return found
+
+    def _named(self, part: Value, kind: str, shared: dict[str, str]) -> list[Number] | None:
+        """The numbers of a component that is the name of declared data; None if it is none."""
+        if isinstance(part, Number | Aggregate) or len(part) != 1 or kind not in SHARED:
+            return None
+        name = part[0].text.lower()
+        datum = self._declarations.data.get(name)
+        if datum is None or datum.kind != kind or not self._declarations.visible(name):
+            return None
+        shared[kind] = name
+        return datum.value.numbers() if isinstance(datum.value, Aggregate) else None
 
     def _written(self, found: Sequence[Token]) -> Meant | str:
         value = aggregate(Reader(self._source, list(found), found[-1].end))
@@ -160,36 +232,3 @@ class RapidTargets:
 
 def _is_offset(found: Sequence[Token]) -> bool:
     return len(found) > 2 and found[0].text.lower() in OFFSETS and found[1].text == "("
-
-
-def _parts(value: Value, counts: tuple[int, ...]) -> list[list[Number]] | str:
-    """Lists of numbers of an aggregate of aggregates, or why it has none."""
-    if not isinstance(value, Number | Aggregate) and [token.kind for token in value] == ["name"]:
-        return f"it is a copy of {value[0].text}, without numbers of its own"
-    if not isinstance(value, Aggregate) or len(value.values) != len(counts):
-        return "it is not written out"
-    found = []
-    for part, count in zip(value.values, counts, strict=True):
-        numbers = part.numbers() if isinstance(part, Aggregate) else None
-        if numbers is None or len(numbers) != count:
-            return "not all of its components are numbers"
-        found.append(numbers)
-    return found
-
-
-def _of_joints(value: Value) -> list[Number] | str:
-    found = _parts(value, (6, 6))
-    if isinstance(found, str):
-        return found
-    return EXTERNAL if any(number.value < UNUSED_AXIS for number in found[1]) else found[0]
-
-
-def _of_pose(value: Value) -> list[Number] | str:
-    found = _parts(value, (3, 4, 4, 6))
-    if isinstance(found, str):
-        return found
-    if pose_of(value) is None:
-        return "its quaternion is not of unit length"
-    if any(number.value < UNUSED_AXIS for number in found[3]):
-        return EXTERNAL
-    return [*found[0], *found[1], *found[2]]
