@@ -189,7 +189,7 @@ def test_offsets_that_are_constant_are_known(robot):
     assert names_changed(result) == ["P1", "P2", "P3"]
     assert np.abs(result.nominal[0] - q).max() < 1e-4
     both = text.replace("4 Mvs", "4 Mov P1\n5 Mvs")
-    assert "several tools, objects or offsets" in reasons(rewritten(MELFA, both, robot))[0][2]
+    assert "as it stands and with offsets" in reasons(rewritten(MELFA, both, robot))[0][2]
 
 
 def test_base_and_tool_parameters_come_from_the_frames_file(robot):

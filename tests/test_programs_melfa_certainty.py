@@ -158,7 +158,7 @@ def test_a_constant_that_is_written_in_the_motion_is_an_offset(robot):
 
 def test_every_motion_of_a_line_is_seen(robot):
     lines = [TOOL, "Mov P2", "If M1=1 Then Mov P1 Else Mov P2,-50", "*L1:If M1=2 Then Mvs P1 Else Mvs P3"]
-    assert left(robot, lines)["P2"].startswith("it is used with several tools")
+    assert left(robot, lines)["P2"].startswith("it is used as it stands and with offsets")
     result = rewritten(MELFA, program(robot, lines), robot, by=SHIFT)
     assert names_changed(result) == ["P1", "P3"]
     moves = read(MELFA, program(robot, lines), robot).moves

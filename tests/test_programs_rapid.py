@@ -122,7 +122,7 @@ GO = "v100,fine,tG\\WObj:=wT;"
 @pytest.mark.parametrize(
     ("body", "name", "reason"),
     [
-        (f"MoveJ pA,{GO}\nMoveL Offs(pA,0,0,nUp),{GO}", "pa", "several"),
+        (f"MoveJ pA,{GO}\nMoveL Offs(pA,0,0,nUp),{GO}", "pa", "with offsets"),
         (f"MoveJ pA,{GO}\nMoveL Offs(pA,0,0,i),{GO}", "pa", "several"),
         (f"MoveL RelTool(pA,0,0,-10\\Rz:=i),{GO}", "pa", "run time"),
         (f"MoveJ pA,{GO}\npA.trans.z:=100;", "pa", "assigned"),

@@ -195,7 +195,7 @@ movel(above)
 """
     result = rewritten(UR, text, robot, by=SHIFT)
     assert names_changed(result) == [3]
-    assert "several tools, objects or offsets" in reasons(result)[0][2]
+    assert "as it stands and with offsets" in reasons(result)[0][2]
 
 
 def test_branches_decide_which_tool_is_set(robot):

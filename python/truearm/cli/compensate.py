@@ -46,6 +46,7 @@ def command(
     largest_deg: LargestDeg = LARGEST_DEG,
     largest_joint_deg: option.LargestJointDeg = LARGEST_JOINT_DEG,
     largest_std_mm: LargestStdMm = LARGEST_STD_MM,
+    offsets_mm: option.OffsetsMm = None,
     densify_mm: option.DensifyMm = None,
     least_spacing_mm: option.LeastSpacingMm = None,
     dry_run: option.DryRun = False,
@@ -80,7 +81,7 @@ def command(
         raise UsageError("--least-spacing-mm says nothing alone", way_out="Give --densify-mm as well")
     least_mm = LEAST_SPACING_MM if least_spacing_mm is None else least_spacing_mm
     spacing = None if densify_mm is None else Spacing.of(densify_mm, least_mm)
-    choices = ta.Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language)
+    choices = ta.Choices(_one_of("--on-refusal", on_refusal, OnRefusal), force, spacing, language, offsets_mm)
     compensator = ta.Compensator(
         ta.Calibration.load(calibration),
         programming=None if programming is None else ta.Robot.load(programming),

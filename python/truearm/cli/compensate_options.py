@@ -60,6 +60,14 @@ LeastSpacingMm: TypeAlias = Annotated[
         show_default=f"{LEAST_SPACING_MM:g}",
     ),
 ]
+OffsetsMm: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        "--offsets-mm",
+        metavar="MM",
+        help="Change targets that are used with offsets too, where these uses stay within this.",
+    ),
+]
 DryRun: TypeAlias = Annotated[
     bool, typer.Option("--dry-run", help="Show a table and a unified diff; write nothing.")
 ]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, Literal, Protocol
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from truearm.controller import Controller
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import make_directory
 from truearm.inverse import Inverse
-from truearm.kinds import check_values, required
+from truearm.kinds import check_positive, check_values, required
+from truearm.programs.corrections import Compensator, Refusal
 from truearm.programs.densify import Densifier, Deviating, Inserted, Spacing, deviation_notices
 from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
@@ -21,13 +22,14 @@ from truearm.programs.frames import Frames
 from truearm.programs.left_open import left_open_mm
 from truearm.programs.listing import describe, listed_target
 from truearm.programs.marks import refuse_marked
+from truearm.programs.offsets import ALSO_OFFSET, Offsets, also_with_offsets
 from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.path_steps import step_notices
 from truearm.programs.program import Language, Listed, Program, StepTexts
 from truearm.programs.solving import are_singular, solve_targets
 from truearm.programs.source import Source
 from truearm.programs.tables import placed, run_of
-from truearm.programs.uses import Uses, target_count
+from truearm.programs.uses import SEVERAL, Uses, target_count
 from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -48,49 +50,14 @@ ALLOWING: Final = {
     FRAMES_UNSURE: "--largest-std-mm",
 }
 """The option that allows more, by the code of a refusal."""
+TARGET_COLUMNS: Final = (
+    "nominal", "corrected", "changed", "correction_mm", "correction_mrad", "std_mm", "residual_mm",
+    "residual_mrad", "moved_mm",
+)  # fmt: skip
+"""Columns of what was rewritten, a row for each target."""
 KEEP_NOMINAL: Final = "keep-nominal"
 ON_REFUSAL: Final = ("stop", KEEP_NOMINAL)
 Tell = Callable[[str, int, int], None]
-
-
-class Refusal(Protocol):
-    """Why a row was refused."""
-
-    @property
-    def number(self) -> int:
-        """Row, from 1."""
-        ...
-
-    @property
-    def reason(self) -> str:
-        """Why, in words that end a sentence."""
-        ...
-
-    @property
-    def code(self) -> int:
-        """Why, for programs."""
-        ...
-
-
-class Corrected(Protocol):
-    """What a compensator gives for rows."""
-
-    q: Floats
-    correction_mm: Floats
-    correction_mrad: Floats
-    residual_mm: Floats
-    residual_mrad: Floats
-    std_mm: Floats
-    refused: Bools
-    refusals: tuple[Any, ...]
-
-
-class Compensator(Protocol):
-    """What turns readings into corrected ones."""
-
-    def joints(self, q: Floats, *, tool: Floats | None = None, author: Robot | None = None) -> Any:  # noqa: ANN401
-        """Corrected readings of rows (n, N), at a tool; `author` as in author_of."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -127,18 +94,23 @@ class Choices:
         force: Rewrite a program that bears a mark.
         spacing: How waypoints are inserted on long lines; None inserts none.
         language: Name of the program's language; by the ending without.
+        offsets_mm: How far off the uses of a target with offsets may be that is changed for its use as it
+            stands; None changes no target that is used with offsets as well.
 
     Raises:
-        UsageError: If `on_refusal` is another word, or the spacing none.
+        UsageError: If `on_refusal` is another word, the spacing none, or the length not positive.
     """
 
     on_refusal: Literal["stop", "keep-nominal"] = "stop"
     force: bool = False
     spacing: Spacing | None = None
     language: str | None = None
+    offsets_mm: float | None = None
 
     def __post_init__(self) -> None:
         check_values(self, choices={"on_refusal": ON_REFUSAL})
+        if self.offsets_mm is not None:
+            check_positive(self.offsets_mm, "--offsets-mm")
         if self.spacing is not None:
             required(self.spacing, Spacing, "the spacing")
 
@@ -260,6 +232,8 @@ def rewrite(
     """
     if not choices.force:
         refuse_marked(program)
+    offsets = None if choices.offsets_mm is None else Offsets.of(program)
+    given, program = program, program if offsets is None else offsets.program
     uses = Uses.of(program)
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
@@ -270,9 +244,20 @@ def rewrite(
     known &= uses.moved
     state = _State(program, uses, models, solved.q, known, tell)
     state.reasons.update(solved.reasons)
+    for target in also_with_offsets(program) if offsets is None else ():
+        if state.reasons.get(target) == SEVERAL:
+            state.reasons[target] = ALSO_OFFSET
     state.compensate()
+    if offsets is not None and choices.offsets_mm is not None:
+        state.agree(offsets, choices.offsets_mm)
     kept = state.settle(choices)
-    return state.finish(mark, choices, kept)
+    return _as_given(state.finish(mark, choices, kept), given)
+
+
+def _as_given(done: Rewritten, program: Program) -> Rewritten:
+    """What was rewritten of the program that was given, whose targets are the first of those."""
+    columns = {name: getattr(done, name)[: len(program.targets)] for name in TARGET_COLUMNS}
+    return replace(done, program=program, **columns)
 
 
 @dataclass(eq=False)
@@ -294,6 +279,7 @@ class _State:
         unknown = np.broadcast_to(np.nan, len(self.nominal))
         self.correction_mm = self.correction_mrad = self.std_mm = unknown
         self.residual_mm = self.residual_mrad = unknown
+        self.suited: Integers = np.empty(0, dtype=np.int64)
 
     def compensate(self) -> None:
         """Corrected readings of all known targets, tool by tool, in the order of the moves."""
@@ -359,6 +345,22 @@ class _State:
         if beyond.any():
             self.codes.add(FRAMES_UNSURE)
         return np.asarray(beyond)
+
+    def agree(self, offsets: Offsets, largest_mm: float) -> None:
+        """Targets that are used with offsets too stay as they are where one change does not suit all uses."""
+        others = offsets.others
+        usable = np.array(self.known)
+        usable[list(self.refused)] = False
+        for target, why in offsets.unsuited(usable, self.corrected, self.models.controller.robot, largest_mm):
+            usable[target] = False
+            if self.known[target] and target not in self.refused:
+                self.reasons[target] = why
+                self.known[target] = False
+        for other in others.tolist():
+            self.refused.pop(other, None)
+            self.reasons.pop(other, None)
+        self.suited = others[usable[offsets.stands_for]]
+        self.known[others] = False
 
     def _what_helps(self) -> str:
         """What can be done about the refusals there are: bounds that have an option may be allowed more."""
@@ -435,6 +437,8 @@ class _State:
                 words.setdefault(number, []).append((at, at, line.encode("latin-1", "replace")))
         contents = edited(self.program, written, words)
         self._forget(~changed)
+        suited = np.array(changed)
+        suited[self.suited] = True
         listed = sorted(
             [*self.program.listed, *(self._listed(target, why) for target, why in self.reasons.items())]
         )
@@ -455,7 +459,7 @@ class _State:
             steps.texts.waypoints,
             steps.deviating,
             (
-                *step_notices(self.program, self.uses, changed),
+                *step_notices(self.program, self.uses, suited),
                 *deviation_notices(self.program, steps.deviating, choices.spacing),
             ),
         )

@@ -1,0 +1,141 @@
+"""Targets that are used as they stand and with offsets: one change where all uses stay near enough."""
+
+import numpy as np
+import pytest
+
+from tests.programs_rig import ABB, again, models, read, rewritten
+from tests.test_programs_rapid import GO, SEEN, module, numbers, points
+from truearm.errors import UsageError
+from truearm.programs.densify import Spacing
+from truearm.programs.offsets import ALSO_OFFSET, Offsets, also_with_offsets
+from truearm.programs.report import report_of
+from truearm.programs.uses import SEVERAL
+
+ABOVE = f"MoveJ Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}\nMoveL RelTool(pA,0,0,-60),{GO}"
+
+
+def program_of(body, data=None):
+    return read("demo.mod", module(body, points() if data is None else data), ABB)
+
+
+def listed(done):
+    return {one.name: one.reason for one in done.listed if not one.reason.startswith("no motion")}
+
+
+def tool_places(done):
+    """Where the controller takes the tool for each move, (m, 3), m, by what the program says now."""
+    program = again(done, ABB)
+    found = []
+    for move in np.flatnonzero(program.moves.moving):
+        target = int(program.moves.target[move])
+        environment = program.environments[int(program.moves.environment[move])]
+        layout = program.layouts[int(program.targets.layout[target])]
+        span = slice(program.targets.first[target], program.targets.first[target + 1])
+        stored = layout.to_poses(program.targets.values[span][None, :7])
+        found.append((environment.flange_poses(stored) @ environment.tool.controller)[0, :3, 3])
+    return np.array(found)
+
+
+def test_a_target_is_changed_where_its_approaches_stay_within():
+    program = program_of(ABOVE)
+    done = rewritten(program, models(ABB), offsets_mm=0.2)
+    assert done.changed.sum() == 1
+    assert not listed(done)
+    assert len(done.nominal) == len(done.changed) == len(done.moved_mm) == len(program.targets)
+    assert done.program is program
+    exactly = rewritten(program_of(f"MoveJ pA,{GO}"), models(ABB))
+    assert done.contents[0].count(b"Offs(pA,0,0,40)") == 1
+    name = b"CONST robtarget pA"
+    (line,) = (line for line in done.contents[0].splitlines() if name in line)
+    assert line in exactly.contents[0].splitlines()
+
+
+def test_its_approaches_are_as_far_off_as_is_said():
+    apart = rewritten(program_of(ABOVE), models(ABB), offsets_mm=1e-4)
+    assert not apart.changed.any()
+    (reason,) = listed(apart).values()
+    said_mm = float(reason.removeprefix("with its correction a use with an offset would be ").split()[0])
+    assert 0.01 < said_mm < 0.2
+    done = rewritten(program_of(ABOVE), models(ABB), offsets_mm=0.2)
+    wanted = np.array(tool_places(done))
+    for place, offset in ((0, "before"), (2, "after")):
+        plain = program_of(f"MoveJ {moved(offset)},{GO}")
+        wanted[place] = tool_places(rewritten(plain, models(ABB)))[0]
+    off_mm = 1e3 * np.linalg.norm(tool_places(done) - wanted, axis=1)
+    assert off_mm[1] == 0.0
+    assert off_mm.max() == pytest.approx(said_mm, abs=2e-3)
+
+
+def moved(offset):
+    """pA with one of the offsets, written out."""
+    program = program_of(ABOVE)
+    number = next(number for number, name in program.targets.names.items() if name == "pa")
+    span = slice(program.targets.first[number], program.targets.first[number + 1])
+    values = program.targets.values[span]
+    layout = program.layouts[int(program.targets.layout[number])]
+    pose = layout.to_poses(values[None, :7])[0]
+    shift = np.eye(4)
+    shift[2, 3] = 0.04 if offset == "before" else -0.06
+    pose = shift @ pose if offset == "before" else pose @ shift
+    written = layout.from_poses(pose[None], values[None, :7])[0]
+    place, turn = (",".join(f"{value:.7f}" for value in part) for part in (written[:3], written[3:]))
+    conf = ",".join(f"{value:.0f}" for value in values[7:])
+    return f"[[{place}],[{turn}],[{conf}],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+
+
+def test_without_a_length_it_is_listed_with_the_way_out():
+    assert listed(rewritten(program_of(ABOVE), models(ABB))) == {"pa": ALSO_OFFSET}
+    assert "--offsets-mm" in ALSO_OFFSET
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        (f"MoveJ pA,{GO}\nMoveL Offs(pA,0,0,nRun),{GO}", SEVERAL),
+        (f"MoveJ pA,{GO}\nMoveL Offs(pA,0,0,40),v100,fine,tool0\\WObj:=wT;", SEVERAL),
+        (f"MoveJ Offs(pA,0,0,30),{GO}\nMoveL Offs(pA,0,0,40),{GO}", SEVERAL),
+        (f"MoveJ pA,{GO}\nMoveJ Offs(pA,0,0,4000),{GO}", "it is used with offsets too, and its correction"),
+    ],
+)
+def test_what_one_change_cannot_be_told_to_suit_stays(body, reason):
+    done = rewritten(program_of(body), models(ABB), offsets_mm=5.0)
+    assert not done.changed.any()
+    assert listed(done)["pa"].startswith(reason)
+
+
+def test_a_refused_approach_leaves_its_target_and_refuses_nothing():
+    body = f"MoveJ pA,{GO}\nMoveJ Offs(pA,0,0,40),{GO}\nMoveJ pB,{GO}"
+    program = program_of(body)
+    numbers_of = {name: number for number, name in program.targets.names.items()}
+    expanded = Offsets.of(program)
+    assert expanded.stands_for.tolist() == [numbers_of["pa"]]
+    done = rewritten(program, models(ABB, refuse=(1,)), offsets_mm=1.0)
+    assert done.changed[numbers_of["pb"]]
+    assert not done.changed[numbers_of["pa"]]
+    assert "its correction is not known there" in listed(done)["pa"]
+
+
+def test_moves_to_offsets_are_named_and_others_are_not():
+    program = program_of(f"{ABOVE}\nMoveJ pB,{GO}")
+    assert list(also_with_offsets(program).values()) == [[0, 2]]
+
+
+def test_no_step_is_told_and_no_waypoint_goes_to_the_wrong_place():
+    body = f"MoveJ pB,{GO}\n{ABOVE}"
+    done = rewritten(program_of(body), models(ABB), offsets_mm=0.5, spacing=Spacing.of(1e-3, 5.0))
+    assert "steps" not in [notice.kind for notice in done.notices]
+    assert report_of(done)["counts"]["changed"] == 2
+    assert done.inserted == 0
+    assert all(line in done.contents[0].decode("latin-1") for line in ABOVE.splitlines())
+
+
+def test_programs_without_offsets_are_what_they_were():
+    body = f"MoveJ {numbers(SEEN['pA'])},{GO}\nMoveL pB,{GO}"
+    plain, given = (rewritten(program_of(body), models(ABB), offsets_mm=mm) for mm in (None, 0.1))
+    assert plain.contents == given.contents
+
+
+@pytest.mark.parametrize("length", [0.0, -1.0, float("nan")])
+def test_a_length_is_positive(length):
+    with pytest.raises(UsageError, match="offsets-mm"):
+        rewritten(program_of(ABOVE), models(ABB), offsets_mm=length)
