@@ -6,6 +6,7 @@ in that function, outside its branches and loops, and nothing else runs it meanw
 
 import math
 import operator
+from bisect import bisect_right
 from collections.abc import Callable, Set
 from typing import Final, NamedTuple
 
@@ -70,7 +71,8 @@ class Constants:
         self._again: dict[str, int] = {}
         self._why_not: dict[str, str] = {}
         self._scopes = Scopes()
-        self._alone: Set[int] = frozenset()
+        self._alone: Set[int | None] = frozenset()
+        self._assigning: dict[str, int | None] = {}
 
     def assign(self, name: str, value: Node | None, line: int, function: int | None = None) -> None:
         """The program assigns `value` to a variable; None for one that cannot be read.
@@ -91,7 +93,7 @@ class Constants:
         """The program changes a variable in place, or it is a parameter of a function."""
         self._why_not[name] = f'"{name}" is changed when the program runs, in line {line}'
 
-    def settle(self, scopes: Scopes, alone: Set[int]) -> None:
+    def settle(self, scopes: Scopes, alone: Set[int | None]) -> None:
         """All was read: which function a place is in, and which functions nothing runs meanwhile."""
         self._scopes, self._alone = scopes, alone
 
@@ -116,12 +118,19 @@ class Constants:
 
     def _last(self, used: Node, assigned: list[_Assigned]) -> Node:
         """The value of the last assignment before the place where a variable is used."""
-        functions = {one.function for one in assigned}
-        before = [one.value for one in assigned if one.value.end <= used.start]
-        function = functions.pop()
-        if functions or function not in self._alone or self._scopes.of(used.start) != function or not before:
+        function = self._function(used.text, assigned)
+        before = bisect_right(assigned, used.start, key=lambda one: one.value.end)
+        if function is None or before == 0 or self._scopes.of(used.start) != function:
             raise RunTime(_assigned_again(used.text, self._again[used.text]))
-        return max(before, key=lambda value: value.start)
+        return assigned[before - 1].value
+
+    def _function(self, name: str, assigned: list[_Assigned]) -> int | None:
+        """The function whose every run assigns a variable, as nothing else does; None if there is none."""
+        if name not in self._assigning:
+            functions = {one.function for one in assigned}
+            alone = len(functions) == 1 and functions <= self._alone
+            self._assigning[name] = functions.pop() if alone else None
+        return self._assigning[name]
 
     def literal(self, node: Node, depth: int = 0) -> Node:
         """What `node` stands for, names and constant places in lists followed.

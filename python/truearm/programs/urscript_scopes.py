@@ -63,7 +63,7 @@ class Scopes:
         around = [one for one in self._blocks if one.word in FUNCTIONS and one.start <= at <= one.end]
         return max(around, key=lambda one: one.depth).start if around else OUTSIDE
 
-    def run_alone(self, calls: Iterable[tuple[str, int]]) -> frozenset[int]:
+    def run_alone(self, calls: Iterable[tuple[str, int]]) -> frozenset[int | None]:
         """Functions of which no run begins within another function's, its own included, and the outside.
 
         Args:
