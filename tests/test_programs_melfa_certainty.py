@@ -149,6 +149,13 @@ def test_an_offset_or_tool_that_the_program_changes_is_not_its_constant(robot, u
     assert "P1" not in left(robot, [TOOL, "If POFF.Z>3 Then M1=POFF.Z+PA(1).Z", use], **stored)
 
 
+def test_a_tool_that_is_stored_as_it_is_assigned_is_its_constant(robot):
+    lines = ["PGRIP=(0,0,120,0,0,0)(0,0)", "Tool PGRIP", "Mov P1"]
+    assert left(robot, lines, PGRIP="(+0.00,+0.00,+120.00,+0.00,+0.00,+0.00)(0,0)") == {}
+    (reason,) = set(left(robot, lines, PGRIP="(+0.00,+0.00,+121.00,+0.00,+0.00,+0.00)(0,0)").values())
+    assert reason == "the tool is computed when the program runs"
+
+
 def test_a_constant_that_is_written_in_the_motion_is_an_offset(robot):
     lines = ["Tool P_NTool", "Mov P1*(0,0,-50,0,0,0)(0,0)", "Mvs P2+(0, 0, 20, 0, 0, 0)"]
     environments = read(MELFA, program(robot, lines, 0.0), robot).environments

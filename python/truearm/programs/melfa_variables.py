@@ -111,12 +111,23 @@ class Variables:
     def transform(self, given: str) -> Transform | None:
         """The transform of a constant, or of a variable that is one; None if it is not constant."""
         held = constant(given, 0, joints=False, joint_count=SLOTS)
-        if held is None and (variable := self._all.get(name_of(given))) is not None:
-            held = variable.constants[0][1] if self.holds_its_constant(name_of(given)) else None
+        if held is None and name_of(given) in self._all:
+            held = self._one_constant(name_of(given))
         values = held.numbers[:SLOTS] if held is not None and held.layout == POSE else ()
         if len(values) < SLOTS:
             return None
         return np.asarray(FLAGGED.to_poses(np.array([[number.value for number in values]]))[0])
+
+    def _one_constant(self, name: str) -> Constant | None:
+        """What a variable holds wherever it is assigned; None if that is not one constant.
+
+        A program that was saved has the values of its variables behind its lines, those too that it assigns.
+        """
+        variable = self._all[name]
+        if variable.changed or self._array(name).changed:
+            return None
+        held = {(one.layout, *(number.value for number in one.numbers)): one for _, one in variable.constants}
+        return next(iter(held.values())) if len(held) == 1 else None
 
     def _array(self, name: str) -> Variable:
         """What is done to any element of the array that an element is of."""
