@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import Notice
+from truearm.errors import Notice, count_of
 from truearm.programs.listing import listed_target
 from truearm.programs.program import Program, Unplaced, motion_is_straight
 from truearm.programs.uses import Uses
@@ -21,8 +21,9 @@ def step_notices(program: Program, uses: Uses, changed: Bools) -> tuple[Notice, 
         return ()
     lines = {listed_target(program, int(target), "").line for target in left}
     lines |= {program.sources[one.file].place(one.at)[0] for one in unplaced}
+    stay = "stays" if count == 1 else "stay"
     text = (
-        f"{count} targets of linear, circular or blended motion are left as they are between "
+        f"{count_of(count, 'target')} of linear, circular or blended motion {stay} uncorrected between "
         "corrected ones: the path steps there by the correction, see the listing"
     )
     return (Notice("steps", text, tuple(sorted(lines))),)

@@ -403,7 +403,7 @@ class _State:
         steps = [target for target in sorted(self.refused) if self._makes_a_step(target)]
         if steps:
             raise WorkError(
-                f"{len(steps)} targets cannot be corrected and cannot be kept as they are:\n"
+                f"{count_of(len(steps), 'target')} can neither be corrected nor kept:\n"
                 + describe(self.program, [self._listed(target, self.refused[target]) for target in steps]),
                 rule="Within linear, circular or blended motion an uncorrected target among corrected ones "
                 "makes a step",
