@@ -397,6 +397,16 @@ def test_angles_within_half_a_turn():
     np.testing.assert_array_equal(within_half_turn(Joints.of(ABB.joints), values), values)
 
 
+def test_angles_of_the_text_within_half_a_turn_stay_within():
+    layout = EulerPose()
+    near = np.array([[1000.0, 2.0, 3.0, 180.0, 10.0, -179.95], [1000.0, 2.0, 3.0, 540.0, 10.0, 190.0]])
+    turned = near + np.array([0.0, 0.0, 0.0, 0.1, 0.0, -0.1])
+    written = layout.from_poses(layout.to_poses(turned), near)
+    np.testing.assert_allclose(layout.to_poses(written), layout.to_poses(turned), atol=1e-12)
+    np.testing.assert_allclose(written[0, 3:], [-179.9, 10.0, 179.95])
+    np.testing.assert_allclose(written[1], turned[1])
+
+
 def test_turns_stay_within_limits():
     branch = np.array([[0.1, -1.0, 0.5, 3.1, 0.5, -3.0]])
     owners, turned = with_turns(branch[None], KUKA)

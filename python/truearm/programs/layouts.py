@@ -20,6 +20,7 @@ from truearm.units import MM_PER_METRE
 Floats = NDArray[np.float64]
 
 FULL_TURN: Final = 2.0 * np.pi
+HALF_TURN_DEG: Final = 180.0
 LOCKED: Final = 1e-7
 DECIMALS_MM, DECIMALS_M, DECIMALS_DEG, DECIMALS_RAD, DECIMALS_QUATERNION = 3, 6, 4, 6, 7
 
@@ -155,13 +156,17 @@ class EulerPose:
         return _poses(values[:, :3] * 1e-3, matrix_from_euler(angles, "ZYX"))
 
     def from_poses(self, poses: Floats, near: Floats) -> Floats:
-        """As in PoseLayout: of the two triples of angles and their full turns the one nearest to `near`."""
+        """As in PoseLayout: of the two triples of angles and their full turns the one nearest to `near`.
+
+        Angles within half a turn stay within it: not every controller may take 180.1 where it had 180.
+        """
         wanted = near[:, 3:6][:, self.columns]
         angles = _nearest_angles(poses[:, :3, :3], np.deg2rad(wanted))
         written = np.empty((len(poses), 6))
         written[:, :3] = poses[:, :3, 3] * MM_PER_METRE
         written[:, [3 + column for column in self.columns]] = np.rad2deg(angles)
-        return written
+        beyond = (np.abs(written) > HALF_TURN_DEG) & (np.abs(near[:, :6]) <= HALF_TURN_DEG)
+        return np.where(beyond, within_half_turn(self, written), written)
 
 
 def within_half_turn(layout: Layout, values: Floats) -> Floats:
@@ -169,7 +174,7 @@ def within_half_turn(layout: Layout, values: Floats) -> Floats:
     if not isinstance(layout, EulerPose):
         return values
     within = np.array(values)
-    within[:, 3:6] -= 360.0 * np.ceil((values[:, 3:6] - 180.0) / 360.0)
+    within[:, 3:6] -= 2.0 * HALF_TURN_DEG * np.ceil((values[:, 3:6] / HALF_TURN_DEG - 1.0) / 2.0)
     return within
 
 
