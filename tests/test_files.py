@@ -10,7 +10,7 @@ import pytest
 
 from truearm.cli import main
 from truearm.errors import InputError
-from truearm.files import check_place, make_directory, read_bytes, write_all, write_whole
+from truearm.files import check_place, followed, make_directory, read_bytes, write_all, write_whole
 
 
 def test_a_link_stays_one_and_what_it_leads_to_is_written(tmp_path):
@@ -54,6 +54,14 @@ def test_a_link_that_leads_to_itself_is_an_error(tmp_path):
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     with pytest.raises(InputError, match="leads to itself"):
         write_whole(tmp_path / "loop", "text")
+
+
+def test_where_nobody_may_look_a_path_is_no_link(tmp_path, monkeypatch):
+    def refused(*_, **__):
+        raise PermissionError
+
+    monkeypatch.setattr(os, "lstat", refused)
+    assert followed(tmp_path / "plain") == tmp_path / "plain"
 
 
 def test_where_one_of_several_cannot_be_written_none_is(tmp_path):

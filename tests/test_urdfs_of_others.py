@@ -105,7 +105,7 @@ def test_what_is_not_read_may_be_as_it_likes(caplog: pytest.LogCaptureFixture) -
         ("revolute", 'lower="-1e6" upper="1000000"', [-np.inf, np.inf]),
         ("revolute", 'lower="-inf" upper="inf"', [-np.inf, np.inf]),
         ("revolute", 'upper="3"', [0.0, 3.0]),
-        ("prismatic", 'lower="-1000" upper="0.5"', [-np.inf, 0.5]),
+        ("prismatic", 'lower="-1e6" upper="0.5"', [-np.inf, 0.5]),
     ],
 )
 def test_limits_that_are_none(kind: str, limit: str, expected: list[float]) -> None:
@@ -127,14 +127,16 @@ def test_limits_that_are_none(kind: str, limit: str, expected: list[float]) -> N
             'lower="0" upper="800"',
             r"limits 0 to 800 m\..*If these are millimetres, divide them by 1000",
         ),
+        ("prismatic", 'lower="0" upper="2000"', r"limits 0 to 2000 m\..*millimetres"),
+        ("prismatic", 'lower="2000" upper="3000"', r"limits 2000 to 3000 m\..*millimetres"),
+        ("revolute", 'lower="1000" upper="3000"', r"limits 1000 to 3000 rad.*degrees"),
         ("revolute", 'lower="1" upper="1"', "limits 1 to 1. The lower limit must be below"),
         ("revolute", 'lower="-1" upper="nan"', 'upper="nan" of <limit> in line 1. It must be a number'),
     ],
 )
 def test_limits_of_another_unit_are_told(kind: str, limit: str, message: str) -> None:
-    with pytest.raises(InputError, match=f'joint "j"|{message}') as caught:
+    with pytest.raises(InputError, match=message):
         with_limit(kind, limit)
-    assert caught.match(message)
 
 
 def test_the_way_out_of_xacro_has_one_ending() -> None:
@@ -166,6 +168,7 @@ def test_columns_of_an_arm_without_its_gripper_say_how_to_end_the_chain(tmp_path
         ("0 0 1.5707", "by up to 0.096 mrad"),
         ("1.5708 -1.570796 3.1416", None),
         ("1.5703 0.5 1", None),
+        ("1.58 3.15 0", None),
         ("1.5703124 1.2 1.5e0", None),
     ],
 )

@@ -1,19 +1,15 @@
 """Our code does without what Python has on POSIX systems alone; see without_posix.py for what this shows."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pandas as pd
 import pytest
-import serial
 
 import truearm as ta
-from truearm.cell.channels import Channel, ConnectionEndedError, _Buffered
 from truearm.simulation import VirtualArm
 
 RUNNER = str(Path(__file__).parent / "without_posix.py")
@@ -74,23 +70,3 @@ def test_a_server_ends_by_ctrl_c(folder):
         running.send_signal(signal.SIGINT)
         assert running.communicate(timeout=30)[1] == ""
     assert running.returncode == 0
-
-
-def test_pyserial_waits_where_descriptors_cannot_be_waited_for():
-    own, other = os.openpty()
-    channel = Channel(_Buffered(serial.Serial(os.ttyname(other)), 0.2), 0.2, ended="the port is gone")
-    assert channel.read(wait=False) == channel.read() == b""
-    os.write(own, b"here\r")
-    answer = b""
-    until = time.monotonic() + 10.0
-    while len(answer) < 5 and time.monotonic() < until:
-        answer += channel.read()
-    assert answer == b"here\r"
-    channel.write(b"there\r")
-    assert os.read(own, 100) == b"there\r"
-    channel.close()
-    for broken in (channel.read, lambda: channel.write(b"x")):
-        with pytest.raises(ConnectionEndedError):
-            broken()
-    os.close(own)
-    os.close(other)

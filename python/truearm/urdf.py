@@ -55,8 +55,7 @@ class UrdfChain:
 
 
 def read_urdf(path: Path, base_link: str | None = None, tip_link: str | None = None) -> UrdfChain:
-    """The chain from `base_link` (the root by default) to `tip_link` (by default the only
-    leaf that moves).
+    """The chain from `base_link` (by default the root) to `tip_link` (by default the only leaf that moves).
 
     Raises:
         InputError: If the file is no URDF, a link is unknown, several leaves leave the tip open, or

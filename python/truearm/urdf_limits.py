@@ -7,8 +7,8 @@ import numpy as np
 from truearm.errors import InputError
 from truearm.robot_checks import MAX_LENGTH_M, MAX_LIMIT_RAD
 
-UNLIMITED: Final = 1000.0
-"""From here, m or rad, a limit is a way to say that there is none."""
+UNLIMITED: Final = {"revolute": 1e3, "continuous": 1e3, "prismatic": 1e5}
+"""From here, rad or m, a limit is a way to say that there is none; rails of some metres may be in mm."""
 
 
 def joint_limits(joint: Any) -> tuple[float, float]:  # noqa: ANN401
@@ -29,15 +29,14 @@ def joint_limits(joint: Any) -> tuple[float, float]:  # noqa: ANN401
         raise InputError(
             f"limits {lower:g} to {upper:g}", where=where, rule="The lower limit must be below the upper one"
         )
-    lower, upper = (
-        value if abs(value) < UNLIMITED else float(np.copysign(np.inf, value)) for value in (lower, upper)
-    )
-    _check_unit(joint.type, (lower, upper), where)
-    return lower, upper
+    none = UNLIMITED[joint.type]
+    meant = -np.inf if lower <= -none else lower, np.inf if upper >= none else upper
+    largest = max((abs(value) for value in meant if np.isfinite(value)), default=0.0)
+    _check_unit(joint.type, largest, f"limits {lower:g} to {upper:g}", where)
+    return meant
 
 
-def _check_unit(kind: str, limits: tuple[float, float], where: str) -> None:
-    largest = max(abs(value) for value in limits if np.isfinite(value)) if np.isfinite(limits).any() else 0.0
+def _check_unit(kind: str, largest: float, stated: str, where: str) -> None:
     sliding = kind == "prismatic"
     if largest <= (MAX_LENGTH_M if sliding else MAX_LIMIT_RAD):
         return
@@ -47,7 +46,7 @@ def _check_unit(kind: str, limits: tuple[float, float], where: str) -> None:
         else ("rad", "degrees", "multiply them by pi/180")
     )
     raise InputError(
-        f"limits {limits[0]:g} to {limits[1]:g} {unit}",
+        f"{stated} {unit}",
         where=where,
         rule="A URDF is in m and rad",
         way_out=f"If these are {other}, {rule}; if the joint has none, leave lower and upper out",

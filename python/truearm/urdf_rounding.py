@@ -11,7 +11,8 @@ TOLD_FROM_RAD: Final = 5e-5
 def rounded_by(angles: Iterable[str]) -> float:
     """By how much, rad, these rpy texts are off the right angles they mean at most; 0 where none is rounded.
 
-    Angles that are off by more than their last digit are meant as they are, as those of calibrated arms.
+    Angles that are neither the nearest with their digits nor cut off are meant as they are, as those of
+    calibrated arms.
     """
     return max((_off(word) for text in angles for word in text.split()), default=0.0)
 
@@ -22,5 +23,7 @@ def _off(word: str) -> float:
         return 0.0
     value = float(word)
     quarters = round(value / (0.5 * math.pi))
-    off = abs(value - 0.5 * math.pi * quarters)
-    return off if quarters and TOLD_FROM_RAD <= off < 10.0 ** -len(digits) else 0.0
+    beyond = abs(value) - 0.5 * math.pi * abs(quarters)
+    last = 10.0 ** -len(digits)
+    rounded = quarters != 0 and -last < beyond <= 0.5 * last
+    return abs(beyond) if rounded and abs(beyond) >= TOLD_FROM_RAD else 0.0

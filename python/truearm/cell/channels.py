@@ -6,6 +6,8 @@ import re
 import select
 import socket
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Final, Protocol
 
 import serial
@@ -43,7 +45,7 @@ class Wire(Protocol):
         """What has come within a time: None where nothing has, empty where the other side has gone."""
 
     def send(self, data: bytes, wait_s: float) -> int:
-        """How many bytes it has taken within a time."""
+        """How many bytes it has taken; none where it takes none now, after waiting for that."""
 
     def close(self) -> None:
         """Be no more; others may still wait for it."""
@@ -70,7 +72,8 @@ class _Terminal:
         try:
             return os.write(self._number, data)
         except BlockingIOError:
-            return os.write(self._number, data) if select.select([], [self._number], [], wait_s)[1] else 0
+            select.select([], [self._number], [], wait_s)
+            return 0
 
     def close(self) -> None:
         """See Wire."""
@@ -99,7 +102,8 @@ class _Connection:
         try:
             return self._socket.send(data)
         except BlockingIOError:
-            return self._socket.send(data) if select.select([], [self._socket], [], wait_s)[1] else 0
+            select.select([], [self._socket], [], wait_s)
+            return 0
 
     def close(self) -> None:
         """See Wire."""
@@ -115,17 +119,28 @@ class _Buffered:
 
     def receive(self, wait_s: float) -> bytes | None:
         """See Wire; it waits a slice or not at all."""
-        first = self._port.read(1) if wait_s > 0.0 else b""
-        return first + self._port.read(self._port.in_waiting) or None
+        with _closed_in_mid_call():
+            first = self._port.read(1) if wait_s > 0.0 else b""
+            return first + self._port.read(self._port.in_waiting) or None
 
     def send(self, data: bytes, wait_s: float) -> int:
         """See Wire; it waits as long as was said at first."""
         del wait_s
-        return self._port.write(data) or 0
+        with _closed_in_mid_call():
+            return self._port.write(data) or 0
 
     def close(self) -> None:
         """See Wire."""
         self._port.close()
+
+
+@contextmanager
+def _closed_in_mid_call() -> Iterator[None]:
+    """Around a call of pyserial, which finds nothing where a port is closed meanwhile."""
+    try:
+        yield
+    except (AttributeError, TypeError) as error:
+        raise OSError("it was closed") from error
 
 
 class Channel:
@@ -143,7 +158,7 @@ class Channel:
         """
         try:
             data = self._wire.receive(SLICE_S if wait else 0.0)
-        except (OSError, ValueError, TypeError) as error:  # ValueError, TypeError: closed in mid-wait
+        except (OSError, ValueError) as error:  # ValueError: closed in mid-wait
             raise _ended(error) from None
         if data == b"":
             raise ConnectionEndedError(self._ended)
@@ -159,7 +174,7 @@ class Channel:
         while data:
             try:
                 taken = self._wire.send(data, max(0.0, until - time.monotonic()))
-            except (OSError, ValueError, TypeError) as error:  # ValueError, TypeError: closed in mid-wait
+            except (OSError, ValueError) as error:  # ValueError: closed in mid-wait
                 raise _ended(error) from None
             if not taken and time.monotonic() > until:
                 raise ConnectionEndedError(f"it could not be sent within {self._limit_s:g} s")

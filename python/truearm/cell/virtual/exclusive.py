@@ -22,7 +22,7 @@ else:
 
     @contextmanager
     def exclusive(file: IO[Any]) -> Iterator[None]:
-        """While nobody else who opened the same file is here."""
+        """While nobody is here who opened the same file for itself."""
         fcntl.flock(file, fcntl.LOCK_EX)
         try:
             yield
