@@ -1,6 +1,7 @@
 """What a rewriter asks of whoever corrects readings."""
 
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,21 +32,52 @@ class Refusal(Protocol):
 
 
 class Corrected(Protocol):
-    """What a compensator gives for rows."""
+    """What a compensator gives for rows; a row that is refused has NaN for readings."""
 
-    q: Floats
-    correction_mm: Floats
-    correction_mrad: Floats
-    residual_mm: Floats
-    residual_mrad: Floats
-    std_mm: Floats
-    refused: Bools
-    refusals: tuple[Any, ...]
+    @property
+    def q(self) -> Floats:
+        """Corrected readings (n, N), rad and m."""
+        ...
+
+    @property
+    def correction_mm(self) -> Floats:
+        """How far the correction shifts the tool, (n,)."""
+        ...
+
+    @property
+    def correction_mrad(self) -> Floats:
+        """How far it turns it, (n,)."""
+        ...
+
+    @property
+    def residual_mm(self) -> Floats:
+        """How far from its place the tool stays, (n,)."""
+        ...
+
+    @property
+    def residual_mrad(self) -> Floats:
+        """How far turned from it, (n,)."""
+        ...
+
+    @property
+    def std_mm(self) -> Floats | None:
+        """Standard deviation of the tool's place, (n,); None where it is not known."""
+        ...
+
+    @property
+    def refused(self) -> Bools:
+        """Which rows are refused, (n,)."""
+        ...
+
+    @property
+    def refusals(self) -> Sequence[Refusal]:
+        """Why, for each of them in order."""
+        ...
 
 
 class Compensator(Protocol):
     """What turns readings into corrected ones."""
 
-    def joints(self, q: Floats, *, tool: Floats | None = None, author: Robot | None = None) -> Any:  # noqa: ANN401
+    def joints(self, q: Floats, *, tool: Floats | None = None, author: Robot | None = None) -> Corrected:
         """Corrected readings of rows (n, N), at a tool; `author` as in author_of."""
         ...

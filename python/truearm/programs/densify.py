@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from truearm.errors import Notice, count_of
 from truearm.inverse import Inverse
 from truearm.kinds import check_positive
+from truearm.programs.corrections import Compensator
 from truearm.programs.encoding import Encoder
 from truearm.programs.environment import Environment, Transform, author_of
 from truearm.programs.layouts import of_joints, of_pose, within_half_turn
@@ -114,7 +115,7 @@ class Densifier:
     def __init__(
         self,
         program: Program,
-        models: tuple[Robot, Inverse, Any],
+        models: tuple[Robot, Inverse, Compensator],
         encoder: Encoder,
         spacing: Spacing,
     ) -> None:

@@ -19,6 +19,7 @@ from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
 from truearm.programs.environment import Frame, Transform, author_of
 from truearm.programs.frames import Frames
+from truearm.programs.helping import FRAMES_UNSURE, KEEP_NOMINAL, NOT_REACHED, measured_there, what_helps
 from truearm.programs.left_open import left_open_mm
 from truearm.programs.listing import describe, listed_target
 from truearm.programs.marks import refuse_marked
@@ -36,26 +37,12 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-UNSURE: Final = 8
-"""Code of refusals where the calibration is less certain than allowed."""
-FRAMES_UNSURE: Final = 0
-"""Code of refusals where it is certain enough, but not together with tool and work object."""
-NOT_REACHED: Final = (2, 3)
 STRETCHED: Final = "it lies at a singularity, where no small change of the joints makes the correction"
-ALLOWING: Final = {
-    5: "--largest-joint-deg",
-    6: "--largest-mm",
-    7: "--largest-deg",
-    UNSURE: "--largest-std-mm",
-    FRAMES_UNSURE: "--largest-std-mm",
-}
-"""The option that allows more, by the code of a refusal."""
 TARGET_COLUMNS: Final = (
     "nominal", "corrected", "changed", "correction_mm", "correction_mrad", "std_mm", "residual_mm",
     "residual_mrad", "moved_mm",
 )  # fmt: skip
 """Columns of what was rewritten, a row for each target."""
-KEEP_NOMINAL: Final = "keep-nominal"
 ON_REFUSAL: Final = ("stop", KEEP_NOMINAL)
 Tell = Callable[[str, int, int], None]
 
@@ -362,43 +349,17 @@ class _State:
         self.suited = others[usable[offsets.stands_for]]
         self.known[others] = False
 
-    def _what_helps(self) -> str:
-        """What can be done about the refusals there are: bounds that have an option may be allowed more."""
-        helping = dict.fromkeys(option for code, option in ALLOWING.items() if code in self.codes)
-        options = " or ".join(helping)
-        allow = f", or allow more with {options}" if options else ""
-        away = ". No option allows a tool to stay away" if self.codes.intersection(NOT_REACHED) else ""
-        keep = f"--on-refusal {KEEP_NOMINAL} leaves such targets as they are where that makes no step"
-        again = ". Touches further apart, and more of them, tell tools and work objects better"
-        frames = again if FRAMES_UNSURE in self.codes else ""
-        return f"{self._beyond()}Change them{allow}; {keep}{away}{self._why_unsure()}{frames}"
-
-    def _beyond(self) -> str:
-        """Features far off, before all else: what is refused may be nothing but their guesses."""
-        if not self.models.beyond:
-            return ""
-        return f"{'; '.join(self.models.beyond)}: measure there, or give what the arm has. "
-
-    def _why_unsure(self) -> str:
-        """What can be done where the calibration is unsure because it knows positions alone."""
-        if self.models.beyond or not (UNSURE in self.codes and self.models.positions_only):
-            return ""
-        return (
-            ". This calibration knows positions alone, so it is sure of tools near the points that were "
-            "measured: state the program's tool (tool of the robot file, --frames), measure orientation "
-            "too or more points on the tool, or allow more with --largest-std-mm"
-        )
-
     def settle(self, choices: Choices) -> tuple[Listed, ...]:
         """Refused targets that are kept as they are, or an error."""
         if not self.refused:
             return ()
+        beyond = self.models.beyond
         listed = [self._listed(target, reason) for target, reason in sorted(self.refused.items())]
         if choices.on_refusal != KEEP_NOMINAL:
             raise WorkError(
                 f"{len(listed)} of {target_count(self.program)} targets cannot be corrected:\n"
                 + describe(self.program, listed),
-                way_out=self._what_helps(),
+                way_out=what_helps(self.codes, beyond, positions_only=self.models.positions_only),
             )
         steps = [target for target in sorted(self.refused) if self._makes_a_step(target)]
         if steps:
@@ -407,7 +368,7 @@ class _State:
                 + describe(self.program, [self._listed(target, self.refused[target]) for target in steps]),
                 rule="Within linear, circular or blended motion an uncorrected target among corrected ones "
                 "makes a step",
-                way_out=f"{self._beyond()}Change these targets or the limits",
+                way_out=f"{measured_there(beyond)}Change these targets or the limits",
             )
         return tuple(listed)
 
