@@ -5,10 +5,12 @@ import pytest
 
 from tests.programs_rig import ABB, again, models, read, rewritten
 from tests.test_programs_rapid import GO, SEEN, module, numbers, points
-from truearm.errors import UsageError
-from truearm.programs.densify import Spacing
-from truearm.programs.offsets import ALSO_OFFSET, Offsets, also_with_offsets
+from truearm.errors import UsageError, WorkError
+from truearm.programs.densify import OFFSET, Spacing
+from truearm.programs.encoding import CORRECTED_SINGULAR
+from truearm.programs.offsets import ALSO_OFFSET, TURNED, Offsets, also_with_offsets
 from truearm.programs.report import report_of
+from truearm.programs.rewriting import Choices
 from truearm.programs.uses import SEVERAL
 
 ABOVE = f"MoveJ Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}\nMoveL RelTool(pA,0,0,-60),{GO}"
@@ -122,11 +124,14 @@ def test_moves_to_offsets_are_named_and_others_are_not():
 
 def test_no_step_is_told_and_no_waypoint_goes_to_the_wrong_place():
     body = f"MoveJ pB,{GO}\n{ABOVE}"
-    done = rewritten(program_of(body), models(ABB), offsets_mm=0.5, spacing=Spacing.of(1e-3, 5.0))
+    done = rewritten(program_of(body), models(ABB), offsets_mm=0.5, spacing=Spacing.of(1e-4, 5.0))
     assert "steps" not in [notice.kind for notice in done.notices]
     assert report_of(done)["counts"]["changed"] == 2
-    assert done.inserted == 0
-    assert all(line in done.contents[0].decode("latin-1") for line in ABOVE.splitlines())
+    text = done.contents[0].decode("latin-1")
+    assert all(line in text for line in ABOVE.splitlines())
+    before = {text[: text.index(line)].count("MoveL [[") for line in ABOVE.splitlines()[:2]}
+    assert before == {0, done.inserted}, "waypoints lead to the target as it stands alone"
+    assert done.inserted > 0
 
 
 def test_programs_without_offsets_are_what_they_were():
@@ -139,3 +144,86 @@ def test_programs_without_offsets_are_what_they_were():
 def test_a_length_is_positive(length):
     with pytest.raises(UsageError, match="offsets-mm"):
         rewritten(program_of(ABOVE), models(ABB), offsets_mm=length)
+
+
+@pytest.mark.parametrize("length", ["0.2", True, np.array([0.2])])
+def test_a_length_is_a_number(length):
+    with pytest.raises(UsageError, match="--offsets-mm is .*number"):
+        Choices(offsets_mm=length)
+
+
+def near_an_edge(q_deg):
+    """Points of which pA means these readings."""
+    name = "  CONST robtarget pA:="
+    return "\n".join(
+        f"{name}{numbers(q_deg)};" if line.startswith(name) else line for line in points().split("\n")
+    )
+
+
+def test_where_the_numbers_of_a_target_cannot_be_said_the_step_at_its_approach_is_told():
+    body = f"MoveJ pA,{GO}\nMoveJ pB,{GO}\nMoveL Offs(pA,0,0,40),{GO}\nMoveJ pB,{GO}"
+    program = program_of(body, near_an_edge([5, 12, 22, 10, 1.0, 20]))
+    by_rad = np.deg2rad([0.0, 0.0, 0.0, 0.0, -0.95, 0.0])
+    done = rewritten(program, models(ABB, by_rad), offsets_mm=50.0, spacing=Spacing.of(1e-3, 5.0))
+    assert listed(done) == {"pa": CORRECTED_SINGULAR}
+    (notice,) = (notice for notice in done.notices if notice.kind == "steps")
+    assert notice.message.startswith("1 target of linear")
+    assert "offsets" not in [one.kind for one in done.notices]
+    assert done.inserted == 0
+
+
+def test_a_refused_target_is_not_kept_where_its_approach_would_show_the_step():
+    program = program_of(f"MoveJ pA,{GO}\nMoveJ pB,{GO}\nMoveL Offs(pA,0,0,40),{GO}")
+    with pytest.raises(WorkError, match="1 target can neither be corrected nor kept"):
+        rewritten(program, models(ABB, refuse=(0,)), on_refusal="keep-nominal", offsets_mm=1.0)
+
+
+def test_uses_with_offsets_do_not_count_as_targets_where_one_is_refused():
+    program = program_of(f"{ABOVE}\nMoveJ pB,{GO}")
+    with pytest.raises(WorkError, match=f"1 of {len(program.targets)} targets cannot be corrected"):
+        rewritten(program, models(ABB, refuse=(1,)), offsets_mm=1.0)
+
+
+def test_lines_at_approaches_get_waypoints_or_are_named():
+    body = f"MoveJ pB,{GO}\nMoveL Offs(pA,0,0,200),{GO}\nMoveL pA,{GO}\nMoveL pB,{GO}"
+    program = program_of(body)
+    done = rewritten(program, models(ABB), offsets_mm=50.0, spacing=Spacing.of(1e-4, 5.0))
+    text = done.contents[0].decode("latin-1")
+    into, away = (text.index(f"MoveL {name},{GO}") for name in ("pA", "pB"))
+    approach = text.index("MoveL Offs(pA,0,0,200)")
+    assert text.count("MoveL [[", 0, approach) == 0
+    assert text.count("MoveL [[", approach, into) > 0
+    assert text.count("MoveL [[", into, away) > 0
+    assert [one.listed.reason for one in done.deviating] == [OFFSET]
+    assert done.deviating[0].deviation_mm > 1e-4
+    (notice,) = (notice for notice in done.notices if notice.kind == "deviation")
+    assert notice.rows == (
+        program.sources[0].text[: program.sources[0].text.index("MoveL Offs")].count("\n") + 1,
+    )
+
+
+def test_what_was_allowed_and_what_it_cost_is_told():
+    done = rewritten(program_of(f"{ABOVE}\nMoveJ pB,{GO}"), models(ABB), offsets_mm=0.2)
+    (notice,) = (notice for notice in done.notices if notice.kind == "offsets")
+    told = {one["name"]: (one["offset_mm"], one["offset_mrad"]) for one in report_of(done)["targets"]}
+    off_mm, off_mrad = told["pa"]
+    assert 0.01 < off_mm < 0.2
+    assert 0.0 < off_mrad < 1.0
+    assert told["pb"] == (None, None)
+    assert notice.message == (
+        "1 target is changed for its use as it stands (--offsets-mm): uses with offsets are up to "
+        f"{off_mm:.3f} mm and {off_mrad:.3f} mrad off"
+    )
+    plain = rewritten(program_of(f"MoveJ pA,{GO}"), models(ABB), offsets_mm=0.2)
+    assert not plain.notices
+    assert len(done.offset_mm) == len(done.program.targets)
+
+
+@pytest.mark.parametrize("heeded", [True, False])
+def test_digits_that_the_controller_does_not_heed_refuse_nothing(heeded):
+    off = "" if heeded else "ConfL\\Off;\n"
+    body = f"{off}MoveJ pB,{GO}\nMoveL Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}"
+    by_rad = np.deg2rad([0.0, 0.0, 0.0, 0.0, 0.0, -0.6])
+    program = program_of(body, near_an_edge([5, 12, 22, 10, 45, 0.5]))
+    done = rewritten(program, models(ABB, by_rad), offsets_mm=5.0)
+    assert listed(done) == ({"pa": TURNED} if heeded else {})

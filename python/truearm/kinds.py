@@ -158,8 +158,11 @@ def _flag(value: object, name: str) -> bool:
 
 
 def check_number(value: object, name: str, kind: type = Real) -> None:
-    """Raise UsageError unless the argument or option `name` is a number, of `kind` Integral a whole one."""
-    if not isinstance(value, kind):
+    """Raise UsageError unless the argument or option `name` is a number, of `kind` Integral a whole one.
+
+    True and False are none.
+    """
+    if isinstance(value, bool) or not isinstance(value, kind):
         words = "a whole number" if kind is Integral else "a number"
         raise UsageError(f"{name} is {value!r}", rule=f"It must be {words}")
 

@@ -65,7 +65,8 @@ OffsetsMm: TypeAlias = Annotated[
     typer.Option(
         "--offsets-mm",
         metavar="MM",
-        help="Change targets that are used with offsets too, where these uses stay within this.",
+        help="Change targets that are used with offsets too, where the tool's point stays within this there; "
+        "its turn is told, not bounded.",
     ),
 ]
 DryRun: TypeAlias = Annotated[

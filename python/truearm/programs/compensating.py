@@ -2,6 +2,7 @@
 
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from truearm.compensation import Compensator
 from truearm.controller import Controller
@@ -80,11 +81,7 @@ def compensate_program(
     mark = mark_text(version("truearm"), calibration.data_hash)
     done = rewrite(program, models, chosen, mark=mark, tell=tell)
     return done.with_facts(
-        {
-            "calibration": {"data_hash": calibration.data_hash, "robot": calibration.robot.name},
-            "controller": {"kind": declared.kind, "source": declared.source},
-            "task": compensator.task,
-        },
+        _facts(compensator, declared, chosen),
         [
             *frames_notices(program, known),
             *payload_notices(program, calibration.robot),
@@ -95,6 +92,17 @@ def compensate_program(
             *beyond_notices(calibration, compensator.features),
         ],
     )
+
+
+def _facts(compensator: Compensator, declared: Controller, chosen: Choices) -> dict[str, Any]:
+    """With what a program is rewritten, for the report."""
+    calibration = compensator.calibration
+    return {
+        "calibration": {"data_hash": calibration.data_hash, "robot": calibration.robot.name},
+        "controller": {"kind": declared.kind, "source": declared.source},
+        "task": compensator.task,
+        "offsets_mm": chosen.offsets_mm,
+    }
 
 
 def _declared(given: Controller | str | Path | None, language: Language, author: Robot) -> Controller:

@@ -128,7 +128,7 @@ class Densifier:
 
         Args:
             nominal: Readings of all targets, (t, N).
-            changed: Which are changed, (t,).
+            changed: Which are changed, (t,); so are places of a changed one with an offset, as in Offsets.
             tell: Called with how many of these moves are done, and how many there are.
         """
         moves = self._program.moves

@@ -4,24 +4,29 @@ An approach above a target is the target with an offset. Its correction differs 
 as the arm's error varies. To know by how much, each such use is followed as a target of its own.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.errors import Notice, count_of
+from truearm.programs.configuration import ANY
 from truearm.programs.layouts import of_pose
+from truearm.programs.listing import listed_target
 from truearm.programs.program import Program
+from truearm.programs.solving import numbers_of
 from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
+from truearm.rotations import rotation_vector_from_matrix
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+MRAD_PER_RAD: Final = 1e3
 ALSO_OFFSET: Final = (
     "it is used as it stands and with offsets, and one change cannot suit them all exactly; --offsets-mm "
     "allows some deviation"
@@ -61,11 +66,13 @@ class Offsets:
 
     Attributes:
         program: The program; these targets stand behind all others.
+        uses: How its targets are used.
         stands_for: Number of the target that each of them is another place of, (n,).
         others: Their own numbers, (n,).
     """
 
     program: Program
+    uses: Uses
     stands_for: Integers
     others: Integers
 
@@ -82,44 +89,105 @@ class Offsets:
         stands_for = np.array([target for target, _ in places], dtype=np.int64)
         moves_now = replace(program.moves, target=target_of)
         targets = _extended(program.targets, stands_for)
-        return cls(
-            replace(program, targets=targets, moves=moves_now), stands_for, count + np.arange(len(places))
-        )
+        apart = replace(program, targets=targets, moves=moves_now)
+        return cls(apart, Uses.of(apart), stands_for, count + np.arange(len(places)))
 
-    def unsuited(
-        self, known: Bools, corrected: Floats, controller: Robot, largest_mm: float
-    ) -> Iterator[tuple[int, str]]:
-        """Targets that are not to be changed since a use with an offset would suffer, and why.
+    def judged(self, known: Bools, corrected: Floats, controller: Robot, largest_mm: float) -> "Judged":
+        """Whether the change of a target for its use as it stands suits its uses with offsets.
 
         Args:
             known: Targets whose corrections are known, (t,).
             corrected: Corrected readings (t, N).
             controller: The controller's model.
-            largest_mm: How far off a use with an offset may be.
+            largest_mm: How far off the tool's place may be at a use with an offset.
         """
-        program, uses = self.program, Uses.of(self.program)
+        off_mm, off_mrad = np.full((2, len(known)), np.nan)
+        reasons: dict[int, str] = {}
+        heeding = self._heeding()
         for target in np.unique(self.stands_for).tolist():
             others = self.others[self.stands_for == target]
             if not (known[target] and known[others].all()):
-                yield target, NOT_KNOWN
+                reasons[target] = NOT_KNOWN
                 continue
             rows = np.array([target, *others.tolist()])
-            flange = controller.flange_chain.pose(
-                np.ascontiguousarray(controller.joints_from_readings(corrected[rows]))
-            )
-            here, *with_offsets = (program.environments[int(number)] for number in uses.environment[rows])
-            (stored,) = here.stored_poses(flange[:1])
-            far = [
-                np.linalg.norm(((one.flange_poses(stored[None])[0] - is_to_be) @ one.tool.controller)[:3, 3])
-                for one, is_to_be in zip(with_offsets, flange[1:], strict=True)
-            ]
-            off_mm = MM_PER_METRE * float(max(far))
-            if off_mm > largest_mm:
-                yield target, f"with its correction a use with an offset would be {off_mm:.3f} mm off"
-            elif program.configuration is not None:
-                digits = program.configuration.digits(corrected[rows])
-                if (digits != digits[0]).any():
-                    yield target, TURNED
+            off_mm[target], off_mrad[target] = self._off(rows, corrected[rows], controller)
+            if off_mm[target] > largest_mm:
+                reasons[target] = (
+                    f"with its correction a use with an offset would be {off_mm[target]:.3f} mm off"
+                )
+            elif self._turned(rows[[True, *heeding[others].tolist()]], corrected):
+                reasons[target] = TURNED
+        return Judged(reasons, off_mm, off_mrad)
+
+    def _off(self, rows: Integers, q: Floats, controller: Robot) -> tuple[float, float]:
+        """How far off the tool is at most, mm and mrad, at the last of targets `rows` (n,), if the first says
+        what readings `q` (n, N) have for it; these are all places of one stored target.
+        """
+        flange = controller.flange_chain.pose(np.ascontiguousarray(controller.joints_from_readings(q)))
+        uses = self.uses.environment[rows]
+        here, *with_offsets = (self.program.environments[int(number)] for number in uses)
+        stored = here.stored_poses(flange[:1])
+        tools = flange @ here.tool.true
+        commanded = np.concatenate([one.flange_poses(stored) for one in with_offsets]) @ here.tool.true
+        far_m = np.linalg.norm(commanded[:, :3, 3] - tools[1:, :3, 3], axis=1)
+        turned = np.swapaxes(tools[1:, :3, :3], 1, 2) @ commanded[:, :3, :3]
+        turn_rad = np.linalg.norm(rotation_vector_from_matrix(turned), axis=-1)
+        return MM_PER_METRE * float(far_m.max()), MRAD_PER_RAD * float(turn_rad.max())
+
+    def _heeding(self) -> Bools:
+        """Targets at which the controller may heed configuration data, (t,)."""
+        moves = self.program.moves
+        unheeded = np.zeros(len(moves), dtype=bool)
+        unheeded[[move for move, certain in self.program.nearest.items() if certain]] = True
+        found = np.zeros(len(self.program.targets), dtype=bool)
+        found[moves.target[moves.moving & ~unheeded]] = True
+        return found
+
+    def _turned(self, rows: Integers, corrected: Floats) -> bool:
+        """Whether digits that are written for the first of targets `rows` are not those of all the others."""
+        configuration = self.program.configuration
+        layout = self.program.layouts[int(self.program.targets.layout[rows[0]])]
+        if configuration is None or not of_pose(layout) or layout.configuration == 0:
+            return False
+        stated = numbers_of(self.program, rows[:1], layout)[:, -layout.configuration :]
+        digits = configuration.digits(corrected[rows])
+        said = configuration.text_of_digits(digits[:1], stated)
+        written = configuration.digits_of_text(np.where(np.isnan(stated), np.nan, said))
+        return bool(((digits != digits[:1]) & (written != ANY)).any())
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What the changes of targets for their uses as they stand make of their uses with offsets.
+
+    Attributes:
+        reasons: Why a target is not to be changed, by its number.
+        off_mm: How far off the tool would be at most at a use with an offset, (t,); NaN where there is none,
+            or that is not known.
+        off_mrad: How far turned it would be at most, (t,).
+    """
+
+    reasons: dict[int, str]
+    off_mm: Floats
+    off_mrad: Floats
+
+
+def offset_notices(program: Program, off_mm: Floats, off_mrad: Floats) -> tuple[Notice, ...]:
+    """What it costs that targets are changed for their uses as they stand, as in Judged; (t,) each."""
+    which = np.flatnonzero(np.isfinite(off_mm))
+    if len(which) == 0:
+        return ()
+    changed = (
+        "is changed for its use as it stands"
+        if len(which) == 1
+        else "are changed for their use as they stand"
+    )
+    text = (
+        f"{count_of(len(which), 'target')} {changed} (--offsets-mm): uses with offsets are up to "
+        f"{off_mm[which].max():.3f} mm and {off_mrad[which].max():.3f} mrad off"
+    )
+    lines = {listed_target(program, int(target), "").line for target in which}
+    return (Notice("offsets", text, tuple(sorted(lines))),)
 
 
 def _extended(targets: Targets, more: Integers) -> Targets:

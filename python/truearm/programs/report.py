@@ -160,6 +160,8 @@ def _target(done: Rewritten, number: int) -> dict[str, Any]:
         "residual_mm": float(done.residual_mm[number]),
         "residual_mrad": float(done.residual_mrad[number]),
         "moved_mm": _number(done.moved_mm[number]),
+        "offset_mm": _number(done.offset_mm[number]),
+        "offset_mrad": _number(done.offset_mrad[number]),
     }
 
 

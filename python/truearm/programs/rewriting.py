@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from truearm.controller import Controller
 from truearm.errors import Notice, WorkError, count_of
 from truearm.files import make_directory
 from truearm.inverse import Inverse
-from truearm.kinds import check_positive, check_values, required
+from truearm.kinds import check_number, check_positive, check_values, required
 from truearm.programs.corrections import Compensator, Refusal
 from truearm.programs.densify import Densifier, Deviating, Inserted, Spacing, deviation_notices
 from truearm.programs.editing import Words, edited
@@ -23,7 +23,7 @@ from truearm.programs.helping import FRAMES_UNSURE, KEEP_NOMINAL, NOT_REACHED, m
 from truearm.programs.left_open import left_open_mm
 from truearm.programs.listing import describe, listed_target
 from truearm.programs.marks import refuse_marked
-from truearm.programs.offsets import ALSO_OFFSET, Offsets, also_with_offsets
+from truearm.programs.offsets import ALSO_OFFSET, Offsets, also_with_offsets, offset_notices
 from truearm.programs.outputs import output_paths, write_outputs
 from truearm.programs.path_steps import step_notices
 from truearm.programs.program import Language, Listed, Program, StepTexts
@@ -40,7 +40,7 @@ Bools = NDArray[np.bool_]
 STRETCHED: Final = "it lies at a singularity, where no small change of the joints makes the correction"
 TARGET_COLUMNS: Final = (
     "nominal", "corrected", "changed", "correction_mm", "correction_mrad", "std_mm", "residual_mm",
-    "residual_mrad", "moved_mm",
+    "residual_mrad", "moved_mm", "offset_mm", "offset_mrad",
 )  # fmt: skip
 """Columns of what was rewritten, a row for each target."""
 ON_REFUSAL: Final = ("stop", KEEP_NOMINAL)
@@ -81,11 +81,11 @@ class Choices:
         force: Rewrite a program that bears a mark.
         spacing: How waypoints are inserted on long lines; None inserts none.
         language: Name of the program's language; by the ending without.
-        offsets_mm: How far off the uses of a target with offsets may be that is changed for its use as it
-            stands; None changes no target that is used with offsets as well.
+        offsets_mm: How far off the tool's place may be where a target is used with an offset that is changed
+            for its use as it stands; None changes no target that is used with offsets as well.
 
     Raises:
-        UsageError: If `on_refusal` is another word, the spacing none, or the length not positive.
+        UsageError: If `on_refusal` is another word, the spacing none, or the length no positive number.
     """
 
     on_refusal: Literal["stop", "keep-nominal"] = "stop"
@@ -97,6 +97,7 @@ class Choices:
     def __post_init__(self) -> None:
         check_values(self, choices={"on_refusal": ON_REFUSAL})
         if self.offsets_mm is not None:
+            check_number(self.offsets_mm, "--offsets-mm")
             check_positive(self.offsets_mm, "--offsets-mm")
         if self.spacing is not None:
             required(self.spacing, Spacing, "the spacing")
@@ -123,6 +124,9 @@ class Rewritten:
         residual_mrad: How far turned from it, (t,).
         moved_mm: How far the position moved that the program says, (t,): that of a Cartesian target in its
             work object, as the controller computes it; NaN for joint targets.
+        offset_mm: How far off the tool is at most where a target is used with an offset, (t,), as it was
+            changed for its use as it stands; NaN for targets without such uses.
+        offset_mrad: How far turned it is at most there, (t,).
         kept: Targets that were refused and kept as they were, with the reason.
         listed: What was left as it was because it cannot be changed with certainty.
         inserted: How many waypoints were inserted.
@@ -142,6 +146,8 @@ class Rewritten:
     residual_mm: Floats
     residual_mrad: Floats
     moved_mm: Floats
+    offset_mm: Floats
+    offset_mrad: Floats
     kept: tuple[Listed, ...]
     listed: tuple[Listed, ...]
     inserted: int = 0
@@ -220,8 +226,8 @@ def rewrite(
     if not choices.force:
         refuse_marked(program)
     offsets = None if choices.offsets_mm is None else Offsets.of(program)
-    given, program = program, program if offsets is None else offsets.program
-    uses = Uses.of(program)
+    given = _Given(program, Uses.of(program))
+    program, uses = (program, given.uses) if offsets is None else (offsets.program, offsets.uses)
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
     )
@@ -229,7 +235,7 @@ def rewrite(
     known: Bools = np.isfinite(np.einsum("ij->i", solved.q))
     known[list(solved.reasons)] = False
     known &= uses.moved
-    state = _State(program, uses, models, solved.q, known, tell)
+    state = _State(program, uses, models, solved.q, known, tell, given)
     state.reasons.update(solved.reasons)
     for target in also_with_offsets(program) if offsets is None else ():
         if state.reasons.get(target) == SEVERAL:
@@ -238,13 +244,20 @@ def rewrite(
     if offsets is not None and choices.offsets_mm is not None:
         state.agree(offsets, choices.offsets_mm)
     kept = state.settle(choices)
-    return _as_given(state.finish(mark, choices, kept), given)
+    return _as_given(state.finish(mark, choices, kept), given.program)
 
 
 def _as_given(done: Rewritten, program: Program) -> Rewritten:
     """What was rewritten of the program that was given, whose targets are the first of those."""
     columns = {name: getattr(done, name)[: len(program.targets)] for name in TARGET_COLUMNS}
     return replace(done, program=program, **columns)
+
+
+class _Given(NamedTuple):
+    """The program that was given, of which is told, and how its targets are used."""
+
+    program: Program
+    uses: Uses
 
 
 @dataclass(eq=False)
@@ -257,6 +270,7 @@ class _State:
     nominal: Floats
     known: Bools
     tell: Tell
+    given: _Given
     reasons: dict[int, str] = field(default_factory=dict)
     refused: dict[int, str] = field(default_factory=dict)
     codes: set[int] = field(default_factory=set)
@@ -266,7 +280,8 @@ class _State:
         unknown = np.broadcast_to(np.nan, len(self.nominal))
         self.correction_mm = self.correction_mrad = self.std_mm = unknown
         self.residual_mm = self.residual_mrad = unknown
-        self.suited: Integers = np.empty(0, dtype=np.int64)
+        self.offset_mm = self.offset_mrad = unknown
+        self.others = self.stands_for = np.empty(0, dtype=np.int64)
 
     def compensate(self) -> None:
         """Corrected readings of all known targets, tool by tool, in the order of the moves."""
@@ -335,19 +350,19 @@ class _State:
 
     def agree(self, offsets: Offsets, largest_mm: float) -> None:
         """Targets that are used with offsets too stay as they are where one change does not suit all uses."""
-        others = offsets.others
+        self.others, self.stands_for = offsets.others, offsets.stands_for
         usable = np.array(self.known)
         usable[list(self.refused)] = False
-        for target, why in offsets.unsuited(usable, self.corrected, self.models.controller.robot, largest_mm):
-            usable[target] = False
+        judged = offsets.judged(usable, self.corrected, self.models.controller.robot, largest_mm)
+        for target, why in judged.reasons.items():
             if self.known[target] and target not in self.refused:
                 self.reasons[target] = why
                 self.known[target] = False
-        for other in others.tolist():
+        for other in self.others.tolist():
             self.refused.pop(other, None)
             self.reasons.pop(other, None)
-        self.suited = others[usable[offsets.stands_for]]
-        self.known[others] = False
+        self.known[self.others] = False
+        self.offset_mm, self.offset_mrad = judged.off_mm, judged.off_mrad
 
     def settle(self, choices: Choices) -> tuple[Listed, ...]:
         """Refused targets that are kept as they are, or an error."""
@@ -357,7 +372,7 @@ class _State:
         listed = [self._listed(target, reason) for target, reason in sorted(self.refused.items())]
         if choices.on_refusal != KEEP_NOMINAL:
             raise WorkError(
-                f"{len(listed)} of {target_count(self.program)} targets cannot be corrected:\n"
+                f"{len(listed)} of {target_count(self.given.program)} targets cannot be corrected:\n"
                 + describe(self.program, listed),
                 way_out=what_helps(self.codes, beyond, positions_only=self.models.positions_only),
             )
@@ -373,7 +388,8 @@ class _State:
         return tuple(listed)
 
     def _makes_a_step(self, target: int) -> bool:
-        return bool(self.uses.straight[target] or self.uses.blended[target])
+        """Whether a target is, at any of its uses, in motion that shows where it is not corrected."""
+        return bool(self.given.uses.straight[target] or self.given.uses.blended[target])
 
     def finish(self, mark: str, choices: Choices, kept: tuple[Listed, ...]) -> Rewritten:
         """The texts, and what is told of them."""
@@ -388,7 +404,9 @@ class _State:
         )
         self.reasons.update(written.reasons)
         changed[list(written.reasons)] = False
-        steps = self._inserted(changed, choices.spacing)
+        suited = np.array(changed)
+        suited[self.others] = changed[self.stands_for]
+        steps = self._inserted(suited, choices.spacing)
         words: dict[int, list[Words]] = {}
         for new in steps.texts.insertions:
             words.setdefault(new.file, []).append((new.start, new.end, new.text.encode("latin-1")))
@@ -398,8 +416,6 @@ class _State:
                 words.setdefault(number, []).append((at, at, line.encode("latin-1", "replace")))
         contents = edited(self.program, written, words)
         self._forget(~changed)
-        suited = np.array(changed)
-        suited[self.suited] = True
         listed = sorted(
             [*self.program.listed, *(self._listed(target, why) for target, why in self.reasons.items())]
         )
@@ -415,24 +431,27 @@ class _State:
             self.residual_mm,
             self.residual_mrad,
             written.moved_mm,
+            self.offset_mm,
+            self.offset_mrad,
             kept,
             tuple(listed),
             steps.texts.waypoints,
             steps.deviating,
             (
-                *step_notices(self.program, self.uses, suited),
+                *step_notices(*self.given, changed[: len(self.given.program.targets)]),
+                *offset_notices(self.program, self.offset_mm, self.offset_mrad),
                 *deviation_notices(self.program, steps.deviating, choices.spacing),
             ),
         )
 
-    def _inserted(self, changed: Bools, spacing: Spacing | None) -> Inserted:
+    def _inserted(self, suited: Bools, spacing: Spacing | None) -> Inserted:
         if spacing is None:
             return Inserted(StepTexts(), ())
         models, controller = self.models, self.models.controller
         encoder = Encoder(self.program, self.uses, controller.robot, controller.inverse)
         of_models = (models.programming, models.inverse, models.compensator)
         densifier = Densifier(self.program, of_models, encoder, spacing)
-        return densifier.insert(self.nominal, changed, lambda done, all_: self.tell("lines", done, all_))
+        return densifier.insert(self.nominal, suited, lambda done, all_: self.tell("lines", done, all_))
 
     def _forget(self, unchanged: Bools) -> None:
         if not unchanged.any():
@@ -444,6 +463,8 @@ class _State:
         self.std_mm = placed(self.std_mm, rows, nothing)
         self.residual_mm = placed(self.residual_mm, rows, nothing)
         self.residual_mrad = placed(self.residual_mrad, rows, nothing)
+        self.offset_mm = placed(self.offset_mm, rows, nothing)
+        self.offset_mrad = placed(self.offset_mrad, rows, nothing)
 
     def _listed(self, target: int, reason: str) -> Listed:
         return listed_target(self.program, target, reason)
