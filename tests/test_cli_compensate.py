@@ -395,3 +395,20 @@ def test_a_path_gets_no_rows_and_says_so(capsys):
     told = " ".join(capsys.readouterr().err.split())
     assert "1 linear move deviates by more than 0.0001 mm (--densify-mm)" in told
     assert "mm; a path gets no rows but its author's)" in told
+
+
+def test_what_offsets_may_cost_is_in_the_report(capsys):
+    body = f"MoveJ Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}\nMoveJ pB,{GO}"
+    Path("above.mod").write_bytes(module(body, points()).encode("latin-1"))
+    words = ["compensate", "arm.calib", "above.mod", "-o", "beside.mod", "--controller", "nominal"]
+    assert main([*words, "--offsets-mm", "0.5", "--report", "beside.json"]) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    report = json.loads(Path("beside.json").read_text())
+    off_mm, off_mrad = next((one["offset_mm"], one["offset_mrad"]) for one in report["targets"])
+    assert report["offsets_mm"] == 0.5
+    assert 0.0 < off_mm <= 0.5
+    assert f"uses with offsets are up to {off_mm:.3f} mm and {off_mrad:.3f} mrad off" in told
+    assert main([*words, "--report", "beside.json"]) == 0
+    report = json.loads(Path("beside.json").read_text())
+    assert report["offsets_mm"] is None
+    assert {one["offset_mm"] for one in report["targets"]} == {None}

@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 
 from tests.programs_rig import ABB, again, models, read, rewritten
-from tests.test_programs_rapid import GO, SEEN, module, numbers, points
+from tests.test_programs_rapid import GO, SEEN, TABLE, TOOL, module, numbers, points
 from truearm.errors import UsageError, WorkError
+from truearm.inverse import Inverse
 from truearm.programs.densify import OFFSET, Spacing
 from truearm.programs.encoding import CORRECTED_SINGULAR
-from truearm.programs.offsets import ALSO_OFFSET, TURNED, Offsets, also_with_offsets
+from truearm.programs.offsets import ALSO_OFFSET, STRETCHED, TURNED, Offsets, also_with_offsets
 from truearm.programs.report import report_of
 from truearm.programs.rewriting import Choices
 from truearm.programs.uses import SEVERAL
+from truearm.rotations import matrix_from_rotation_vector, quaternion_from_matrix
 
 ABOVE = f"MoveJ Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}\nMoveL RelTool(pA,0,0,-60),{GO}"
 
@@ -227,3 +229,80 @@ def test_digits_that_the_controller_does_not_heed_refuse_nothing(heeded):
     program = program_of(body, near_an_edge([5, 12, 22, 10, 45, 0.5]))
     done = rewritten(program, models(ABB, by_rad), offsets_mm=5.0)
     assert listed(done) == ({"pa": TURNED} if heeded else {})
+
+
+def test_an_offset_in_a_turned_work_object_is_off_by_what_is_said():
+    placed = rigid_motion_of([300.0, 50.0, 100.0], [0.3, -0.4, 1.2])
+    x, y, z = placed[:3, 3] * 1e3
+    turn = ",".join(f"{value:.9f}" for value in quaternion_from_matrix(placed[:3, :3]))
+    q = np.deg2rad(SEEN["pA"])
+    data = (
+        f'{points()}\n  PERS wobjdata wR:=[FALSE,TRUE,"",[[{x},{y},{z}],[{turn}]],[[0,0,0],[1,0,0,0]]];\n'
+        f"  CONST robtarget pT:={numbers(SEEN['pA'], placed=placed, decimals=6)};"
+    )
+    there = "v100,fine,tG\\WObj:=wR;"
+    by_rad = np.array([1e-3, -1e-3, 5e-4, 1e-3, -1e-3, 2e-3])
+    body = f"MoveJ Offs(pT,10,-20,40),{there}\nMoveL pT,{there}"
+    done = rewritten(program_of(body, data), models(ABB, by_rad), offsets_mm=0.5)
+    moved_by = np.eye(4)
+    moved_by[:3, 3] = [0.01, -0.02, 0.04]
+    approach = placed @ moved_by @ np.linalg.inv(placed) @ ABB.pose(q)
+    wanted = ABB.pose(Inverse(ABB).near(approach[None], q[None])[0] + by_rad) @ TOOL
+    off_mm = 1e3 * np.linalg.norm(tool_places(done)[0] - wanted[:3, 3])
+    (said_mm,) = done.offset_mm[done.changed]
+    assert off_mm == pytest.approx(said_mm, abs=1e-3)
+    assert said_mm > 0.01
+
+
+def rigid_motion_of(place_mm, turn):
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = matrix_from_rotation_vector(np.array(turn)), np.array(place_mm) * 1e-3
+    return pose
+
+
+OTHER_TOOL = "\n  PERS tooldata tH:=[TRUE,[[0,0,130],[1,0,0,0]],[1.5,[0,0,50],[1,0,0,0],0,0,0]];"
+LOAD = "\n  PERS loaddata lPart:=[2,[0,0,50],[1,0,0,0],0,0,0];"
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"MoveJ Offs(pA,0,0,40),v100,fine,tH\\WObj:=wT;\nMoveL pA,{GO}",
+        f"MoveJ Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}\nGripLoad lPart;\nMoveL Offs(pA,0,0,40),{GO}",
+        f"MoveJ Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}\nPickThere pA;",
+        f"MoveJ Offs(pA,0,0,40),{GO}\nMoveL pA,{GO}\npA.trans.z:=10;",
+        f"FOR i FROM 1 TO 3 DO\nMoveJ Offs(pA,0,0,i*20),{GO}\nMoveL pA,{GO}\nENDFOR",
+    ],
+    ids=["tool", "load", "routine", "assigned", "index"],
+)
+def test_what_is_not_alike_at_target_and_approach_leaves_the_target(body):
+    done = rewritten(program_of(body, points() + OTHER_TOOL + LOAD), models(ABB), offsets_mm=50.0)
+    assert not done.changed.any()
+    assert "pa" in listed(done)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f"FOR i FROM 1 TO 3 DO\n{ABOVE}\nENDFOR",
+        f"{ABOVE}\nMoveL pB,{GO}\nMoveL Offs(pA,0,0,40),{GO}",
+        f"MoveJ pB,{GO}\nMoveC Offs(pA,0,0,40),pA,{GO}",
+    ],
+    ids=["loop", "two", "arc"],
+)
+def test_target_and_approach_may_be_used_again(body):
+    done = rewritten(program_of(body), models(ABB), offsets_mm=0.5)
+    assert not listed(done)
+    names = done.program.targets.names
+    assert [names[target] for target in np.flatnonzero(np.isfinite(done.offset_mm))] == ["pa"]
+
+
+def test_an_approach_whose_correction_ends_at_a_singularity_leaves_its_target():
+    approach, up = np.deg2rad([5, 12, 22, 10, 1.0, 20]), np.eye(4)
+    up[2, 3] = 0.04
+    pose = TABLE @ up @ np.linalg.inv(TABLE) @ ABB.pose(approach)
+    q_deg = np.rad2deg(Inverse(ABB).near(pose[None], approach[None])[0])
+    program = program_of(f"MoveJ Offs(pA,0,0,-40),{GO}\nMoveJ pA,{GO}", near_an_edge(q_deg))
+    by_rad = np.deg2rad([0.0, 0.0, 0.0, 0.0, -0.95, 0.0])
+    done = rewritten(program, models(ABB, by_rad), offsets_mm=50.0)
+    assert listed(done) == {"pa": STRETCHED}

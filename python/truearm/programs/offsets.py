@@ -15,7 +15,7 @@ from truearm.programs.configuration import ANY
 from truearm.programs.layouts import of_pose
 from truearm.programs.listing import listed_target
 from truearm.programs.program import Program
-from truearm.programs.solving import numbers_of
+from truearm.programs.solving import are_singular, numbers_of
 from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
@@ -32,6 +32,7 @@ ALSO_OFFSET: Final = (
     "allows some deviation"
 )
 NOT_KNOWN: Final = "it is used with offsets too, and its correction is not known there"
+STRETCHED: Final = "it is used with offsets too, and its correction ends at a singularity there"
 TURNED: Final = "it is used with offsets too, where its corrected configuration data would name other joints"
 
 
@@ -115,6 +116,8 @@ class Offsets:
                 reasons[target] = (
                     f"with its correction a use with an offset would be {off_mm[target]:.3f} mm off"
                 )
+            elif are_singular(controller, corrected[others]).any():
+                reasons[target] = STRETCHED
             elif self._turned(rows[[True, *heeding[others].tolist()]], corrected):
                 reasons[target] = TURNED
         return Judged(reasons, off_mm, off_mrad)
