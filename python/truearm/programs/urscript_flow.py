@@ -9,11 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 from truearm.programs.environment import Frame
+from truearm.programs.urscript_syntax import BLOCKS, CHAINED, FUNCTIONS, LOOPS
 
-_LOOPS: Final = frozenset({"while", "for"})
-_FUNCTIONS: Final = frozenset({"def", "thread", "sec"})
-_BLOCKS: Final = _FUNCTIONS | _LOOPS | {"if", "switch", "case", "default"}
-_CHAINED: Final = frozenset({"elif", "else"})
 _ROUNDS: Final = 8
 _DEEPEST_BLOCKS: Final = 20
 _DEEPEST_CALLS: Final = 12
@@ -105,11 +102,11 @@ def _blocks(steps: Iterable[Step]) -> tuple[_Block, dict[str, _Block]]:
             if len(stack) > 1:
                 stack.pop()
                 stack[-1].last.items.append(step)
-        elif step.kind in _CHAINED:
+        elif step.kind in CHAINED:
             top.branches.append(_Block(step))
-        elif step.kind in _BLOCKS:
+        elif step.kind in BLOCKS:
             block = _Block(step)
-            if step.kind in _FUNCTIONS:
+            if step.kind in FUNCTIONS:
                 functions[step.name] = block
             elif len(stack) < _DEEPEST_BLOCKS:
                 top.last.items.append(block)
@@ -163,7 +160,7 @@ class _Walker:
         return now
 
     def _nested(self, block: _Block, state: State, ways: _Ways) -> State | None:
-        if block.header.kind in _LOOPS:
+        if block.header.kind in LOOPS:
             return self._loop(block, state, ways)
         ends = [self.run(branch, state, ways) for branch in (block, *block.branches)]
         if not any(branch.header.kind == "else" for branch in block.branches):

@@ -21,9 +21,14 @@ _TOKEN: Final = re.compile(
 # fmt: on
 _SKIPPED: Final = frozenset({"space", "comment", "mark"})
 _OPENING, _CLOSING = "([{", ")]}"
-HEADERS: Final = frozenset(
-    {"def", "thread", "sec", "while", "for", "if", "elif", "else", "switch", "case", "default"}
-)
+FUNCTIONS: Final = frozenset({"def", "thread", "sec"})
+LOOPS: Final = frozenset({"while", "for"})
+BLOCKS: Final = FUNCTIONS | LOOPS | {"if", "switch", "case", "default"}
+"""First words of what an `end` closes."""
+CHAINED: Final = frozenset({"elif", "else"})
+HEADERS: Final = BLOCKS | CHAINED
+_ALSO_BEHIND: Final = CHAINED | {"end"}
+"""Words that begin a statement behind another one in the same line."""
 _DEEPEST: Final = 60
 _PRECEDENCE: Final = {
     "or": 1, "xor": 1, "and": 2, "==": 3, "!=": 3, "<": 3, ">": 3, "<=": 3, ">=": 3,
@@ -42,7 +47,10 @@ class Token(NamedTuple):
 
 
 class Statement(NamedTuple):
-    """One statement; line ends within brackets are nothing, a header ends with its colon."""
+    """One statement; line ends within brackets are nothing, a header ends with its colon.
+
+    What stands in one line before an `end`, `else` or `elif` is a statement of its own.
+    """
 
     tokens: tuple[Token, ...]
 
@@ -117,6 +125,9 @@ def statements(source: Source, start: int, end: int) -> Iterator[Statement]:
                 yield Statement(tuple(tokens))
             tokens = []
             continue
+        if tokens and depth == 0 and token.text in _ALSO_BEHIND and tokens[-1].text != ".":
+            yield Statement(tuple(tokens))
+            tokens = []
         tokens.append(token)
         if token.text in _OPENING:
             depth += 1
