@@ -4,6 +4,7 @@ The program is walked as it may run: both ways at branches, loops until nothing 
 wherever they are called. What differs between two ways to the same place is not known there.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
@@ -193,13 +194,19 @@ class _Walker:
 
 def _setting(functions: dict[str, _Block]) -> set[str]:
     """Functions that set something, or call one that does."""
-    below = {name: list(_steps(block)) for name, block in functions.items()}
-    found = {name for name, steps in below.items() if any(s.kind in ("tcp", "payload") for s in steps)}
-    while True:
-        more = {name for name, steps in below.items() if any(s.name in found for s in steps)} - found
-        if not more:
-            return found
-        found |= more
+    found: set[str] = set()
+    pending: set[str] = set()
+    above: dict[str, set[str]] = defaultdict(set)
+    for name, block in functions.items():
+        for step in _steps(block):
+            if step.kind in ("tcp", "payload"):
+                pending.add(name)
+            above[step.name].add(name)
+    while pending:
+        name = pending.pop()
+        found.add(name)
+        pending |= above[name] - found
+    return found
 
 
 def _steps(block: _Block) -> Iterator[Step]:

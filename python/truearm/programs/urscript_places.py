@@ -22,6 +22,8 @@ from truearm.rotations import rigid_inverse
 Transform = NDArray[np.float64]
 
 _DEEPEST: Final = 20
+_DEEPEST_LEAVES: Final = 120
+_MOST_LEAVES: Final = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,7 @@ class Places:
     def __init__(self, constants: Constants) -> None:
         self._constants = constants
         self.direct: set[int] = set()
+        self._leaves: dict[tuple[int, int], frozenset[int]] = {}
 
     def note_direct(self, node: Node) -> None:
         """A motion has this target: remember the pose if it goes to it as it is."""
@@ -174,9 +177,19 @@ class Places:
         return place.moved(moving(fixed, -1.0), turning(rigid_inverse(fixed)), self.leaves(second))
 
     def leaves(self, node: Node, depth: int = 0) -> frozenset[int]:
-        """Offsets of the poses that an expression is made of, variables followed."""
-        if depth > _DEEPEST:
-            return frozenset()
+        """Offsets of the poses that an expression is made of, variables followed.
+
+        Raises:
+            RunTime: If they are too many.
+        """
+        if depth > _DEEPEST_LEAVES:
+            raise RunTime("its computation is nested too deeply")
+        place = (node.start, node.end)
+        if place not in self._leaves:
+            self._leaves[place] = self._found_leaves(node, depth)
+        return self._leaves[place]
+
+    def _found_leaves(self, node: Node, depth: int) -> frozenset[int]:
         if node.kind == "pose":
             return frozenset({node.start})
         if node.kind in ("name", "index"):
@@ -185,8 +198,10 @@ class Places:
             except RunTime:
                 return frozenset()
             return self.leaves(literal, depth + 1) if literal is not node else frozenset()
-        below = [self.leaves(part, depth + 1) for part in node.parts]
-        return frozenset().union(*below)
+        found = frozenset[int]().union(*(self.leaves(part, depth + 1) for part in node.parts))
+        if len(found) > _MOST_LEAVES:
+            raise RunTime("its computation is nested too deeply")
+        return found
 
 
 def argument(call: Node, position: int, name: str) -> Node | None:
