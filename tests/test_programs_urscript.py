@@ -389,7 +389,6 @@ end
         ("d = a[2]\nmovel(pose_trans(p[0, 0, d, 0, 0, 0], p[0.5, 0.2, 0.3, 0, 0, 0]))", "a"),
         ("movej([a[0], -1.5, 1.5, -1.5, -1.5, 0])", "a"),
         ("n = nearest(b)\nmovej(list[n])", "b"),
-        ("list.append(a)", "ab"),
         ("n = own_length(a)", "a"),
         ("textmsg(own_length(a))", "a"),
         ("n = length(list)", ""),
@@ -406,6 +405,14 @@ def test_what_the_program_computes_with_is_left(robot, statement, left):
     assert set(found) == set(left)
     assert all(reason.startswith(f'"{name}" is also used in line') for name, reason in found.items())
     assert {"a", "b"} - set(found) <= set(names_changed(result))
+
+
+def test_a_list_that_is_appended_to_is_not_known(robot):
+    result = rewritten(UR, PAIR.format("list.append(a)"), robot, by=SHIFT)
+    found = {line: reason for line, _, reason in reasons(result)}
+    assert not result.changed.any()
+    assert found[5] == '"list" is changed when the program runs, in line 3'
+    assert found[2].startswith('"b" is also used in line')
 
 
 @settings(max_examples=60)

@@ -17,8 +17,9 @@ from truearm.programs.urscript_constants import Constants, RunTime
 from truearm.programs.urscript_flow import Step
 from truearm.programs.urscript_lines import MOTIONS, STREAMED, TARGETS, Lines, blend_radius
 from truearm.programs.urscript_places import argument
-from truearm.programs.urscript_scopes import FUNCTIONS, Scopes
+from truearm.programs.urscript_scopes import Scopes
 from truearm.programs.urscript_syntax import (
+    FUNCTIONS,
     HEADERS,
     Node,
     NotReadable,
@@ -38,6 +39,7 @@ UNTRACKED: Final = {
     "optimovej": NOT_FOLLOWED,
     "optimovel": NOT_FOLLOWED,
     "mc_run_motion": NOT_FOLLOWED,
+    "interpreter_mode": "what is sent to the interpreter moves the arm",
 }
 SHIFTING: Final = frozenset(
     {"path_offset_enable", "path_offset_set", "track_conveyor_linear", "track_conveyor_circular"}
@@ -55,6 +57,7 @@ HARMLESS: Final = COUNTING | {
 DEFINED: Final = re.compile(rb"\b(?:def|thread|sec)[ \t]+(\w+)")
 PAYLOADS: Final = frozenset({"set_payload", "set_target_payload", "set_payload_mass"})
 LONGEST_NAME: Final = 48
+_OPERATORS: Final = ("+", "-", "*", "/", "%", "^")
 TCP: Final = "tcp"
 INSTALLATION: Final = "installation"
 
@@ -95,6 +98,7 @@ class Collected:
         self._tcps: dict[int, Node | None] = {}
         self._masses: dict[int, Node | None] = {}
         self._made_of: dict[str, tuple[int, list[str]]] = {}
+        self._run: set[str] = set()
         for start, end in self.lines.rest():
             for statement in statements(source, start, end):
                 self._statement(statement)
@@ -137,7 +141,7 @@ class Collected:
     def _tool(self, at: int, name: str, frames: Frames) -> Frame:
         node = self._tcps.get(at)
         try:
-            if node is None or (node.kind == "name" and not self.constants.once(node.text)):
+            if node is None or not self.constants.fixed(node):
                 raise RunTime("")
             return frames.tool(name, self.constants.transform(node))
         except RunTime:
@@ -160,11 +164,14 @@ class Collected:
 
     def _statement(self, statement: Statement) -> None:
         word = statement.word
+        for token in _changed_in(statement.tokens):
+            self.constants.change(token.text, self._source.place(token.start)[0])
         if word in FUNCTIONS:
             self._function(statement)
         elif word in HEADERS or word in ("end", "break", "continue", "return"):
             self._steps.append(Step(statement.at, word))
             self._used(statement.tokens[1:], statement.at)
+            self._read(statement.tokens[1 : -1 if statement.tokens[-1].text == ":" else None])
         else:
             self._plain(statement)
 
@@ -173,6 +180,16 @@ class Collected:
         self._steps.append(Step(statement.at, statement.word, names[1] if len(names) > 1 else ""))
         for parameter in names[2:]:
             self.constants.change(parameter, self._source.place(statement.at)[0])
+        self._used([token for token in statement.tokens[1:] if token.text not in names[1:2]], None)
+
+    def _read(self, tokens: Sequence[Token]) -> Node | None:
+        """The expression that `tokens` are; None for none, and for what cannot be read and may assign."""
+        try:
+            return expression(tokens) if tokens else None
+        except NotReadable:
+            for token in _assigned_in(tokens):
+                self.constants.doubt(token.text, self._source.place(token.start)[0])
+            return None
 
     def _plain(self, statement: Statement) -> None:
         """An assignment, a call, or something that is neither."""
@@ -180,33 +197,35 @@ class Collected:
         scope = 1 if statement.word in ("global", "local") else 0
         target = tokens[scope : scope + 2]
         if len(target) == 2 and target[0].kind == "name" and target[1].text == "=":
-            self._assignment(target[0].text, statement, tokens[scope + 2 :])
+            self._assignment(target[0].text, statement, tokens[scope + 2 :], statement.word if scope else "")
         elif len(target) == 2 and target[1].text in ("[", ".") and any(t.text == "=" for t in tokens):
             self.constants.change(target[0].text, self._source.place(statement.at)[0])
             self._used(tokens, statement.at)
+            first = next(place for place, token in enumerate(tokens) if token.text == "=")
+            self._read(tokens[first + 1 :])
         else:
-            try:
-                node = expression(tokens)
-            except NotReadable:
-                node = None
-            self._call(node, statement)
+            if scope and target:
+                self.constants.doubt(target[0].text, self._source.place(statement.at)[0])
+            self._call(self._read(tokens), statement)
 
-    def _assignment(self, name: str, statement: Statement, tokens: Sequence[Token]) -> None:
+    def _assignment(self, name: str, statement: Statement, tokens: Sequence[Token], scope: str) -> None:
         line = self._source.place(statement.at)[0]
-        try:
-            value = expression(tokens)
-        except NotReadable:
+        value = self._read(tokens)
+        if value is None:
             self.constants.assign(name, None, line)
             self._used(tokens, statement.at)
             return
-        self.constants.assign(name, value, line, self._scopes.always)
+        self.constants.assign(name, value, line, self._scopes.always, scope)
         self._note(_of_numbers(value), statement.at)
-        used = self._used(tokens, None)
-        self._made_of[name] = (statement.at, [*used, *self._made_of.get(name, (0, []))[1]])
+        made_of = self._made_of.get(name, (0, []))[1]
+        made_of += self._used(tokens, None)
+        self._made_of[name] = (statement.at, made_of)
 
     def _call(self, node: Node | None, statement: Statement) -> None:
         """A statement that is a call; None, or another expression, for one that is not understood."""
         word = node.text if node is not None and node.kind == "call" else ""
+        if node is not None and word in (*MOTIONS, "set_tcp", *PAYLOADS):
+            self._called_within(node)
         if node is not None and word in MOTIONS:
             self._motion(node)
         elif node is not None and word == "set_tcp":
@@ -236,6 +255,13 @@ class Collected:
         others = [part for part in node.parts if not any(part is target for target in targets)]
         self._note(_names(others), node.start)
 
+    def _called_within(self, call: Node) -> None:
+        """Take note of what the arguments of a call call before it."""
+        for part in (part for given in call.parts for part in given.walk()):
+            foreign = part.kind == "call" and part.text != "" and part.text not in HARMLESS
+            if foreign or (part.kind in ("call", "name") and part.text in self._own):
+                self._called(part.text, part.start, call.start)
+
     def _used(self, tokens: Sequence[Token], at: int | None) -> list[str]:
         """Take note of calls among `tokens`, and of the variables if `at` says where; those variables."""
         used: list[str] = []
@@ -245,12 +271,18 @@ class Collected:
             if token.kind != "name":
                 continue
             if texts[place + 1 : place + 2] == ["("]:
+                if texts[place - 1 : place] == ["run"]:
+                    self._run.add(token.text)
                 if token.text not in HARMLESS or token.text in self._own:
-                    self._called(token.text, token.start)
+                    self._called(token.text, token.start, token.start)
                 elif place > skip_to:
                     closing = _closing(tokens, place + 1)
                     skip_to = closing if self._own.isdisjoint(texts[place:closing]) else place
-            elif place > skip_to and not _is_counted(texts[place + 1 : place + 4]):
+                continue
+            if token.text in self._own:
+                self._run.add(token.text)
+                self._called(token.text, token.start, token.start)
+            if place > skip_to and not _is_counted(texts[place + 1 : place + 4]):
                 used.append(token.text)
         if at is not None:
             self._note(used, at)
@@ -261,7 +293,10 @@ class Collected:
         for name in names:
             self.elsewhere.setdefault(name, at)
 
-    def _called(self, name: str, at: int) -> None:
+    def _called(self, name: str, at: int, step_at: int) -> None:
+        """Something is called at `at`, which is a step of the program at `step_at`."""
+        if name == "interpreter_mode":
+            self._scopes.doubt()
         if name in MOTIONS:
             self.leave(at, "", "it stands within another statement, or the statement cannot be read")
         elif name in UNTRACKED:
@@ -273,12 +308,12 @@ class Collected:
             self._tcps[at] = None
             self._steps.append(Step(at, "tcp"))
         else:
-            self._steps.append(Step(at, "call", name))
+            self._steps.append(Step(step_at, "call", name))
 
     def _resolve(self) -> None:
         """What is only known when all was read: calls of the program's own functions, indirect uses."""
         calls = [(step.name, step.at) for step in self._steps if step.kind == "call"]
-        self.constants.settle(self._scopes, self._scopes.run_alone(calls))
+        self.constants.settle(self._scopes, self._scopes.run_alone(calls, self._run))
         own = {step.name for step in self._steps if step.kind in FUNCTIONS}
         self._steps = [step for step in self._steps if step.kind != "call" or step.name in own]
         self._break(calls)
@@ -336,6 +371,39 @@ def _of_numbers(node: Node) -> Iterator[str]:
 def _is_counted(behind: Sequence[str]) -> bool:
     """Whether what follows a name asks for the number of its elements, as in path.length()."""
     return len(behind) == 3 and behind[0] == "." and behind[1] in COUNTING and behind[2] == "("
+
+
+def _assigned_in(tokens: Sequence[Token]) -> Iterator[Token]:
+    """Names, or elements of them, before a =, += or ++, but for those of arguments in closed brackets."""
+    texts = [token.text for token in tokens]
+    steps = [(text in "([{") - (text in ")]}") for text in texts]
+    closed = sum(steps) == 0
+    depth = 0
+    for place, token in enumerate(tokens):
+        depth += steps[place]
+        if token.kind != "name" or (closed and depth > 0):
+            continue
+        behind = place + 1
+        while texts[behind : behind + 1] == ["["] or texts[behind : behind + 1] == ["."]:
+            behind = _closing(tokens, behind) + 1 if texts[behind] == "[" else behind + 2
+        first, second = (*texts[behind : behind + 2], "", "")[:2]
+        if first == "=" or (first in _OPERATORS and second in ("=", first)):
+            yield token
+
+
+def _changed_in(tokens: Sequence[Token]) -> Iterator[Token]:
+    """Variables whose methods are called, as path.append(place), but for those that count their elements."""
+    texts = [token.text for token in tokens]
+    for place in (place for place, text in enumerate(texts) if text == "."):
+        if texts[place + 2 : place + 3] != ["("] or texts[place + 1] in COUNTING:
+            continue
+        depth = 0
+        for token in reversed(tokens[:place]):
+            depth += (token.text in ")]}") - (token.text in "([{")
+            if depth < 0 or (depth == 0 and token.kind == "name"):
+                break
+        if depth == 0 and token.kind == "name":
+            yield token
 
 
 def _closing(tokens: Sequence[Token], opening: int) -> int:

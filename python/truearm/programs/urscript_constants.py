@@ -1,7 +1,8 @@
 """What is constant in a URScript program: variables where they are used, arithmetic, and poses of poses.
 
 A variable that is assigned several times has one value at each place of a function, if all assignments are
-in that function, outside its branches and loops, and nothing else runs it meanwhile.
+in that function, outside its branches and loops, to one variable of that name, and nothing else runs it
+meanwhile.
 """
 
 import math
@@ -57,14 +58,19 @@ class _Assigned(NamedTuple):
     Attributes:
         value: What is assigned.
         function: Function whose every run takes it, as in Scopes; None if none does.
+        scope: The word before it, global or local; empty if there is none.
     """
 
     value: Node
     function: int | None
+    scope: str
 
 
 class Constants:
-    """Variables by name: what each is assigned, or why it is not constant."""
+    """Variables by name: what each is assigned, or why it is not constant.
+
+    What an expression stands for is kept by its place, as variables may be made of one another many times.
+    """
 
     def __init__(self) -> None:
         self._assigned: dict[str, list[_Assigned]] = {}
@@ -73,8 +79,13 @@ class Constants:
         self._scopes = Scopes()
         self._alone: Set[int | None] = frozenset()
         self._assigning: dict[str, int | None] = {}
+        self._literals: dict[tuple[int, int], Node] = {}
+        self._numbers: dict[tuple[int, int], float] = {}
+        self._transforms: dict[tuple[int, int], Transform] = {}
 
-    def assign(self, name: str, value: Node | None, line: int, function: int | None = None) -> None:
+    def assign(
+        self, name: str, value: Node | None, line: int, function: int | None = None, scope: str = ""
+    ) -> None:
         """The program assigns `value` to a variable; None for one that cannot be read.
 
         Args:
@@ -82,16 +93,21 @@ class Constants:
             value: The expression.
             line: Line of the assignment.
             function: Function whose every run takes it; None if none does.
+            scope: The word before it, global or local; empty if there is none.
         """
         if value is None:
             self._why_not[name] = _assigned_again(name, line)
         else:
-            self._assigned.setdefault(name, []).append(_Assigned(value, function))
+            self._assigned.setdefault(name, []).append(_Assigned(value, function, scope))
             self._again[name] = line
 
     def change(self, name: str, line: int) -> None:
         """The program changes a variable in place, or it is a parameter of a function."""
         self._why_not[name] = f'"{name}" is changed when the program runs, in line {line}'
+
+    def doubt(self, name: str, line: int) -> None:
+        """A statement that cannot be read may assign a variable, or declare another one of that name."""
+        self._why_not.setdefault(name, _assigned_again(name, line))
 
     def settle(self, scopes: Scopes, alone: Set[int | None]) -> None:
         """All was read: which function a place is in, and which functions nothing runs meanwhile."""
@@ -112,9 +128,17 @@ class Constants:
             raise RunTime(f'"{name}" is not assigned in this file')
         return assigned[0].value if len(assigned) == 1 else self._last(used, assigned)
 
-    def once(self, name: str) -> bool:
-        """Whether the program assigns a variable once."""
-        return len(self._assigned.get(name, [])) == 1
+    def fixed(self, node: Node) -> bool:
+        """Whether an expression, and what its variables are made of, has variables assigned once alone."""
+        pending, seen = [node], set[str]()
+        while pending:
+            for name in {part.text for part in pending.pop().walk() if part.kind == "name"} - seen:
+                assigned = self._assigned.get(name, [])
+                if len(assigned) != 1:
+                    return False
+                seen.add(name)
+                pending.append(assigned[0].value)
+        return True
 
     def _last(self, used: Node, assigned: list[_Assigned]) -> Node:
         """The value of the last assignment before the place where a variable is used."""
@@ -128,8 +152,10 @@ class Constants:
         """The function whose every run assigns a variable, as nothing else does; None if there is none."""
         if name not in self._assigning:
             functions = {one.function for one in assigned}
+            scopes = {one.scope for one in assigned} - {""}
+            one_variable = not scopes or (len(scopes) == 1 and assigned[0].scope in scopes)
             alone = len(functions) == 1 and functions <= self._alone
-            self._assigning[name] = functions.pop() if alone else None
+            self._assigning[name] = functions.pop() if alone and one_variable else None
         return self._assigning[name]
 
     def literal(self, node: Node, depth: int = 0) -> Node:
@@ -140,9 +166,17 @@ class Constants:
         """
         if depth > _DEEPEST:
             raise RunTime("variables are assigned one another")
+        if node.kind not in ("name", "index"):
+            return node
+        place = (node.start, node.end)
+        if place not in self._literals:
+            self._literals[place] = self._literal(node, depth)
+        return self._literals[place]
+
+    def _literal(self, node: Node, depth: int) -> Node:
         if node.kind == "name":
             return self.literal(self.value(node), depth + 1)
-        if node.kind == "index" and len(node.parts) == 2:
+        if len(node.parts) == 2:
             whole = self.literal(node.parts[0], depth + 1)
             place = self.number(node.parts[1], depth + 1)
             if whole.kind in ("list", "pose") and place.is_integer() and 0 <= place < len(whole.parts):
@@ -150,18 +184,20 @@ class Constants:
             raise RunTime("there is no such element")
         return node
 
-    def holder(self, node: Node) -> str:
+    def holder(self, node: Node, depth: int = 0) -> str:
         """The variable that is assigned what a known `node` stands for; empty where `node` itself says it.
 
         Raises:
             RunTime: As for :meth:`literal`.
         """
+        if depth > _DEEPEST:
+            raise RunTime("variables are assigned one another")
         if node.kind == "name":
-            return self.holder(self.value(node)) or node.text
+            return self.holder(self.value(node), depth + 1) or node.text
         if node.kind == "index" and len(node.parts) == 2:
             whole = self.literal(node.parts[0])
             element = whole.parts[int(self.number(node.parts[1]))]
-            return self.holder(element) or self.holder(node.parts[0])
+            return self.holder(element, depth + 1) or self.holder(node.parts[0], depth + 1)
         return ""
 
     def number(self, node: Node, depth: int = 0) -> float:
@@ -173,6 +209,12 @@ class Constants:
         if depth > _DEEPEST:
             raise RunTime("variables are assigned one another")
         node = self.literal(node, depth + 1)
+        place = (node.start, node.end)
+        if place not in self._numbers:
+            self._numbers[place] = self._number(node, depth)
+        return self._numbers[place]
+
+    def _number(self, node: Node, depth: int) -> float:
         found = math.nan
         if node.kind == "number":
             found = float(node.text)
@@ -197,6 +239,13 @@ class Constants:
         if depth > _DEEPEST:
             raise RunTime("variables are assigned one another")
         node = self.literal(node, depth + 1)
+        place = (node.start, node.end)
+        if place not in self._transforms:
+            self._transforms[place] = self._transform(node, depth)
+            self._transforms[place].setflags(write=False)
+        return self._transforms[place]
+
+    def _transform(self, node: Node, depth: int) -> Transform:
         if node.kind == "pose" and len(node.parts) == AXES:
             values = np.array([[self.number(part, depth + 1) for part in node.parts]])
             found: Transform = _POSE.to_poses(values)[0]

@@ -135,7 +135,7 @@ class Lines:
         try:
             call = expression(found[0].tokens)
             leaf = argument(call, 0, TARGETS.get(call.text, "pose")) if call.kind == "call" else None
-            if leaf is None or leaf.kind not in ("list", "pose") or call.text == "movec":
+            if leaf is None or leaf.kind not in ("list", "pose") or call.text == "movec" or _calls(call):
                 return None
             written = numbers_of(leaf)
         except (NotReadable, RunTime):
@@ -155,6 +155,12 @@ class Lines:
             radius=places[radius.start] if radius is not None and plain else None,
             blended=call.text in STREAMED or (radius is not None and not plain),
         )
+
+
+def _calls(call: Node) -> bool:
+    """Whether the arguments call something, which then is a step of the program."""
+    inner = (part for part in call.walk() if part is not call)
+    return any(part.kind == "call" and part.text != "d2r" for part in inner)
 
 
 def blend_radius(call: Node) -> Node | None:

@@ -1,18 +1,23 @@
-"""The blocks of a URScript program: which function a place is in, and which blocks do not move the arm."""
+"""The blocks of a URScript program: which function a place is in, and which blocks do not move the arm.
 
-from collections.abc import Iterable, Sequence
+Where the blocks cannot be told for certain, nothing that depends on them is taken as known.
+"""
+
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.programs.urscript_syntax import Statement
+from truearm.programs.urscript_syntax import BLOCKS, FUNCTIONS, HEADERS, Statement
 
-FUNCTIONS: Final = frozenset({"def", "thread", "sec"})
-BLOCKS: Final = FUNCTIONS | {"while", "for", "if", "switch", "case", "default"}
 OUTSIDE: Final = -1
 """Stands for the function that a statement outside all of them is in."""
+_WORDS: Final = HEADERS | {"end"}
+_WITHIN: Final = {"elif": "if", "else": "if", "case": "switch", "default": "switch"}
 
 
 @dataclass
@@ -22,14 +27,14 @@ class _Block:
     Attributes:
         word: The first word of its header.
         name: Name of a function; else empty.
-        depth: How many blocks it is in.
+        function: The function that its header stands in, as in Scopes.of.
         start: Offset of its header.
         end: Offset of its end; that of its header until that is read.
     """
 
     word: str
     name: str
-    depth: int
+    function: int
     start: int
     end: int
 
@@ -40,16 +45,32 @@ class Scopes:
     def __init__(self) -> None:
         self._open: list[_Block] = []
         self._blocks: list[_Block] = []
+        self._functions: dict[int, _Block] = {}
+        self._edges = [OUTSIDE]
+        self._inside = [OUTSIDE]
+        self._doubted = False
 
     def take(self, statement: Statement) -> None:
         """The next statement."""
-        if statement.word in BLOCKS:
-            names = statement.names if statement.word in FUNCTIONS else []
-            block = _Block(statement.word, "".join(names[1:2]), len(self._open), statement.at, statement.at)
-            self._open.append(block)
-            self._blocks.append(block)
-        elif statement.word == "end" and self._open:
-            self._open.pop().end = statement.at
+        around = self._open[-1].word if self._open else ""
+        word = statement.word
+        if _WITHIN.get(word, around) != around or any(token.text in _WORDS for token in statement.tokens[1:]):
+            self.doubt()
+        if word in BLOCKS:
+            self._begin(statement)
+        elif word == "end" and self._open:
+            self._finish(statement.at)
+        elif word == "end":
+            self.doubt()
+
+    def doubt(self) -> None:
+        """The program has blocks, or runs statements, that are not known."""
+        self._doubted = True
+
+    @property
+    def certain(self) -> bool:
+        """Whether every block has its end, as is known when all was read."""
+        return not self._open and not self._doubted
 
     @property
     def always(self) -> int | None:
@@ -60,37 +81,79 @@ class Scopes:
 
     def of(self, at: int) -> int:
         """Function that an offset is in, by the offset of its header."""
-        around = [one for one in self._blocks if one.word in FUNCTIONS and one.start <= at <= one.end]
-        return max(around, key=lambda one: one.depth).start if around else OUTSIDE
+        return self._inside[bisect_right(self._edges, at) - 1]
 
-    def run_alone(self, calls: Iterable[tuple[str, int]]) -> frozenset[int | None]:
+    def run_alone(self, calls: Iterable[tuple[str, int]], run: Collection[str]) -> frozenset[int | None]:
         """Functions of which no run begins within another function's, its own included, and the outside.
+
+        Threads are none of them: they may run several times at once.
 
         Args:
             calls: Name and offset of every call.
+            run: Names of what is run as a thread.
         """
-        within = {name for name, at in calls if self.of(at) != OUTSIDE}
-        functions = [one for one in self._blocks if one.word in FUNCTIONS]
-        return frozenset({OUTSIDE, *(one.start for one in functions if one.name not in within)})
+        if not self.certain:
+            return frozenset()
+        within = {name for name, at in calls if self.of(at) != OUTSIDE}.union(run)
+        alone = (at for at, one in self._functions.items() if one.word == "def" and one.name not in within)
+        return frozenset({OUTSIDE, *alone})
 
     def standing(self, calls: Sequence[tuple[str, int]], moving: NDArray[np.int64]) -> "Standing":
-        """Where the arm stays.
+        """Where the arm stays: nowhere for certain if a thread may move it meanwhile.
 
         Args:
             calls: Name and offset of every call.
             moving: Offsets of all that moves the arm, ascending.
         """
-        functions = [one for one in self._blocks if one.word in FUNCTIONS]
-        moves = {one.name for one in functions if _holds(one, moving)}
-        while True:
-            at = np.sort(np.array([at for name, at in calls if name in moves], dtype=np.int64))
-            more = {one.name for one in functions if _holds(one, at)} - moves
-            if not more:
-                break
-            moves |= more
+        moves = self._moves(calls, moving)
+        threads = {one.name for one in self._functions.values() if one.word != "def"}
+        if not self.certain or not threads.isdisjoint(moves):
+            every_name = frozenset(one.name for one in self._functions.values())
+            return Standing(every_name, np.empty((0, 2), dtype=np.int64))
+        at = np.array([at for name, at in calls if name in moves], dtype=np.int64)
         every = np.sort(np.concatenate([moving, at]))
-        still = [(one.start, one.end) for one in self._blocks if not _holds(one, every)]
-        return Standing(frozenset(moves), np.array(sorted(still), dtype=np.int64).reshape(-1, 2))
+        blocks = np.array([(one.start, one.end) for one in self._blocks], dtype=np.int64).reshape(-1, 2)
+        first = np.searchsorted(every, blocks[:, 0])
+        still = first == np.searchsorted(every, blocks[:, 1], side="right")
+        return Standing(frozenset(moves), blocks[still])
+
+    def _moves(self, calls: Iterable[tuple[str, int]], moving: NDArray[np.int64]) -> set[str]:
+        """Names of the functions that move the arm, or call or hold one that does."""
+        found: set[str] = set()
+        above: dict[str, set[int]] = defaultdict(set)
+        for name, at in calls:
+            above[name].add(self.of(at))
+        for one in self._functions.values():
+            above[one.name].add(one.function)
+        edges = np.array(self._edges, dtype=np.int64)
+        pending = {self._inside[int(one) - 1] for one in np.unique(np.searchsorted(edges, moving, "right"))}
+        while pending:
+            at = pending.pop()
+            name = self._functions[at].name if at != OUTSIDE else ""
+            if at != OUTSIDE and name not in found:
+                found.add(name)
+                pending |= above[name]
+        return found
+
+    def _begin(self, statement: Statement) -> None:
+        names = statement.names if statement.word in FUNCTIONS else []
+        block = _Block(statement.word, "".join(names[1:2]), self._inside[-1], statement.at, statement.at)
+        self._open.append(block)
+        self._blocks.append(block)
+        if statement.word in FUNCTIONS:
+            self._functions[statement.at] = block
+            self._turn(statement.at, statement.at)
+
+    def _finish(self, at: int) -> None:
+        block = self._open.pop()
+        block.end = at
+        if block.word in FUNCTIONS:
+            self._turn(at + 1, block.function)
+
+    def _turn(self, at: int, function: int) -> None:
+        """From an offset on the text is in another function."""
+        self._edges.append(at)
+        self._inside.append(function)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +174,3 @@ class Standing:
         last = np.searchsorted(self.still[:, 0], places, side="right") - 1
         found: NDArray[np.bool_] = (last >= 0) & (places <= np.append(ends, -1)[last])
         return found
-
-
-def _holds(block: _Block, places: NDArray[np.int64]) -> bool:
-    """Whether one of the offsets, ascending, is in a block."""
-    return bool(np.searchsorted(places, block.start) < np.searchsorted(places, block.end, side="right"))
