@@ -156,6 +156,7 @@ UNCERTAIN = {
     "an end too many": {"behind": "end\n"},
     "a block without an end": {"behind": "while x:\n"},
     "a block within a statement": {"between": "  sync() if x:\n    sync()\n  end\n"},
+    "an open bracket": {"behind": "sync(\n"},
     "an else of a loop": {"between": "  while x:\n    sync()\n  else:\n    sync()\n  end\n"},
 }
 

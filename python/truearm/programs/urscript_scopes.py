@@ -54,7 +54,9 @@ class Scopes:
         """The next statement."""
         around = self._open[-1].word if self._open else ""
         word = statement.word
-        if _WITHIN.get(word, around) != around or any(token.text in _WORDS for token in statement.tokens[1:]):
+        texts = [token.text for token in statement.tokens]
+        opened = sum((text in "([{") - (text in ")]}") for text in texts)
+        if opened or _WITHIN.get(word, around) != around or not _WORDS.isdisjoint(texts[1:]):
             self.doubt()
         if word in BLOCKS:
             self._begin(statement)
