@@ -130,7 +130,8 @@ def test_make_says_what_there_is():
     make = shutil.which("make")
     if make is None:
         pytest.skip("make is not on the path")
-    told = subprocess.run([make, "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    command = [make, "--no-print-directory", "help"]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     listed = {line.split()[1] for line in told.splitlines()}
     declared = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert declared is not None
