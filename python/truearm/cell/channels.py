@@ -6,6 +6,7 @@ import re
 import select
 import socket
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final, Protocol
@@ -51,26 +52,25 @@ class Wire(Protocol):
         """Be no more; others may still wait for it."""
 
 
-class _Terminal:
-    """A serial port, or a pseudo-terminal, by its descriptor."""
+class _Waited(ABC):
+    """What can be waited for by its number, and does not block."""
 
-    def __init__(self, port: serial.Serial) -> None:
+    def __init__(self, port: serial.Serial | socket.socket) -> None:
         self._port, self._number = port, port.fileno()
-        os.set_blocking(self._number, False)
 
     def receive(self, wait_s: float) -> bytes | None:
         """See Wire."""
         if not select.select([self._number], [], [], wait_s)[0]:
             return None
         try:
-            return os.read(self._number, CHUNK)
+            return self._read()
         except BlockingIOError:
             return None
 
     def send(self, data: bytes, wait_s: float) -> int:
         """See Wire."""
         try:
-            return os.write(self._number, data)
+            return self._write(data)
         except BlockingIOError:
             select.select([], [self._number], [], wait_s)
             return 0
@@ -80,34 +80,42 @@ class _Terminal:
         self._number = CLOSED
         self._port.close()
 
+    @abstractmethod
+    def _read(self) -> bytes:
+        """What is there."""
 
-class _Connection:
-    """A TCP connection."""
+    @abstractmethod
+    def _write(self, data: bytes) -> int:
+        """How many bytes are taken."""
+
+
+class _Terminal(_Waited):
+    """A serial port, or a pseudo-terminal, by its descriptor."""
+
+    def __init__(self, port: serial.Serial) -> None:
+        super().__init__(port)
+        os.set_blocking(self._number, False)
+
+    def _read(self) -> bytes:
+        return os.read(self._number, CHUNK)
+
+    def _write(self, data: bytes) -> int:
+        return os.write(self._number, data)
+
+
+class _Connection(_Waited):
+    """A TCP connection; on Windows the number of a socket is no descriptor."""
 
     def __init__(self, opened: socket.socket) -> None:
+        super().__init__(opened)
         self._socket = opened
         opened.setblocking(False)
 
-    def receive(self, wait_s: float) -> bytes | None:
-        """See Wire."""
-        if not select.select([self._socket], [], [], wait_s)[0]:
-            return None
-        try:
-            return self._socket.recv(CHUNK)
-        except BlockingIOError:
-            return None
+    def _read(self) -> bytes:
+        return self._socket.recv(CHUNK)
 
-    def send(self, data: bytes, wait_s: float) -> int:
-        """See Wire."""
-        try:
-            return self._socket.send(data)
-        except BlockingIOError:
-            select.select([], [self._socket], [], wait_s)
-            return 0
-
-    def close(self) -> None:
-        """See Wire."""
-        self._socket.close()
+    def _write(self, data: bytes) -> int:
+        return self._socket.send(data)
 
 
 class _Buffered:
