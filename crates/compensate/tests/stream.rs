@@ -227,6 +227,15 @@ proptest! {
                         }
                     }
                     prop_assert!(change.abs() <= options.rate[0] * dt + 1e-12);
+                    if let (0, Event::Beyond(side)) = (joint, &event)
+                        && now[0] == 0.0
+                        && rate[0] * side > 0.0
+                    {
+                        // It was on its way out, and is stopped where it would have crossed.
+                        prop_assert!(change * side <= (rate[0] * side + options.acceleration[0] * dt) * dt + 1e-12);
+                        rate[0] = 0.0;
+                        continue;
+                    }
                     if dt > 1e-6 {
                         let next = change / dt;
                         prop_assert!((next - rate[joint]).abs() <= options.acceleration[0] * dt + 1e-6);

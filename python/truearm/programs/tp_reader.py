@@ -16,6 +16,7 @@ from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, Number, TargetTable
 from truearm.programs.tp_configuration import LETTERS, ConfiguredPose, FanucConfiguration, turn_orders
 from truearm.programs.tp_positions import CURRENT, JOINTS, POSE, Position, positions, section
+from truearm.programs.tp_registers import StatedFrames
 from truearm.programs.tp_state import JUMPS, OFFSET, SENSED, Current, moved_at
 from truearm.robot import Robot
 
@@ -75,7 +76,8 @@ class Reader:
         self._current = Current()
         self._settings()
         self._moved = moved_at(source.part(0, self._main[0]), self._statements())
-        self._used, self._chosen = set[int](), 0
+        self._stated = StatedFrames()
+        self._used, self._chosen = dict[int, set[int]](), 0
         self._motions()
         self.orders = self._orders()
 
@@ -129,6 +131,7 @@ class Reader:
         follows = False
         for at, text in self._statements():
             motion = _MOTION.match(text)
+            self._stated.read(text)
             if motion is None:
                 self._other_use(at, text)
                 follows = follows and JUMPS.match(text) is None
@@ -139,7 +142,7 @@ class Reader:
     def _settle(self) -> None:
         """Positions that only a motion to a computed number may go to."""
         if self._chosen:
-            unused = set(self._targets.values()) - self._used
+            unused = set(self._targets.values()) - self._used.keys()
             self._keep(unused, f"only line {self._chosen} may go there, by a computed number")
 
     def _other_use(self, at: int, text: str) -> None:
@@ -185,8 +188,8 @@ class Reader:
                 follows = known = False
                 continue
             position = self._positions[number]
-            self._used.add(self._targets[number])
             environment = self.environments.number(self._environment(position, problem))
+            self._used.setdefault(self._targets[number], set()).add(environment)
             self.moves.add(
                 self._targets[number],
                 (0, at),
@@ -231,10 +234,12 @@ class Reader:
             if doubt:
                 return Frame.missing(doubt, number)
             number = self._current.number(kind)
-        unknown = self._current.why_unknown(kind, number)
+        unknown, stated = self._current.why_unknown(kind, number), np.eye(4) if number == "0" else None
         if unknown:
-            return Frame.missing(unknown, number)
-        stated = np.eye(4) if number == "0" else None
+            placed = self._stated.of(kind, number)
+            if placed is None:
+                return Frame.missing(unknown, number)
+            stated = _POSE.to_poses(np.array([placed]))[0]
         find = self._frames.tool if kind == "UTOOL" else self._frames.work_object
         return find(number, stated)
 
@@ -255,8 +260,9 @@ class Reader:
 
     def _flange(self, position: Position) -> Floats:
         """base_from_flange (4, 4) as the controller has it; NaN where frame or tool are not known."""
-        environment = self._environment(position, "")
-        if environment.tool.unknown or environment.work_object.unknown:
+        used = self._used.get(self._targets[position.number], set())
+        environment = self.environments.all[next(iter(used))] if len(used) == 1 else None
+        if environment is None or environment.tool.unknown or environment.work_object.unknown:
             return np.full((4, 4), np.nan)
         values = np.array([[number.value for number in position.numbers[: len("XYZWPR")]]])
         return environment.flange_poses(_POSE.to_poses(values)[0])
