@@ -195,8 +195,8 @@ proptest! {
     #[test]
     fn rate_and_acceleration_stay_bounded(events in proptest::collection::vec((event(), 1..120usize), 1..30)) {
         let (options, mut stream) = (StreamOptions::default(), stream());
-        let (mut time, mut offset) = (0.0, 0.0);
-        let (mut applied, mut rate) = (vec![0.0; JOINTS], vec![0.0; JOINTS]);
+        let (mut time, mut offset, mut side) = (0.0, 0.0, 0.0);
+        let (mut applied, mut rates) = (vec![0.0; JOINTS], vec![[0.0; 2]; JOINTS]);
         for (event, times) in events {
             for _ in 0..times {
                 let mut readings = moved(time);
@@ -211,40 +211,58 @@ proptest! {
                     Event::Beyond(side) => readings[0] = 3.2 * side,
                     Event::Switch(on) => stream.switch(on),
                 }
+                // What is not given or not finite leaves the set-point where it was.
+                side = match event {
+                    Event::Beyond(side) => side,
+                    Event::Broken | Event::Missing => side,
+                    _ => 0.0,
+                };
                 let mut out = [0.0; JOINTS];
                 stream.step(given.then_some(&readings[..]), &[], elapsed, &mut out);
+                prop_assert!(out.iter().all(|value| value.is_finite()));
                 time += CYCLE;
                 let dt = elapsed.min(options.deadline);
                 let now: Vec<f64> = stream.applied().collect();
                 for joint in 0..JOINTS {
-                    prop_assert!(out[joint].is_finite());
-                    let change = now[joint] - applied[joint];
-                    if let (0, Event::Beyond(side)) = (joint, &event) {
-                        prop_assert!(now[0] * side <= 0.0);
-                        if applied[0] * side > 0.0 {
-                            rate[0] = 0.0;
-                            continue;
-                        }
-                    }
-                    prop_assert!(change.abs() <= options.rate[0] * dt + 1e-12);
-                    if let (0, Event::Beyond(side)) = (joint, &event)
-                        && now[0] == 0.0
-                        && rate[0] * side > 0.0
-                    {
-                        // It was on its way out, and is stopped where it would have crossed.
-                        prop_assert!(change * side <= (rate[0] * side + options.acceleration[0] * dt) * dt + 1e-12);
-                        rate[0] = 0.0;
-                        continue;
-                    }
-                    if dt > 1e-6 {
-                        let next = change / dt;
-                        prop_assert!((next - rate[joint]).abs() <= options.acceleration[0] * dt + 1e-6);
-                        rate[joint] = next;
-                    }
+                    let beyond = if joint == 0 { side } else { 0.0 };
+                    let step = Moved { from: applied[joint], to: now[joint], dt };
+                    prop_assert!(step.is_bounded(&mut rates[joint], beyond, &options), "{joint} {event:?}");
                 }
                 applied = now;
             }
         }
+    }
+}
+
+/// What one cycle did to the correction of a joint.
+struct Moved {
+    from: f64,
+    to: f64,
+    dt: f64,
+}
+
+impl Moved {
+    /// Whether rate and acceleration are within bounds, or the joint's limit ended the correction sooner.
+    ///
+    /// `rates` are what its rate may be, before and afterwards: at a limit it may have come to rest, or have been
+    /// stopped. `beyond` is the side on which the set-point is beyond the limit, 0 where it is not.
+    fn is_bounded(&self, rates: &mut [f64; 2], beyond: f64, options: &StreamOptions) -> bool {
+        let change = self.to - self.from;
+        let (rate, gain) = (change / self.dt, options.acceleration[0] * self.dt + 1e-6);
+        let even = self.dt <= 1e-6 || (rates[0] - gain..=rates[1] + gain).contains(&rate);
+        let slow = change.abs() <= options.rate[0] * self.dt + 1e-12;
+        if self.to * beyond > 0.0 {
+            return false;
+        }
+        let led_back = self.from * beyond > 0.0;
+        let stopped = beyond != 0.0 && self.to == 0.0;
+        if self.dt > 1e-6 {
+            *rates = [rate; 2];
+        }
+        if stopped {
+            *rates = if even { [rates[0].min(0.0), rates[1].max(0.0)] } else { [0.0; 2] };
+        }
+        (slow || led_back) && (even || stopped)
     }
 }
 
