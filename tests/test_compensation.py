@@ -269,3 +269,26 @@ def test_standard_deviations_of_constants_are_the_calibrations(constant):
 def test_bad_input_is_told_what_is_wrong(constant, make, words):
     with pytest.raises(ta.InputError, match=words):
         make(constant)
+
+
+def planar(lengths):
+    """An arm of parallel axes."""
+    link = '[[link]]\njoint = "revolute"\ntheta = 0\nd = 0\na = {}\nalpha = 0\nlimits = [-170, 170]\n'
+    head = 'name = "planar"\nconvention = "standard"\nlength_unit = "m"\nangle_unit = "deg"\n'
+    return ta.Robot.from_toml(head + "".join(link.format(length) for length in lengths))
+
+
+@pytest.mark.parametrize("lengths", [(0.4, 0.3), (0.4, 0.3, 0.2), (0.3, 0.3, 0.2, 0.1)])
+def test_an_arm_that_cannot_leave_a_plane_is_corrected_in_it(lengths):
+    robot = planar(lengths)
+    arm = VirtualArm(robot, seed=2)
+    calibration = ta.calibrate(robot, arm.measure(arm.poses(120)), model="constant", refit=False)
+    q = arm.poses(60, seed=5)
+    found = ta.Compensator(calibration).joints(q)
+    assert found.refused.mean() < 0.2
+    done = ~found.refused
+    left = robot.position(q[done]) - calibration.position(found.q[done])
+    assert np.abs(left[:, :2]).max() < MET_M
+    beside = 1e3 * np.abs(left[:, 2])
+    assert beside.max() > 0.01
+    np.testing.assert_allclose(found.residual_mm[done], beside, atol=1e-5)

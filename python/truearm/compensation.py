@@ -59,7 +59,8 @@ class Compensated:
         q: Corrected readings (n, N), rad and m; NaN where the waypoint is refused.
         nominal: Readings (n, N) that were corrected: a copy of the program's, or the programming model's for
             its poses.
-        residual_mm: How far from its target the calibrated model puts the tool, (n,).
+        residual_mm: How far from its target the calibrated model puts the tool, (n,): more than rounding for
+            an arm that cannot leave a plane.
         residual_mrad: How far turned from it, (n,).
         correction_mm: How far the correction shifts the tool, (n,), as the programming model sees it.
         correction_mrad: How far it turns it, (n,).

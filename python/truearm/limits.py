@@ -29,7 +29,8 @@ class Limits:
         change_mm_per_mm: Change of the shift from one waypoint to the next, for each mm that the tool goes; a
             radian that it turns counts as 300 mm.
         change_mrad_per_rad: Change of the turn from one waypoint to the next, likewise for each rad.
-        residual_mm: How far from its target the calibrated model may leave the tool.
+        residual_mm: How far from its target the calibrated model may leave the tool; beside the plane that an
+            arm cannot leave, `largest_mm` counts.
         residual_mrad: How far turned from it; with fewer than six moving joints, which cannot reach every
             orientation, `largest_deg` counts.
         joint_limits: Whether corrected readings must stay within the robot's limits.

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame, Transform, dispatch, lane_room, norm};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::error::CompensateError;
 use crate::limits::Limits;
 use crate::model::Model;
-use crate::newton::{Plan, Search, toward};
+use crate::newton::{Search, toward};
+use crate::plan::{Left, Plan};
 use crate::refusal::{Reason, Refusal};
 use crate::task::{Task, axis_turn, shift, turn};
 
@@ -25,9 +25,6 @@ const HOPELESS: f64 = 0.999;
 const UNSTEADY: f64 = 0.1;
 /// Those of constant parameters fall by what the last step tells: still below 1e-12 m, with so much more foreseen.
 const STEADILY: f64 = 5.0;
-/// With fewer joints than the task has numbers, turns weigh so much less that the position is met first, and no joint turns
-/// far for what little of the orientation it would mend.
-const POSITION_FIRST: f64 = 1e-4;
 
 /// What is corrected, and how far.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -82,7 +79,7 @@ pub struct Workspace {
 /// What was found for eight waypoints; the readings are in `search.best`.
 pub(crate) struct Group {
     pub target: LaneFrame,
-    pub residual: [Lane; 2],
+    pub left: Left,
     pub shift: [Lane; 3],
     pub turn: [Lane; 3],
     pub std: Lane,
@@ -213,7 +210,7 @@ impl Corrector {
         let nominal = &nominal[..self.joint_count()];
         let target = self.programming.end::<I>(nominal, alone, programming);
         search.best.copy_from_slice(nominal);
-        let residual = toward::<I>(&self.calibrated, &self.plan, &target, alone, search);
+        let left = toward::<I>(&self.calibrated, &self.plan, &target, alone, search);
         let reached = self.programming.end::<I>(&search.best, alone, programming);
         // A closure would be compiled without the instruction set of this function.
         let std = match &self.calibrated.model.spread {
@@ -225,30 +222,30 @@ impl Corrector {
         } else {
             turn::<I>(&target, &reached)
         };
-        Group { residual, shift: shift(&target, &reached), turn: turned, std, target }
+        Group { left, shift: shift(&target, &reached), turn: turned, std, target }
     }
 
     /// What waypoint `i` of a group found, and whether that may be used.
     pub(crate) fn judge(&self, group: &Group, workspace: &Workspace, i: usize) -> Correction {
         let pick = |lanes: &[Lane; 3]| [lanes[0].0[i], lanes[1].0[i], lanes[2].0[i]];
         let mut correction = Correction {
-            residual_m: group.residual[0].0[i],
-            residual_rad: group.residual[1].0[i],
+            residual_m: group.left.distance(i),
+            residual_rad: group.left.turn.0[i],
             shift: pick(&group.shift),
             turn: pick(&group.turn),
             std_m: group.std.0[i],
             refusal: None,
         };
-        correction.refusal = self.refuse(&correction, workspace, i);
+        correction.refusal = self.refuse(&correction, &group.left, workspace, i);
         correction
     }
 
-    fn refuse(&self, found: &Correction, workspace: &Workspace, i: usize) -> Option<Refusal> {
+    fn refuse(&self, found: &Correction, left: &Left, workspace: &Workspace, i: usize) -> Option<Refusal> {
         let limits = &self.options.limits;
         let std = if limits.largest_std.is_finite() { found.std_m } else { 0.0 };
         limits
             .refuse_reading(&self.calibrated.chain, true, |joint| workspace.nominal[joint].0[i])
-            .or_else(|| limits.refuse_residual(&self.plan, [found.residual_m, found.residual_rad]))
+            .or_else(|| limits.refuse_residual(&self.plan, left, i))
             .or_else(|| self.refuse_joint(workspace, i))
             .or_else(|| Refusal::above(Reason::Shift, norm(found.shift), limits.largest_shift))
             .or_else(|| Refusal::above(Reason::Turn, norm(found.turn), limits.largest_turn))
@@ -294,31 +291,6 @@ fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let hopeless = if plan.position_first() { plan.hopeless } else { HOPELESS };
     let foreseen = plan.enough() * if plan.varied { UNSTEADY } else { STEADILY };
     Ok(Plan { hopeless, foreseen, ..plan })
-}
-
-impl Plan {
-    pub(crate) fn new(
-        model: &Model,
-        task: Task,
-        moving: Option<&[usize]>,
-        steps: usize,
-        longest: f64,
-    ) -> Result<Plan, CompensateError> {
-        let joints = model.joint_count();
-        let moving = moving.map_or_else(|| (0..joints).collect(), <[usize]>::to_vec);
-        let known = moving.last().is_some_and(|last| *last < joints);
-        if !known || !moving.is_sorted_by(|a, b| a < b) {
-            return Err(CompensateError::Moving { moving, joints });
-        }
-        let unit = |k: &usize| if model.chain.slides(*k) { ANGLE_ARM } else { 1.0 };
-        // The last of five axes mostly is that of the tool, and then moves nothing that an axis task asks for.
-        let few = moving.len() < task.rows() || joints < Task::Pose.rows();
-        let position_first = task != Task::Position && few;
-        let turn_weight = if position_first { ANGLE_ARM * POSITION_FIRST } else { ANGLE_ARM };
-        let unit = moving.iter().map(unit).collect();
-        let (varied, hopeless, foreseen) = (model.field.is_some(), f64::INFINITY, 0.0);
-        Ok(Plan { task, moving, unit, turn_weight, varied, steps, longest, hopeless, foreseen })
-    }
 }
 
 struct One<'a> {

@@ -9,8 +9,9 @@ use crate::corrector::Options;
 use crate::error::{CompensateError, check_finite, check_length};
 use crate::limits::Limits;
 use crate::model::Model;
-use crate::newton::{Plan, Search, fill_pose_columns, toward};
+use crate::newton::{Search, fill_pose_columns, toward};
 use crate::path::{Run, not_finite};
+use crate::plan::{Left, Plan};
 use crate::refusal::{Reason, Refusal};
 use crate::task::Task;
 
@@ -168,23 +169,23 @@ impl Inverse {
 
     /// Finds the readings of a group; the solutions are in `workspace.search.best`.
     #[inline(always)]
-    fn group<I: Isa>(&self, alone: bool, target: &LaneFrame, workspace: &mut Workspace) -> [Lane; 2] {
+    fn group<I: Isa>(&self, alone: bool, target: &LaneFrame, workspace: &mut Workspace) -> Left {
         let Workspace { search, seed, seed_columns, .. } = workspace;
         search.best.copy_from_slice(&seed[..self.joint_count()]);
         if self.has_branches() {
             fill_pose_columns::<I>(&self.aimed, &self.plan, alone, search);
             seed_columns.copy_from_slice(&search.columns);
         }
-        let residual = toward::<I>(&self.aimed, &self.plan, target, alone, search);
+        let left = toward::<I>(&self.aimed, &self.plan, target, alone, search);
         if self.has_branches() {
             fill_pose_columns::<I>(&self.aimed, &self.plan, alone, search);
         }
-        residual
+        left
     }
 
-    fn refuse(&self, residual: [f64; 2], workspace: &Workspace, i: usize) -> Option<Refusal> {
+    fn refuse(&self, left: &Left, workspace: &Workspace, i: usize) -> Option<Refusal> {
         self.limits
-            .refuse_residual(&self.plan, residual)
+            .refuse_residual(&self.plan, left, i)
             .or_else(|| {
                 self.limits
                     .refuse_reading(&self.aimed.chain, false, |joint| workspace.search.best[joint].0[i])
@@ -223,16 +224,16 @@ impl Kernel for Work<'_> {
             load_lanes::<I>(poses, MATRIX, first, &mut workspace.target);
             let bad = not_finite(&mut workspace.seed[..count]);
             let target = frame(&workspace.target);
-            let residual = inverse.group::<I>(all == 1, &target, workspace);
+            let left = inverse.group::<I>(all == 1, &target, workspace);
             for place in first..all.min(first + LANES) {
                 let i = place - first;
-                let left = [residual[0].0[i], residual[1].0[i]];
                 let unusable = bad[i].then(|| Refusal::plain(Reason::NotFinite));
-                let refusal = unusable.or_else(|| inverse.refuse(left, workspace, i));
+                let refusal = unusable.or_else(|| inverse.refuse(&left, workspace, i));
                 for (joint, value) in out.readings[place * count..][..count].iter_mut().enumerate() {
                     *value = if refusal.is_none() { workspace.search.best[joint].0[i] } else { f64::NAN };
                 }
-                out.residuals[place * RESIDUALS..][..RESIDUALS].copy_from_slice(&left);
+                out.residuals[place * RESIDUALS..][..RESIDUALS]
+                    .copy_from_slice(&[left.distance(i), left.turn.0[i]]);
                 refused.extend(refusal.map(|refusal| (place, refusal)));
             }
         }

@@ -21,6 +21,7 @@ mod limits;
 mod model;
 mod newton;
 mod path;
+mod plan;
 mod refusal;
 mod spread;
 mod stream;

@@ -3,7 +3,7 @@
 use truearm_kinematics::Chain;
 
 use crate::error::{CompensateError, check_bounds};
-use crate::newton::Plan;
+use crate::plan::{Left, Plan};
 use crate::refusal::{Reason, Refusal};
 
 /// Bounds of a correction; infinity switches one off.
@@ -25,7 +25,7 @@ pub struct Limits {
     pub shift_change: f64,
     /// Largest change of the turn along a path, rad per rad.
     pub turn_change: f64,
-    /// How far from its target the tool may stay, m.
+    /// How far from its target the tool may stay, m; off the plane that an arm cannot leave `largest_shift` counts.
     pub residual: f64,
     /// How far it may stay turned from it, rad; with fewer than six joints, which cannot meet every orientation,
     /// `largest_turn` counts.
@@ -78,11 +78,12 @@ impl Limits {
 }
 
 impl Limits {
-    /// Whether the tool stays too far from its target, m and rad.
-    pub(crate) fn refuse_residual(&self, plan: &Plan, residual: [f64; 2]) -> Option<Refusal> {
+    /// Whether the tool stays too far from its target in pose `i`.
+    pub(crate) fn refuse_residual(&self, plan: &Plan, left: &Left, i: usize) -> Option<Refusal> {
         let turn = if plan.position_first() { self.largest_turn } else { self.residual_turn };
-        Refusal::above(Reason::PositionNotReached, residual[0], self.residual)
-            .or_else(|| Refusal::above(Reason::OrientationNotReached, residual[1], turn))
+        Refusal::above(Reason::PositionNotReached, left.position.0[i], self.residual)
+            .or_else(|| Refusal::above(Reason::PositionNotReached, left.aside.0[i], self.largest_shift))
+            .or_else(|| Refusal::above(Reason::OrientationNotReached, left.turn.0[i], turn))
     }
 
     /// Largest change of a joint's reading, m where it slides, else rad.

@@ -13,18 +13,14 @@
 
 use std::marker::PhantomData;
 
-use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{Isa, Kernel, Lane, LaneFrame};
 
 use crate::aimed::{Aimed, AimedScratch};
 use crate::bend::Bend;
 use crate::cholesky::{Factor, gram};
-use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task};
+use crate::plan::{Left, Plan};
+use crate::task::{AxisGoal, Goal, PoseGoal, PositionGoal, Task, shift};
 
-/// Error at which the search ends, m: a few roundings of a pose.
-const ENOUGH: f64 = 1e-13;
-/// The same where the parameters vary, which each step leaves a thousandth of the error for, or less.
-const ENOUGH_VARIED: f64 = 1e-10;
 /// Step up to which a Jacobian is good enough for the steps to come, in units, if errors fall fast.
 const SHORT: f64 = 1e-2;
 /// Part of the error up to which a step may bend, if that is to be trusted, and by which it may make the step longer.
@@ -38,40 +34,6 @@ const STANDSTILL: f64 = 1e-11;
 const STEADY: f64 = 0.1;
 /// Added to J J^T so that it can be inverted everywhere, m^2.
 const FLOOR: f64 = 1e-12;
-
-/// How a search goes.
-#[derive(Debug, Clone)]
-pub(crate) struct Plan {
-    pub task: Task,
-    /// Readings that may change, ascending.
-    pub moving: Vec<usize>,
-    /// For each of these, its unit: 1 rad, or as many metres.
-    pub unit: Vec<f64>,
-    /// Metres that one radian of the task counts.
-    pub turn_weight: f64,
-    /// Whether the model's parameters vary with the joints.
-    pub varied: bool,
-    /// Steps at most.
-    pub steps: usize,
-    /// Longest step, rad.
-    pub longest: f64,
-    /// Rate from which on errors fall too slowly to go on.
-    pub hopeless: f64,
-    /// Foreseen error at which the search ends without another look, m.
-    pub foreseen: f64,
-}
-
-impl Plan {
-    /// Error at which the search ends, m.
-    pub fn enough(&self) -> f64 {
-        if self.varied { ENOUGH_VARIED } else { ENOUGH }
-    }
-
-    /// Whether there are too few joints to meet all of the task.
-    pub fn position_first(&self) -> bool {
-        self.turn_weight < ANGLE_ARM
-    }
-}
 
 /// What a search writes to.
 #[derive(Debug, Clone)]
@@ -149,7 +111,7 @@ struct Straight<const M: usize> {
 const NO: Lane = Lane::ZERO;
 const YES: Lane = Lane::splat(1.0);
 
-/// Moves `search.best` to the target; gives what is left of position (m) and orientation (rad).
+/// Moves `search.best` to the target; gives what is left.
 #[inline(always)]
 pub(crate) fn toward<I: Isa>(
     aimed: &Aimed,
@@ -157,7 +119,7 @@ pub(crate) fn toward<I: Isa>(
     target: &LaneFrame,
     alone: bool,
     search: &mut Search,
-) -> [Lane; 2] {
+) -> Left {
     let to = To { aimed, plan, target, alone };
     match plan.task {
         Task::Pose => to.meet::<I, PoseGoal, 6>(search),
@@ -178,16 +140,18 @@ struct To<'a> {
 impl To<'_> {
     /// The task's rows; then, where they cannot all be met, the position from there once more and alone.
     #[inline(always)]
-    fn meet<I: Isa, G: Goal<M>, const M: usize>(self, search: &mut Search) -> [Lane; 2] {
-        let left = I::call(Approach::<G, M> { to: self, search, goal: PhantomData });
+    fn meet<I: Isa, G: Goal<M>, const M: usize>(self, search: &mut Search) -> Left {
+        let [mut position, turn] = I::call(Approach::<G, M> { to: self, search, goal: PhantomData });
         let Self { aimed, plan, target, alone } = self;
-        if !plan.position_first() {
-            return left;
+        if plan.meets_all() {
+            return Left { position, turn, aside: NO };
         }
-        let [position, _] = I::call(Approach::<PositionGoal, 3> { to: self, search, goal: PhantomData });
+        if plan.position_first() {
+            [position, _] = I::call(Approach::<PositionGoal, 3> { to: self, search, goal: PhantomData });
+        }
         let frame = aimed.end::<I>(&search.best, alone, &mut search.model);
-        let turn = squared::<I>(&G::error::<I>(&frame, target)[3..]);
-        [position, turn.sqrt()]
+        let turn = squared::<I>(&G::error::<I>(&frame, target)[3..]).sqrt();
+        Left { position, turn, aside: plan.aside::<I>(&shift(&frame, target)) }
     }
 }
 
@@ -214,7 +178,7 @@ impl<G: Goal<M>, const M: usize> Kernel for Approach<'_, G, M> {
             } else {
                 aimed.end::<I>(&search.trial, alone, &mut search.model)
             };
-            let error = weighted::<I, G, M>(&frame, target, plan.turn_weight);
+            let error = plan.weigh::<I, M>(G::error::<I>(&frame, target));
             let norm = progress.take::<I, M>(&error, plan, search);
             if step == plan.steps || !progress.any_open() {
                 break;
@@ -374,25 +338,6 @@ impl Progress {
     }
 }
 
-/// The task's error, all of it in metres.
-#[inline(always)]
-fn weighted<I: Isa, G: Goal<M>, const M: usize>(
-    frame: &LaneFrame,
-    target: &LaneFrame,
-    weight: f64,
-) -> [Lane; M] {
-    weigh(G::error::<I>(frame, target), weight)
-}
-
-/// Rows of a task, all of them in metres.
-#[inline(always)]
-fn weigh<const M: usize>(mut rows: [Lane; M], weight: f64) -> [Lane; M] {
-    for value in rows.iter_mut().skip(3) {
-        *value = *value * weight;
-    }
-    rows
-}
-
 #[inline(always)]
 fn squared<I: Isa>(values: &[Lane]) -> Lane {
     dot::<I>(values, values)
@@ -411,10 +356,9 @@ fn fill_columns<I: Isa, G: Goal<M>, const M: usize>(
     let screws = &search.model.screws[..aimed.chain.joint_count()];
     for (column, (&k, &unit)) in search.columns.iter_mut().zip(moving) {
         let screw = aimed.model.coupling.screw::<I>(screws, k);
-        let rows = G::column::<I>(&screw, frame);
-        for (i, (value, row)) in column.iter_mut().zip(rows).enumerate() {
-            let row = row * if i < 3 { unit } else { unit * plan.turn_weight };
-            *value = NO.where_below(stale, row, *value);
+        let rows = plan.weigh::<I, M>(G::column::<I>(&screw, frame));
+        for (value, row) in column.iter_mut().zip(rows) {
+            *value = NO.where_below(stale, row * unit, *value);
         }
     }
 }
@@ -481,7 +425,7 @@ impl Search {
         }
         aimed.model.coupling.joints::<I>(&self.shifts, &mut self.turns);
         let bent = self.bend.along::<I>(&self.model.inputs, &self.turns);
-        weigh(G::bent::<I>(&bent, frame), plan.turn_weight)
+        plan.weigh::<I, M>(G::bent::<I>(&bent, frame))
     }
 
     /// The next trials: a step on from those that were better, half the way back from the others.
