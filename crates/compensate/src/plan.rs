@@ -57,8 +57,8 @@ impl Plan {
             return Err(CompensateError::Moving { moving, joints });
         }
         let unit = |k: &usize| if model.chain.slides(*k) { ANGLE_ARM } else { 1.0 };
-        // The last of five axes mostly is that of the tool, and then moves nothing that an axis task asks for.
         let normal = plane_normal(&model.chain)?;
+        // The last of five axes mostly is that of the tool, and then moves nothing that an axis task asks for.
         let few = moving.len() < task.rows() || joints < Task::Pose.rows() || normal.is_some();
         let position_first = task != Task::Position && few;
         let turn_weight = if position_first { ANGLE_ARM * POSITION_FIRST } else { ANGLE_ARM };
@@ -72,7 +72,7 @@ impl Plan {
         if self.varied { ENOUGH_VARIED } else { ENOUGH }
     }
 
-    /// Whether there are too few joints to meet all of the task.
+    /// Whether the position is met first: joints are too few for all of the task, or move in planes.
     pub fn position_first(&self) -> bool {
         self.turn_weight < ANGLE_ARM
     }
