@@ -5,7 +5,7 @@ use truearm_kinematics::{Chain, Isa, Lane, Parameters, norm};
 
 use crate::error::CompensateError;
 use crate::model::Model;
-use crate::task::Task;
+use crate::task::{Task, dot};
 
 /// Error at which the search ends, m: a few roundings of a pose.
 const ENOUGH: f64 = 1e-13;
@@ -91,9 +91,10 @@ impl Plan {
             *value = *value * self.turn_weight;
         }
         if let Some(normal) = &self.normal {
-            let off = along::<I>(&rows[..3], normal);
+            let normal = normal.map(Lane::splat);
+            let off = dot::<I>(&[rows[0], rows[1], rows[2]], &normal);
             for (row, part) in rows.iter_mut().zip(normal) {
-                *row = I::mul_add(-off, Lane::splat(*part), *row);
+                *row = I::mul_add(-off, part, *row);
             }
         }
         rows
@@ -103,7 +104,7 @@ impl Plan {
     #[inline(always)]
     pub fn aside<I: Isa>(&self, shift: &[Lane; 3]) -> Lane {
         let Some(normal) = &self.normal else { return Lane::ZERO };
-        let off = along::<I>(shift, normal);
+        let off = dot::<I>(shift, &normal.map(Lane::splat));
         (off * off).sqrt()
     }
 }
@@ -124,15 +125,6 @@ impl Left {
         let (position, aside) = (self.position.0[i], self.aside.0[i]);
         if aside > 0.0 { position.hypot(aside) } else { position }
     }
-}
-
-#[inline(always)]
-fn along<I: Isa>(rows: &[Lane], normal: &[f64; 3]) -> Lane {
-    let mut sum = Lane::ZERO;
-    for (row, part) in rows.iter().zip(normal) {
-        sum = I::mul_add(*row, Lane::splat(*part), sum);
-    }
-    sum
 }
 
 /// Normal of the planes that an arm moves in by its nominal table, in the base frame: its axes are parallel, and what
