@@ -14,6 +14,7 @@ import pytest
 
 import truearm as ta
 from truearm.cli import main
+from truearm.errors import WorkError
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
@@ -302,6 +303,19 @@ def test_measurements_are_not_written_over(name, folder, capsys):
     assert main(["calibrate", "rv-m2", name, "-o", "."]) == 2
     assert "never written over" in capsys.readouterr().err
     assert (folder / name).read_bytes() == before
+
+
+def test_no_report_of_another_calibration_is_left_beside_one(folder, monkeypatch):
+    def stopped(*_):
+        raise WorkError("stopped here")
+
+    command = ["calibrate", "rv-m2", "arm.csv", "-o", "out", "--model", "constant"]
+    assert main(command) == 0
+    assert (folder / "out/report.html").exists()
+    monkeypatch.setattr("truearm.cli.calibrate.make_report", stopped)
+    assert main([*command, "--seed", "3"]) == 1
+    assert (folder / "out/calibration.calib").exists()
+    assert not (folder / "out/report.html").exists()
 
 
 def test_another_calibration_that_is_there_is_kept(folder, capsys):

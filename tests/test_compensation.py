@@ -3,7 +3,7 @@
 import time
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from truearm.solving import beyond_learnt
 
 MET_M = 1e-9
 PATH = np.linspace([0.3, -1.2, 1.5, -0.8, 1.1, 0.4], [0.8, -1.0, 1.3, -0.9, 1.2, 0.2], 40)
+BOUNDS = [field.name for field in fields(ta.Limits) if field.name.startswith(("largest", "change"))]
 OPEN = ta.Limits(largest_mm=20.0, largest_joint_deg=10.0)
 
 
@@ -292,3 +293,20 @@ def test_an_arm_that_cannot_leave_a_plane_is_corrected_in_it(lengths):
     beside = 1e3 * np.abs(left[:, 2])
     assert beside.max() > 0.01
     np.testing.assert_allclose(found.residual_mm[done], beside, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["adept-cobra-600", "rv-m2"])
+def test_bounds_refuse_what_is_found_and_never_change_it(name):
+    """Also where arms of few axes are nearly stretched, and a turn that can be met asks for long steps."""
+    robot = ta.Robot.load(name)
+    arm = VirtualArm(robot, seed=3)
+    calibration = ta.calibrate(robot, arm.measure(arm.poses(60)), model="constant", refit=False)
+    tool, q = np.eye(4), arm.poses(500, seed=9)
+    tool[:3, 3] = [0.11, 0.04, 0.05]
+    bounded = ta.Compensator(calibration).joints(q, tool=tool)
+    none: dict[str, Any] = dict.fromkeys(BOUNDS)
+    free = ta.Compensator(calibration, limits=ta.Limits(**none)).joints(q, tool=tool)
+    both = ~bounded.refused & ~free.refused
+    assert both.sum() > 450
+    assert bounded.q[both] == pytest.approx(free.q[both], abs=1e-9)
+    assert bounded.residual_mrad[both] == pytest.approx(free.residual_mrad[both], abs=1e-6)

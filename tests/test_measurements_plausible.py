@@ -1,5 +1,6 @@
 """Measurements against the robot they are said to be of."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -119,12 +120,12 @@ def test_stated_radians_are_believed() -> None:
     """An endless wrist may have turned many times: what is stated is not doubted, but said."""
     robot = Robot.load("ur10")
     q = readings(robot)
-    q[7, 5] += 8 * np.pi
+    q[7:15, 5] += 8 * np.pi
     points = table(robot, q)
-    with pytest.raises(InputError, match="row 8.*beyond what UR10 can reach"):
+    with pytest.raises(InputError, match="rows 8, 9.*beyond what UR10 can reach"):
         check_against(Measurements.from_dataframe(points), robot)
     (notice,) = check_against(Measurements.from_dataframe(points, angle_unit="rad"), robot)
-    assert (notice.kind, notice.rows) == ("limits", (8,))
+    assert (notice.kind, notice.rows) == ("limits", tuple(range(8, 16)))
 
 
 def test_limits_are_warned_of_with_rows() -> None:
@@ -229,7 +230,7 @@ def test_no_honest_tool_or_region_is_refused(seed: int, reach: float, share: flo
 def test_one_gross_outlier_is_no_wrong_unit() -> None:
     robot = Robot.load("abb-irb-120")
     points = table(robot, readings(robot))
-    points.loc[3, "x"] = 1e4
+    points.loc[3, "x"] = 1e3
     assert check_against(Measurements.from_dataframe(points), robot) == []
 
 
@@ -382,3 +383,54 @@ def test_degrees_of_joints_the_other_way_stay_an_error() -> None:
     q = np.radians(11.0) * q / np.abs(q).max()
     with pytest.raises(InputError, match="give --angle-unit deg"):
         check_against(stated(robot, q, np.degrees(q * [1, -1, -1, 1, 1, 1])), robot)
+
+
+def unlimited(robot: Robot) -> Robot:
+    return replace(robot, limits=np.full(robot.limits.shape, np.inf) * [-1.0, 1.0])
+
+
+def about(robot: Robot, span: float) -> Floats:
+    middle = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
+    return middle + np.random.default_rng(1).uniform(-span, span, (40, robot.joint_count))
+
+
+@pytest.mark.parametrize("span", [0.05, 0.3, 1.0])
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (180.0 / np.pi, "degrees that are read as radians"),
+        (np.pi / 180.0, "radians that were taken for degrees"),
+    ],
+)
+def test_points_tell_degrees_where_limits_do_not(span: float, factor: float, words: str) -> None:
+    robot = unlimited(Robot.load("ur10"))
+    data = table(robot, about(robot, span))
+    assert check_against(Measurements.from_dataframe(data), robot) == []
+    data.iloc[:, : robot.joint_count] *= factor
+    with pytest.raises(InputError, match=words):
+        check_against(Measurements.from_dataframe(data), robot)
+
+
+def test_points_tell_metres_read_as_millimetres_where_they_lie_close_together() -> None:
+    robot = Robot.load("ur10")
+    data = table(robot, about(robot, 0.05))
+    with pytest.raises(InputError, match="too close together.*--length-unit m"):
+        check_against(Measurements.from_dataframe(data, length_unit="mm"), robot)
+
+
+def test_one_reading_beyond_all_limits_makes_no_degrees_of_the_others() -> None:
+    robot = Robot.load("ur10")
+    q = readings(robot)
+    q[7, 0] = 20.0
+    notices = check_against(Measurements.from_dataframe(table(robot, q)), robot)
+    assert [(notice.kind, notice.rows) for notice in notices] == [("limits", (8,))]
+
+
+@pytest.mark.parametrize("value", [9999.0, -99999.0, 1e15, 1e300])
+@pytest.mark.parametrize("columns", [["x"], ["x", "y", "z"]])
+def test_numbers_that_stand_for_nothing_seen_are_named(value: float, columns: list[str]) -> None:
+    robot = Robot.load("ur10")
+    data = table(robot, readings(robot))
+    data.loc[[4, 9], columns] = value
+    with pytest.raises(InputError, match=r"in rows 5 and 10, .*Leave the cells empty"):
+        check_against(Measurements.from_dataframe(data), robot)

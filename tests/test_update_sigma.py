@@ -23,8 +23,12 @@ def later(arm):
     return arm.measure_table(arm.poses(15, seed=8), seed=8)
 
 
+def of(table):
+    return ta.Measurements.from_dataframe(table)
+
+
 def rest(calibration, table):
-    return ta.update(calibration, ta.Measurements.from_dataframe(table)).rest.squares
+    return ta.update(calibration, of(table)).rest.squares
 
 
 def noise_mm(calibration):
@@ -47,3 +51,18 @@ def test_a_sigma_comes_on_top_of_what_constants_alone_leave(arm, later):
     constant = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
     sigma_mm = 0.5e3 * constant.constant.noise_m
     assert rest(constant, later.assign(sigma_mm=sigma_mm)) < rest(constant, later)
+
+
+def test_rows_that_state_none_scatter_as_those_of_the_calibration_did(arm, later):
+    stated = ta.calibrate(arm.robot, of(arm.measure_table(arm.poses(60)).assign(sigma_mm=0.03)))
+    told = later.assign(sigma_mm=0.03)
+    assert rest(stated, later) == pytest.approx(rest(stated, told), rel=1e-9)
+    assert [notice.message for notice in ta.update(stated, of(later)).notices if notice.kind == "sigma"] == [
+        "15 rows without a sigma, which the calibration's rows have: the device is taken to scatter as it "
+        "did then, by 0.03 mm. If it does not, say how much in a column sigma_mm."
+    ]
+    assert "sigma" not in {notice.kind for notice in ta.update(stated, of(told)).notices}
+
+
+def test_nothing_is_said_where_the_calibration_stated_none(silent, later):
+    assert "sigma" not in {notice.kind for notice in ta.update(silent, of(later)).notices}

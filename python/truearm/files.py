@@ -121,6 +121,18 @@ def write_whole(path: Path, content: str | bytes) -> None:
     write_all([(path, content)])
 
 
+def remove(path: Path) -> None:
+    """Take a file away, if there is one.
+
+    Raises:
+        InputError: If it cannot be.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f"this cannot be replaced: {_reason(error)}", where=str(path)) from None
+
+
 def write_all(contents: Iterable[tuple[Path, str | bytes]]) -> None:
     """Write files, each completely or not at all: neighbours of all are written, then renamed in this order.
 

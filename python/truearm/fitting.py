@@ -356,7 +356,8 @@ def feature_values(data: Measurements, names: Sequence[str]) -> Floats:
             raise InputError(
                 f'there is no column "{name}" to use as a feature',
                 where=where,
-                rule=f"There are {list_names(map(str, data.features.columns)) or 'no further columns'}",
+                rule="Features are columns beside readings and what was measured; there are "
+                + (list_names(map(str, data.features.columns)) or "none"),
             )
         values[:, k] = data.features[name].to_numpy(np.float64)
         bad = ~np.isfinite(values[:, k])

@@ -11,7 +11,7 @@ from truearm.measurements import Measurements
 from truearm.mixed_units import check_mixed_units
 from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.robot import Robot
-from truearm.stated_in_degrees import check_degrees, otherwise_notices, outside_limits
+from truearm.stated_in_degrees import check_angles, check_degrees, otherwise_notices, outside_limits
 from truearm.turning_sense import FIT, MISFIT
 from truearm.unit_change import check_one_unit
 from truearm.units import MM_PER_INCH, MM_PER_METRE, RADIANS_PER_DEGREE
@@ -51,6 +51,10 @@ FIT_BETTER: Final = 5.0
 """Times nearer to the points that an arm is whose slides were read in the right unit."""
 APART_M: Final = 0.01
 """No arm comes back to the same readings so far from where it was."""
+NO_LENGTH_M: Final = 1e9
+"""In no unit that is mistaken for metres points lie so far apart."""
+NO_REACH_M: Final = 2e3
+"""Points that lie so far apart in metres are no gross errors of an instrument: it wrote something else."""
 SHORTEST_M: Final = 0.005
 """No bar or wire that tells distances is as short as this; a metre read as a millimetre is shorter."""
 
@@ -92,13 +96,39 @@ def check_readings(measurements: Measurements, robot: Robot) -> list[Notice]:
 
 
 def check_points(measurements: Measurements, robot: Robot) -> None:
-    """Raise InputError where points lie too far apart, too close together, in inches, or in two units."""
+    """Raise InputError where points lie too far apart, too close together, in inches, or in two units.
+
+    Neither may angles be in another unit than points tell.
+    """
+    _check_far(measurements, NO_LENGTH_M)
     check_one_unit(measurements, robot)
     _check_slides(measurements, robot)
     check_mixed_units(measurements, robot)
     for group in measurements.groups if measurements.target_count else []:
         _check_spread(measurements.select(measurements.group == group), robot, group)
+    check_angles(measurements, robot)
+    _check_far(measurements, NO_REACH_M)
     _check_distances(measurements, robot)
+
+
+def _check_far(measurements: Measurements, most: float) -> None:
+    """Raise InputError where a point lies more than `most` (m) from the middle of those of its set-up."""
+    far = np.zeros(len(measurements), dtype=bool)
+    for group in measurements.groups if measurements.target_count else []:
+        rows = measurements.group == group
+        points = measurements.targets[rows]
+        seen = points[np.isfinite(points).all(axis=2)]
+        if len(seen) > 0:
+            far[rows] = (np.abs(points - np.median(seen, axis=0)) > most).any(axis=(1, 2))
+    if not far.any():
+        return
+    away = np.nanmax(np.abs(measurements.targets[far]))
+    raise InputError(
+        f"coordinates up to {away:.4g} m in {measurements.row_names(far)}, over {most:g} m from the others",
+        where=", ".join(measurements.files),
+        rule="No arm reaches so far: the instrument may have written such a number where it saw nothing",
+        way_out="Leave the cells empty where nothing was measured, or leave these rows out",
+    )
 
 
 def _check_kinds(measurements: Measurements, robot: Robot) -> None:
@@ -223,7 +253,8 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
             rule="The joint readings, stated in degrees, look like radians",
             way_out="Name the columns q1, q2, ..., or, if their names say nothing, give --angle-unit rad",
         )
-    if nominal > TOOL_ALLOWANCE_M and measured < nominal / SPREAD_FACTOR:
+    by_spread = nominal > TOOL_ALLOWANCE_M
+    if measured < nominal / SPREAD_FACTOR and (by_spread or _fit_in_metres(group.select(seen), robot)):
         raise InputError(
             found,
             where=where,
@@ -249,6 +280,11 @@ def _check_inches(rows: Measurements, robot: Robot, found: str, where: str) -> N
             raise InputError(
                 f"{found}; times {factor:.4g} they fit it", where=where, rule=rule, way_out=way_out
             )
+
+
+def _fit_in_metres(rows: Measurements, robot: Robot) -> bool:
+    """Whether points fit the nominal arm once they are a thousand times as large."""
+    return len(rows) >= FEWEST_ROWS and _misfit(rows, robot, MM_PER_METRE) < FIT
 
 
 def _misfit(rows: Measurements, robot: Robot, factor: float) -> float:

@@ -118,7 +118,7 @@ class Table:
             "truearm import --missing TEXT empties those that say so"
         )
         if not row_out and "," in cell and "." not in cell:
-            way_out = 'If this is a decimal comma, convert the file with: truearm import --decimal ","'
+            way_out = 'If this is a decimal comma, bring it in by truearm import with --decimal ","'
         return InputError(
             f'column "{name}" holds "{cell}" in row {row + 1}',
             where=self.where,

@@ -12,7 +12,7 @@ from truearm.errors import InputError, Notice, list_rows
 from truearm.measurements import Measurements
 from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
 from truearm.robot import Robot
-from truearm.turning_sense import MISFIT
+from truearm.turning_sense import FIT, MISFIT
 from truearm.units import RADIANS_PER_DEGREE
 
 Floats = NDArray[np.float64]
@@ -21,8 +21,15 @@ Mask = NDArray[np.bool_]
 MAX_READING_RAD: Final = 4.0 * np.pi
 """Beyond two turns either way, and beyond its limits, a reading stated in no unit is taken for degrees."""
 LIMIT_TOLERANCE: Final = 1e-6
+AS_DEGREES: Final = "If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ..."
+AS_RADIANS: Final = (
+    "If these are radians, name the columns q1, q2, ..., and give no --angle-unit; if they were converted "
+    "from degrees twice, convert them once"
+)
 MOST_OUTSIDE: Final = 0.5
 """Part of the rows outside the limits from which something is wrong with all of them."""
+FEWEST_FAR: Final = 0.1
+"""Part of the rows from which such readings are no slips of single rows."""
 MOST_WAYS: Final = 2
 
 
@@ -48,6 +55,8 @@ def check_degrees(measurements: Measurements, robot: Robot) -> None:
     far = outside & (np.abs(readings) > MAX_READING_RAD)
     as_degrees = np.where(unstated, readings * RADIANS_PER_DEGREE, readings)
     fits = not (outside_limits(as_degrees, robot.limits) & unstated).any()
+    if far.any(axis=1).mean() < FEWEST_FAR:
+        far = np.zeros_like(far)
     if not far.any() and not (outside.any(axis=1).mean() > MOST_OUTSIDE and fits):
         return
     otherwise = "" if far.any() else _within_otherwise(readings, robot)
@@ -62,10 +71,38 @@ def check_degrees(measurements: Measurements, robot: Robot) -> None:
         f"rad, in {measurements.row_names(found.any(axis=1))}, beyond what {robot.name} can reach",
         where=", ".join(measurements.files),
         rule="Revolute joints are in radians unless their columns say so (q1_deg)",
-        way_out="If these are degrees, give --angle-unit deg, or name the columns q1_deg, q2_deg, ..."
+        way_out=AS_DEGREES
         + (f"; {otherwise}: if so, put that right in the robot file or in the data" if otherwise else "")
         + ("" if far.any() else "; if they are radians, they are of another arm: name that one"),
     )
+
+
+def check_angles(measurements: Measurements, robot: Robot) -> None:
+    """Check by the points that angles are in the unit they are read in, also where limits tell nothing.
+
+    Raises:
+        InputError: If the nominal arm, its frame and target fitted, is far from them with the readings as
+            they are, and near with all of them divided, or multiplied, by the degrees of a radian.
+    """
+    revolute = np.array([kind == "revolute" for kind in robot.joints])
+    unstated = revolute & (np.array(measurements.joint_units) == "")
+    if not revolute.any() or _misfit(measurements, robot) <= MISFIT:
+        return
+    for joints, factor, looks, way_out in (
+        (unstated, RADIANS_PER_DEGREE, "degrees that are read as radians", AS_DEGREES),
+        (revolute, 1.0 / RADIANS_PER_DEGREE, "radians that were taken for degrees", AS_RADIANS),
+    ):
+        times = np.where(joints, factor, 1.0)
+        if (
+            joints.any()
+            and _misfit(replace(measurements, readings=measurements.readings * times), robot) < FIT
+        ):
+            raise InputError(
+                f"the joint readings look like {looks}: {factor:.4g} times as large they fit the points",
+                where=", ".join(measurements.files),
+                rule="Revolute joints are in radians unless their columns say so (q1_deg)",
+                way_out=way_out,
+            )
 
 
 def otherwise_notices(measurements: Measurements, robot: Robot) -> list[Notice]:
@@ -114,14 +151,22 @@ def _exchanges(readings: Floats, robot: Robot) -> Iterator[tuple[int, int]]:
 
 
 def _denied(converted: Measurements, robot: Robot) -> bool:
-    """Whether points of the first set-up tell that readings so converted are not those of the nominal arm."""
-    if converted.target_count == 0:
-        return False
-    target = converted.most_held()
-    points = converted.targets[:, target]
-    seen = np.asarray(np.isfinite(points).all(axis=1)) & (converted.group == converted.groups[0])
+    """Whether points tell that readings so converted are not those of the nominal arm."""
+    return _misfit(converted, robot) > MISFIT
+
+
+def _misfit(given: Measurements, robot: Robot) -> float:
+    """How far points of the first set-up are from those of the nominal arm, over their spread.
+
+    Zero if they are too few.
+    """
+    if given.target_count == 0:
+        return 0.0
+    target = given.most_held()
+    points = given.targets[:, target]
+    seen = np.asarray(np.isfinite(points).all(axis=1)) & (given.group == given.groups[0])
     if seen.sum() < FEWEST_ROWS:
-        return False
-    some = Seen.of(converted, target).select(some_rows(np.flatnonzero(seen)))
-    spread = np.median(np.linalg.norm(some.points - np.median(some.points, axis=0), axis=1))
-    return bool(NominalArm.of(robot).misfit_m(some) > MISFIT * spread)
+        return 0.0
+    some = Seen.of(given, target).select(some_rows(np.flatnonzero(seen)))
+    spread = float(np.median(np.linalg.norm(some.points - np.median(some.points, axis=0), axis=1)))
+    return NominalArm.of(robot).misfit_m(some) / spread if spread > 0.0 else 0.0

@@ -289,8 +289,11 @@ fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let plan = Plan::new(model, options.task, options.moving.as_deref(), STEPS, longest)?;
     // The turn that five axes leave is no failure: its least value is searched for to the end.
     let hopeless = if plan.position_first() { plan.hopeless } else { HOPELESS };
+    // Short steps would end on the way to a turn that can be met, and meet the position by turning the tool.
+    let longest = if plan.position_first() { LONGEST_STEP } else { plan.longest };
+    let longest = if plan.position_first() { LONGEST_STEP } else { plan.longest };
     let foreseen = plan.enough() * if plan.varied { UNSTEADY } else { STEADILY };
-    Ok(Plan { hopeless, foreseen, ..plan })
+    Ok(Plan { longest, hopeless, foreseen, ..plan })
 }
 
 struct One<'a> {

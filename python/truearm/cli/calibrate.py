@@ -22,7 +22,7 @@ from truearm.cli.progress import Stages, told_stages
 from truearm.cli.report import CALIBRATION_NAME, REPORT_NAME, make_report
 from truearm.defaults import DEGREE, DRIFT, FIRST_TARGET, FRAME, HOLDOUT, MODEL, ROBUST, SEED
 from truearm.errors import InputError, UsageError, count_of, list_outliers, typed
-from truearm.files import is_file, make_directory, read_bytes, refuse_own_input, write_whole
+from truearm.files import is_file, make_directory, read_bytes, refuse_own_input, remove, write_whole
 from truearm.scheme_options import SchemeOptions
 
 if TYPE_CHECKING:
@@ -189,11 +189,13 @@ def bound_std(calibration: "Calibration", stages: Stages) -> None:
 def write_results(calibration: "Calibration", output: Path, *, with_rows: bool = True) -> dict[str, Any]:
     """Write all three files to a directory, which is made if needed; the content of summary.json.
 
-    Another calibration that is there is kept beside them as PREVIOUS_NAME.
+    Another calibration that is there is kept beside them as PREVIOUS_NAME; its report goes first,
+    so that none stands beside a calibration that it is not of.
     """
     summary, content = calibration.summary, calibration.to_bytes(with_rows=with_rows)
     make_directory(output)
     _keep_previous(output, content)
+    remove(output / REPORT_NAME)
     write_whole(output / CALIBRATION_NAME, content)
     write_whole(output / SUMMARY_NAME, json.dumps(summary, indent=2, allow_nan=False) + "\n")
     make_report(calibration if with_rows else calibration.without_rows(), output / REPORT_NAME)

@@ -347,5 +347,5 @@ def _print(plan: "Plan", output: Path, order: str, joints: "tuple[str, ...]", *,
     warn(_told_unreached(plan.unreached))
     say_wrapped(_lowest(plan.lowest_m))
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]
-    say("Expected standard deviation of the calibrated position:")
+    say("Expected standard deviation of the calibrated position, from constants alone:")
     print_table(("poses", "mm"), rows)

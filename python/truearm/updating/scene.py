@@ -50,6 +50,21 @@ class Linear:
     pose: NDArray[np.int64]
 
 
+def usual_sigma_m(calibration: Calibration) -> float:
+    """What half of the calibration's rows state as their sigma, or less, m; zero where none does."""
+    learned = calibration.learned_from
+    stated = None if learned is None else learned.data.sigma_m
+    if stated is None or not np.isfinite(stated).any():
+        return 0.0
+    return float(np.nanmedian(stated))
+
+
+def sigmas_m(calibration: Calibration, data: Measurements) -> Floats:
+    """Sigma of each row (n,), m; where it states none that which was usual when the arm was calibrated."""
+    stated = np.full(len(data), np.nan) if data.sigma_m is None else data.sigma_m
+    return np.where(np.isfinite(stated), stated, usual_sigma_m(calibration))
+
+
 class Scene:
     """The rows of an update under one model of a calibration.
 
@@ -174,11 +189,10 @@ class Scene:
         """Variances (n,) of what rows state as their sigma, beyond the noise that holds the device's already.
 
         It does where the calibration's own rows stated none: then the larger of both counts. What constants
-        alone leave is mostly the arm's, and holds no sigma.
+        alone leave is mostly the arm's, and holds no sigma. Rows that state none are as those of the
+        calibration were, whose noise is what they left beyond their own.
         """
-        if self.data.sigma_m is None:
-            return np.zeros(len(self.data))
-        stated, details = np.nan_to_num(self.data.sigma_m) ** 2, self._calibration.variable
+        stated, details = sigmas_m(self._calibration, self.data) ** 2, self._calibration.variable
         learned = self._calibration.learned_from
         if details is None or learned is None or learned.data.sigma_m is not None:
             return stated
