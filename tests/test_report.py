@@ -207,6 +207,31 @@ def test_repeated_poses_tell_scatter_and_sides():
     assert "ISO 9283" not in text
 
 
+def test_rows_say_themselves_from_which_side_joints_came():
+    """As sessions export them: a repeat comes at once from the other side, and at the end from the first."""
+    arm = VirtualArm.paper(seed=2)
+    q = arm.poses(40, seed=4)
+    twice = np.repeat(q, 2, axis=0)
+    sides = np.concatenate([np.tile([1, -1], len(q)), np.ones(len(q), dtype=int)])
+    table = arm.measure_table(np.concatenate([twice, q]), seed=4).assign(approach=sides)
+    table["z"] += 0.1e-3 * sides
+    text = words_of(
+        report(ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")).html
+    )
+    assert "The column approach says from which side all joints came." in text
+    apart, _ = re.findall(r"all joints 40 (\d\.\d+) (\d\.\d+)", text)[0]
+    assert float(apart) == pytest.approx(0.2, abs=0.05)
+    assert "Farther apart than scatter makes them are the sides of all joints" in text
+    silent = words_of(
+        report(
+            ta.calibrate(
+                arm.robot, ta.Measurements.from_dataframe(table.drop(columns="approach")), model="constant"
+            )
+        ).html
+    )
+    assert "The column approach" not in silent
+
+
 def test_advice_follows_from_the_data(calibrations, reports):
     kinds = {model: [advice.kind for advice in reports[model].advice] for model in MODELS}
     assert "no_orientation" in kinds["variable"]

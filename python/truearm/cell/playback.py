@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.device_errors import DeviceError, RefusedError
-from truearm.cell.poses_file import APPROACH
 from truearm.cell.protocols import Managed
 from truearm.cell.reading import Expected, Reading
 from truearm.cell.schema import Positive, Section
+from truearm.columns import APPROACH
 from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.robot import Robot

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.columns import PURPOSE, StatedUnits
+from truearm.columns import APPROACH, PURPOSE, StatedUnits
 from truearm.errors import InputError, list_names, list_rows
 from truearm.measured_fields import read_joint_columns
 from truearm.reading import Table, read_csv_table
@@ -15,7 +15,6 @@ from truearm.robot import Robot
 
 Floats = NDArray[np.float64]
 
-APPROACH: Final = "approach"
 GROUP: Final = "group"
 MOST_NAMED: Final = 3
 DIRECTIONS: Final = (-1.0, 0.0, 1.0)

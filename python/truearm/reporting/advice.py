@@ -29,6 +29,9 @@ from truearm.row_order import ORDER_OF_POSES
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
 """A mean error within so many times what noise alone leaves has reached it."""
+LENGTHS_SPREAD: Final = 0.42
+"""Standard deviation of the length of a vector with three equal normal coordinates, over its mean."""
+SURE: Final = 3.0
 FEW_FOR_NOISE: Final = 60
 """Training poses below which noise may be told a third or half of what it is."""
 LONG_TAIL: Final = 5.0
@@ -123,7 +126,7 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)
     if mean <= AT_THE_FLOOR * floor:
-        if mean < UNLIKELY * floor or facts.grids or any(map(facts.noticed, HIDING)):
+        if mean < _least_by_chance(facts) * floor or facts.grids or any(map(facts.noticed, HIDING)):
             return
         words = (
             f"The {facts.mean_error} is {left} mm, and noise alone would leave {noise} mm. More poses will "
@@ -142,6 +145,18 @@ def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
         f"what {trained} leave undetermined. Poses like those of the task help most."
     )
     yield Advice("more_poses", "Measure more poses.", words, mean - floor)
+
+
+def _least_by_chance(facts: Facts) -> float:
+    """Part of the floor that the mean error reaches by chance.
+
+    Below it the floor is too high, and tells nothing.
+    """
+    validation = facts.calibration.validation
+    if not (validation.n_train_poses and validation.n_holdout_poses):
+        return UNLIKELY
+    per_pose = 1.0 / validation.n_train_poses + 1.0 / validation.n_holdout_poses
+    return max(UNLIKELY, 1.0 - SURE * LENGTHS_SPREAD * float(np.sqrt(per_pose)))
 
 
 def _warm_up(facts: Facts) -> Iterator[Advice]:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.columns import REPEAT
+from truearm.columns import APPROACH, REPEAT
 from truearm.errors import count_of
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
@@ -40,12 +40,14 @@ class Repeats:
         approach: Sign of each joint's last movement (n, N).
         stayed: Whether a row came right after another of its pose (n,), and was not planned to repeat it: the
             arm may have stood still.
+        stated: Whether the rows say themselves from which side all joints came.
     """
 
     place: Index
     missed: Floats
     approach: Floats
     stayed: NDArray[np.bool_]
+    stated: bool
 
     @classmethod
     def of(cls, facts: Facts) -> "Repeats | None":
@@ -58,7 +60,8 @@ class Repeats:
         which = selection.targets.index(target)
         seen = np.flatnonzero(np.isfinite(data.targets[:, target]).all(axis=1))
         order = seen[np.lexsort((data.rows[seen], data.sources[seen]))]
-        approach = _approach(data)[order]
+        stated = _stated_approach(data)
+        approach = (_approach(data) if stated is None else stated)[order]
         place = pose_numbers(data.readings[order], data.group[order])
         again = np.bincount(place)[place] > 1
         if not again.any():
@@ -66,7 +69,10 @@ class Repeats:
         missed = rows.residual[order][:, 3 * which : 3 * which + 3]
         here, there = order[again], order[place[again]]
         moved = _predicted(facts, data, here, which) - _predicted(facts, data, there, which)
-        return cls(place[again], missed[again] + moved, approach[again], _stayed(data, order, place)[again])
+        stayed = _stayed(data, order, place)
+        if stated is not None:
+            stayed &= approach[:, 0] == np.roll(approach[:, 0], 1)
+        return cls(place[again], missed[again] + moved, approach[again], stayed[again], stated is not None)
 
     def distances_mm(self) -> Floats:
         """Distance of each row from the mean of its pose (n,), mm."""
@@ -191,17 +197,18 @@ def _standing(found: Repeats) -> str:
 
 
 def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
-    """How far poses lie apart that a joint reached from both sides, in the order of the rows."""
+    """How far poses lie apart that a joint, or all as rows say themselves, reached from both sides."""
     rows, beyond = [], []
     noise = whole_noise_mm(facts.calibration)
-    for joint in range(len(facts.joints)):
+    names = ["all joints"] if found.stated else [f"joint {joint + 1}" for joint in range(len(facts.joints))]
+    for joint, name in enumerate(names):
         apart, alone = found.both_sides_mm(joint, noise)
         if len(apart) < FEWEST_GROUPS:
             continue
         both, expected = (float(np.sqrt(np.square(values).mean())) for values in (apart, alone))
-        rows.append([f"joint {joint + 1}", str(len(apart)), fixed(both), fixed(expected)])
+        rows.append([name, str(len(apart)), fixed(both), fixed(expected)])
         if both > expected * np.sqrt(1.0 + SURE * np.sqrt(2.0 / (COORDINATES * len(apart)))):
-            beyond.append(f"joint {joint + 1} ({fixed(both)} mm)")
+            beyond.append(f"{name} ({fixed(both)} mm)")
     if not rows:
         return []
     table = Table(
@@ -209,8 +216,12 @@ def hysteresis(facts: Facts, found: Repeats) -> list[Table]:
         ["", "poses", "difference of the sides, mm", "expected from scatter, mm"],
         rows,
         says=f"{_beyond(beyond)} Both columns are root mean squares; scatter is that within the sides, and "
-        f"the calibration's noise of {fixed(noise)} mm per coordinate where each has one measurement. The "
-        "order of the rows is taken for the order of measuring.",
+        f"the calibration's noise of {fixed(noise)} mm per coordinate where each has one measurement. "
+        + (
+            f"The column {APPROACH} says from which side all joints came."
+            if found.stated
+            else "The order of the rows is taken for the order of measuring."
+        ),
     )
     return [table]
 
@@ -249,6 +260,16 @@ def _stayed(data: Measurements, order: Index, place: Index) -> NDArray[np.bool_]
     unplanned = np.ones(len(order), bool) if data.purpose is None else data.purpose[order] != REPEAT
     follows = (source == source[before]) & (number == number[before] + 1)
     return np.asarray((place == place[before]) & follows & unplanned)
+
+
+def _stated_approach(data: Measurements) -> Floats | None:
+    """The side that rows say all joints came from (n, N), zero where none; None where they do not say."""
+    if APPROACH not in data.features.columns:
+        return None
+    sides = data.features[APPROACH].to_numpy(dtype=np.float64)
+    if not np.isin(sides, (1.0, -1.0, 0.0)).all() or not {1.0, -1.0} <= set(sides):
+        return None
+    return np.repeat(sides[:, None], data.joint_count, axis=1)
 
 
 def _approach(data: Measurements) -> Floats:
