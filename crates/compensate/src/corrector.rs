@@ -291,7 +291,6 @@ fn plan(model: &Model, options: &Options) -> Result<Plan, CompensateError> {
     let hopeless = if plan.position_first() { plan.hopeless } else { HOPELESS };
     // Short steps would end on the way to a turn that can be met, and meet the position by turning the tool.
     let longest = if plan.position_first() { LONGEST_STEP } else { plan.longest };
-    let longest = if plan.position_first() { LONGEST_STEP } else { plan.longest };
     let foreseen = plan.enough() * if plan.varied { UNSTEADY } else { STEADILY };
     Ok(Plan { longest, hopeless, foreseen, ..plan })
 }

@@ -52,7 +52,9 @@ def command(
     if as_json:
         print_json(run.content)
     else:
-        _print(run, output, again=f"truearm fleet {typed(fleet)} -o {typed(output)}")
+        places = f" --scheduler {scheduler}" if scheduler else ""
+        places += f" --workers {workers}" if workers else ""
+        _print(run, output, again=f"truearm fleet {typed(fleet)} -o {typed(output)}{places}")
     if run.failed:
         raise typer.Exit(FAILED)
 

@@ -24,7 +24,10 @@ COLOURS: Final = {
 }
 PALE: Final = "#bbbbbb"
 PANEL_IN: Final = (2.6, 2.1)
-TICKS_MM: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+TICKS_MM: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)
+FEWEST_TICKS: Final = 2
+MOST_COLUMNS: Final = 4
+LEGEND_ROW_IN: Final = 0.2
 STEM: Final = "learning_curves"
 CROWDED: Final = 1.5
 """Ratio of two numbers of poses below which their labels would touch."""
@@ -37,16 +40,17 @@ def save_curves(summary: Mapping[str, Any], directory: Path) -> list[Path]:
     if not names:
         return []
     with mpl.rc_context(STYLE):
-        figure = Figure(
-            figsize=(PANEL_IN[0] * len(kinds), PANEL_IN[1] * len(names) + 0.8), layout="constrained"
-        )
+        figure = Figure(layout="constrained")
         panels = figure.subplots(len(names), len(kinds), squeeze=False)
         lines: dict[str, Any] = {}
         for row, name in enumerate(names):
             for column, kind in enumerate(kinds):
                 _draw(panels[row][column], summary, name, kind, lines)
+        columns = min(MOST_COLUMNS, len(kinds))
+        legend_in = LEGEND_ROW_IN * math.ceil(len(lines) / columns)
+        figure.set_size_inches(PANEL_IN[0] * len(kinds), PANEL_IN[1] * len(names) + legend_in)
         figure.legend(
-            [lines[name] for name in lines], list(lines), loc="outside lower center", ncols=4, frameon=False
+            list(lines.values()), list(lines), loc="outside lower center", ncols=columns, frameon=False
         )
         return save_figure(figure, directory / STEM)
 
@@ -84,6 +88,11 @@ def _draw(axes: Axes, summary: Mapping[str, Any], name: str, kind: str, lines: d
     axes.minorticks_off()
     low, high = axes.get_ylim()
     ticks = [tick for tick in TICKS_MM if low <= tick <= high]
+    if len(ticks) < FEWEST_TICKS:
+        below = max((tick for tick in TICKS_MM if tick <= low), default=low)
+        above = min((tick for tick in TICKS_MM if tick >= high), default=high)
+        ticks = [below, *ticks, above]
+        axes.set_ylim(below, above)
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_title(f"{name}, {SPLITS[kind]}", fontsize=6)
     axes.set_xlabel("training poses")
