@@ -18,6 +18,8 @@ Rows = NDArray[np.int64]
 MOST_ROWS: Final = 60
 FEWEST_ROWS: Final = 12
 """Rows, at the most and at the least, that such a fit is asked of."""
+LEAST_SPREAD_M: Final = 1e-4
+"""Points that lie closer together are taken to be so far apart."""
 
 
 def some_rows(rows: Rows, most: int = MOST_ROWS) -> Rows:
@@ -43,6 +45,16 @@ class Seen:
     def of(cls, data: Measurements, target: int) -> "Seen":
         """The points of a target, index from 0."""
         return cls(data.readings, data.targets[:, target], data.sigma_m)
+
+    @classmethod
+    def first(cls, data: Measurements) -> "Seen | None":
+        """Up to MOST_ROWS points of the first set-up, of the target that most rows hold; None if too few."""
+        if data.target_count == 0:
+            return None
+        target = data.most_held()
+        held = np.isfinite(data.targets[:, target]).all(axis=1) & (data.group == data.groups[0])
+        rows = np.flatnonzero(held)
+        return cls.of(data, target).select(some_rows(rows)) if len(rows) >= FEWEST_ROWS else None
 
     def select(self, rows: Rows) -> "Seen":
         """Some of them, by their indices."""
@@ -103,6 +115,16 @@ class NominalArm:
         """That of frame and target alone."""
         values = seen.readings @ self.coupling.T
         return Problem(self.chain, measured_points(values, seen.points, sigma_m=seen.sigma_m), [], False)
+
+
+def spread_m(points: Floats) -> float:
+    """Median distance of points (n, 3) from their median point, m."""
+    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
+
+
+def relative_misfit(robot: Robot, seen: Seen) -> float:
+    """How far points are from those of the nominal arm, over their spread."""
+    return NominalArm.of(robot).misfit_m(seen) / max(spread_m(seen.points), LEAST_SPREAD_M)
 
 
 def _distances(left: Floats, points: Floats) -> Floats:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from truearm.errors import InputError, Notice
 from truearm.measurements import Measurements
 from truearm.mixed_units import check_mixed_units
-from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
+from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, relative_misfit, some_rows, spread_m
 from truearm.robot import Robot
 from truearm.stated_in_degrees import check_angles, check_degrees, otherwise_notices, outside_limits
 from truearm.turning_sense import FIT, MISFIT
@@ -190,15 +190,10 @@ def _check_slides(measurements: Measurements, robot: Robot) -> None:
 
 def _fits_much_better(converted: Measurements, given: Measurements, robot: Robot) -> bool:
     """Whether the nominal arm fits points of the first set-up far better with other readings."""
-    if given.target_count == 0:
+    arm, seen, read = NominalArm.of(robot), Seen.first(given), Seen.first(converted)
+    if seen is None or read is None:
         return False
-    target = given.most_held()
-    seen = np.isfinite(given.targets[:, target]).all(axis=1) & (given.group == given.groups[0])
-    if seen.sum() < FEWEST_ROWS:
-        return False
-    rows = some_rows(np.flatnonzero(seen))
-    arm = NominalArm.of(robot)
-    now, then = (arm.misfit_m(Seen.of(each, target).select(rows)) for each in (given, converted))
+    now, then = arm.misfit_m(seen), arm.misfit_m(read)
     return then * FIT_BETTER < now
 
 
@@ -231,7 +226,7 @@ def _check_spread(group: Measurements, robot: Robot, name: str) -> None:
     seen = np.isfinite(points).all(axis=1)
     if seen.sum() < 2:
         return
-    nominal, measured = _spread(robot.position(group.readings[seen])), _spread(points[seen])
+    nominal, measured = spread_m(robot.position(group.readings[seen])), spread_m(points[seen])
     where = f"{', '.join(group.files)}, group {name}"
     found = (
         f"half of the measured points lie more than {measured:.4g} m from their middle, "
@@ -290,8 +285,7 @@ def _fit_in_metres(rows: Measurements, robot: Robot) -> bool:
 def _misfit(rows: Measurements, robot: Robot, factor: float) -> float:
     """How far points times `factor` are from those of the nominal arm, over their spread."""
     seen = Seen.of(rows, rows.most_held())
-    seen = replace(seen, points=factor * seen.points)
-    return NominalArm.of(robot).misfit_m(seen) / max(_spread(seen.points), ALIKE_RAD_OR_M)
+    return relative_misfit(robot, replace(seen, points=factor * seen.points))
 
 
 def _check_distances(measurements: Measurements, robot: Robot) -> None:
@@ -300,7 +294,7 @@ def _check_distances(measurements: Measurements, robot: Robot) -> None:
     if given is None or not np.isfinite(given).any():
         return
     measured = float(np.nanmedian(given))
-    nominal = _spread(robot.position(measurements.readings))
+    nominal = spread_m(robot.position(measurements.readings))
     found = (
         f"the median of the measured distances is {measured:.4g} m, and half of the poses take the tool of "
         f"{robot.name} more than {nominal:.3g} m from their middle"
@@ -333,11 +327,6 @@ def _could_be_radians(group: Measurements, robot: Robot) -> bool:
     degrees = np.array(group.joint_units) == "deg"
     values = group.readings[:, degrees] / RADIANS_PER_DEGREE
     return bool(degrees.any()) and bool((np.abs(values) <= 2.0 * np.pi).all())
-
-
-def _spread(points: Floats) -> float:
-    """Median distance of points (n, 3) from their median point."""
-    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
 
 
 def _limit_notices(measurements: Measurements, robot: Robot) -> list[Notice]:

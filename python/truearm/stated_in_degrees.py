@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, Notice, list_rows
 from truearm.measurements import Measurements
-from truearm.nominal_misfit import FEWEST_ROWS, NominalArm, Seen, some_rows
+from truearm.nominal_misfit import Seen, relative_misfit
 from truearm.robot import Robot
 from truearm.turning_sense import FIT, MISFIT
 from truearm.units import RADIANS_PER_DEGREE
@@ -156,17 +156,6 @@ def _denied(converted: Measurements, robot: Robot) -> bool:
 
 
 def _misfit(given: Measurements, robot: Robot) -> float:
-    """How far points of the first set-up are from those of the nominal arm, over their spread.
-
-    Zero if they are too few.
-    """
-    if given.target_count == 0:
-        return 0.0
-    target = given.most_held()
-    points = given.targets[:, target]
-    seen = np.asarray(np.isfinite(points).all(axis=1)) & (given.group == given.groups[0])
-    if seen.sum() < FEWEST_ROWS:
-        return 0.0
-    some = Seen.of(given, target).select(some_rows(np.flatnonzero(seen)))
-    spread = float(np.median(np.linalg.norm(some.points - np.median(some.points, axis=0), axis=1)))
-    return NominalArm.of(robot).misfit_m(some) / spread if spread > 0.0 else 0.0
+    """How far the first set-up's points are from the nominal arm's, over their spread; zero if too few."""
+    seen = Seen.first(given)
+    return 0.0 if seen is None else relative_misfit(robot, seen)

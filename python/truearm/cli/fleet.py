@@ -52,7 +52,7 @@ def command(
     if as_json:
         print_json(run.content)
     else:
-        places = f" --scheduler {scheduler}" if scheduler else ""
+        places = f" --scheduler {typed(scheduler)}" if scheduler else ""
         places += f" --workers {workers}" if workers else ""
         _print(run, output, again=f"truearm fleet {typed(fleet)} -o {typed(output)}{places}")
     if run.failed:

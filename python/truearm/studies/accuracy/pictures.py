@@ -24,7 +24,7 @@ COLOURS: Final = {
 }
 PALE: Final = "#bbbbbb"
 PANEL_IN: Final = (2.6, 2.1)
-TICKS_MM: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)
+TICKS_MM: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 FEWEST_TICKS: Final = 2
 MOST_COLUMNS: Final = 4
 LEGEND_ROW_IN: Final = 0.2
