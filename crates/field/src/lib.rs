@@ -33,6 +33,7 @@ mod error;
 mod evidence;
 mod extrapolation;
 mod fit;
+mod gram;
 mod greedy;
 mod hyper;
 mod hyper_check;

@@ -174,6 +174,8 @@ pub struct BlockPlan<'a> {
     pub axes: Vec<(usize, &'a CellKernel)>,
     /// Driven columns with the prior variance of their weights.
     pub driven: Vec<(usize, f64)>,
+    /// Whether these are all that blocks drive, and not the joint's own column alone.
+    pub of_all: bool,
 }
 
 impl BlockPlan<'_> {
@@ -214,7 +216,7 @@ impl Model {
         for (k, own) in self.by_column.own.iter().enumerate() {
             if let (Some((p, lever)), Some(cells)) = (own, &self.cells.own[k]) {
                 let driven = vec![(*p, (self.hyper.own * lever).powi(2))];
-                plans.push(BlockPlan { name: "own", axes: vec![(k, cells)], driven });
+                plans.push(BlockPlan { name: "own", axes: vec![(k, cells)], driven, of_all: false });
             }
         }
         for (k, cells) in self.cells.smooth.iter().enumerate() {
@@ -222,16 +224,18 @@ impl Model {
                 name: "smooth",
                 axes: vec![(k, cells)],
                 driven: self.driven(&self.hyper.smooth),
+                of_all: true,
             });
         }
         for (axes, product) in self.cells.products.iter().zip(&self.hyper.products) {
             let axes = axes.iter().map(|(k, cells)| (*k, cells)).collect();
-            plans.push(BlockPlan { name: &product.name, axes, driven: self.driven(&product.amplitudes) });
+            let driven = self.driven(&product.amplitudes);
+            plans.push(BlockPlan { name: &product.name, axes, driven, of_all: true });
         }
         for ((k, cells), wave) in self.cells.waves.iter().zip(&self.hyper.waves) {
             if let Some((p, lever)) = self.by_column.own[*k] {
                 let driven = vec![(p, (wave.amplitude * lever).powi(2))];
-                plans.push(BlockPlan { name: WAVE_NAME, axes: vec![(*k, cells)], driven });
+                plans.push(BlockPlan { name: WAVE_NAME, axes: vec![(*k, cells)], driven, of_all: false });
             }
         }
         plans

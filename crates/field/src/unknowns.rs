@@ -49,15 +49,22 @@ pub struct Unknowns {
 }
 
 /// Unknowns that a model has in weight space, constants and set-up included; `None` where the cells' priors fail.
+///
+/// Blocks that drive all columns have the last ones.
 pub fn unknowns(model: &Model) -> Option<(Vec<Unknowns>, usize)> {
-    let mut start = sag_start(model) + model.training.geometry.len();
+    let plans = model.plans();
     let mut all = Vec::new();
-    for plan in model.plans() {
+    for plan in &plans {
         let roots: Vec<Root> = plan.axes.iter().map(|(_, cells)| Root::new(cells)).collect::<Option<_>>()?;
         let combinations = combinations(&roots);
-        let count = combinations.len() * plan.driven.len();
-        all.push(Unknowns { start, roots, combinations });
-        start += count;
+        all.push(Unknowns { start: 0, roots, combinations });
+    }
+    let mut start = sag_start(model) + model.training.geometry.len();
+    for of_all in [false, true] {
+        for (plan, unknowns) in plans.iter().zip(&mut all).filter(|(plan, _)| plan.of_all == of_all) {
+            unknowns.start = start;
+            start += unknowns.combinations.len() * plan.driven.len();
+        }
     }
     Some((all, start))
 }

@@ -41,6 +41,41 @@ impl<'a> WeightRows<'a> {
         Self { model, unknowns, width, plans: model.plans(), sag: model.sag_terms() }
     }
 
+    /// The model whose unknowns they are of.
+    pub fn model(&self) -> &Model {
+        self.model
+    }
+
+    /// Blocks that drive all columns.
+    fn of_all(&self) -> impl Iterator<Item = (&BlockPlan<'a>, &Unknowns)> {
+        self.plans.iter().zip(self.unknowns).filter(|(plan, _)| plan.of_all)
+    }
+
+    /// The first unknown of blocks that drive all columns: one block stands behind the other, up to the last unknown.
+    pub fn first_of_all(&self) -> usize {
+        self.of_all().map(|(_, unknowns)| unknowns.start).min().unwrap_or(self.width)
+    }
+
+    /// The columns that those blocks drive, in the order of each one's unknowns.
+    pub fn driven_by_all(&self) -> Vec<usize> {
+        self.of_all().next().map_or(vec![], |(plan, _)| plan.driven.iter().map(|&(p, _)| p).collect())
+    }
+
+    /// Prior standard deviation of the weights of those blocks' features, (columns, F).
+    pub fn deviations_of_all(&self) -> Mat<f64> {
+        let of_features = self
+            .of_all()
+            .flat_map(|(plan, unknowns)| std::iter::repeat_n(&plan.driven, unknowns.combinations.len()));
+        let of_features: Vec<_> = of_features.collect();
+        let columns = of_features.first().map_or(0, |driven| driven.len());
+        Mat::from_fn(columns, of_features.len(), |k, f| of_features[f][k].1.sqrt())
+    }
+
+    /// Those blocks' features of a configuration, one block behind the other, (F,).
+    pub fn features_of_all(&self, values: &[f64]) -> Vec<f64> {
+        self.of_all().flat_map(|(plan, unknowns)| products(plan, unknowns, values)).collect()
+    }
+
     /// Calls `use_batch` with whitened rows of some poses at a time, in order.
     ///
     /// # Errors
@@ -146,7 +181,7 @@ fn products(plan: &BlockPlan, unknowns: &Unknowns, values: &[f64]) -> Vec<f64> {
 
 impl Model {
     /// Factor of the noise covariance of one pose's rows: instrument and what its joints do not repeat.
-    fn noise_cholesky(&self, pose: usize) -> Result<Cholesky, FieldError> {
+    pub fn noise_cholesky(&self, pose: usize) -> Result<Cholesky, FieldError> {
         let rows = self.training.rows(pose);
         let noise = self.noise_covariance(&self.training.jacobian, rows.clone());
         let noise = Mat::from_fn(rows.len(), rows.len(), |i, j| {

@@ -5,13 +5,13 @@
 //! the pose's own noise covariance. With A the whitened rows, `(I + A^T A) v = A^T r`; set-up unknowns stand beside
 //! with the precision of their priors.
 
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat, MatRef};
+use faer::{Mat, MatRef};
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
+use crate::gram::add_gram;
 use crate::model::{BlockPlan, Model};
 use crate::outliers::SUSPICIOUS;
 use crate::posterior::{LeaveOneOut, Query, Solution};
@@ -35,21 +35,6 @@ pub struct WeightSpace {
     cancel: Cancel,
 }
 
-/// Adds sign rows rows^T, of rows (u, r), to the lower triangle.
-fn add_gram(normal: &mut Mat<f64>, rows: MatRef<f64>, sign: f64) {
-    triangular::matmul(
-        normal.as_mut(),
-        BlockStructure::TriangularLower,
-        Accum::Add,
-        rows,
-        BlockStructure::Rectangular,
-        rows.transpose(),
-        BlockStructure::Rectangular,
-        sign,
-        parallelism(),
-    );
-}
-
 fn factored(normal: &Mat<f64>, cancel: &Cancel) -> Result<Cholesky, FieldError> {
     let rows = normal.nrows();
     let factor = Cholesky::heeding(normal.clone(), parallelism(), cancel)?;
@@ -70,10 +55,7 @@ impl WeightSpace {
             normal[(at, at)] = *known;
         }
         let poses: Vec<usize> = (0..model.training.pose_count()).collect();
-        WeightRows::new(&model, &unknowns, width).each(&poses, cancel, |batch| {
-            add_gram(&mut normal, batch.rows, 1.0);
-            Ok(())
-        })?;
+        add_gram(&mut normal, &WeightRows::new(&model, &unknowns, width), &poses, 1.0, cancel)?;
         let factor = factored(&normal, cancel)?;
         Ok(Self { model, unknowns, width, normal, factor, cancel: cancel.clone() })
     }
@@ -90,14 +72,8 @@ impl WeightSpace {
             if let Some(weight) = weight {
                 self.model.training.weight = weight;
             }
-            WeightRows::new(&self.model, &self.unknowns, self.width).each(
-                &changed,
-                &self.cancel,
-                |batch| {
-                    add_gram(&mut self.normal, batch.rows, sign);
-                    Ok(())
-                },
-            )?;
+            let rows = WeightRows::new(&self.model, &self.unknowns, self.width);
+            add_gram(&mut self.normal, &rows, &changed, sign, &self.cancel)?;
         }
         self.factor = factored(&self.normal, &self.cancel)?;
         Ok(self)

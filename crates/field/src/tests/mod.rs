@@ -3,6 +3,7 @@
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod evidence;
+mod gram;
 mod greedy;
 mod joined;
 mod oracle;
