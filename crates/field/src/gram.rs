@@ -3,7 +3,8 @@
 //! A row of a block that drives all columns is `phi (x) w`: what the block's eigenvectors make of the pose's joints, times
 //! the row's whitened entries. Over the rows of a pose these add up to `phi phi^T (x) w^T w`, so that each pair of columns
 //! asks for one symmetric product of features, `sum of (w^T w)_ab phi phi^T` over the poses, whatever the rows of a
-//! pose. Of 24 columns and three rows a pose that is a sixth of the multiplications of the rows' own product.
+//! pose. Of 24 columns and three rows a pose that is a sixth of the multiplications of the rows' own product. With
+//! other unknowns x of a row it meets in `phi (sum of x w)^T`, a third of them.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -13,7 +14,7 @@ use truearm_estimate::Cancel;
 use truearm_estimate::dense::parallelism;
 
 use crate::FieldError;
-use crate::model::Model;
+use crate::pairs::by_pose;
 use crate::weight_rows::WeightRows;
 
 /// Poses whose features are multiplied at a time: they stay in a core's cache.
@@ -32,126 +33,134 @@ pub fn add_gram(
     sign: f64,
     cancel: &Cancel,
 ) -> Result<(), FieldError> {
+    let of_all = OfAll::new(rows, poses)?;
+    let beside = of_all.start;
+    let mut meeting = vec![Mat::zeros(of_all.features.nrows(), beside); of_all.entries.nrows()];
+    let mut first = 0;
     rows.each(poses, cancel, |batch| {
-        add_beside(normal.as_mut(), batch.rows, rows.first_of_all(), sign);
+        let own = batch.rows.subrows(0, beside);
+        add_lower(normal.as_mut().submatrix_mut(0, 0, beside, beside), own, own, sign, parallelism());
+        meeting.par_iter_mut().enumerate().for_each(|(column, sum)| of_all.meet(own, first, column, sum));
+        first += batch.poses.len();
         Ok(())
     })?;
-    OfAll::new(rows, poses)?.add(normal, sign, cancel)
+    for (column, sum) in meeting.iter().enumerate() {
+        for k in 0..beside {
+            for f in 0..sum.nrows() {
+                let deviation = of_all.deviations[(column, f)];
+                normal[(of_all.unknown(f, column), k)] += sign * deviation * sum[(f, k)];
+            }
+        }
+    }
+    of_all.add(normal, sign, cancel)
 }
 
-/// The part in which the first `beside` unknowns, those of no block that drives all columns, meet one another and the others.
-fn add_beside(normal: MatMut<f64>, rows: MatRef<f64>, beside: usize, sign: f64) {
-    let (own, others) = rows.split_at_row(beside);
-    let (corner, _, below, _) = normal.split_at_mut(beside, beside);
-    triangular::matmul(
-        corner,
-        BlockStructure::TriangularLower,
-        Accum::Add,
-        own,
-        BlockStructure::Rectangular,
-        own.transpose(),
-        BlockStructure::Rectangular,
-        sign,
-        parallelism(),
-    );
-    matmul(below, Accum::Add, others, own.transpose(), sign, parallelism());
+/// Adds sign left right^T to the lower triangle of a square.
+fn add_lower(out: MatMut<f64>, left: MatRef<f64>, right: MatRef<f64>, sign: f64, par: Par) {
+    let (triangle, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    triangular::matmul(out, triangle, Accum::Add, left, whole, right.transpose(), whole, sign, par);
 }
 
 /// Blocks that drive all columns, at some poses.
 struct OfAll {
-    /// Their first unknown.
+    /// Their first unknown: those before it are of constants, set-up, `sag` and single columns.
     start: usize,
     /// phi, block by block, (F, n).
     features: Mat<f64>,
     /// Prior standard deviation of each feature's weight for each driven column, (columns, F).
     deviations: Mat<f64>,
-    /// Pairs (a, b) of driven columns, a >= b.
-    pairs: Vec<(usize, usize)>,
-    /// w^T w of each pair, (pairs, n).
-    moments: Mat<f64>,
+    /// w of the poses' rows, one pose behind the other, (columns, r), and where each pose's begin, (n + 1,).
+    entries: Mat<f64>,
+    offsets: Vec<usize>,
 }
 
 impl OfAll {
     fn new(rows: &WeightRows, poses: &[usize]) -> Result<Self, FieldError> {
-        let model = rows.model();
+        let training = &rows.model().training;
         let columns = rows.driven_by_all();
-        let pairs: Vec<_> = (0..columns.len()).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
         let deviations = rows.deviations_of_all();
+        let counts = || poses.iter().map(|&pose| training.rows(pose).len());
+        let mut offsets = vec![0];
+        offsets.extend(counts().scan(0, |end, count| {
+            *end += count;
+            Some(*end)
+        }));
         let mut features = Mat::zeros(deviations.ncols(), poses.len());
-        let mut moments = Mat::zeros(pairs.len(), poses.len());
-        let places = features.par_col_iter_mut().zip(moments.par_col_iter_mut());
-        places.zip(poses.par_iter()).try_for_each(|((features, moments), &pose)| {
-            let values = rows.features_of_all(model.training.values_of(pose));
+        let mut entries = Mat::zeros(columns.len(), offsets[poses.len()]);
+        let parts = by_pose(entries.as_mut(), counts());
+        let places = poses.par_iter().zip(features.par_col_iter_mut()).zip(parts);
+        places.try_for_each(|((&pose, features), mut entries)| {
+            let values = rows.features_of_all(training.values_of(pose));
             features.iter_mut().zip(values).for_each(|(out, value)| *out = value);
-            let entries = whitened(model, pose, &columns)?;
-            moments
-                .iter_mut()
-                .zip(&pairs)
-                .for_each(|(out, &(a, b))| *out = entries.col(a).transpose() * entries.col(b));
+            for (r, row) in training.rows(pose).enumerate() {
+                let jacobian = training.jacobian_row(row);
+                columns.iter().enumerate().for_each(|(k, &p)| entries[(k, r)] = jacobian[p]);
+            }
+            rows.model().noise_cholesky(pose)?.solve_lower(entries.transpose_mut());
             Ok::<(), FieldError>(())
         })?;
-        Ok(Self { start: rows.first_of_all(), features, deviations, pairs, moments })
+        Ok(Self { start: rows.first_of_all(), features, deviations, entries, offsets })
+    }
+
+    /// The unknown of a feature and a column.
+    fn unknown(&self, feature: usize, column: usize) -> usize {
+        self.start + feature * self.entries.nrows() + column
+    }
+
+    /// Adds to `sum` (F, k) what poses from `first` on hold of one column with other unknowns, of rows `own` (k, r).
+    fn meet(&self, own: MatRef<f64>, first: usize, column: usize, sum: &mut Mat<f64>) {
+        let begin = self.offsets[first];
+        let poses = self.offsets[first..].partition_point(|&offset| offset < begin + own.ncols());
+        let rows = |i: usize| self.offsets[first + i]..self.offsets[first + i + 1];
+        let by_pose = Mat::from_fn(own.nrows(), poses, |k, i| {
+            rows(i).map(|row| own[(k, row - begin)] * self.entries[(column, row)]).sum::<f64>()
+        });
+        let features = self.features.subcols(first, poses);
+        matmul(sum.as_mut(), Accum::Add, features, by_pose.transpose(), 1.0, Par::Seq);
     }
 
     fn add(&self, normal: &mut Mat<f64>, sign: f64, cancel: &Cancel) -> Result<(), FieldError> {
-        for first in (0..self.pairs.len()).step_by(PAIRS) {
-            let pairs = first..(first + PAIRS).min(self.pairs.len());
-            let sums = pairs.clone().into_par_iter().map(|pair| {
+        let pairs: Vec<_> = (0..self.entries.nrows()).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
+        for pairs in pairs.chunks(PAIRS) {
+            let sums = pairs.par_iter().map(|&pair| {
                 cancel.check()?;
                 Ok(self.sum(pair))
             });
             let sums = sums.collect::<Result<Vec<_>, FieldError>>()?;
-            pairs.zip(&sums).for_each(|(pair, sum)| self.put(normal, self.pairs[pair], sum, sign));
+            pairs.iter().zip(&sums).for_each(|(&pair, sum)| self.put(normal, pair, sum, sign));
         }
         Ok(())
     }
 
-    /// Sum over the poses of a pair's moment times phi phi^T, lower triangle.
-    fn sum(&self, pair: usize) -> Mat<f64> {
+    /// Sum over the poses of (w^T w)_ab phi phi^T, lower triangle.
+    fn sum(&self, (a, b): (usize, usize)) -> Mat<f64> {
         let (count, poses) = (self.features.nrows(), self.features.ncols());
+        let moment = |pose: usize| -> f64 {
+            let rows = self.offsets[pose]..self.offsets[pose + 1];
+            rows.map(|row| self.entries[(a, row)] * self.entries[(b, row)]).sum()
+        };
+        let moments: Vec<f64> = (0..poses).map(moment).collect();
         let mut sum = Mat::zeros(count, count);
         for first in (0..poses).step_by(POSES) {
             let part = self.features.subcols(first, POSES.min(poses - first));
-            let scaled =
-                Mat::from_fn(count, part.ncols(), |f, i| self.moments[(pair, first + i)] * part[(f, i)]);
-            triangular::matmul(
-                sum.as_mut(),
-                BlockStructure::TriangularLower,
-                Accum::Add,
-                part,
-                BlockStructure::Rectangular,
-                scaled.transpose(),
-                BlockStructure::Rectangular,
-                1.0,
-                Par::Seq,
-            );
+            let scaled = Mat::from_fn(count, part.ncols(), |f, i| moments[first + i] * part[(f, i)]);
+            add_lower(sum.as_mut(), part, scaled.as_ref(), 1.0, Par::Seq);
         }
         sum
     }
 
     /// Adds a pair's sum where its two columns meet: for two features each of them goes with either.
     fn put(&self, normal: &mut Mat<f64>, (a, b): (usize, usize), sum: &Mat<f64>, sign: f64) {
-        let at = |feature: usize, column: usize| self.start + feature * self.deviations.nrows() + column;
         for g in 0..sum.ncols() {
             for f in g..sum.nrows() {
                 let value = sign * sum[(f, g)];
                 let deviation =
                     |of_f: usize, of_g: usize| self.deviations[(of_f, f)] * self.deviations[(of_g, g)];
-                normal[(at(f, a), at(g, b))] += value * deviation(a, b);
+                normal[(self.unknown(f, a), self.unknown(g, b))] += value * deviation(a, b);
                 if a != b && f != g {
-                    normal[(at(f, b), at(g, a))] += value * deviation(b, a);
+                    normal[(self.unknown(f, b), self.unknown(g, a))] += value * deviation(b, a);
                 }
             }
         }
     }
-}
-
-/// A pose's rows of some columns, whitened, (m, columns).
-fn whitened(model: &Model, pose: usize, columns: &[usize]) -> Result<Mat<f64>, FieldError> {
-    let range = model.training.rows(pose);
-    let mut entries = Mat::from_fn(range.len(), columns.len(), |r, k| {
-        model.training.jacobian_row(range.start + r)[columns[k]]
-    });
-    model.noise_cholesky(pose)?.solve_lower(entries.as_mut());
-    Ok(entries)
 }
