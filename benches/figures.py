@@ -3,19 +3,23 @@
     python -m benches.figures OUT [--data DIR] [--seeds 10] [--only NAME]
     python docs/make_results.py OUT
 
-Writes OUT/NAME/case.json and OUT/NAME/seed-S/summary.json, or evaluation.json; what is there is not run
-again. The first seed is 7, for which targets are stated; the others follow from 0.
+Writes OUT/NAME/case.json and OUT/NAME/seed-S/summary.json and cost.json, or evaluation.json; what is there is
+not run again. The first seed is 7, for which targets are stated; the others follow from 0.
 """
 
 import argparse
 import json
+import os
 import subprocess
 import sys
+import time
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 FIRST_SEED = 7
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+BYTES_OF_PEAK = 1 if sys.platform == "darwin" else 1024
+MEGABYTE = 1e6
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,8 @@ def calibrate(case: Case, folder: Path, data: Path, seed: int) -> None:
     files = [str(data / name) for name in case.files]
     use = [] if "--use" in case.options else ["--use", "position"]
     options = [*use, "--seed", str(seed), "--no-refit", *case.options]
-    truearm("calibrate", case.robot, *files, "-o", str(folder), *options)
+    cost = what_it_takes("calibrate", case.robot, *files, "-o", str(folder), *options)
+    (folder / "cost.json").write_text(json.dumps(cost))
 
 
 def seeds(count: int) -> list[int]:
@@ -137,9 +142,24 @@ def seeds(count: int) -> list[int]:
 
 def truearm(*arguments: str) -> str:
     """What the command prints as JSON; its progress goes to our stderr."""
-    program = Path(sys.executable).parent / "truearm"
-    command = [str(program), *arguments, "--json"]
-    return subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+    return subprocess.run(_command(*arguments), stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
+def what_it_takes(*arguments: str) -> dict[str, float | None]:
+    """Seconds by the clock and the largest memory, in MB, of a command, and how many cores there are."""
+    started = time.monotonic()
+    command = _command(*arguments)
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    peak = usage.ru_maxrss * BYTES_OF_PEAK / MEGABYTE
+    return {"seconds": time.monotonic() - started, "peak_mb": peak, "cores": os.cpu_count()}
+
+
+def _command(*arguments: str) -> list[str]:
+    return [str(Path(sys.executable).parent / "truearm"), *arguments, "--json"]
 
 
 if __name__ == "__main__":

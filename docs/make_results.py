@@ -31,7 +31,8 @@ constant and variable each have their own frame and target fitted to the same ro
 seed 7; the second shows how much the choice of held-out rows matters, and which share of the held-out
 coordinates lies within the 95 % intervals that were given for them. Where set-ups moved while they were
 measured that is [taken out](../explanations/drift.md) of the rows, the held-out ones too; the third table has
-the errors with it left in. The mean to reach is the goal that the project set itself.
+the errors with it left in; the last one what `truearm calibrate --no-refit` takes, its report included. The
+mean to reach is the goal that the project set itself.
 
 The data, q1 ... q6 in rad and x y z in m, from their authors' repositories:
 
@@ -46,7 +47,7 @@ def main() -> int:
     if not found:
         parser.error("there are no results; run: python -m benches.figures OUT")
     sources = "\n".join(f"- {arm}, {how}: {_linked(place)}" for arm, (how, place) in SOURCES.items())
-    tables = [first_seed_table(found), "", seeds_table(found), "", drift_table(found)]
+    tables = [first_seed_table(found), "", seeds_table(found), "", drift_table(found), "", cost_table(found)]
     PAGE.write_text("\n".join([HEAD + sources, "", *tables, ""]))
     short = {name: case for name, case in found.items() if name in IN_README}
     written = re.sub(
@@ -72,6 +73,7 @@ def read_cases(out: Path) -> dict[str, dict[str, Any]]:
         }
         case["coverage"] = [] if case["judge"] else [read_coverage(folder) for folder in folders]
         case["drift"] = [] if case["judge"] else [read_drift(folder) for folder in folders]
+        case["cost"] = read_cost(out / case["name"] / f"seed-{FIRST_SEED}")
         if FIRST_SEED in case["errors"]:
             cases[case["name"]] = case
     return cases
@@ -95,6 +97,16 @@ def read_drift(folder: Path) -> tuple[float, float] | None:
     """How far the set-up moved, and the variable model's mean error with that left in, or None."""
     drift = json.loads((folder / "summary.json").read_text())["drift"]
     return None if drift is None else (max(drift["moved_mm"].values()), drift["left_in_mean_mm"]["variable"])
+
+
+def read_cost(folder: Path) -> dict[str, float] | None:
+    """Training rows, seconds of fit and command, memory and cores; None where they were not kept."""
+    kept = folder / "cost.json"
+    if not kept.exists():
+        return None
+    summary = json.loads((folder / "summary.json").read_text())
+    fit = summary["seconds"]["constant"] + summary["seconds"]["variable"]
+    return {"rows": summary["n_train"], "fit": fit, **json.loads(kept.read_text())}
 
 
 def first_seed_table(cases: dict[str, dict[str, Any]]) -> str:
@@ -147,6 +159,18 @@ def drift_table(cases: dict[str, dict[str, Any]]) -> str:
         spans, left_in = zip(*moved, strict=True)
         medians = " | ".join(f"{statistics.median(some):.3f}" for some in (spans, taken_out, left_in))
         lines.append(f"| {case['title']} | {len(moved)} of {len(case['drift'])} seeds | {medians} |")
+    return "\n".join(lines)
+
+
+def cost_table(cases: dict[str, dict[str, Any]]) -> str:
+    """Time and memory of the first seed, where they were kept."""
+    lines = ["| data | training poses | fit, s | all, s | cores | memory, MB |", "|---|---|---|---|---|---|"]
+    for case in cases.values():
+        if (cost := case["cost"]) is not None:
+            times = f"{cost['fit']:.0f} | {cost['seconds']:.0f}"
+            lines.append(
+                f"| {case['title']} | {cost['rows']} | {times} | {cost['cores']} | {cost['peak_mb']:.0f} |"
+            )
     return "\n".join(lines)
 
 

@@ -378,9 +378,10 @@ def test_what_fewer_joints_leave_is_told(capsys):
     assert [one["residual_mrad"] for one in targets] == pytest.approx(found.residual_mrad)
     assert [one["residual_mm"] for one in targets] == pytest.approx(found.residual_mm)
     assert found.residual_mrad.max() > 0.1
-    assert f"in full: up to {found.residual_mrad.max():.3f} mrad are left." in told
+    most = found.residual_mrad.argmax()
+    assert f"in full: left are up to {found.residual_mrad[most]:.3f} mrad (few.csv, line {most + 2}," in told
     assert main(words) == 0
-    assert "are left." not in capsys.readouterr().out
+    assert "in full" not in capsys.readouterr().out
 
 
 def test_a_path_gets_no_rows_and_says_so(capsys):

@@ -1,12 +1,15 @@
 """A compensated program as `truearm compensate` shows it."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from truearm.cli.console import print_table, say, say_wrapped
 from truearm.errors import count_of
-from truearm.programs.listing import describe
+from truearm.programs.listing import describe, listed_target, shortened
 from truearm.programs.report import counts, table_rows, unified_diff
 from truearm.programs.rewriting import Rewritten
+
+Floats = NDArray[np.float64]
 
 ROWS_SHOWN = 100
 LISTED_SHOWN = 30
@@ -48,11 +51,22 @@ def _positions(done: Rewritten) -> str:
 
 def _print_left(done: Rewritten) -> None:
     """Say how far the arm stays from its targets, where that is more than rounding."""
-    away, turned = done.residual_mm[done.changed].max(), done.residual_mrad[done.changed].max()
-    left = [f"{away:.3f} mm"] if away > ROUNDING_MM else []
-    left += [f"{turned:.3f} mrad"] if turned > ROUNDING_MRAD else []
+    left = [
+        *_most_left(done, done.residual_mm, "mm", ROUNDING_MM),
+        *_most_left(done, done.residual_mrad, "mrad", ROUNDING_MRAD),
+    ]
     if left:
-        say_wrapped(f"Not all targets are met in full: up to {' and '.join(left)} are left.")
+        say_wrapped(f"Not all targets are met in full: left are {' and '.join(left)}.")
+
+
+def _most_left(done: Rewritten, residual: Floats, unit: str, rounding: float) -> list[str]:
+    """The largest residual (t,) of the changed targets and which target has it; none within rounding."""
+    most = int(np.argmax(np.where(done.changed, residual, 0.0)))
+    if residual[most] <= rounding:
+        return []
+    place = listed_target(done.program, most, "")
+    file = done.program.sources[place.file].path.name
+    return [f"up to {residual[most]:.3f} {unit} ({file}, line {place.line}, {shortened(place.name)})"]
 
 
 def _print_dry(done: Rewritten) -> None:

@@ -185,7 +185,7 @@ impl<S: Source> Work<'_, S> {
             Verdict::Ready(_) => self.enter(0, &prepared, &vec![0.0; self.arm.columns.len()]),
             Verdict::IllConditioned(kappa) => {
                 let rule = "it must be within the limit: give more poses or candidates, fewer parameters, or a higher limit";
-                refuse("the condition number of the whole workspace's poses", kappa, rule)
+                refuse("the condition number of the whole workspace's poses", kappa.round(), rule)
             }
             Verdict::Scarce => {
                 let rule =
