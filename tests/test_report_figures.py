@@ -7,6 +7,7 @@ import pytest
 
 import truearm as ta
 from tests.report_support import figures_of, repeated_measurements, small_calibration, words_of
+from truearm.cli import main
 from truearm.reporting.advice import advise
 from truearm.reporting.curves import in_words
 from truearm.reporting.facts import Facts
@@ -55,6 +56,23 @@ def test_what_varies_with_a_feature_is_told(warmed):
     along = next(words for title, words in says.items() if title.startswith("Which parameter varies"))
     assert "the effect is largest along temperature_c" in along
     assert words_of(made.html).count("features are at the medians of the rows: temperature_c = ") == 3
+
+
+def test_noise_of_several_targets_is_said_to_be_of_all(tmp_path, monkeypatch, capsys):
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=1)
+    q = arm.poses(60)
+    table = arm.measure_table(q)
+    arm.target_in_flange = np.add(arm.target_in_flange, [0.1, 0.0, 0.0])
+    table[["x2", "y2", "z2"]] = arm.measure_table(q)[["x", "y", "z"]].to_numpy()
+    monkeypatch.chdir(tmp_path)
+    table.to_csv("two.csv", index=False)
+    for use, of_all in (("targets", True), ("position", False)):
+        assert main(["calibrate", "ur10", "two.csv", "-o", use, "--use", use, "--no-refit"]) == 0
+        told = " ".join(capsys.readouterr().out.split())
+        assert ("mm per coordinate of all targets together." in told) == of_all
+        page = words_of((tmp_path / use / "report.html").read_text())
+        assert "mean error that noise alone would leave" in page
+        assert ("noise alone would leave on all targets together" in page) == of_all
 
 
 def test_every_cell_with_measured_poses_is_filled_and_good_ones_are_dark(drawn, variable):

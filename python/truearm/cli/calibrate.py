@@ -258,6 +258,8 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     from truearm.summary import states_sigma
 
     per = "distance" if calibration.selection.distances else "coordinate"
+    if len(calibration.selection.targets) > 1:
+        per += " of all targets together"
     beyond = ", beyond the stated sigma" if states_sigma(calibration) else ""
     left = f"{summary['noise_floor_mm']:.3f} mm"
     alone = (

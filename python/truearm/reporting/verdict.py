@@ -120,7 +120,8 @@ def cards(facts: Facts) -> list[Card]:
     ]
     if facts.best != CONSTANT and not facts.is_of_no_help:
         floor = facts.floor_mm
-        found.append(Card(*_short_mm(floor), "mean error that noise alone would leave"))
+        several = " on all targets together" if len(facts.calibration.selection.targets) > 1 else ""
+        found.append(Card(*_short_mm(floor), f"mean error that noise alone would leave{several}"))
     ratios = summary["error_to_repeatability"]
     if ratios is not None:
         found.append(Card(f"{ratios[facts.best]:.1f}", "times", "the stated repeatability: the mean error"))
