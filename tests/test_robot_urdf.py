@@ -51,6 +51,8 @@ def urdf(chain: Chain) -> str:
     return "".join(parts) + "</robot>"
 
 
+TURN = ("revolute", (0, 0, 0.1), (0, 0, 0), "0 0 1")
+TWICE = '<joint name="{name}" type="revolute"><parent link="l0"/><child link="{child}"/></joint></robot>'
 ONE_JOINT = urdf([("revolute", (0, 0, 0), (0, 0, 0), "0 0 1")])
 
 
@@ -192,6 +194,16 @@ def test_the_tip_is_chosen_behind_a_hash(tmp_path: Path) -> None:
         (ONE_JOINT.replace('<link name="l0"/>', ""), 'its parent "l0" is no link of the file'),
         (ONE_JOINT.replace('xyz="0 0 0"', 'xyz="0 0"'), 'xyz="0 0" of <origin> in line .*3 finite numbers'),
         (ONE_JOINT.replace('rpy="0 0 0"', 'rpy="0 0 nan"'), 'rpy="0 0 nan".*3 finite numbers'),
+        (ONE_JOINT.replace('rpy="0 0 0"', 'rpy="90 0 0"'), 'rpy="90 0 0" .*in rad: if these are degrees'),
+        (
+            urdf([TURN, TURN]).replace("</robot>", TWICE.format(name="j0", child="l2")),
+            'joint "j0": it stands in line 1 and again in line 1. Every joint needs a name of its own',
+        ),
+        (ONE_JOINT.replace("</robot>", '<link name="l1"/></robot>'), 'link "l1" stands twice'),
+        (
+            urdf([TURN, TURN]).replace("</robot>", TWICE.format(name="rod", child="l2")),
+            'link "l2" is the child of "j1" and "rod". One joint leads to a link',
+        ),
         (ONE_JOINT.replace('lower="-2"', 'lower="low"'), 'lower="low" of <limit> in line .*a number'),
         (ONE_JOINT.replace('lower="-2"', 'lower="${-limit}"'), r"\$\{-limit\}.*is xacro.*Expand it first"),
         (ONE_JOINT.replace("<axis", "<xacro:axis"), "<xacro:axis> in line .* is xacro"),

@@ -12,6 +12,8 @@ from truearm.errors import InputError, did_you_mean
 
 TRIPLES: Final = ("xyz", "rpy")
 LIMITS: Final = ("lower", "upper")
+MAX_ANGLE_RAD: Final = 4.0 * np.pi
+"""Roll, pitch and yaw of two turns and more are degrees."""
 
 
 @dataclass
@@ -31,7 +33,8 @@ def check_urdf(text: str) -> None:
 
     Raises:
         InputError: If the text is not XML or no URDF, is xacro that was not expanded, a number is none, a
-            joint has no name, type, parent or child, or names a link that there is not.
+            joint has no name, type, parent or child, or names a link that there is not, two joints or
+            links have one name, or an angle can only be in degrees.
     """
     elements = _Elements()
     try:
@@ -40,6 +43,7 @@ def check_urdf(text: str) -> None:
         raise InputError(f"not XML: {error}", rule="A URDF is an XML file") from None
     for joint in elements.joints:
         _check_joint(joint, elements.links)
+    _check_names(elements)
 
 
 class _Elements:
@@ -100,6 +104,8 @@ class _Elements:
         values = _numbers(text)
         if len(values) != 3 or not np.isfinite(values).all():
             self._refuse(element, attribute, text, "3 finite numbers")
+        if attribute == "rpy" and np.abs(values).max() >= MAX_ANGLE_RAD:
+            self._refuse(element, attribute, text, "in rad: if these are degrees, multiply them by pi/180")
 
     def _check_limit(self, element: str, attribute: str, text: str) -> None:
         values = _numbers(text)
@@ -133,3 +139,20 @@ def _check_joint(joint: _Joint, links: list[str]) -> None:
         if link not in links:
             rule = did_you_mean(link, links) or "Every link that a joint names needs a <link> of its own"
             raise InputError(f'its {end} "{link}" is no link of the file', where=joint.where, rule=rule)
+
+
+def _check_names(elements: _Elements) -> None:
+    """Refuse names that stand twice."""
+    lines: dict[str, int] = {}
+    for joint in elements.joints:
+        name = joint.attributes["name"]
+        if name in lines:
+            raise InputError(
+                f"it stands in line {lines[name]} and again in line {joint.line}",
+                where=joint.where,
+                rule="Every joint needs a name of its own",
+            )
+        lines[name] = joint.line
+    for link in elements.links:
+        if elements.links.count(link) > 1:
+            raise InputError(f'link "{link}" stands twice', rule="Every link needs a name of its own")

@@ -24,7 +24,8 @@ def chain_between(
     base: frames that are fixed to it, such as a "base" beside a "base_link", are no end of an arm.
 
     Raises:
-        InputError: If a link is unknown, several links may be meant, or none is behind the other.
+        InputError: If a link is unknown, several links may be meant, none is behind the other, or two joints
+            lead to one on the way.
     """
     joint_to = {joint.child: joint for joint in joints}
     parents = {joint.parent for joint in joints}
@@ -35,6 +36,7 @@ def chain_between(
             raise InputError(f'there is no link "{name}"', rule=hint)
     first = base or _root([name for name in links if name not in joint_to], links)
     last = tip or _end(joint_to, first, leaves)
+    _check_one_way(joints, first, last)
     return first, last, _path(joint_to, first, last)
 
 
@@ -87,6 +89,22 @@ def _is_behind(joint_to: Mapping[str, Any], base: str, link: str) -> bool:
             return False
         link = joint_to[link].parent
     return False
+
+
+def _check_one_way(joints: Sequence[Any], base: str, tip: str) -> None:
+    """Refuse links that two joints lead to, from the tip up to the base: the arm would be one of two."""
+    link = tip
+    for _ in joints:
+        above = [joint for joint in joints if joint.child == link]
+        if link == base or not above:
+            return
+        if len(above) > 1:
+            raise InputError(
+                f'link "{link}" is the child of {_named([joint.name for joint in above], "and")}',
+                rule="One joint leads to a link",
+                way_out="Leave out those that close a loop; what its rods couple can be said in a robot file",
+            )
+        link = above[0].parent
 
 
 def _path(joint_to: Mapping[str, Any], base: str, tip: str) -> list[Any]:
