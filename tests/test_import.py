@@ -301,6 +301,16 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         {"columns": {**COLUMNS, "x": "px:deg"}},
         'column "x" is said to be in deg: "px:deg". "x" has one of the units in, m, mm. Write --map x=',
     ),
+    "no unit": (
+        PLAIN,
+        {"columns": {**COLUMNS, "x": "px:ft"}},
+        '"ft" behind "px" is no unit. Units are in, m, mm',
+    ),
+    "several columns at once": (
+        PLAIN,
+        {"columns": {**COLUMNS, "x": "px:mm,y=py:mm"}},
+        '"px:mm,y=py:mm" names several columns. One --map names one column. Repeat --map',
+    ),
     "angle in a header": ("q1_deg,x_deg,y_mm,z_mm\n1,2,3,4\n", {"columns": {}}, '"x" is said to be in deg'),
     "unit of a word": (PLAIN, {"keep": {}, "columns": {**COLUMNS, "group": "J1:mm"}}, '"group" has no unit'),
     "points and commas": (

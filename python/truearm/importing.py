@@ -312,9 +312,16 @@ def _kept(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> Floats |
 def _split_unit(table: RawTable, theirs: str) -> tuple[str, str]:
     """Their column and the unit behind it, "" where there is none."""
     name, mark, unit = theirs.rpartition(":")
-    if mark and unit in UNITS and theirs not in table.parts:
-        return table.existing(name), unit
-    return table.existing(theirs), ""
+    if not mark or theirs in table.parts:
+        name, unit = theirs, ""
+    if name not in table.parts and "=" in name.partition(",")[2]:
+        raise UsageError(
+            f'"{theirs}" names several columns', rule="One --map names one column", way_out="Repeat --map"
+        )
+    table.existing(name)
+    if unit and unit not in UNITS:
+        raise UsageError(f'"{unit}" behind "{name}" is no unit', rule=f"Units are {', '.join(UNITS)}")
+    return name, unit
 
 
 def _check_is_ours(ours: str) -> None:
