@@ -19,8 +19,8 @@ use crate::weight_rows::WeightRows;
 
 /// Poses whose features are multiplied at a time: they stay in a core's cache.
 const POSES: usize = 256;
-/// Pairs of columns whose products are kept at a time, some tens of megabytes.
-const PAIRS: usize = 64;
+/// Numbers of pairs' products that are kept at a time, 64 megabytes; one product a thread at least.
+const ROOM: usize = 1 << 23;
 
 /// Adds sign A^T A of some poses to the lower triangle of `normal`.
 ///
@@ -121,7 +121,8 @@ impl OfAll {
 
     fn add(&self, normal: &mut Mat<f64>, sign: f64, cancel: &Cancel) -> Result<(), FieldError> {
         let pairs: Vec<_> = (0..self.entries.nrows()).flat_map(|a| (0..=a).map(move |b| (a, b))).collect();
-        for pairs in pairs.chunks(PAIRS) {
+        let at_once = (ROOM / self.features.nrows().pow(2).max(1)).max(rayon::current_num_threads());
+        for pairs in pairs.chunks(at_once) {
             let sums = pairs.par_iter().map(|&pair| {
                 cancel.check()?;
                 Ok(self.sum(pair))
