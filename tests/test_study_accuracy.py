@@ -266,6 +266,25 @@ def test_the_page_says_who_is_first_and_what_is_missing():
     assert "| constant D-H, theta curves | **0.100** |" in text
 
 
+def test_the_page_has_a_column_for_each_block():
+    means = {"constant": 0.5, "ours-own": 0.3, "ours-smooth": 0.25, "ours-wrist": 0.2, "ours": 0.1}
+    methods = {name: _found(mean) for name, mean in means.items()} | {"ours-sag": {"failed": 1}}
+    group = {"set": "arm", "split": "random", "size": "100", "runs": 1, "seeds": 1, "n_train": 100}
+    text = page(
+        {
+            "version": "1",
+            "asked": 6,
+            "there": 6,
+            "sizes": ["100"],
+            "sets": {"arm": {"robot": "ur10", "rows": 200}},
+            "groups": [{**group, "methods": methods, "lead": None}],
+            "results": [],
+        }
+    )
+    assert "| constant | + own | + smooth | + major | + wrist | + sag | + waves: ours |" in text
+    assert "| arm | random rows held out | 100 | 0.500 | 0.300 | 0.250 |  | 0.200 |  | 0.100 |" in text
+
+
 def _found(mean):
     errors = dict.fromkeys(("p95_mm", "p99_mm", "max_mm", "worst_mean_mm"), 2.0 * mean)
     return {"mean_mm": mean, "failed": 0, "coverage_95": None, "fit_s": 1.0, "predict_us": 2.0, **errors}

@@ -139,6 +139,23 @@ def test_ours_brings_its_parts(prepared):
     assert (fitted["ours"].coverage(prepared) or 0.0) > 0.8
 
 
+def test_parts_of_ours_have_the_blocks_up_to_theirs(prepared):
+    fitted = BY_NAME["ours"].fit(prepared, QUICK)
+    named = {name: _blocks(one) for name, one in fitted.items()}
+    whole = named.pop("ours")
+    assert {"own", "smooth", "sag"} <= whole
+    assert list(named) == [f"ours-{block}" for block in ("sag", "wrist", "major", "smooth", "own")]
+    assert named["ours-own"] == {"own"}
+    assert named["ours-smooth"] == {"own", "smooth"}
+    assert named["ours-major"] == whole & {"own", "smooth", "major"}
+    assert named["ours-sag"] == whole - {"wave"}
+
+
+def _blocks(fitted):
+    """Names of the blocks that change a parameter by more than a tenth of a micrometre or microradian."""
+    return {block["name"] for block in fitted.model.field.blocks() if np.abs(block["weights"]).max() > 1e-7}
+
+
 def test_another_target_is_judged_with_its_point_found(arm_file):
     """The second target of the file is where the first is, so that it must be judged alike."""
     pytest.importorskip("sklearn")

@@ -6,7 +6,7 @@ from statistics import median
 from typing import Any, Final
 
 from truearm.studies.accuracy.methods import FAMILIES, OURS, TITLES
-from truearm.studies.accuracy.methods.ours import OWN, OWN_SMOOTH
+from truearm.studies.accuracy.methods.ours import FURTHER_BLOCKS, PARTS
 from truearm.studies.accuracy.splits import TITLES as SPLITS
 from truearm.studies.accuracy.summary import LEVEL
 from truearm.studies.markdown import table
@@ -17,7 +17,12 @@ DETAILED: Final = ("400", "all", "200", "100", "50", "25")
 """The first of these sizes that there is, is told in detail."""
 HALF: Final = 0.5
 SEVERAL_A_SEED: Final = ("tails", "target")
-BLOCKS: Final = ("constant", OWN, OWN_SMOOTH, OURS)
+CUMULATED: Final = (
+    {"constant": "constant"}
+    | {part: f"+ {block}" for part, block in PARTS.items()}
+    | {OURS: f"+ {FURTHER_BLOCKS[-1]}: ours"}
+)
+"""Heads of the columns of what blocks add, by the methods that have them."""
 ABOUT: Final = (
     "Mean held-out position error in mm, the median over runs: one run is a seed and, for tails, one joint's "
     "tail. Each table has its number of runs and seeds. In bold the lowest mean and those within 3 % of it."
@@ -144,19 +149,18 @@ def _blocks(summary: Summary) -> Iterable[str]:
     for (name, split), groups in _by_set_and_split(summary).items():
         size = next(size for size in DETAILED + tuple(groups) if size in groups)
         found = groups[size]["methods"]
-        if OWN in found:
-            means = [
-                f"{found[block]['mean_mm']:.3f}" if "mean_mm" in found.get(block, {}) else ""
-                for block in BLOCKS
-            ]
+        if not PARTS.keys().isdisjoint(found):
+            means = [_number(found.get(name, {}).get("mean_mm")) for name in CUMULATED]
             rows.append((name, SPLITS[split], size, *means))
     if rows:
         yield "## What each block adds"
         yield (
-            "Scales as the whole model found them; the other blocks are switched off and everything else is "
-            "fitted again. Where larger blocks do most of the work, `own` alone takes over what is theirs."
+            "Blocks are added one after the other, from left to right. Scales are those that the whole model "
+            "found; the blocks further right are switched off, and everything else is fitted again. Where "
+            "those do most of the work, a column further left takes over what is theirs, and may be worse "
+            "than none. A block that the evidence did not ask for changes nothing."
         )
-        yield table(("set", "split", "poses", "constant", "and own", "and smooth", "all: ours"), rows)
+        yield table(("set", "split", "poses", *CUMULATED.values()), rows)
 
 
 def _cost(summary: Summary) -> Iterable[str]:

@@ -19,7 +19,7 @@ from truearm.studies.accuracy.methods.gravity import fit_gravity
 from truearm.studies.accuracy.methods.grid import fit_grid
 from truearm.studies.accuracy.methods.neighbours import fit_neighbours
 from truearm.studies.accuracy.methods.network import fit_network
-from truearm.studies.accuracy.methods.ours import OURS, OWN, OWN_SMOOTH, fit_variable
+from truearm.studies.accuracy.methods.ours import OURS, PARTS, fit_variable
 from truearm.studies.accuracy.methods.radial import fit_radial
 from truearm.studies.accuracy.methods.searching import Effort, Learn
 from truearm.studies.accuracy.methods.trees import fit_trees
@@ -86,10 +86,10 @@ METHODS: Final = (
     _residual("mlp", "multilayer perceptron", fit_network),
     _residual("trees", "gradient-boosted trees", fit_trees, "lightgbm"),
     _residual("grid", "grid of errors", fit_grid, ""),
-    Method("ours", "variable D-H (ours)", "ours", fit_variable, parts=(OWN, OWN_SMOOTH)),
+    Method("ours", "variable D-H (ours)", "ours", fit_variable, parts=tuple(PARTS)),
 )
 BY_NAME: Final = {method.name: method for method in METHODS}
-PART_TITLES: Final = {OWN: "ours, own blocks alone", OWN_SMOOTH: "ours, own and smooth blocks"}
+PART_TITLES: Final = {part: f"ours, blocks up to {block}" for part, block in PARTS.items()}
 TITLES: Final = {method.name: method.title for method in METHODS} | PART_TITLES
 FAMILIES: Final = {method.name: method.family for method in METHODS} | dict.fromkeys(PART_TITLES, "block")
 
