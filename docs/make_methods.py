@@ -2,6 +2,8 @@
 
 truearm study accuracy ROBOT=FILE... -o STUDY
 python docs/make_methods.py STUDY
+
+With --section, one section of the page is replaced by what a study of fewer methods gave.
 """
 
 import argparse
@@ -86,8 +88,14 @@ def main() -> int:
     """Write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("study", type=Path, help="directory that truearm study accuracy wrote")
-    study = parser.parse_args().study
+    parser.add_argument("--section", metavar="TITLE", help="replace this section of the page alone")
+    given = parser.parse_args()
+    study = given.study
     summary = json.loads((study / "accuracy.json").read_text())
+    if given.section:
+        PAGE.write_text(with_section(PAGE.read_text(), summary, given.section))
+        sys.stdout.write(f"section replaced in {PAGE}\n")
+        return 0
     PICTURE.write_text(leaner((study / "learning_curves.svg").read_text()))
     parts = [
         HEAD,
@@ -100,6 +108,19 @@ def main() -> int:
     PAGE.write_text("\n\n".join(part.strip("\n") for part in parts) + "\n")
     sys.stdout.write(f"written to {PAGE}\n")
     return 0
+
+
+def with_section(page: str, summary: Mapping[str, Any], title: str) -> str:
+    """The page with one section as this study has it, which says that it is of another run."""
+    head, split = f"## {title}\n", re.compile(r"^(?=## )", re.MULTILINE)
+    found = [part for part in split.split("\n\n".join(sections(summary))) if part.startswith(head)]
+    parts = split.split(page)
+    if not found or not any(part.startswith(head) for part in parts):
+        raise SystemExit(f'the page and the study must both have a section "{title}"')
+    names = ", ".join(summary["methods"])
+    note = f"This section is of a later run than the others, of these methods: {names}."
+    fresh = f"{found[0].strip()}\n\n{note}\n\n"
+    return "".join(fresh if part.startswith(head) else part for part in parts)
 
 
 def leaner(svg: str) -> str:

@@ -235,6 +235,20 @@ def test_a_leaner_picture_is_the_same_picture():
     )
 
 
+def test_a_section_of_the_comparison_is_replaced_alone(monkeypatch):
+    maker = load_script("make_methods")
+    fresh = ["## Where ours stands", "new", "## What it costs", "| cheap |"]
+    monkeypatch.setattr(maker, "sections", lambda summary: fresh)
+    summary = {"methods": ["constant", "ours"]}
+    page = "# Page\n\n## Where ours stands\n\nold\n\n## What it costs\n\n| dear |\n\n## End\n\nlast\n"
+    changed = maker.with_section(page, summary, "What it costs")
+    assert changed.startswith("# Page\n\n## Where ours stands\n\nold\n\n## What it costs\n\n| cheap |\n\n")
+    assert "of these methods: constant, ours.\n\n## End\n\nlast\n" in changed
+    assert "dear" not in changed
+    with pytest.raises(SystemExit, match='must both have a section "End"'):
+        maker.with_section(page, summary, "End")
+
+
 def test_every_public_name_is_in_the_python_reference():
     for page in ("python-api", "python-docstrings"):
         text = (ROOT / "docs" / "reference" / f"{page}.md").read_text()

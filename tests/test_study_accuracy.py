@@ -282,7 +282,7 @@ def test_the_page_has_a_column_for_each_block():
         }
     )
     assert "| constant | + own | + smooth | + major | + wrist | + sag | + waves: ours |" in text
-    assert "| arm | random rows held out | 100 | 0.500 | 0.300 | 0.250 |  | 0.200 |  | 0.100 |" in text
+    assert "| arm | random rows held out | 100 | 1 | 0.500 | 0.300 | 0.250 |  | 0.200 |  | 0.100 |" in text
 
 
 def _found(mean):

@@ -151,7 +151,7 @@ def _blocks(summary: Summary) -> Iterable[str]:
         found = groups[size]["methods"]
         if not PARTS.keys().isdisjoint(found):
             means = [_number(found.get(name, {}).get("mean_mm")) for name in CUMULATED]
-            rows.append((name, SPLITS[split], size, *means))
+            rows.append((name, SPLITS[split], size, str(groups[size]["runs"]), *means))
     if rows:
         yield "## What each block adds"
         yield (
@@ -160,7 +160,7 @@ def _blocks(summary: Summary) -> Iterable[str]:
             "those do most of the work, a column further left takes over what is theirs, and may be worse "
             "than none. A block that the evidence did not ask for changes nothing."
         )
-        yield table(("set", "split", "poses", *CUMULATED.values()), rows)
+        yield table(("set", "split", "poses", "runs", *CUMULATED.values()), rows)
 
 
 def _cost(summary: Summary) -> Iterable[str]:
