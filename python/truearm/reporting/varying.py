@@ -1,6 +1,8 @@
 """Chapter: how the parameters vary."""
 
-from typing import Final
+import json
+from collections.abc import Sequence
+from typing import Any, Final
 
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.axes import coupling_words
@@ -13,6 +15,8 @@ from truearm.reporting.region_tree import region_tree
 from truearm.reporting.slices import slices
 from truearm.reporting.sweeps import influence_mm
 from truearm.summary import WAVE, waves_in_words
+
+Block = dict[str, Any]
 
 
 def varying(facts: Facts) -> Section:
@@ -41,23 +45,18 @@ def varying(facts: Facts) -> Section:
 
 
 def _blocks(facts: Facts) -> Table:
-    """The blocks of the field as summary.json has them."""
-    rows, blocks = [], facts.summary["blocks"]
+    """The blocks of the field as summary.json has them; those that differ in their joint alone in one row."""
+    blocks = facts.summary["blocks"]
     shown = [key for key in _AMPLITUDES if any(key in block["amplitudes"] for block in blocks)]
-    for block in blocks:
-        amplitudes = block["amplitudes"]
-        kind = "reading" if block.get("over_reading") else "joint"
-        inputs = [f"{kind} {joint}" for joint in block["joints"]] + list(block["features"])
-        if block["name"] == WAVE:
-            inputs.append(waves_in_words([block]))
-        if "ripples" in block:
-            inputs.append(f"may ripple about {block['ripples']:.0f} times a turn")
+    rows = []
+    for alike in _alike(blocks):
+        amplitudes, cells = alike[0]["amplitudes"], sorted({block["cells"] for block in alike})
         rows.append(
             [
-                block["name"],
-                ", ".join(inputs),
-                str(block["parameters"]),
-                str(block["cells"]),
+                alike[0]["name"],
+                _over(alike),
+                str(alike[0]["parameters"]),
+                " to ".join(str(count) for count in dict.fromkeys((cells[0], cells[-1]))),
                 *(fixed(amplitudes[key]) if key in amplitudes else "" for key in shown),
             ]
         )
@@ -69,6 +68,32 @@ def _blocks(facts: Facts) -> Table:
         "each block may take its parameters.",
         left=(0, 1),
     )
+
+
+def _alike(blocks: Sequence[Block]) -> list[list[Block]]:
+    """Blocks over one joint each that are alike but for it, together; every other by itself."""
+    groups: dict[str, list[Block]] = {}
+    for number, block in enumerate(blocks):
+        alone = len(block["joints"]) == 1 and not block["features"] and block["name"] != WAVE
+        kept = {name: value for name, value in block.items() if name not in ("joints", "lengths", "cells")}
+        groups.setdefault(json.dumps(kept) if alone else str(number), []).append(block)
+    return list(groups.values())
+
+
+def _over(alike: Sequence[Block]) -> str:
+    """What blocks that are alike are over."""
+    block = alike[0]
+    kind = "reading" if block.get("over_reading") else "joint"
+    if len(alike) > 1:
+        joints = [str(joint) for each in alike for joint in each["joints"]]
+        inputs = [f"each of {kind}s {', '.join(joints)}"]
+    else:
+        inputs = [f"{kind} {joint}" for joint in block["joints"]] + list(block["features"])
+    if block["name"] == WAVE:
+        inputs.append(waves_in_words([block]))
+    if "ripples" in block:
+        inputs.append(f"may ripple about {block['ripples']:.0f} times a turn")
+    return ", ".join(inputs)
 
 
 _COLUMNS: Final = ("block", "over", "parameters", "cells")
