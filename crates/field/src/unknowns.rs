@@ -11,7 +11,7 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// hundredth of a block's prior variance.
 const SHARES: [f64; 3] = [NEGLIGIBLE, 1e-4, 1e-3];
 /// Unknowns, or rows where they are fewer, that are few: seconds to factor on two cores.
-const FEW: usize = 9000;
+const FEW: usize = 7000;
 
 /// E of one axis, (cells, r).
 pub struct Root {
