@@ -7,8 +7,8 @@ use crate::model::Model;
 
 /// Eigenvalues below this share of the largest are left out.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Of products of eigenvalues those below such a share: the first that leaves few unknowns, or the last, which leaves out half a
-/// hundredth of a block's prior variance.
+/// Of products of eigenvalues those below such a share: the first that leaves few unknowns, or the last, which leaves out less than
+/// a hundredth of a block's prior variance.
 const SHARES: [f64; 3] = [NEGLIGIBLE, 1e-4, 1e-3];
 /// Unknowns, or rows where they are fewer, that are few: seconds to factor on two cores.
 const FEW: usize = 7000;

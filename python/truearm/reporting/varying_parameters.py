@@ -26,7 +26,7 @@ def varying_parameters(facts: Facts) -> Table:
     whole = corrections(facts, poses)
     effects = effect_mm(facts) * np.sqrt(np.square(whole).mean(axis=0))
     spread = standard_deviations(facts, list(candidates.columns))
-    held = set(calibration.identifiability.undetermined)
+    unknown = {name for name in calibration.identifiability.undetermined if name in candidates.names}
     rows = []
     for name, column in zip(candidates.names, candidates.columns, strict=True):
         unit, values = per_unit(column), whole[:, column]
@@ -36,7 +36,7 @@ def varying_parameters(facts: Facts) -> Table:
                 name,
                 unit_of(column),
                 f"{nominal[column] / unit:.3f}",
-                HELD if name in held else signed(constants[column] / unit),
+                NOMINAL if name in unknown and constants[column] == 0.0 else signed(constants[column] / unit),
                 *(signed(value / unit) for value in ends),
                 *([] if spread is None else [f"{spread[column] / unit:.4f}"]),
                 f"{effects[column]:.3f}",
@@ -47,8 +47,8 @@ def varying_parameters(facts: Facts) -> Table:
         "Corrections to the nominal values: the constant part, then constant part and what varies together "
         f"at {len(poses)} {of}. Compensation uses the latter."
     )
-    if held.intersection(candidates.names):
-        says += f" The constant part of those that the poses do not determine is {HELD}: the maker's value."
+    if unknown:
+        says += f" Where the poses do not determine a constant, the maker's value stays: {NOMINAL}."
     if spread is not None:
         says += (
             " Standard deviations are of the whole in a typical pose; parameters are correlated, so that "
@@ -64,7 +64,7 @@ def varying_parameters(facts: Facts) -> Table:
     )
 
 
-HELD: Final = "nominal"
+NOMINAL: Final = "nominal"
 COLUMNS: Final = ("", "unit", "nominal", "constant part", "mean", "smallest", "largest")
 
 
