@@ -12,7 +12,7 @@ use crate::joined::{Joined, join};
 use crate::kernel::Input;
 use crate::linear::{input_values, training};
 use crate::optimise::Limits;
-use crate::outliers::{self, Judgement, News};
+use crate::outliers::{self, Judgement};
 use crate::posterior::{Posterior, Solution};
 use crate::refine::relinearised;
 use crate::select::{Found, contest_major, prune_major, refine, select_major};
@@ -150,6 +150,10 @@ const POSES_FOR_SELECTION: usize = 120;
 const POSES_FOR_HYPER: usize = 200;
 const ROWS_FOR_POLISH: usize = 3000;
 const ROWS_FOR_EXTRAPOLATION: usize = 1200;
+/// Rows that are judged at once: of more a part judges all first, and that outliers of a smaller share than [`FELT`] of all
+/// squared residuals came or went is not worth another posterior.
+const ROWS_AT_ONCE: usize = 2 * ROWS_FOR_POLISH;
+const FELT: f64 = 0.01;
 const SEARCH: Limits = Limits { evaluations: 60, gain: 0.02 };
 const POLISH: Limits = Limits { evaluations: 12, gain: 0.05 };
 /// Reweightings of outliers at the most, and how many of them have hyper-parameters of their own where none is spoiled.
@@ -160,8 +164,9 @@ const NOISE_SHARE: f64 = 0.3;
 
 /// Fits constants, field and set-up together, starting from a constant calibration.
 ///
-/// Poses whose weight is zero take no part. Other weights are where the search begins: after it every pose is judged by the
-/// others, and has its full weight or, as an outlier, next to none.
+/// Poses whose weight is zero take no part. Other weights are where the search begins, or the judgement of many poses by a part
+/// of them that comes before it: after it every pose is judged by the others, and has its full weight or, as an outlier,
+/// next to none.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -176,16 +181,18 @@ pub fn fit_field(
     training.take_weight(&doubtful);
     let noise = [constant.noise.position * NOISE_SHARE, constant.noise.orientation * NOISE_SHARE];
     let mut search = Search { problem, options, evidence: f64::NAN, evaluations: 0 };
-    let mut hyper = search.first(&training, noise)?;
-    let mut judged = search.judge(search.posterior(&training, &hyper)?, &training)?;
+    let mut hyper = search.first(&mut training, noise)?;
+    let all: Vec<usize> = (0..training.pose_count()).collect();
+    let mut judged = search.judge(search.posterior(&training, &hyper)?, (&training, &all))?;
     let large = training.row_count() > ROWS_FOR_POLISH;
+    let felt = if training.row_count() > ROWS_AT_ONCE { FELT } else { 0.0 };
     for round in 0..REWEIGHTINGS {
-        let News { poses, spoils } = judged.judgement.reweigh(&mut training);
-        if !spoils && !poses {
+        let news = judged.judgement.reweigh(&mut training);
+        if !news.spoils() && (!news.poses || news.share < felt) {
             break;
         }
         let Judged { posterior, .. } = judged;
-        let posterior = if spoils && options.hyper.is_none() {
+        let posterior = if news.spoils() && options.hyper.is_none() {
             drop(posterior);
             hyper = search.contested(&training, hyper, noise)?;
             search.posterior(&training, &hyper)?
@@ -198,7 +205,7 @@ pub fn fit_field(
             hyper = search.cleaned(&training, hyper)?;
             search.posterior(&training, &hyper)?
         };
-        judged = search.judge(posterior, &training)?;
+        judged = search.judge(posterior, (&training, &all))?;
     }
     let Judged { posterior, solution, judgement } = judged;
     let values = input_values(problem, options);
@@ -267,17 +274,18 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    fn first(&mut self, training: &Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
+    /// Hyper-parameters that the judgement of all poses begins with.
+    fn first(&mut self, training: &mut Training, noise: [f64; 2]) -> Result<Hyper, FieldError> {
         if let Some(hyper) = &self.options.hyper {
-            return Ok(hyper.clone());
+            return self.judged_by_part(training, hyper.clone(), noise);
         }
-        let begun = match self.options.near.clone() {
-            Some(near) => {
-                self.evidence = near.evidence;
-                near.hyper
-            }
-            None => return self.anew(training, noise),
+        let Some(near) = &self.options.near else {
+            let found = self.searched(training, noise)?;
+            let found = self.judged_by_part(training, found, noise)?;
+            return if self.options.rough { Ok(found) } else { self.finished(training, found) };
         };
+        self.evidence = near.evidence;
+        let begun = self.judged_by_part(training, near.hyper.clone(), noise)?;
         if self.options.contested {
             return self.contested(training, begun, noise);
         }
@@ -324,6 +332,33 @@ impl Search<'_> {
         }
         let polished = self.widened(training, &polished)?;
         self.trusted_beyond(training, polished)
+    }
+
+    /// Hyper-parameters without outliers that a part of many poses tells among all, whose weight is taken away; those that were
+    /// found with them are searched again.
+    ///
+    /// What takes long then begins without most of what it would have to be done again for.
+    fn judged_by_part(
+        &mut self,
+        training: &mut Training,
+        mut hyper: Hyper,
+        noise: [f64; 2],
+    ) -> Result<Hyper, FieldError> {
+        let known = self.options.hyper.is_some() || self.options.near.is_some();
+        let rounds = if training.row_count() > ROWS_AT_ONCE { REWEIGHTINGS } else { 0 };
+        for _ in 0..rounds {
+            let chosen = evenly(training, ROWS_FOR_POLISH, 0);
+            let posterior = self.posterior(&training.select(&chosen), &hyper)?;
+            let Judged { judgement, .. } = self.judge(posterior, (training, &chosen))?;
+            let news = judgement.reweigh(training);
+            if !news.poses || news.share < FELT {
+                break;
+            }
+            if news.spoils() && !known {
+                hyper = self.searched(training, noise)?;
+            }
+        }
+        Ok(hyper)
     }
 
     /// Hyper-parameters with how far they are trusted where nothing was measured.
@@ -415,12 +450,17 @@ impl Search<'_> {
         Posterior::new(training.clone(), hyper, self.options.degree, &self.options.cancel)
     }
 
-    fn judge(&self, posterior: Posterior, all: &Training) -> Result<Judged, FieldError> {
+    /// Judges a training set by a posterior whose poses have these places in it.
+    fn judge(
+        &self,
+        posterior: Posterior,
+        (all, places): (&Training, &[usize]),
+    ) -> Result<Judged, FieldError> {
         let cancel = &self.options.cancel;
         cancel.check()?;
         let solution = posterior.solve(&posterior.training().residual)?;
         cancel.check()?;
-        let judgement = outliers::judge(&posterior, &solution, all)?;
+        let judgement = outliers::judge(&posterior, &solution, all, places)?;
         Ok(Judged { posterior, solution, judgement })
     }
 }
@@ -440,11 +480,16 @@ fn middle_of(training: &Training) -> Training {
     part_of(training, ROWS_FOR_HYPER, POSES_FOR_HYPER)
 }
 
+/// The rows of [`evenly`] spread poses.
+fn part_of(training: &Training, rows: usize, at_least: usize) -> Training {
+    training.select(&evenly(training, rows, at_least))
+}
+
 /// Poses spread evenly over the training set (and so over its groups) with at most `rows` rows, or
 /// `at_least` poses.
-fn part_of(training: &Training, rows: usize, at_least: usize) -> Training {
+fn evenly(training: &Training, rows: usize, at_least: usize) -> Vec<usize> {
     let poses = training.pose_count();
     let per_pose = (training.row_count() as f64 / poses.max(1) as f64).max(1.0);
     let wanted = ((rows as f64 / per_pose) as usize).max(at_least).clamp(1, poses);
-    training.select(&(0..wanted).map(|k| k * poses / wanted).collect::<Vec<usize>>())
+    (0..wanted).map(|k| k * poses / wanted).collect()
 }

@@ -45,30 +45,47 @@ pub fn chi_squared(freedom: f64, normal_quantile: f64) -> f64 {
     freedom * (1.0 - spread + normal_quantile * spread.sqrt()).powi(3)
 }
 
-/// Judges every pose of a training set by a posterior, which may have been inferred from a part of them, and its solution.
+/// Judges every pose of a training set by a posterior that was inferred from all or from some of them, and its solution.
+///
+/// `places` says which of `all` poses each of the posterior's is. Poses of which it has no rows are judged by what it
+/// predicts of them.
 ///
 /// # Errors
 /// [`FieldError::NotPositiveDefinite`], [`FieldError::Estimate`] where it is cancelled.
-pub fn judge(posterior: &Posterior, solution: &Solution, all: &Training) -> Result<Judgement, FieldError> {
+pub fn judge(
+    posterior: &Posterior,
+    solution: &Solution,
+    all: &Training,
+    places: &[usize],
+) -> Result<Judgement, FieldError> {
     let training = posterior.training();
     let left_out = posterior.leave_one_out(&training.residual)?;
-    let poses = 0..training.pose_count();
-    let mut squares: Vec<f64> =
-        poses.clone().map(|pose| square_of(&left_out.standardised[training.rows(pose)])).collect();
-    let mut distance: Vec<f64> =
-        poses.clone().map(|pose| distance_of(&left_out.residual[training.rows(pose)])).collect();
-    for aside in judge_aside(posterior, solution, all)? {
-        (squares[aside.pose], distance[aside.pose]) = (aside.square, aside.distance);
+    let took_part: Vec<usize> =
+        (0..training.pose_count()).filter(|&pose| !training.rows(pose).is_empty()).collect();
+    let poses = 0..all.pose_count();
+    let (mut squares, mut distance) = (vec![0.0; poses.len()], vec![0.0; poses.len()]);
+    let mut is_aside: Vec<bool> = poses.clone().map(|pose| !all.rows(pose).is_empty()).collect();
+    for &pose in &took_part {
+        let place = places[pose];
+        squares[place] = square_of(&left_out.standardised[training.rows(pose)]);
+        distance[place] = distance_of(&left_out.residual[training.rows(pose)]);
+        is_aside[place] = false;
     }
     let sampled = |pose: usize| training.rows(pose).next().is_some_and(|row| left_out.sampled[row]);
     let trusted: Vec<usize> =
-        poses.clone().filter(|&pose| is_trusted(training, pose) && sampled(pose)).collect();
-    let shares =
-        trusted.iter().map(|&pose| squares[pose] / chi_squared(training.rows(pose).len() as f64, 0.0));
+        took_part.into_iter().filter(|&pose| is_trusted(training, pose) && sampled(pose)).collect();
+    let shares = trusted
+        .iter()
+        .map(|&pose| squares[places[pose]] / chi_squared(training.rows(pose).len() as f64, 0.0));
     let typical = quantile(shares, 0.5).max(1.0);
+    let limit = |rows: usize| typical * chi_squared(rows as f64, OVERWHELMING);
+    let others: Vec<usize> = poses.clone().filter(|&pose| is_aside[pose]).collect();
+    for aside in judge_aside(posterior, solution, (all, &others), limit)? {
+        (squares[aside.pose], distance[aside.pose]) = (aside.square, aside.distance);
+    }
     let score = |pose: usize| match all.rows(pose).len() {
         0 => 0.0,
-        rows => squares[pose] / (typical * chi_squared(rows as f64, OVERWHELMING)),
+        rows => squares[pose] / limit(rows),
     };
     let components = trusted.iter().flat_map(|&pose| &left_out.standardised[training.rows(pose)]);
     let inflation = (quantile(components.map(|z| z.abs()), 0.95) / QUANTILE_95).max(1.0);
@@ -92,14 +109,18 @@ struct Aside {
     distance: f64,
 }
 
-/// Judges poses that no posterior was inferred from: all that took part are others. Beside the noise alone, what is not
-/// suspicious needs no covariance of the prediction.
-fn judge_aside(posterior: &Posterior, solution: &Solution, all: &Training) -> Result<Vec<Aside>, FieldError> {
-    let poses = posterior.training().aside(all);
+/// Judges poses of a training set that no posterior was inferred from: all that took part are others. What is below the limit of
+/// its number of rows beside the noise alone needs no covariance of the prediction.
+fn judge_aside(
+    posterior: &Posterior,
+    solution: &Solution,
+    (all, poses): (&Training, &[usize]),
+    limit: impl Fn(usize) -> f64,
+) -> Result<Vec<Aside>, FieldError> {
     if poses.is_empty() {
         return Ok(Vec::new());
     }
-    let part = all.select(&poses);
+    let part = all.select(poses);
     let explained = explained(&part, solution)?;
     let left: Vec<f64> =
         part.residual.iter().zip(explained).map(|(residual, known)| residual - known).collect();
@@ -109,7 +130,7 @@ fn judge_aside(posterior: &Posterior, solution: &Solution, all: &Training) -> Re
     for (k, &pose) in poses.iter().enumerate() {
         let rows = part.rows(k);
         let square = rows.clone().map(|row| left[row].powi(2) / noise(row)).sum();
-        if square > SUSPICIOUS * rows.len() as f64 {
+        if square > limit(rows.len()) {
             suspicious.entry(rows.len()).or_default().push(k);
         }
         found.push(Aside { pose, square, distance: distance_of(&left[rows]) });
@@ -167,8 +188,15 @@ impl Training {
 pub struct News {
     /// Whether poses became outliers, or are none any more.
     pub poses: bool,
+    /// Share of all squared residuals that weights were given or taken away of.
+    pub share: f64,
+}
+
+impl News {
     /// Whether hyper-parameters that were found with the former weights cannot stay.
-    pub spoils: bool,
+    pub fn spoils(&self) -> bool {
+        self.share > SPOILING
+    }
 }
 
 impl Judgement {
@@ -187,7 +215,7 @@ impl Judgement {
             kept += weight * self.distance[pose].powi(2);
             training.weight[rows].fill(weight);
         }
-        News { poses, spoils: changed > SPOILING * (changed + kept) }
+        News { poses, share: changed / (changed + kept).max(f64::MIN_POSITIVE) }
     }
 
     /// The same for shots, each of the pose that `pose_of` (n,) says.

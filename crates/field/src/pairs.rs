@@ -336,14 +336,12 @@ pub fn write_covariance(
 ) {
     let scratch = || (PairTable::default(), RowFactors::default());
     let rows = (0..training.pose_count()).map(|pose| training.rows(pose).len());
-    by_pose(matrix.rb_mut(), rows).into_par_iter().enumerate().for_each_init(
-        scratch,
-        |(table, factors), (pose, out)| {
-            kernels.fill(pose, table);
-            factors.fill(by_column, hyper, table, (pose, training.rows(pose).start));
-            dispatch(PoseColumns { training, by_column, hyper, factors, pose, out });
-        },
-    );
+    let own = by_pose(matrix.rb_mut(), rows).into_par_iter().enumerate();
+    own.filter(|(_, out)| out.ncols() > 0).for_each_init(scratch, |(table, factors), (pose, out)| {
+        kernels.fill(pose, table);
+        factors.fill(by_column, hyper, table, (pose, training.rows(pose).start));
+        dispatch(PoseColumns { training, by_column, hyper, factors, pose, out });
+    });
     for row in 0..by_column.rows {
         matrix[(row, row)] += training.noise_variance(row, hyper.noise);
     }

@@ -139,7 +139,25 @@ fn many_rows_go_to_weight_space_where_suspicious_poses_are_judged_exactly() {
 
 fn judged(posterior: &Posterior, all: &Training) -> Judgement {
     let solution = posterior.solve(&posterior.training().residual).unwrap();
-    judge(posterior, &solution, all).unwrap()
+    judge(posterior, &solution, all, &(0..all.pose_count()).collect::<Vec<_>>()).unwrap()
+}
+
+#[test]
+fn some_poses_judge_all_wherever_they_stand() {
+    let (mut training, hyper) = of_scara(300);
+    let chosen: Vec<usize> = (0..300).step_by(2).collect();
+    for pose in [41, 120, 271] {
+        training.residual[3 * pose + 1] += 5e-4;
+    }
+    let of = |training: Training| Posterior::new(training, hyper.clone(), 2, &Cancel::default()).unwrap();
+    let alone = of(training.select(&chosen));
+    let solution = alone.solve(&alone.training().residual).unwrap();
+    let found = judge(&alone, &solution, &training, &chosen).unwrap();
+    assert_eq!(found.outliers, [41, 120, 271]);
+    let beside = judged(&of(training.only(&chosen)), &training);
+    assert_eq!(found.outliers, beside.outliers);
+    close(&found.score, &beside.score, 2e-3, "scores, but for where cells begin");
+    close(&found.distance, &beside.distance, 2e-3, "distances, but for where cells begin");
 }
 
 #[test]
