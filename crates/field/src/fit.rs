@@ -460,7 +460,7 @@ impl Search<'_> {
         cancel.check()?;
         let solution = posterior.solve(&posterior.training().residual)?;
         cancel.check()?;
-        let judgement = outliers::judge(&posterior, &solution, all, places)?;
+        let judgement = outliers::judge(&posterior, &solution, all, places, cancel)?;
         Ok(Judged { posterior, solution, judgement })
     }
 }

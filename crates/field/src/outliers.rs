@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use faer::Mat;
+use truearm_estimate::Cancel;
 
 use crate::FieldError;
 use crate::posterior::{Posterior, Solution, standardised};
@@ -35,6 +36,8 @@ const NEGLIGIBLE: f64 = 1e-3;
 const SPOILING: f64 = 0.1;
 /// A pose is suspicious when its squared residual reaches this many times its number of rows.
 pub const SUSPICIOUS: f64 = 3.0;
+/// Poses that are predicted between two looks at a request to stop.
+const TOGETHER: usize = 128;
 /// 95 % of a standard normal variable lies within this.
 pub const QUANTILE_95: f64 = 1.959_963_984_540_054;
 
@@ -57,6 +60,7 @@ pub fn judge(
     solution: &Solution,
     all: &Training,
     places: &[usize],
+    cancel: &Cancel,
 ) -> Result<Judgement, FieldError> {
     let training = posterior.training();
     let left_out = posterior.leave_one_out(&training.residual)?;
@@ -80,7 +84,7 @@ pub fn judge(
     let typical = quantile(shares, 0.5).max(1.0);
     let limit = |rows: usize| typical * chi_squared(rows as f64, OVERWHELMING);
     let others: Vec<usize> = poses.clone().filter(|&pose| is_aside[pose]).collect();
-    for aside in judge_aside(posterior, solution, (all, &others), limit)? {
+    for aside in judge_aside(posterior, solution, (all, &others), limit, cancel)? {
         (squares[aside.pose], distance[aside.pose]) = (aside.square, aside.distance);
     }
     let score = |pose: usize| match all.rows(pose).len() {
@@ -116,6 +120,7 @@ fn judge_aside(
     solution: &Solution,
     (all, poses): (&Training, &[usize]),
     limit: impl Fn(usize) -> f64,
+    cancel: &Cancel,
 ) -> Result<Vec<Aside>, FieldError> {
     if poses.is_empty() {
         return Ok(Vec::new());
@@ -135,12 +140,15 @@ fn judge_aside(
         }
         found.push(Aside { pose, square, distance: distance_of(&left[rows]) });
     }
-    for (count, some) in suspicious {
-        let chosen = part.select(&some);
+    let chunks =
+        suspicious.iter().flat_map(|(&count, some)| some.chunks(TOGETHER).map(move |some| (count, some)));
+    for (count, some) in chunks {
+        cancel.check()?;
+        let chosen = part.select(some);
         let setup = Some(chosen.setup.as_slice());
         let known = posterior.covariance(&chosen.values, &chosen.jacobian, setup, count)?;
         let anew = posterior.repeatability(&chosen.jacobian, count)?;
-        for (at, k) in some.into_iter().enumerate() {
+        for (at, &k) in some.iter().enumerate() {
             let first = part.rows(k).start;
             let covariance = Mat::from_fn(count, count, |i, j| {
                 let entry = (at * count + i) * count + j;

@@ -139,7 +139,7 @@ fn many_rows_go_to_weight_space_where_suspicious_poses_are_judged_exactly() {
 
 fn judged(posterior: &Posterior, all: &Training) -> Judgement {
     let solution = posterior.solve(&posterior.training().residual).unwrap();
-    judge(posterior, &solution, all, &(0..all.pose_count()).collect::<Vec<_>>()).unwrap()
+    judge(posterior, &solution, all, &(0..all.pose_count()).collect::<Vec<_>>(), &Cancel::default()).unwrap()
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn some_poses_judge_all_wherever_they_stand() {
     let of = |training: Training| Posterior::new(training, hyper.clone(), 2, &Cancel::default()).unwrap();
     let alone = of(training.select(&chosen));
     let solution = alone.solve(&alone.training().residual).unwrap();
-    let found = judge(&alone, &solution, &training, &chosen).unwrap();
+    let found = judge(&alone, &solution, &training, &chosen, &Cancel::default()).unwrap();
     assert_eq!(found.outliers, [41, 120, 271]);
     let beside = judged(&of(training.only(&chosen)), &training);
     assert_eq!(found.outliers, beside.outliers);
