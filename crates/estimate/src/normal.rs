@@ -37,27 +37,41 @@ impl Columns {
     /// `rows` is how many of the lanes of each column are filled.
     #[inline(always)]
     pub fn add_gram<I: Isa>(&self, rows: usize, gram: &mut [f64]) {
-        let mut block = 0;
-        while block < self.width {
-            let mut other = 0;
-            while other <= block {
-                self.add_tile::<I>(rows, block, other, gram);
-                other += TILE;
+        if I::MANY_REGISTERS {
+            self.add_tiles::<I, 4, 4>(rows, gram);
+        } else {
+            self.add_tiles::<I, 3, 2>(rows, gram);
+        }
+    }
+
+    /// The same in tiles of so many columns from either side, whose sums stay in registers.
+    #[inline(always)]
+    fn add_tiles<I: Isa, const A: usize, const B: usize>(&self, rows: usize, gram: &mut [f64]) {
+        for first in (0..self.width).step_by(A) {
+            for second in (0..(first + A).min(self.width)).step_by(B) {
+                self.add_tile::<I, A, B>(rows, first, second, gram);
             }
-            block += TILE;
         }
     }
 
     #[inline(always)]
-    fn add_tile<I: Isa>(&self, rows: usize, first: usize, second: usize, gram: &mut [f64]) {
+    fn add_tile<I: Isa, const A: usize, const B: usize>(
+        &self,
+        rows: usize,
+        first: usize,
+        second: usize,
+        gram: &mut [f64],
+    ) {
         // Columns past the end repeat the last one; their sums are dropped.
         let last = self.width - 1;
-        let (mut left, mut right) = ([&self.lanes[..0]; TILE], [&self.lanes[..0]; TILE]);
-        for k in 0..TILE {
-            left[k] = &self.column((first + k).min(last))[..rows];
-            right[k] = &self.column((second + k).min(last))[..rows];
+        let (mut left, mut right) = ([&self.lanes[..0]; A], [&self.lanes[..0]; B]);
+        for (k, column) in left.iter_mut().enumerate() {
+            *column = &self.column((first + k).min(last))[..rows];
         }
-        let mut sums = [[Lane::ZERO; TILE]; TILE];
+        for (k, column) in right.iter_mut().enumerate() {
+            *column = &self.column((second + k).min(last))[..rows];
+        }
+        let mut sums = [[Lane::ZERO; B]; A];
         for row in 0..rows {
             for (line, a) in sums.iter_mut().zip(left) {
                 for (sum, b) in line.iter_mut().zip(right) {
@@ -73,21 +87,21 @@ impl Columns {
     }
 }
 
-/// Columns that a tile of the Gram matrix takes from each side: 16 sums stay in registers.
-const TILE: usize = 4;
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use truearm_kinematics::{Kernel, LANES, dispatch};
 
-    struct Gram<'a>(&'a Columns, &'a mut [f64]);
+    struct Grams<'a>(&'a Columns, [&'a mut [f64]; 3]);
 
-    impl Kernel for Gram<'_> {
+    impl Kernel for Grams<'_> {
         type Output = ();
         #[inline(always)]
         fn run<I: Isa>(self) {
-            self.0.add_gram::<I>(5, self.1);
+            let [chosen, large, small] = self.1;
+            self.0.add_gram::<I>(5, chosen);
+            self.0.add_tiles::<I, 4, 4>(5, large);
+            self.0.add_tiles::<I, 3, 2>(5, small);
         }
     }
 
@@ -101,13 +115,15 @@ mod tests {
                 columns.set(c, r, Lane(std::array::from_fn(|l| value(c, r, l))));
             }
         }
-        let mut gram = vec![0.0; width * width];
-        dispatch(Gram(&columns, &mut gram));
+        let mut grams = [(); 3].map(|()| vec![0.0; width * width]);
+        dispatch(Grams(&columns, grams.each_mut().map(Vec::as_mut_slice)));
         for i in 0..width {
             for j in 0..=i {
                 let expected: f64 =
                     (0..5).flat_map(|r| (0..LANES).map(move |l| value(i, r, l) * value(j, r, l))).sum();
-                assert!((gram[i * width + j] - expected).abs() < 1e-12);
+                for gram in &grams {
+                    assert!((gram[i * width + j] - expected).abs() < 1e-12);
+                }
             }
         }
     }

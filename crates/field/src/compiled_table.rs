@@ -289,9 +289,9 @@ impl<const K: usize, const W: usize> Kernel for Wide<'_, K, W> {
             let mut found = [Lane::ZERO; MOST_LANES + 1];
             found[..W].copy_from_slice(&sums);
             for way in &sheet.ways {
-                let picked = I::pick(&found[way.lane], &found[way.lane + 1], &way.pick);
                 let last = out.len().min(way.parameter + LANES);
-                I::add_to(&picked, &mut out[way.parameter..last]);
+                let out = &mut out[way.parameter..last];
+                I::add_picked(&found[way.lane], &found[way.lane + 1], &way.pick, out);
             }
         }
     }

@@ -10,6 +10,9 @@ use crate::lane::{LANES, Lane, Pick, Short};
 
 /// What differs between instruction sets: whether a multiplication fuses with an addition, and how rows are moved.
 pub trait Isa {
+    /// Whether sixteen lanes and what is added to them stay in registers; else six do.
+    const MANY_REGISTERS: bool = false;
+
     /// Run a kernel that is compiled once for this instruction set, and not wherever it is called.
     ///
     /// For what is large, or called in several places: kernels that hold all they call take minutes to compile.
@@ -57,20 +60,19 @@ pub trait Isa {
     fn pick(low: &Lane, high: &Lane, pick: &Pick) -> Lane {
         let mut out = Lane::ZERO;
         for (i, out) in out.0.iter_mut().enumerate() {
-            *out = match pick.from[i] as usize {
-                from if pick.taken >> i & 1 == 0 || from >= 2 * LANES => 0.0,
-                from if from < LANES => low.0[from],
-                from => high.0[from - LANES],
-            };
+            *out = pick.of(i, low, high).unwrap_or(0.0);
         }
         out
     }
 
-    /// Add the first numbers of a lane to `to`, up to eight.
+    /// Add eight numbers out of sixteen to `to`, or as many as it has.
     #[inline(always)]
-    fn add_to(lane: &Lane, to: &mut [f64]) {
-        for (to, value) in to.iter_mut().zip(&lane.0) {
-            *to += value;
+    fn add_picked(low: &Lane, high: &Lane, pick: &Pick, to: &mut [f64]) {
+        // Number by number: where lanes are no single registers, to put them together takes longer than to add them.
+        for (i, to) in to.iter_mut().enumerate().take(LANES) {
+            if let Some(value) = pick.of(i, low, high) {
+                *to += value;
+            }
         }
     }
 
@@ -265,6 +267,8 @@ mod vector {
     }
 
     impl Isa for Avx512 {
+        const MANY_REGISTERS: bool = true;
+
         #[inline(always)]
         fn call<K: Kernel>(kernel: K) -> K::Output {
             // SAFETY: this instruction set is only used on processors that have it.
@@ -308,9 +312,9 @@ mod vector {
         }
 
         #[inline(always)]
-        fn add_to(lane: &Lane, to: &mut [f64]) {
+        fn add_picked(low: &Lane, high: &Lane, pick: &Pick, to: &mut [f64]) {
             // SAFETY: as above.
-            unsafe { x86::add_to_avx512(lane, to) }
+            unsafe { x86::add_to_avx512(&x86::pick_avx512(low, high, pick), to) }
         }
 
         #[inline(always)]

@@ -56,6 +56,16 @@ impl Pick {
         }
         pick
     }
+
+    /// The number that becomes the one of a place, if any does.
+    #[inline(always)]
+    pub(crate) fn of(&self, place: usize, low: &Lane, high: &Lane) -> Option<f64> {
+        if self.taken >> place & 1 == 0 {
+            return None;
+        }
+        let from = self.from[place] as usize;
+        if from < LANES { Some(low.0[from]) } else { high.0.get(from - LANES).copied() }
+    }
 }
 
 impl Lane {

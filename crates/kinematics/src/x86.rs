@@ -150,7 +150,7 @@ pub unsafe fn pick_avx512(low: &Lane, high: &Lane, pick: &Pick) -> Lane {
     }
 }
 
-/// Adds the first numbers of a lane to `to`, see [`crate::Isa::add_to`].
+/// Adds the first numbers of a lane to `to`, up to eight.
 ///
 /// # Safety
 /// The processor must have AVX-512F.

@@ -15,14 +15,14 @@ impl Kernel for Picking<'_> {
     }
 }
 
-struct Adding<'a>(&'a Lane, &'a mut [f64]);
+struct Adding<'a>(&'a [Lane; 2], &'a Pick, &'a mut [f64]);
 
 impl Kernel for Adding<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        I::add_to(self.0, self.1);
+        I::add_picked(&self.0[0], &self.0[1], self.1, self.2);
     }
 }
 
@@ -76,14 +76,19 @@ proptest! {
 
     #[test]
     fn no_more_is_added_to_than_is_there(
-        numbers in prop::array::uniform8(-1.0..1.0),
+        numbers in prop::array::uniform16(-1.0..1.0),
+        sources in prop::collection::vec(prop::option::of(0..20_usize), 0..12),
         before in prop::collection::vec(-1.0..1.0, 0..12),
     ) {
+        let lanes = [Lane::from_fn(|i| numbers[i]), Lane::from_fn(|i| numbers[LANES + i])];
+        let pick = Pick::new(sources.iter().copied());
         for set in InstructionSet::ALL {
             let mut found = before.clone();
-            dispatch_on(set, Adding(&Lane(numbers), &mut found));
+            dispatch_on(set, Adding(&lanes, &pick, &mut found));
             for (i, (found, before)) in found.iter().zip(&before).enumerate() {
-                prop_assert_eq!(*found, numbers.get(i).map_or(*before, |number| before + number));
+                let source = sources.get(i).copied().flatten().filter(|_| i < LANES);
+                let number = source.and_then(|source| numbers.get(source)).copied().unwrap_or(0.0);
+                prop_assert_eq!(*found, before + number);
             }
         }
     }
