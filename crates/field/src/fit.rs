@@ -150,9 +150,9 @@ const POSES_FOR_SELECTION: usize = 120;
 const POSES_FOR_HYPER: usize = 200;
 const ROWS_FOR_POLISH: usize = 3000;
 const ROWS_FOR_EXTRAPOLATION: usize = 1200;
-/// Rows that are judged at once: of more a part judges all first, and that outliers of a smaller share than [`FELT`] of all
-/// squared residuals came or went is not worth another posterior.
+/// Rows that are judged at once: of more a part judges all first.
 const ROWS_AT_ONCE: usize = 2 * ROWS_FOR_POLISH;
+/// Share of all squared residuals from which outliers that come or go among more rows are worth another posterior.
 const FELT: f64 = 0.01;
 const SEARCH: Limits = Limits { evaluations: 60, gain: 0.02 };
 const POLISH: Limits = Limits { evaluations: 12, gain: 0.05 };
