@@ -1,15 +1,29 @@
 """The paper's experiment in small: three regions, the real process, all that is written, and going on."""
 
+import io
 import json
+from contextlib import redirect_stdout
 
 import numpy as np
+import pytest
+from distributed import LocalCluster
 
 from truearm.cell.session import Session
 from truearm.cli import main
 from truearm.studies.process.planning import plan_experiment
 from truearm.studies.process.setting import Setting, path, space
 
-SMALL = ("--regions", "3", "--poses", "16")
+SMALL = ("--regions", "3", "--poses", "16", "--seeds", "2")
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """Where a small experiment on two arms was made, and what it printed."""
+    directory = tmp_path_factory.mktemp("experiments") / "small"
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        assert main(["study", "experiment", "-o", str(directory), *SMALL, "--json", "--workers", "1"]) == 0
+    return directory, json.loads(printed.getvalue())
 
 
 def test_the_path_of_figure_10_is_within_reach_and_within_the_space():
@@ -31,10 +45,8 @@ def test_every_region_gets_its_poses_at_whole_tenths_of_a_degree():
     assert not plan.poses.readings[:, 3:].any()
 
 
-def test_the_experiment_in_small(tmp_path, capsys):
-    directory = tmp_path / "experiment"
-    assert main(["study", "experiment", "-o", str(directory), *SMALL, "--json"]) == 0
-    result = json.loads(capsys.readouterr().out)
+def test_the_experiment_in_small(small):
+    directory, result = small
     assert result == json.loads((directory / "experiment.json").read_text())
     figure = result["figure10"]
     errors = {name: part["workspace"]["mean_mm"] for name, part in figure.items()}
@@ -45,8 +57,29 @@ def test_the_experiment_in_small(tmp_path, capsys):
     assert all(each["ours"] in page for each in result["statements"])
     for name in ("figure10.png", "figure10.svg", "cell.toml", "session.db"):
         assert (directory / name).stat().st_size > 0
-    with Session(directory / "session.db", writing=False) as session:
-        assert session.rows("SELECT count(*) FROM outcomes") == session.rows("SELECT count(*) FROM steps")
+    for session_file in (directory / "session.db", directory / "arm-7" / "session.db"):
+        with Session(session_file, writing=False) as session:
+            assert session.rows("SELECT count(*) FROM outcomes") == session.rows("SELECT count(*) FROM steps")
+
+
+def test_several_arms_tell_what_holds_beyond_the_first(small):
+    directory, result = small
+    over = result["over_arms"]
+    assert over["seeds"] == [6, 7]
+    spread = over["figure10"]["conventional"]["path"]["mean_mm"]
+    assert spread["p05"] < spread["median"] < spread["p95"]
+    assert result["figure10"]["conventional"]["path"]["mean_mm"] != spread["median"]
+    assert len(over["statements"]) == len(result["statements"])
+    assert "## On 2 arms" in (directory / "experiment.md").read_text()
+
+
+def test_a_cluster_finds_what_processes_find(small, tmp_path, capsys):
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+    ) as cluster:
+        place = ["--scheduler", cluster.scheduler_address]
+        assert main(["study", "experiment", "-o", str(tmp_path), *SMALL, "--json", *place]) == 0
+    assert json.loads(capsys.readouterr().out) == small[1]
 
 
 def test_another_experiment_does_not_go_on_with_this_session(tmp_path, capsys):
@@ -54,3 +87,10 @@ def test_another_experiment_does_not_go_on_with_this_session(tmp_path, capsys):
     (tmp_path / "session.db").write_bytes(b"not a session")
     assert main(plan_again) == 1
     assert "this is no session file" in capsys.readouterr().err
+
+
+def test_workers_that_contradict_each_other_are_refused_before_anything_is_measured(tmp_path, capsys):
+    place = ["--workers", "1", "--scheduler", "tcp://127.0.0.1:1"]
+    assert main(["study", "experiment", "-o", str(tmp_path), *SMALL, *place]) == 2
+    assert "both a scheduler and a number of workers" in capsys.readouterr().err
+    assert not (tmp_path / "session.db").exists()

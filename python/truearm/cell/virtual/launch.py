@@ -56,7 +56,10 @@ PTY_FRAME: Final = "8N1"
 
 
 class VirtualCell:
-    """The devices of a cell file, virtual: a process for each, or a thread where asked for or not on Linux.
+    """The devices of a cell file, virtual: a process for each, or a thread where asked for or needed.
+
+    Threads are needed beside Linux, in processes that may have no children, as those of a cluster's workers,
+    and outside of the main thread, for other threads may hold locks that a fork would keep for ever.
 
     Attributes:
         content: The cell file's values with the addresses at which the virtual devices are.
@@ -72,7 +75,7 @@ class VirtualCell:
             InputError: If the file is wrong, a driver has no virtual counterpart, or a fault is not possible.
         """
         self._text, self._where, self._folder = text, where, folder.resolve()
-        self._processes = processes and FORKS
+        self._processes = processes and FORKS and _may_fork()
         self.content: dict[str, Any] = parsed(text, where=where)
         cell = Cell.from_toml(text, where=where, folder=folder)
         for device, settings in (("robot", cell.robot_settings), ("sensor", cell.sensor_settings)):
@@ -158,6 +161,11 @@ class _Job:
     device: str
     state: Path
     report: Connection
+
+
+def _may_fork() -> bool:
+    in_main = threading.current_thread() is threading.main_thread()
+    return in_main and not multiprocessing.current_process().daemon
 
 
 def _in_process(job: _Job) -> None:

@@ -1,6 +1,6 @@
 """What the paper says of its experiment, beside what comes out here."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from truearm.studies.claims import Claim, look_up
@@ -118,5 +118,22 @@ def judged(result: Result) -> dict[str, Any]:
         ours, agrees = statement.check(result)
         said = {"place": statement.place, "paper": statement.paper}
         statements.append({**said, "ours": ours, "agrees": bool(agrees)})
-    claims = [claim.judge([result]) for claim in CLAIMS]
-    return {"claims": [claim for claim in claims if claim is not None], "statements": statements}
+    return {"claims": _claims([result]), "statements": statements}
+
+
+def judged_over_arms(results: Sequence[Result]) -> dict[str, Any]:
+    """Claims over several arms, and with how many of them each statement agrees."""
+    statements = [
+        {
+            "place": statement.place,
+            "paper": statement.paper,
+            "agrees": sum(bool(statement.check(result)[1]) for result in results),
+        }
+        for statement in STATEMENTS
+    ]
+    return {"claims": _claims(results), "statements": statements}
+
+
+def _claims(results: Sequence[Result]) -> list[dict[str, Any]]:
+    claims = [claim.judge(results) for claim in CLAIMS]
+    return [claim for claim in claims if claim is not None]

@@ -81,10 +81,47 @@ def page(result: Result) -> str:
                 for c in result["claims"]
             ],
         ),
+        *_several(result.get("over_arms")),
         "## How it is read",
         table(("what", "reading"), READINGS),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _several(over: Result | None) -> list[str]:
+    """What holds on several arms, where there are several."""
+    if over is None:
+        return []
+    count = len(over["seeds"])
+    return [
+        f"## On {count} arms",
+        f"The same experiment on {count} virtual arms, the one above among them: errors of the same sizes "
+        "are drawn anew and all poses are measured anew. The first arm was taken because its path errs as "
+        "that of Figure 10(a); the others come as they come.",
+        table(
+            ("place", "the paper", f"agrees on, of {count}"),
+            [(s["place"], s["paper"], str(s["agrees"])) for s in over["statements"]],
+        ),
+        "Medians over the arms, and the 95 % quantile in brackets, mm.",
+        table(
+            ("scheme", "path mean", "path max", "space mean", "space max", "worst of ten paths"),
+            [_over_arms(name, part, over["paths"][name]) for name, part in over["figure10"].items()],
+        ),
+        table(
+            ("claim", "median", "5 to 95 %", "to reach"),
+            [(c["claim"], *_spread(c["value"]), c["limit"]) for c in over["claims"]],
+        ),
+    ]
+
+
+def _over_arms(name: str, part: Result, paths: Result) -> tuple[str, ...]:
+    path, space = part["path"], part["workspace"]
+    numbers = (path["mean_mm"], path["max_mm"], space["mean_mm"], space["max_mm"], paths["worst_mean_mm"])
+    return (_title(name), *(f"{x['median']:.3f} ({x['p95']:.3f})" for x in numbers))
+
+
+def _spread(value: Result) -> tuple[str, str]:
+    return f"{value['median']:.3g}", f"{value['p05']:.3g} to {value['p95']:.3g}"
 
 
 def _on_path(name: str, path: Result) -> tuple[str, ...]:

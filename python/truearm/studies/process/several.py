@@ -1,0 +1,92 @@
+"""The experiment on several virtual arms: one here, the others over processes or a cluster."""
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Final
+
+from truearm.cell.measuring import Progress
+from truearm.files import make_directory, write_whole
+from truearm.fitting import no_stages
+from truearm.studies.metrics import over_seeds
+from truearm.studies.paper import Drawn
+from truearm.studies.process.conducting import Result, Stages, conduct_experiment
+from truearm.studies.process.judging import judged, judged_over_arms
+from truearm.studies.process.setting import Setting, cell_text
+from truearm.workers import check_workers, run_tasks
+
+CELL_NAME: Final = "cell.toml"
+OVER_ARMS: Final = "over_arms"
+
+
+def conduct_arms(
+    settings: Sequence[Setting],
+    directory: Path,
+    report: Callable[[Progress], None],
+    stages: Stages,
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+) -> tuple[Result, Drawn]:
+    """Conduct the experiment on arms that differ in their seeds.
+
+    Each arm has its session and cell file: the first in the directory, the one of seed S in "arm-S" of it.
+    Sessions that are there are continued.
+
+    Args:
+        settings: Of each arm.
+        directory: Where the sessions are; the workers of a cluster see it under the same name.
+        report: Told of the progress of measuring the first arm.
+        stages: Called with the name of each stage of the rest.
+        scheduler: Address of a Dask scheduler, as in run_tasks.
+        workers: Local processes at the most, as in run_tasks.
+
+    Returns:
+        The results of the first arm with its statements and claims, and under "over_arms" those of all where
+        there are several; and what is drawn of the first.
+
+    Raises:
+        UsageError: If workers contradict each other.
+        InputError: If the scheduler does not answer, or a session that is there is of something else.
+        WorkError: If an arm cannot be measured.
+        KeyboardInterrupt: After Ctrl-C; the same call goes on with what was measured.
+    """
+    check_workers(scheduler, workers)
+    first, drawn = _conduct(settings[0], directory, report, stages)
+    others = [(setting, directory.resolve() / f"arm-{setting.seed}") for setting in settings[1:]]
+    each = [first, *_elsewhere_all(others, stages, scheduler, workers)]
+    result = {**first, **judged(first)}
+    if others:
+        seeds = [setting.seed for setting in settings]
+        result[OVER_ARMS] = {"seeds": seeds, **over_seeds(each), **judged_over_arms(each)}
+    return result, drawn
+
+
+def _conduct(
+    setting: Setting, directory: Path, report: Callable[[Progress], None], stages: Stages
+) -> tuple[Result, Drawn]:
+    make_directory(directory)
+    write_whole(directory / CELL_NAME, cell_text(setting))
+    return conduct_experiment(setting, directory, report, stages)
+
+
+def _elsewhere_all(
+    items: Sequence[tuple[Setting, Path]], stages: Stages, scheduler: str | None, workers: int | None
+) -> list[Result]:
+    """Results of arms in their order."""
+    found: dict[int, Result] = {}
+    with closing(run_tasks(_elsewhere, items, scheduler=scheduler, workers=workers)) as finished:
+        for number in range(2, len(items) + 2):
+            with stages(f"arm {number} of {len(items) + 1}"):
+                done = next(finished)
+            found[done.index] = done.result()
+    return [found[position] for position in range(len(items))]
+
+
+def _elsewhere(item: tuple[Setting, Path]) -> Result:
+    setting, directory = item
+    return _conduct(setting, directory, _untold, no_stages)[0]
+
+
+def _untold(progress: Progress) -> None:
+    del progress
