@@ -61,10 +61,8 @@ test: rust-test py-test
 # With the extension's features and profile, so that what both rest on is built once.
 RUST_WHOLE := --release --locked --workspace --features truearm-python/extension-module
 
-# Text comes from files: its numbers are looked at for overflows as well.
 rust-test: $(STAMPS)/tools
 	$(CARGO) test $(RUST_WHOLE)
-	$(CARGO) test --locked --package truearm-text
 
 py-test: $(STAMPS)/built
 	$(BIN)/python -m pytest --numprocesses auto --dist worksteal --durations=15

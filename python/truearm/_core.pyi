@@ -1052,6 +1052,18 @@ def observability(jacobian: NDArray[np.float64], columns: Sequence[int]) -> dict
         and Hollerbach); log_det of M^t M.
     """
 
+def non_negative_least_squares(
+    columns: NDArray[np.float64], target: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The x (n,), none of it negative, that makes columns (m, n) times x come nearest to the target (m,).
+
+    After Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23. What depends on columns in use
+    stays at zero.
+
+    Raises:
+        CoreError: If the columns are not of as many rows as the target.
+    """
+
 def independent_columns(jacobian: NDArray[np.float64], columns: Sequence[int]) -> list[int]:
     """Positions of the columns of a Jacobian (n, m, P) that none before them can stand for, ascending.
 

@@ -212,6 +212,6 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-fn length(a: &[f64]) -> f64 {
+pub fn length(a: &[f64]) -> f64 {
     dot(a, a).sqrt()
 }

@@ -23,6 +23,7 @@ mod layout;
 mod measurements;
 mod minimise;
 mod noise;
+mod non_negative;
 mod normal;
 mod packets;
 mod pass;
@@ -52,6 +53,7 @@ pub use identifiability::{Confounded, Identifiability, identifiability, independ
 pub use layout::{Layout, Problem};
 pub use measurements::{MeasurementSet, Noise};
 pub use minimise::Reason;
+pub use non_negative::non_negative_least_squares;
 pub use robust::Robust;
 pub use rows::{Linearised, Point, linearise, residuals};
 pub use scale::{ANGLE_ARM, column_unit, row_unit, scaled_jacobian};

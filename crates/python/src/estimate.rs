@@ -2,12 +2,14 @@
 
 use numpy::ndarray::Array3;
 use numpy::{
-    IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use truearm_estimate::{
     ConstantFit as Core, ConstantOptions, FrameMode, Layout, Linearised, Noise, Point, Prior, Problem,
-    Robust, fit_constant as fit, identifiability as identify, linearise as linear, residuals as left_over,
+    Robust, fit_constant as fit, identifiability as identify, linearise as linear,
+    non_negative_least_squares as non_negative, residuals as left_over,
 };
 
 use crate::chain::Chain;
@@ -300,4 +302,16 @@ fn array3<'py>(
     let array = Array3::from_shape_vec(shape, values)
         .map_err(|error| CoreError::new_err(format!("the Jacobian: {error}")))?;
     Ok(array.into_pyarray(py))
+}
+
+/// Unknowns that are not negative, see the stub.
+#[pyfunction]
+pub fn non_negative_least_squares<'py>(
+    py: Python<'py>,
+    columns: PyReadonlyArray2<'py, f64>,
+    target: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (count, target) = (columns.shape()[1], target.as_array().to_vec());
+    let columns: Vec<f64> = columns.as_array().iter().copied().collect();
+    Ok(quick(py, || non_negative(&columns, count, &target))?.into_pyarray(py))
 }

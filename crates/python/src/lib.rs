@@ -76,6 +76,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     add_class::<compensate::Solver>(module)?;
     module.add_function(wrap_pyfunction!(estimate::fit_constant, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::identifiability, module)?)?;
+    module.add_function(wrap_pyfunction!(estimate::non_negative_least_squares, module)?)?;
     module.add_function(wrap_pyfunction!(estimate::residuals, module)?)?;
     module.add_function(wrap_pyfunction!(field::fit_field, module)?)?;
     module.add_function(wrap_pyfunction!(drift::find_drift, module)?)?;

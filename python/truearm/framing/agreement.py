@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from truearm.errors import InputError, Notice, WorkError, list_rows
 from truearm.leaving_out import left_out
@@ -65,7 +65,7 @@ def _farthest(residuals: Floats, jacobian: Floats, chance: float) -> tuple[int |
     gained = np.square(found.lengths)
     place = int(gained.argmax())
     others = max(found.squares - float(gained[place]), 0.0) / (freedom - 3)
-    if gained[place] / 3.0 <= f_distribution.isf(chance, 3, freedom - 3) * others:
+    if gained[place] / 3.0 <= fdtri(3, freedom - 3, 1.0 - chance) * others:
         return None, 0.0
     return place, float(np.linalg.norm(found.alone[place]))
 

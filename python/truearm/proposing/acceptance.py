@@ -6,8 +6,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
+from scipy.special import chdtri, chndtrinc
 
 from truearm._core import choose_telling
 from truearm.identified import IdentifiedArm
@@ -141,6 +140,4 @@ def standard_errors(freedom: int, level: float) -> float:
         return float("inf")
     if level >= NOTICED:
         return 0.0
-    limit = chi2.isf(level, freedom)
-    squares = brentq(lambda found: ncx2.sf(limit, freedom, found) - NOTICED, 1e-6, 10.0 * limit + 100.0)
-    return float(np.sqrt(squares))
+    return float(np.sqrt(chndtrinc(chdtri(freedom, level), freedom, 1.0 - NOTICED)))

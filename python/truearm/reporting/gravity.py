@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Chain
+from truearm._core import Chain, non_negative_least_squares
 from truearm.doubts import UPRIGHT
 from truearm.models import CONSTANT
 from truearm.reporting.charts import axis, line, points, running_median
@@ -152,9 +152,6 @@ def _reach_mm(facts: Facts, poses: Floats, up: Floats) -> Floats:
 
 def _explained(basis: Floats, moved: Floats) -> float:
     """Share of the variance that the best compliances, none of them negative, explain."""
-    from scipy.optimize import nnls  # noqa: PLC0415
-
-    found, _ = nnls(basis, moved)
-    left = moved - basis @ found
+    left = moved - basis @ non_negative_least_squares(basis, moved)
     total = float(moved @ moved)
     return 1.0 - float(left @ left) / total if total > 0.0 else 0.0
