@@ -70,7 +70,8 @@ def test_what_a_set_up_moved_is_found_and_taken_out(measured, settled):
     left = rows.moved[order] - (truth - truth.mean(axis=0))
     left -= left.mean(axis=0)
     assert np.sqrt(np.square(left).mean()) < 0.5 * np.sqrt(np.square(truth - truth.mean(axis=0)).mean())
-    left_in, alone = ta.calibrate(arm.robot, data, drift="none"), ta.calibrate(arm.robot, steady)
+    left_in = ta.calibrate(arm.robot, data, drift="none", refit=False)
+    alone = ta.calibrate(arm.robot, steady, refit=False)
     assert held_mean(settled) < 0.5 * (held_mean(left_in) + held_mean(alone))
     assert left_in.validation.drift is None
     assert rows_of(left_in).moved is None
@@ -253,7 +254,7 @@ def test_what_was_bumped_is_told_with_its_rows(measured, tmp_path, after):
     arm, _, data = measured
     bump = np.outer(np.arange(ROWS) >= after, [0.0, 4e-4, 3e-4])
     calibration = ta.calibrate(arm.robot, moved(data, bump))
-    left_in = ta.calibrate(arm.robot, moved(data, bump), drift="none")
+    left_in = ta.calibrate(arm.robot, moved(data, bump), drift="none", refit=False)
     assert held_mean(calibration) < 0.5 * held_mean(left_in)
     ((jump,),) = drift_of(calibration).jumps.values()
     before, behind = (int(row) for row in re.findall(r"row (\d+)", jump.between))

@@ -28,7 +28,7 @@ def with_points_of(table, source):
 
 
 def notices_of(arm, table):
-    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table))
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), refit=False)
     return {notice.kind: notice for notice in found.notices}
 
 

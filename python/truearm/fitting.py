@@ -51,6 +51,8 @@ SUSPECTED: Final = 1e-4
 """Weight of a row with which a fit begins that is to judge it."""
 CLEARER: Final = 0.7
 """Ratio of the median distances of rows left out, below which a fit is believed that begins without some."""
+PROMISING: Final = 0.85
+"""The same of a rough fit that begins at the one to all rows, above which none is made from nothing."""
 OTHER_MINIMUM: Final = 0.7
 """Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1
@@ -264,9 +266,12 @@ def _unmasked(
     far = robust.weights < FAR_FROM_CONSTANTS
     if not far[variable.weights >= 1.0].any() or far.mean() > MOST_FAR:
         return fits
-    found = _without_outliers(task, data, np.where(far, SUSPECTED, 1.0), NOTHING_KNOWN)
-    clearer = np.median(found[1].distances) < CLEARER * np.median(variable.distances)
-    return found if clearer else fits
+    weights, before = np.where(far, SUSPECTED, 1.0), np.median(variable.distances)
+    _, rough = _without_outliers(task, data, weights, KnownHyper(near=variable, rough=True))
+    if np.median(rough.distances) > PROMISING * before:
+        return fits
+    found = _without_outliers(task, data, weights, NOTHING_KNOWN)
+    return found if np.median(found[1].distances) < CLEARER * before else fits
 
 
 def _fit_scheme(
