@@ -94,9 +94,9 @@ fn a_wave_that_is_too_fine_for_a_curve_is_found_and_taken_away() {
 fn outliers_do_not_hide_a_wave() {
     let arm = six_axes(Truth { wave: (8e-5, 202.0, 1), ..Truth::BENDING });
     for outliers in [1, 4] {
-        let mut set = Measure::poses(250).of(&arm);
+        let mut set = Measure::poses(150).of(&arm);
         for pose in 0..outliers {
-            set.targets[3 * (60 * pose + 5) + pose % 3] += 20e-3;
+            set.targets[3 * (35 * pose + 5) + pose % 3] += 20e-3;
         }
         let fit = fit(&arm, &set).unwrap();
         let waves = &fit.field.hyper.waves;

@@ -166,9 +166,9 @@ def _figure(found: Measured, schemes: Mapping[str, Scheme]) -> tuple[Result, Dra
     """Every scheme on the path of Figure 10, over the space, and at the test points of the regions."""
     made, traces, result = found.made, {}, {}
     workspace = needed_pool(made.space, WORKSPACE_POSES, PoolOptions(seed=made.arm.seed)).readings
-    readings, _ = made.space.readings(path())
+    (readings, _), box = made.space.readings(path()), space()
     for name, scheme in schemes.items():
-        traces[name] = followed(made, space(), scheme, path())
+        traces[name] = followed(made, box, scheme, path())
         result[name] = {
             "path": _along(made, traces[name], readings),
             "workspace": sizes(trace(made, scheme, workspace).size_mm),
@@ -180,10 +180,11 @@ def _figure(found: Measured, schemes: Mapping[str, Scheme]) -> tuple[Result, Dra
 def _paths(made: Experiment, schemes: Mapping[str, Scheme]) -> Result:
     """Every scheme on straight paths between random points."""
     rng = np.random.default_rng([made.arm.seed, PATHS_DRAWN])
-    lines = random_paths(RANDOM_PATHS, rng)
+    points, box = np.concatenate(random_paths(RANDOM_PATHS, rng)), space()
     result: Result = {}
     for name, scheme in schemes.items():
-        means = [float(np.nanmean(followed(made, space(), scheme, line).size_mm)) for line in lines]
+        each = np.split(followed(made, box, scheme, points).size_mm, RANDOM_PATHS)
+        means = [float(np.nanmean(size_mm)) for size_mm in each]
         result[name] = {
             "mean_mm": float(np.mean(means)),
             "worst_mean_mm": max(means),
