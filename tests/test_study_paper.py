@@ -25,7 +25,7 @@ def study():
     """One seed of every figure, with few regions so that it is quick."""
     patch = pytest.MonkeyPatch()
     patch.setattr(paper, "JOINT_REGIONS", 16)
-    patch.setattr(paper, "SPHERE_REGIONS", 16)
+    patch.setattr(paper, "SPHERE_REGIONS", 8)
     patch.setattr(paper, "READINGS", setting.READINGS[::2])
     patch.setattr("truearm.studies.experiment.WORKSPACE_POSES", FEW_POSES)
     yield conduct_study([0], paper.FIGURES)
@@ -128,7 +128,7 @@ def test_claims_of_figures_that_were_not_run_are_left_out(study):
 
 
 def test_command_writes_its_files(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(paper, "JOINT_REGIONS", 8)
+    monkeypatch.setattr(paper, "JOINT_REGIONS", 16)
     monkeypatch.setattr("truearm.studies.experiment.WORKSPACE_POSES", FEW_POSES)
     out = tmp_path / "study"
     assert main(["study", "paper", "-o", str(out), "--figure", "cmac", "--seeds", "1", "--json"]) == 0
