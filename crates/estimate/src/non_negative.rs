@@ -6,7 +6,7 @@ use crate::EstimateError;
 use crate::dense::Orthogonal;
 use crate::identifiability::length;
 
-/// A column counts as dependent of others, and as none where all is so small, below this share of its length.
+/// Share of a column's length that has to be beyond the columns in use; and of the longest column's that it must have.
 const INDEPENDENT_SHARE: f64 = 1e-8;
 /// An unknown may grow whose column has more than this share of the length of the target in common with what is left.
 const GAIN_SHARE: f64 = 1e-10;

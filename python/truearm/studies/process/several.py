@@ -16,7 +16,6 @@ from truearm.studies.process.setting import Setting, cell_text
 from truearm.workers import check_workers, run_tasks
 
 CELL_NAME: Final = "cell.toml"
-OVER_ARMS: Final = "over_arms"
 
 
 def conduct_arms(
@@ -58,7 +57,7 @@ def conduct_arms(
     result = {**first, **judged(first)}
     if others:
         seeds = [setting.seed for setting in settings]
-        result[OVER_ARMS] = {"seeds": seeds, **over_seeds(each), **judged_over_arms(each)}
+        result["over_arms"] = {"seeds": seeds, **over_seeds(each), **judged_over_arms(each)}
     return result, drawn
 
 
