@@ -13,9 +13,10 @@ const GAIN_SHARE: f64 = 1e-10;
 /// Steps for each unknown; some three are needed.
 const STEPS_EACH: usize = 30;
 
-/// The x (`count`,), none of it negative, that makes `columns` (m, `count`), row by row, times x come nearest to `target` (m,).
+/// The x (`count`,), none of it negative, that makes `columns` (m, `count`), row by row, times x come nearest to `target`
+/// (m,).
 ///
-/// Columns that depend on those already used stay at zero: they cannot come nearer.
+/// Columns that those in use make up stay at zero: they come no nearer.
 ///
 /// # Errors
 /// [`EstimateError::Length`] where the columns are not of as many rows as the target.
@@ -52,16 +53,18 @@ struct Search<'a> {
 impl Search<'_> {
     fn run(mut self) -> Vec<f64> {
         let mut found = vec![0.0; self.columns.ncols()];
+        let mut barred = vec![false; found.len()];
         let enough = GAIN_SHARE * length(self.target);
         for _ in 0..STEPS_EACH * found.len() {
-            let Some(best) = self.most_gaining(&found, enough) else { break };
+            let Some(best) = self.most_gaining(&found, &barred, enough) else { break };
             self.used.push(best);
             let solution = self.solution().filter(|wanted| wanted.last().is_some_and(|newest| *newest > 0.0));
             let Some(mut wanted) = solution else {
                 self.used.pop();
-                self.usable[best] = false;
+                barred[best] = true;
                 continue;
             };
+            barred.fill(false);
             while let Some((first, share)) = self.first_at_zero(&found, &wanted) {
                 for (&unknown, to) in self.used.iter().zip(&wanted) {
                     found[unknown] += share * (to - found[unknown]);
@@ -76,15 +79,16 @@ impl Search<'_> {
         found
     }
 
-    /// The unknown at zero whose column has most in common with what is left, if that is more than `enough`.
-    fn most_gaining(&self, found: &[f64], enough: f64) -> Option<usize> {
+    /// The unknown at zero, and not barred, whose column has most in common with what is left, if that is more than
+    /// `enough`.
+    fn most_gaining(&self, found: &[f64], barred: &[bool], enough: f64) -> Option<usize> {
         let left: Vec<f64> = (0..self.target.len())
             .map(|row| {
                 self.target[row] - self.used.iter().map(|&k| self.columns[(row, k)] * found[k]).sum::<f64>()
             })
             .collect();
         (0..found.len())
-            .filter(|k| self.usable[*k] && !self.used.contains(k))
+            .filter(|k| self.usable[*k] && !barred[*k] && !self.used.contains(k))
             .map(|k| (k, (0..left.len()).map(|row| self.columns[(row, k)] * left[row]).sum::<f64>()))
             .filter(|(_, gain)| *gain > enough)
             .max_by(|one, other| one.1.total_cmp(&other.1))
