@@ -105,6 +105,17 @@ def test_what_handled_signals_before_does_so_again():
     assert signal.getsignal(signal.SIGTERM) == before
 
 
+def test_work_within_work_leaves_ctrl_c_to_the_outer_one():
+    """As a session that is measured in a command that goes on with what it brought."""
+    outer = Asked()
+    with asked_by((signal.SIGINT,), outer):
+        with asked_by((signal.SIGINT,), Asked()):
+            pass
+        assert signal.getsignal(signal.SIGINT) is outer
+        signal.raise_signal(signal.SIGINT)
+    assert outer
+
+
 def test_another_thread_leaves_signals_as_they_are():
     before, seen = signal.getsignal(signal.SIGTERM), []
 

@@ -51,7 +51,9 @@ def asked_by(numbers: Sequence[int], asked: Asked) -> Iterator[Asked]:
     if threading.current_thread() is not threading.main_thread():
         yield asked
         return
-    before = {number: signal.getsignal(number) or signal.SIG_DFL for number in numbers}
+    # None is a handler that was not set from Python; an Asked that nobody asked is false, and is kept.
+    found = {number: signal.getsignal(number) for number in numbers}
+    before = {number: signal.SIG_DFL if handler is None else handler for number, handler in found.items()}
     try:
         for number in numbers:
             signal.signal(number, asked)
