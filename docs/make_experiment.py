@@ -1,6 +1,6 @@
 """Write docs/explanations/the-papers-experiment.md, with its figure, from an experiment.
 
-truearm study experiment -o EXPERIMENT
+truearm study experiment -o EXPERIMENT --seeds 10
 python docs/make_experiment.py EXPERIMENT
 """
 

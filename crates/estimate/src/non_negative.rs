@@ -6,7 +6,8 @@ use crate::EstimateError;
 use crate::dense::Orthogonal;
 use crate::identifiability::length;
 
-/// Share of a column's length that has to be beyond the columns in use; and of the longest column's that it must have.
+/// A column of which no more than this share is beyond the columns in use is made up of them; one that is no longer than
+/// this share of the longest is none.
 const INDEPENDENT_SHARE: f64 = 1e-8;
 /// An unknown may grow whose column has more than this share of the length of the target in common with what is left.
 const GAIN_SHARE: f64 = 1e-10;

@@ -95,9 +95,9 @@ def _several(over: Result | None) -> list[str]:
     count = len(over["seeds"])
     return [
         f"## On {count} arms",
-        f"The same experiment on {count} virtual arms, the one above among them: errors of the same sizes "
-        "are drawn anew and all poses are measured anew. The first arm was taken because its path errs as "
-        "that of Figure 10(a); the others come as they come.",
+        f"With `--seeds {count}`: the same experiment on {count} virtual arms, the one above among them. "
+        "Errors of the same sizes are drawn anew and all poses are measured anew. The first arm was taken "
+        "because its path errs as that of Figure 10(a); the others come as they come.",
         table(
             ("place", "the paper", f"agrees on, of {count}"),
             [(s["place"], s["paper"], str(s["agrees"])) for s in over["statements"]],
