@@ -23,6 +23,8 @@ unexport PYTHONDONTWRITEBYTECODE
 # Kernels index their lanes in plain loops, which are sure to be inlined and vectorised.
 CLIPPY := -D warnings -D clippy::too_many_lines -A clippy::needless_range_loop
 
+NEEDED := import tomllib; \
+  print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["dependencies"], sep="\n")
 RUST_SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -path '*/src/*') $(wildcard crates/*/Cargo.toml)
 PY_PATHS := python tests benches docs examples
 # macOS comes with a make that cannot keep the lines of a target together.
@@ -131,12 +133,18 @@ $(STAMPS)/venv:
 	@$(PIP) install --upgrade 'pip>=25.1'
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/tools: pyproject.toml $(STAMPS)/venv
+# maturin alone, so that Rust is built while pip brings the rest.
+$(STAMPS)/maturin: pyproject.toml $(STAMPS)/venv
 	@$(if $(CARGO),:,echo 'truearm needs Rust 1.89 or newer; cargo was not found.' >&2; \
 	  echo 'Install it from https://rustup.rs, or name it: make CARGO=/path/to/cargo $(MAKECMDGOALS)' >&2; exit 1)
 	@minor="$$($(CARGO) --version | cut -d. -f2)"; [ "$$minor" -ge 89 ] || { \
 	  echo "truearm needs Rust 1.89 or newer; $$($(CARGO) --version) was found. Try: rustup update stable" >&2; exit 1; }
-	$(PIP) install --group dev
+	$(PIP) install --group build
+	@touch $@
+
+# With what truearm itself needs.
+$(STAMPS)/tools: pyproject.toml $(STAMPS)/maturin
+	@$(BIN)/python -c '$(NEEDED)' | $(PIP) install --group dev --requirement /dev/stdin
 	@touch $@
 
 $(STAMPS)/site: pyproject.toml $(STAMPS)/venv
@@ -147,8 +155,14 @@ $(STAMPS)/bench: pyproject.toml $(STAMPS)/venv
 	$(PIP) install --group bench
 	@touch $@
 
-# The stamp is as old as the start of the build, so an edit made meanwhile is built next time.
-$(STAMPS)/built: $(RUST_SOURCES) pyproject.toml $(STAMPS)/tools
+# In place, beside the modules in Python. The stamp is as old as the start of the build, so an edit made meanwhile is
+# built next time.
+$(STAMPS)/extension: $(RUST_SOURCES) pyproject.toml $(STAMPS)/maturin
 	@touch $@.started
-	$(BIN)/maturin develop --release --locked --quiet
+	$(BIN)/maturin develop --release --locked --quiet --skip-install
 	@mv $@.started $@
+
+$(STAMPS)/built: $(RUST_SOURCES) pyproject.toml $(STAMPS)/maturin
+	@$(MAKE) --no-print-directory --jobs=2 $(TOGETHER) $(STAMPS)/extension $(STAMPS)/tools
+	$(BIN)/maturin develop --release --locked --quiet
+	@touch -r $(STAMPS)/extension $@
