@@ -9,11 +9,12 @@
 
 use std::ops::Range;
 
-use faer::{Mat, Side};
+use faer::Mat;
 
 use crate::EstimateError;
 use crate::MeasurementSet;
 use crate::Noise;
+use crate::dense::eigenvalues;
 use crate::layout::{HELD_PRECISION, Layout, Problem, TARGET_PRECISION};
 use crate::packets::Packets;
 use crate::pass::{Normal, normal_equations};
@@ -111,8 +112,7 @@ fn go_about_in_space(problem: &Problem, point: Point, groups: &[usize]) -> Resul
         let centre: [f64; 3] = std::array::from_fn(|k| mean_of(&|point| point[k]));
         let spread =
             Mat::from_fn(3, 3, |i, j| mean_of(&|point| (point[i] - centre[i]) * (point[j] - centre[j])));
-        let squares = spread.self_adjoint_eigenvalues(Side::Lower);
-        if !squares.is_ok_and(|squares| squares[0] > THIN * THIN) {
+        if !eigenvalues(&spread).is_some_and(|squares| squares[0] > THIN * THIN) {
             return Ok(false);
         }
     }

@@ -8,15 +8,21 @@ use std::ops::Range;
 use faer::diag::Diag;
 use faer::linalg::cholesky::llt::{factor, inverse};
 use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::linalg::qr::no_pivoting::solve::{solve_lstsq_in_place, solve_lstsq_in_place_scratch};
+use faer::linalg::solvers::DenseSolveCore;
 use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use crate::{Cancel, EstimateError};
+
+mod eigen;
+mod products;
+
+pub use eigen::{Eigen, eigenvalues};
+pub use products::{add_product, add_to_lower, product, symmetric_product, times, transposed_product};
 
 /// Rows up to which a matrix is factored at once: in some tenths of a second.
 const AT_ONCE: usize = 2048;
@@ -57,17 +63,7 @@ impl Cholesky {
             }
             let alone = if below.nrows() == 1 { Par::Seq } else { par };
             solve_lower_triangular_in_place(corner.rb(), below.rb_mut().transpose_mut(), alone);
-            triangular::matmul(
-                behind,
-                BlockStructure::TriangularLower,
-                Accum::Add,
-                below.rb(),
-                BlockStructure::Rectangular,
-                below.rb().transpose(),
-                BlockStructure::Rectangular,
-                -1.0,
-                par,
-            );
+            add_to_lower(behind, below.rb(), below.rb().transpose(), -1.0, par);
         }
         Ok(Some(Self { lower: matrix, par }))
     }
@@ -226,13 +222,6 @@ impl Orthogonal {
     }
 }
 
-/// `left^T right`, by one thread: tall matrices of few columns gain nothing by more, and sum in another order with each.
-pub fn transposed_product(left: MatRef<f64>, right: MatRef<f64>) -> Mat<f64> {
-    let mut out = Mat::zeros(left.ncols(), right.ncols());
-    matmul(out.as_mut(), Accum::Replace, left.transpose(), right, 1.0, Par::Seq);
-    out
-}
-
 /// Singular values, the largest first, by one thread; `None` where they cannot be found.
 pub fn singular_values(matrix: MatRef<f64>) -> Option<Vec<f64>> {
     let (rows, columns) = (matrix.nrows(), matrix.ncols());
@@ -243,6 +232,11 @@ pub fn singular_values(matrix: MatRef<f64>) -> Option<Vec<f64>> {
     let mut values = Diag::zeros(rows.min(columns));
     svd(matrix, values.as_mut(), None, None, Par::Seq, stack, Default::default()).ok()?;
     Some((0..values.dim()).map(|k| values[k]).collect())
+}
+
+/// The inverse of a square matrix, infinite or not a number where it has none.
+pub fn inverse_of_square(matrix: &Mat<f64>) -> Mat<f64> {
+    matrix.partial_piv_lu().inverse()
 }
 
 /// Copies the lower triangle onto the upper one.

@@ -9,14 +9,13 @@ use std::ops::Range;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
 use truearm_estimate::Cancel;
-use truearm_estimate::dense::{Cholesky, parallelism};
+use truearm_estimate::dense::{Cholesky, parallelism, product, times};
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
 use crate::model::{BlockPlan, Excited, Implied, Model};
 use crate::pairs::write_covariance;
 use crate::posterior::{LeaveOneOut, Query, Solution};
-use crate::product::{product, times};
 use crate::projection::{Projection, setup_columns};
 
 /// Poses whose covariances are found together.

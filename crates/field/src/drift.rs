@@ -9,8 +9,8 @@
 //! `G^T r`, and v the ratio of the drift's variance to that of the noise, `s^2 = (r^T r - sum v z^2 / (1 + v e)) / N`
 //! and `log L = -1/2 (N log s^2 + 3 sum log(1 + v e))`.
 
-use faer::{Mat, Side};
-use truearm_estimate::dense::transposed_product;
+use faer::Mat;
+use truearm_estimate::dense::{Eigen, transposed_product};
 
 use crate::FieldError;
 use crate::cells::{Axis, CellKernel};
@@ -172,9 +172,8 @@ impl Curve {
         let (rows, width) = (features.len(), features[0].len());
         let (features, mean) = centred(Mat::from_fn(rows, width, |i, k| features[i][k]), left.weight);
         let gram = transposed_product(features.as_ref(), features.as_ref());
-        let eigen = gram.self_adjoint_eigen(Side::Lower).ok()?;
-        let vectors = eigen.U().to_owned();
-        let values = eigen.S().column_vector().iter().map(|value| value.max(0.0)).collect();
+        let Eigen { values, vectors } = Eigen::new(&gram)?;
+        let values = values.into_iter().map(|value| value.max(0.0)).collect();
         let products = transposed_product(features.as_ref(), right.as_ref());
         let projected = transposed_product(vectors.as_ref(), products.as_ref());
         let square = right.squared_norm_l2();

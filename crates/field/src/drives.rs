@@ -7,7 +7,7 @@
 use std::borrow::Cow;
 
 use faer::Mat;
-use faer::linalg::solvers::DenseSolveCore;
+use truearm_estimate::dense::inverse_of_square;
 
 use crate::bank::Block;
 use crate::cells::Grid;
@@ -45,7 +45,7 @@ impl Drives {
         if readings.is_empty() || readings.iter().any(|&k| slides(k)) {
             return None;
         }
-        let inverse = Mat::from_fn(count, count, entry).partial_piv_lu().inverse();
+        let inverse = inverse_of_square(&Mat::from_fn(count, count, entry));
         let drive = |reading: usize| Drive {
             reading,
             from_joints: (0..count).map(|joint| inverse[(reading, joint)]).collect(),

@@ -7,11 +7,10 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat};
+use faer::Mat;
 use rayon::prelude::*;
 use truearm_estimate::Cancel;
-use truearm_estimate::dense::{Cholesky, parallelism};
+use truearm_estimate::dense::{Cholesky, add_to_lower, parallelism, times};
 use truearm_kinematics::{Isa, Kernel, dispatch};
 
 use crate::FieldError;
@@ -23,7 +22,6 @@ use crate::hyper::{
 };
 use crate::information::Slopes;
 use crate::pairs::{ByColumn, STEP, Step, add_products, step_at, write_covariance, write_step};
-use crate::product::times;
 use crate::projection::Projection;
 use crate::training::Training;
 
@@ -184,17 +182,7 @@ impl<'a> Evidence<'a> {
         let (alpha, value) = self.explained(&projection, &root);
         let Projection { factor, .. } = projection;
         factor.inverse_lower(projected.as_mut());
-        triangular::matmul(
-            projected.as_mut(),
-            BlockStructure::TriangularLower,
-            Accum::Add,
-            root.transpose(),
-            BlockStructure::Rectangular,
-            root.as_ref(),
-            BlockStructure::Rectangular,
-            -1.0,
-            parallelism(),
-        );
+        add_to_lower(projected.as_mut(), root.transpose(), root.as_ref(), -1.0, parallelism());
         Ok(Restricted { factor, projected, root, alpha, value })
     }
 

@@ -6,12 +6,10 @@
 //! pose. Of 24 columns and three rows a pose that is a sixth of the multiplications of the rows' own product. With
 //! other unknowns x of a row it meets in `phi (sum of x w)^T`, a third of them.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use faer::{Mat, MatRef, Par};
 use rayon::prelude::*;
 use truearm_estimate::Cancel;
-use truearm_estimate::dense::parallelism;
+use truearm_estimate::dense::{add_product, add_to_lower, parallelism};
 
 use crate::FieldError;
 use crate::pairs::by_pose;
@@ -39,7 +37,8 @@ pub fn add_gram(
     let mut first = 0;
     rows.each(poses, cancel, |batch| {
         let own = batch.rows.subrows(0, beside);
-        add_lower(normal.as_mut().submatrix_mut(0, 0, beside, beside), own, own, sign, parallelism());
+        let corner = normal.as_mut().submatrix_mut(0, 0, beside, beside);
+        add_to_lower(corner, own, own.transpose(), sign, parallelism());
         meeting.par_iter_mut().enumerate().for_each(|(column, sum)| of_all.meet(own, first, column, sum));
         first += batch.poses.len();
         Ok(())
@@ -53,12 +52,6 @@ pub fn add_gram(
         }
     }
     of_all.add(normal, sign, cancel)
-}
-
-/// Adds sign left right^T to the lower triangle of a square.
-fn add_lower(out: MatMut<f64>, left: MatRef<f64>, right: MatRef<f64>, sign: f64, par: Par) {
-    let (triangle, whole) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    triangular::matmul(out, triangle, Accum::Add, left, whole, right.transpose(), whole, sign, par);
 }
 
 /// Blocks that drive all columns, at some poses.
@@ -112,11 +105,11 @@ impl OfAll {
         let begin = self.offsets[first];
         let poses = self.offsets[first..].partition_point(|&offset| offset < begin + own.ncols());
         let rows = |i: usize| self.offsets[first + i]..self.offsets[first + i + 1];
-        let by_pose = Mat::from_fn(own.nrows(), poses, |k, i| {
+        let of_poses = Mat::from_fn(own.nrows(), poses, |k, i| {
             rows(i).map(|row| own[(k, row - begin)] * self.entries[(column, row)]).sum::<f64>()
         });
         let features = self.features.subcols(first, poses);
-        matmul(sum.as_mut(), Accum::Add, features, by_pose.transpose(), 1.0, Par::Seq);
+        add_product(sum.as_mut(), features, of_poses.transpose(), 1.0);
     }
 
     fn add(&self, normal: &mut Mat<f64>, sign: f64, cancel: &Cancel) -> Result<(), FieldError> {
@@ -145,7 +138,7 @@ impl OfAll {
         for first in (0..poses).step_by(POSES) {
             let part = self.features.subcols(first, POSES.min(poses - first));
             let scaled = Mat::from_fn(count, part.ncols(), |f, i| moments[first + i] * part[(f, i)]);
-            add_lower(sum.as_mut(), part, scaled.as_ref(), 1.0, Par::Seq);
+            add_to_lower(sum.as_mut(), part, scaled.transpose(), 1.0, Par::Seq);
         }
         sum
     }

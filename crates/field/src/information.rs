@@ -6,11 +6,9 @@
 //! indefinite, and asks for products of matrices with vectors alone. With positions alone it is singular: nothing tells of
 //! the noise of orientations.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::{Accum, Mat, MatRef, Par};
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
-use truearm_estimate::dense::{Cholesky, transposed_product};
+use truearm_estimate::dense::{Cholesky, add_product, product, symmetric_product, transposed_product};
 
 use crate::continuous::{Continuous, Pairing, exponent_factors};
 use crate::hyper::{
@@ -19,7 +17,6 @@ use crate::hyper::{
 };
 use crate::kernel::InputKind;
 use crate::pairs::ByColumn;
-use crate::product::product;
 use crate::training::{Class, Training};
 
 /// What the slopes of the rows' covariance K at a point are made of.
@@ -58,7 +55,7 @@ impl Slopes<'_> {
         let common = product(root, slopes.as_ref());
         factor.solve_lower(slopes.as_mut());
         let mut information = transposed_product(slopes.as_ref(), slopes.as_ref());
-        matmul(information.as_mut(), Accum::Add, common.transpose(), common.as_ref(), -1.0, Par::Seq);
+        add_product(information.as_mut(), common.transpose(), common.as_ref(), -1.0);
         information *= faer::Scale(0.5);
         information
     }
@@ -201,15 +198,7 @@ impl Slopes<'_> {
         for j in 0..room.ncols() {
             self.write(slope, j, &mut room.col_as_slice_mut(j)[j..]);
         }
-        let mut out = Mat::zeros(right.nrows(), right.ncols());
-        for (half, structure) in [
-            (room.as_ref(), BlockStructure::TriangularLower),
-            (room.transpose(), BlockStructure::StrictTriangularUpper),
-        ] {
-            let (out, all) = (out.as_mut(), BlockStructure::Rectangular);
-            triangular::matmul(out, all, Accum::Add, half, structure, right, all, 1.0, Par::Seq);
-        }
-        out
+        symmetric_product(room.as_ref(), right)
     }
 
     /// `out[r] += factor J[r, p] of_pose[pose of r]`.

@@ -49,7 +49,6 @@ mod own;
 mod pairs;
 mod posterior;
 mod predict;
-mod product;
 mod projection;
 mod refine;
 pub mod regions;

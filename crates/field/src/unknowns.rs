@@ -1,6 +1,7 @@
 //! The unknowns of weight space: constants, set-up, `sag`, then block by block the eigenvectors of the cells' priors that matter.
 
-use faer::{Mat, Side};
+use faer::Mat;
+use truearm_estimate::dense::Eigen;
 
 use crate::cells::CellKernel;
 use crate::model::Model;
@@ -25,8 +26,7 @@ impl Root {
     pub fn new(cells: &CellKernel) -> Option<Self> {
         let n = cells.axis.count;
         let matrix = Mat::from_fn(n, n, |i, j| cells.correlation[i.abs_diff(j)]);
-        let eigen = matrix.self_adjoint_eigen(Side::Lower).ok()?;
-        let (vectors, values) = (eigen.U(), eigen.S().column_vector());
+        let Eigen { values, vectors } = Eigen::new(&matrix)?;
         let largest = values[n - 1];
         let kept: Vec<usize> = (0..n).rev().filter(|&k| values[k] > NEGLIGIBLE * largest).collect();
         let entries = Mat::from_fn(n, kept.len(), |i, k| vectors[(i, kept[k])] * values[kept[k]].sqrt());

@@ -7,7 +7,7 @@
 
 use faer::{Mat, MatRef};
 use truearm_estimate::Cancel;
-use truearm_estimate::dense::{Cholesky, column, parallelism, to_vec};
+use truearm_estimate::dense::{Cholesky, column, parallelism, product, times, to_vec};
 
 use crate::FieldError;
 use crate::bank::{Bank, Block};
@@ -15,7 +15,6 @@ use crate::gram::add_gram;
 use crate::model::{BlockPlan, Model};
 use crate::outliers::SUSPICIOUS;
 use crate::posterior::{LeaveOneOut, Query, Solution};
-use crate::product::{product, times};
 use crate::unknowns::{Unknowns, sag_start, unknowns};
 use crate::weight_rows::{Batch, WeightRows};
 

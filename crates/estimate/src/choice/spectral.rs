@@ -4,10 +4,11 @@
 //! the first of them are tried. A candidate that cannot raise the least eigenvalue enough is dropped by the inertia of
 //! an m x m matrix (m rows a pose) in place of new eigenvalues.
 
-use faer::{Mat, Par, Side};
+use faer::Mat;
 
 use crate::choice::observability::Criterion;
 use crate::choice::pool::Pool;
+use crate::dense::{Eigen, add_product, eigenvalues};
 use crate::{Cancel, EstimateError};
 
 /// Candidates that are tried for each pose that may leave.
@@ -16,6 +17,7 @@ const TRIED: usize = 32;
 const BETTER: f64 = 1e-9;
 /// Eigenvalues below this share of the largest one count as this share.
 const LEAST_SHARE: f64 = 1e-14;
+const NOT_FINITE: EstimateError = EstimateError::NotFinite { what: "the Jacobian of a candidate", pose: 0 };
 
 /// Eigenvalues, ascending, and eigenvectors of a symmetric matrix.
 struct Spectrum {
@@ -25,10 +27,8 @@ struct Spectrum {
 
 impl Spectrum {
     fn new(matrix: &Mat<f64>) -> Result<Self, EstimateError> {
-        let failed = |_| EstimateError::NotFinite { what: "the Jacobian of a candidate", pose: 0 };
-        let eigen = matrix.self_adjoint_eigen(Side::Lower).map_err(failed)?;
-        let values = (0..matrix.nrows()).map(|k| eigen.S()[k]).collect();
-        Ok(Self { values, vectors: eigen.U().to_owned() })
+        let Eigen { values, vectors } = Eigen::new(matrix).ok_or(NOT_FINITE)?;
+        Ok(Self { values, vectors })
     }
 
     /// Directions with the criterion's derivative with respect to their eigenvalues.
@@ -103,7 +103,7 @@ pub fn settle<const M: usize>(
     chosen.iter().for_each(|&pose| is_chosen[pose] = true);
     let mut normal = given.clone();
     chosen.iter().for_each(|&pose| add(&mut normal, &pool.jacobian(pose), 1.0));
-    let mut best = criterion.value(&eigenvalues(&normal)?);
+    let mut best = criterion.value(&eigenvalues(&normal).ok_or(NOT_FINITE)?);
     let mut exchanges = 0;
     for _ in 0..passes {
         let before = exchanges;
@@ -151,7 +151,7 @@ fn better<const M: usize>(
         }
         let mut with = without.clone();
         add(&mut with, &jacobian, 1.0);
-        let value = criterion.value(&eigenvalues(&with)?);
+        let value = criterion.value(&eigenvalues(&with).ok_or(NOT_FINITE)?);
         if value > best {
             (found, best) = (Some((pose, value)), value);
         }
@@ -159,14 +159,8 @@ fn better<const M: usize>(
     Ok(found)
 }
 
-fn eigenvalues(matrix: &Mat<f64>) -> Result<Vec<f64>, EstimateError> {
-    let failed = |_| EstimateError::NotFinite { what: "the Jacobian of a candidate", pose: 0 };
-    matrix.self_adjoint_eigenvalues(Side::Lower).map_err(failed)
-}
-
 fn add(normal: &mut Mat<f64>, jacobian: &Mat<f64>, sign: f64) {
-    use faer::linalg::matmul::matmul;
-    matmul(normal.as_mut(), faer::Accum::Add, jacobian.transpose(), jacobian.as_ref(), sign, Par::Seq);
+    add_product(normal.as_mut(), jacobian.transpose(), jacobian.as_ref(), sign);
 }
 
 #[cfg(test)]

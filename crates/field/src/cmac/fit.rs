@@ -6,7 +6,7 @@
 //! number of cells hardly matters.
 
 use faer::Mat;
-use truearm_estimate::dense::{Cholesky, parallelism};
+use truearm_estimate::dense::{Cholesky, parallelism, product, times};
 use truearm_estimate::{Cancel, EstimateError, column_unit};
 
 use crate::FieldError;
@@ -14,7 +14,6 @@ use crate::cmac::gain::Rows;
 use crate::cmac::network::Network;
 use crate::cmac::roughness::Modes;
 use crate::compass::Compass;
-use crate::product::{product, times};
 
 /// Standard deviations, m; angles of weights and rows count at 0.3 m.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,9 @@
 //! Rough is what has second differences along an input, cell by cell. The penalty is a sum over the inputs, so its
 //! eigenvectors are products of eigenvectors along each input, and nothing larger than one input's matrix is factored.
 
-use faer::{Mat, Side};
+use faer::Mat;
 use truearm_estimate::EstimateError;
+use truearm_estimate::dense::{Eigen, transposed_product};
 
 use crate::cmac::network::Network;
 
@@ -100,8 +101,6 @@ fn second_differences(cells: usize) -> Option<(Vec<f64>, Mat<f64>)> {
         _ => 0.0,
     };
     let d = Mat::from_fn(cells.saturating_sub(2), cells, difference);
-    let penalty = d.transpose() * &d;
-    let eigen = penalty.self_adjoint_eigen(Side::Lower).ok()?;
-    let values = (0..cells).map(|k| f64::max(eigen.S()[k], 0.0)).collect();
-    Some((values, eigen.U().to_owned()))
+    let Eigen { values, vectors } = Eigen::new(&transposed_product(d.as_ref(), d.as_ref()))?;
+    Some((values.into_iter().map(|value| value.max(0.0)).collect(), vectors))
 }

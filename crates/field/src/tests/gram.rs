@@ -2,12 +2,12 @@
 
 use faer::Mat;
 use truearm_estimate::Cancel;
+use truearm_estimate::dense::product;
 
 use super::posterior::sets;
 use super::sets::long;
 use crate::gram::add_gram;
 use crate::model::Model;
-use crate::product::product;
 use crate::unknowns::unknowns;
 use crate::weight_rows::WeightRows;
 

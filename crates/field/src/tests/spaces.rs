@@ -1,8 +1,8 @@
 //! What a posterior must be wherever it is asked: positive semidefinite, surer among the data than away from it, back at
 //! the constants far away; and the choice between the spaces.
 
-use faer::Side;
 use truearm_estimate::Cancel;
+use truearm_estimate::dense::eigenvalues;
 
 use super::common::{Measure, Truth, scara};
 use super::posterior::close;
@@ -41,7 +41,7 @@ fn variances(posterior: &Posterior, values: &[f64]) -> Vec<f64> {
         (0..columns * columns).map(|k| if k / columns == k % columns { 1.0 } else { 0.0 }).collect();
     let covariance = posterior.covariance(values, &identity, None, columns).unwrap();
     let matrix = faer::Mat::from_fn(columns, columns, |i, j| covariance[i * columns + j]);
-    let eigenvalues = matrix.self_adjoint_eigenvalues(Side::Lower).unwrap();
+    let eigenvalues = eigenvalues(&matrix).unwrap();
     let largest = eigenvalues[columns - 1];
     assert!(eigenvalues[0] > -1e-9 * largest, "{eigenvalues:?}");
     (0..columns).map(|p| matrix[(p, p)]).collect()

@@ -1,5 +1,5 @@
 use faer::Mat;
-use faer::linalg::solvers::SolveLstsq;
+use truearm_estimate::dense::Orthogonal;
 
 use super::{GAUSSIAN, inputs, made, network};
 use crate::cmac::{Composition, FitOptions, Membership, Network, NetworkOptions, Rows, Scales};
@@ -74,8 +74,9 @@ fn dense(network: &Network, measured: &Measured, cells: [usize; 2]) -> Vec<f64> 
     for (i, (line, _)) in lines.iter().enumerate() {
         line.iter().for_each(|&(j, value)| matrix[(i, j)] += value);
     }
-    let weights = matrix.qr().solve_lstsq(Mat::from_fn(lines.len(), 1, |i, _| lines[i].1));
-    (0..2 * count).map(|k| weights[(k, 0)] / unit[k % 2]).collect()
+    let right: Vec<f64> = lines.iter().map(|line| line.1).collect();
+    let weights = Orthogonal::new(matrix).least_squares(&right);
+    weights.iter().enumerate().map(|(k, weight)| weight / unit[k % 2]).collect()
 }
 
 #[test]
