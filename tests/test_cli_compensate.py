@@ -384,6 +384,17 @@ def test_what_fewer_joints_leave_is_told(capsys):
     assert "in full" not in capsys.readouterr().out
 
 
+def test_targets_that_are_left_alone_are_not_said_to_be_missed(capsys):
+    refused_first = "\n".join(reversed(FAR.splitlines()))
+    Path("far.mod").write_bytes(module(refused_first, points()).encode("latin-1"))
+    words = ["compensate", "arm.calib", "far.mod", "-o", "kept.mod", "--controller", "nominal"]
+    words += ["--task", "position", "--largest-mm", "1.35", "--on-refusal", "keep-nominal"]
+    assert main(words) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "1 of 6 targets changed, 1 kept" in told
+    assert "in full" not in told
+
+
 def test_a_path_gets_no_rows_and_says_so(capsys):
     q = np.array([[0.0, 0.2, 0.1, 0.1, 0.5, 0.0], [0.6, 0.2, 0.1, 0.1, 0.5, 0.0]])
     poses = ABB.pose(q)

@@ -61,12 +61,13 @@ def _print_left(done: Rewritten) -> None:
 
 def _most_left(done: Rewritten, residual: Floats, unit: str, rounding: float) -> list[str]:
     """The largest residual (t,) of the changed targets and which target has it; none within rounding."""
-    most = int(np.argmax(np.where(done.changed, residual, 0.0)))
-    if residual[most] <= rounding:
+    changed = np.where(done.changed, residual, 0.0)
+    most = int(np.argmax(changed))
+    if changed[most] <= rounding:
         return []
     place = listed_target(done.program, most, "")
     file = done.program.sources[place.file].path.name
-    return [f"up to {residual[most]:.3f} {unit} ({file}, line {place.line}, {shortened(place.name)})"]
+    return [f"up to {changed[most]:.3f} {unit} ({file}, line {place.line}, {shortened(place.name)})"]
 
 
 def _print_dry(done: Rewritten) -> None:
