@@ -1058,10 +1058,10 @@ def non_negative_least_squares(
     """The x (n,), none of it negative, that makes columns (m, n) times x come nearest to the target (m,).
 
     After Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23. What depends on columns in use
-    stays at zero.
+    stays at zero, and so do columns shorter than 1e-8 of the longest one.
 
     Raises:
-        CoreError: If the columns are not of as many rows as the target.
+        CoreError: If the columns are not of as many rows as the target, or an entry is not finite.
     """
 
 def independent_columns(jacobian: NDArray[np.float64], columns: Sequence[int]) -> list[int]:

@@ -196,7 +196,8 @@ fn whole_or_missing(
     }
 }
 
-fn finite(what: &'static str, values: &[f64], width: usize) -> Result<(), EstimateError> {
+/// All are finite; `width` values belong to a pose.
+pub(crate) fn finite(what: &'static str, values: &[f64], width: usize) -> Result<(), EstimateError> {
     match values.iter().position(|value| !value.is_finite()) {
         Some(at) => Err(EstimateError::NotFinite { what, pose: at / width.max(1) }),
         None => Ok(()),

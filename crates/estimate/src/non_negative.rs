@@ -5,6 +5,7 @@ use faer::{Mat, MatRef};
 use crate::EstimateError;
 use crate::dense::Orthogonal;
 use crate::identifiability::length;
+use crate::measurements::finite;
 
 /// A column of which no more than this share is beyond the columns in use is made up of them; one that is no longer than
 /// this share of the longest is none.
@@ -17,10 +18,11 @@ const STEPS_EACH: usize = 30;
 /// The x (`count`,), none of it negative, that makes `columns` (m, `count`), row by row, times x come nearest to `target`
 /// (m,).
 ///
-/// Columns that those in use make up stay at zero: they come no nearer.
+/// Columns that those in use make up stay at zero: they come no nearer. So do columns a hundred million times shorter than the
+/// longest one, which are taken for rounding.
 ///
 /// # Errors
-/// [`EstimateError::Length`] where the columns are not of as many rows as the target.
+/// [`EstimateError::Length`] where the columns are not of as many rows as the target, [`EstimateError::NotFinite`].
 pub fn non_negative_least_squares(
     columns: &[f64],
     count: usize,
@@ -31,6 +33,8 @@ pub fn non_negative_least_squares(
         let (found, expected) = (columns.len(), rows * count);
         return Err(EstimateError::Length { what: "the matrix of columns", found, expected });
     }
+    finite("a column", columns, count)?;
+    finite("the target", target, 1)?;
     let columns = MatRef::from_row_major_slice(columns, rows, count);
     let lengths: Vec<f64> = (0..count).map(|column| columns.col(column).norm_l2()).collect();
     let negligible = INDEPENDENT_SHARE * lengths.iter().copied().fold(0.0, f64::max);

@@ -65,3 +65,19 @@ fn columns_of_other_rows_are_refused() {
     let told = EstimateError::Length { what: "the matrix of columns", found: 2, expected: 3 };
     assert_eq!(refused, Err(told));
 }
+
+#[test]
+fn what_is_not_finite_is_refused() {
+    for (column, target) in [([1.0, f64::NAN], [1.0; 2]), ([1.0; 2], [1.0, f64::INFINITY])] {
+        let refused = non_negative_least_squares(&column, 1, &target);
+        assert!(matches!(refused, Err(EstimateError::NotFinite { pose: 1, .. })), "{refused:?}");
+    }
+}
+
+#[test]
+fn columns_that_are_rounding_beside_others_stay_at_zero() {
+    let found = non_negative_least_squares(&[1.0, 0.0, 0.0, 1e-9], 2, &[2.0, 1.0]).unwrap();
+    assert_eq!(found, [2.0, 0.0]);
+    let found = non_negative_least_squares(&[1.0, 0.0, 0.0, 1e-6], 2, &[2.0, 1.0]).unwrap();
+    assert!((found[1] - 1e6).abs() < 1.0, "{found:?}");
+}
