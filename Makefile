@@ -63,7 +63,7 @@ test: rust-test py-test
 # With the extension's features and profile, so that what both rest on is built once.
 RUST_WHOLE := --release --locked --workspace --features truearm-python/extension-module
 
-rust-test: $(STAMPS)/tools
+rust-test: $(STAMPS)/built
 	$(CARGO) test $(RUST_WHOLE)
 
 py-test: $(STAMPS)/built
@@ -89,7 +89,7 @@ rust-check: $(STAMPS)/built
 	$(CARGO) clippy $(RUST_WHOLE) --all-targets -- $(CLIPPY)
 
 # Needs a C and a C++ compiler with address and undefined-behaviour sanitizers.
-check-capi: $(STAMPS)/tools
+check-capi: $(STAMPS)/built
 	TRUEARM_SANITIZE=1 $(CARGO) test $(RUST_WHOLE) --test examples
 
 # Installs Chromium where there is none and apt-get may install packages.
@@ -129,7 +129,7 @@ $(STAMPS)/venv:
 	@[ -n '$(PYTHON)' ] && '$(PYTHON)' -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
 	  echo 'truearm needs Python 3.11 or newer with the venv module; none was found (PYTHON=$(PYTHON)).' >&2; \
 	  echo 'Install one, or name it: make PYTHON=/path/to/python3.12 $(MAKECMDGOALS)' >&2; exit 1; }
-	@[ -x '$(BIN)/python' ] || '$(PYTHON)' -m venv '$(VENV)'
+	@$(PIP) --version >/dev/null 2>&1 || '$(PYTHON)' -m venv --clear '$(VENV)'
 	@$(PIP) install --upgrade 'pip>=25.1'
 	@mkdir -p $(STAMPS) && touch $@
 
@@ -142,7 +142,7 @@ $(STAMPS)/maturin: pyproject.toml $(STAMPS)/venv
 	$(PIP) install --group build
 	@touch $@
 
-# With what truearm itself needs.
+# With what truearm itself needs, so that nothing is left to bring once it is built.
 $(STAMPS)/tools: pyproject.toml $(STAMPS)/maturin
 	@$(BIN)/python -c '$(NEEDED)' | $(PIP) install --group dev --requirement /dev/stdin
 	@touch $@
@@ -151,7 +151,7 @@ $(STAMPS)/site: pyproject.toml $(STAMPS)/venv
 	$(PIP) install --group docs
 	@touch $@
 
-$(STAMPS)/bench: pyproject.toml $(STAMPS)/venv
+$(STAMPS)/bench: pyproject.toml $(STAMPS)/venv | $(STAMPS)/built
 	$(PIP) install --group bench
 	@touch $@
 
