@@ -3,6 +3,7 @@
 import io
 import json
 from contextlib import redirect_stdout
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -10,8 +11,12 @@ from distributed import LocalCluster
 
 from truearm.cell.session import Session
 from truearm.cli import main
+from truearm.errors import InputError, WorkError
+from truearm.fitting import no_stages
+from truearm.studies.process import several
 from truearm.studies.process.planning import plan_experiment
 from truearm.studies.process.setting import Setting, path, space
+from truearm.workers.done import answer
 
 SMALL = ("--regions", "3", "--poses", "16", "--seeds", "2")
 
@@ -83,6 +88,43 @@ def test_another_experiment_does_not_go_on_with_this_session(tmp_path, capsys):
     (tmp_path / "session.db").write_bytes(b"not a session")
     assert main(plan_again) == 1
     assert "this is no session file" in capsys.readouterr().err
+
+
+def test_a_session_of_other_regions_is_left_alone_with_its_cell_file(small, capsys):
+    directory, _ = small
+    before = {name: (directory / name).read_bytes() for name in ("cell.toml", "experiment.json")}
+    assert main(["study", "experiment", "-o", str(directory), "--regions", "2", "--poses", "16"]) == 1
+    assert "session.db" in " ".join(capsys.readouterr().err.split())
+    assert {name: (directory / name).read_bytes() for name in before} == before
+
+
+def test_an_arm_that_fails_is_named_and_stops_none_of_the_others(tmp_path, monkeypatch):
+    settings, asked = [Setting(seed=seed) for seed in (1, 2, 3)], []
+
+    def conducted(setting, *_):
+        asked.append(setting.seed)
+        if setting.seed == 2:
+            raise WorkError("nothing was measured", where="session.db")
+        return {}, None
+
+    monkeypatch.setattr(several, "conduct_experiment", conducted)
+    monkeypatch.setattr(several, "run_tasks", in_this_process)
+    with pytest.raises(WorkError, match=r"^arm 2, session\.db: nothing was measured"):
+        several.conduct_arms(settings, tmp_path, lambda _: None, no_stages)
+    assert asked == [1, 2, 3]
+
+
+def in_this_process(function, items, **_):
+    for number, item in enumerate(items):
+        yield answer(function, item, version("truearm")).of(number)
+
+
+def test_a_worker_that_does_not_see_the_directory_measures_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(several, "conduct_experiment", lambda *_: ({}, None))
+    monkeypatch.setattr(several, "make_directory", lambda _: None)
+    monkeypatch.setattr(several, "run_tasks", in_this_process)
+    with pytest.raises(InputError, match=r"arm-2: there is no such directory where a worker runs"):
+        several.conduct_arms([Setting(seed=1), Setting(seed=2)], tmp_path, lambda _: None, no_stages)
 
 
 def test_workers_that_contradict_each_other_are_refused_before_anything_is_measured(tmp_path, capsys):

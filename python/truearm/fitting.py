@@ -52,7 +52,7 @@ SUSPECTED: Final = 1e-4
 CLEARER: Final = 0.7
 """Ratio of the median distances of rows left out, below which a fit is believed that begins without some."""
 PROMISING: Final = 0.85
-"""The same of a rough fit that begins at the one to all rows, above which none is made from nothing."""
+"""The same ratio of a rough fit, quick to make, above which the whole fit without these rows is not tried."""
 OTHER_MINIMUM: Final = 0.7
 """Ratio of what constants leave below which they were found in another, better minimum."""
 SPOILING: Final = 0.1
@@ -256,7 +256,8 @@ def _unmasked(
     """The fits, or those that begin without rows far from constants, if these are by far the clearer.
 
     Many outliers among few rows become part of the noise that the evidence finds, and no row is far off then.
-    Rows that are innocent have their weight back once a model without them judges them.
+    Rows that are innocent have their weight back once a model without them judges them. A rough fit that
+    begins at the one to all rows tells first whether there is anything to find.
     """
     constants, variable = fits
     measured = core_set(task.arm.robot, data, task.selection, task.groups)

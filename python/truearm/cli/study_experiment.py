@@ -59,7 +59,8 @@ def command(
     make_directory(output)
     first = Setting(regions=regions, poses=poses, speed=speed)
     settings = [replace(first, seed=first.seed + number) for number in range(seeds)]
-    kept = f"What was measured is in {output}; the same command goes on with it."
+    kept = f"What was measured is in {output}; the same command goes on with it"
+    kept += " once the cluster's workers are through with the arms under way." if scheduler else "."
     try:
         with Teller() as teller, ends_promptly(lambda: kept):
             result, drawn = conduct_arms(

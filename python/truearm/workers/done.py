@@ -39,6 +39,8 @@ class Done(Generic[R]):
             Exception: The task's error, if it failed.
         """
         if self.error is not None:
+            if self.trace:
+                self.error.add_note(self.trace)
             raise self.error
         return cast("R", self.value)
 

@@ -92,10 +92,8 @@ class VirtualCell:
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             memory = Path("/dev/shm")  # noqa: S108 - where there is one, the clock's file is kept in memory
-            folder = stack.enter_context(
-                tempfile.TemporaryDirectory(prefix="truearm-", dir=memory if memory.is_dir() else None)
-            )
-            state = Path(folder) / "state"
+            folder = tempfile.TemporaryDirectory(prefix="truearm-", dir=memory if memory.is_dir() else None)
+            state = Path(stack.enter_context(folder)) / "state"
             Shared.create(state, self._cell.file.simulate.speed).close()
             self.world = World(self._cell, state)
             self.shared = self.world.shared
@@ -106,6 +104,8 @@ class VirtualCell:
                 address = self._started(device, state, stack)
                 settings = getattr(self._cell, f"{device}_settings")
                 self.content[device] = _at(self.content[device], address, settings, self.shared.speed)
+            if os.name == "posix":  # all have it open: a process that is killed leaves nothing behind
+                folder.cleanup()
             recovery_s = self._cell.file.process.recovery_s / self.shared.speed
             self.content["process"] = {**self.content.get("process", {}), "recovery_s": recovery_s}
             self._stack = stack.pop_all()

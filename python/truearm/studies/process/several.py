@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from truearm.cell.measuring import Progress
+from truearm.errors import InputError
 from truearm.files import make_directory, write_whole
 from truearm.fitting import no_stages
 from truearm.studies.metrics import over_seeds
@@ -13,7 +14,7 @@ from truearm.studies.paper import Drawn
 from truearm.studies.process.conducting import Result, Stages, conduct_experiment
 from truearm.studies.process.judging import judged, judged_over_arms
 from truearm.studies.process.setting import Setting, cell_text
-from truearm.workers import check_workers, run_tasks
+from truearm.workers import Done, check_workers, run_tasks
 
 CELL_NAME: Final = "cell.toml"
 
@@ -46,13 +47,16 @@ def conduct_arms(
 
     Raises:
         UsageError: If workers contradict each other.
-        InputError: If the scheduler does not answer, or a session that is there is of something else.
-        WorkError: If an arm cannot be measured.
+        InputError: If the scheduler does not answer, its workers do not see the directory, or a session that
+            is there is of something else.
+        WorkError: If an arm cannot be measured; the others are conducted first.
         KeyboardInterrupt: After Ctrl-C; the same call goes on with what was measured.
     """
     check_workers(scheduler, workers)
     first, drawn = _conduct(settings[0], directory, report, stages)
-    others = [(setting, directory.resolve() / f"arm-{setting.seed}") for setting in settings[1:]]
+    others = [(setting, directory.absolute() / f"arm-{setting.seed}") for setting in settings[1:]]
+    for _, own in others:
+        make_directory(own)
     each = [first, *_elsewhere_all(others, stages, scheduler, workers)]
     result = {**first, **judged(first)}
     if others:
@@ -65,26 +69,37 @@ def _conduct(
     setting: Setting, directory: Path, report: Callable[[Progress], None], stages: Stages
 ) -> tuple[Result, Drawn]:
     make_directory(directory)
+    found = conduct_experiment(setting, directory, report, stages)
     write_whole(directory / CELL_NAME, cell_text(setting))
-    return conduct_experiment(setting, directory, report, stages)
+    return found
 
 
 def _elsewhere_all(
     items: Sequence[tuple[Setting, Path]], stages: Stages, scheduler: str | None, workers: int | None
 ) -> list[Result]:
-    """Results of arms in their order."""
-    found: dict[int, Result] = {}
+    """Results of arms in their order; an arm that fails stops none of the others."""
+    found: dict[int, Done[Result]] = {}
     with closing(run_tasks(_elsewhere, items, scheduler=scheduler, workers=workers)) as finished:
         for number in range(2, len(items) + 2):
             with stages(f"arm {number} of {len(items) + 1}"):
                 done = next(finished)
-            found[done.index] = done.result()
-    return [found[position] for position in range(len(items))]
+            found[done.index] = done
+    return [found[position].result() for position in range(len(items))]
 
 
 def _elsewhere(item: tuple[Setting, Path]) -> Result:
     setting, directory = item
-    return _conduct(setting, directory, _untold, no_stages)[0]
+    if not directory.is_dir():
+        raise InputError(
+            "there is no such directory where a worker runs",
+            where=str(directory),
+            rule="Workers write what they measure into it",
+            way_out="Give a directory that every worker sees under this name, or leave the scheduler out",
+        )
+    try:
+        return _conduct(setting, directory, _untold, no_stages)[0]
+    except InputError as error:
+        raise error.at(f"arm {setting.seed}") from None
 
 
 def _untold(progress: Progress) -> None:
