@@ -120,7 +120,7 @@ pub struct FieldFit {
     pub judgement: Judgement,
     /// Which of the posterior's poses each measured one is a shot of, (n,).
     pub pose_of: Vec<usize>,
-    /// Weight of every measured pose, (n,); one where nothing was measured.
+    /// Weight of every measured pose in the posterior, (n,); one where nothing was measured.
     pub weights: Vec<f64>,
     /// Poses that were judged but not fitted, since others that fill the space stood for them.
     pub stood_aside: usize,
@@ -152,7 +152,7 @@ const ROWS_FOR_POLISH: usize = 3000;
 const ROWS_FOR_EXTRAPOLATION: usize = 1200;
 /// Rows that are judged at once: of more a part judges all first.
 const ROWS_AT_ONCE: usize = 2 * ROWS_FOR_POLISH;
-/// Share of all squared residuals from which outliers that come or go among more rows are worth another posterior.
+/// Share of all squared residuals from which outliers that come or go, of more rows than those, are worth another posterior.
 const FELT: f64 = 0.01;
 const SEARCH: Limits = Limits { evaluations: 60, gain: 0.02 };
 const POLISH: Limits = Limits { evaluations: 12, gain: 0.05 };
@@ -166,7 +166,7 @@ const NOISE_SHARE: f64 = 0.3;
 ///
 /// Poses whose weight is zero take no part. Other weights are where the search begins, or the judgement of many poses by a part
 /// of them that comes before it: after it every pose is judged by the others, and has its full weight or, as an outlier,
-/// next to none.
+/// next to none; of very many rows a few that are judged otherwise at the end, and change next to nothing, keep theirs.
 ///
 /// # Errors
 /// [`FieldError`].
@@ -187,8 +187,10 @@ pub fn fit_field(
     let large = training.row_count() > ROWS_FOR_POLISH;
     let felt = if training.row_count() > ROWS_AT_ONCE { FELT } else { 0.0 };
     for round in 0..REWEIGHTINGS {
+        let fitted = training.weight.clone();
         let news = judged.judgement.reweigh(&mut training);
         if !news.spoils() && (!news.poses || news.share < felt) {
+            training.weight = fitted;
             break;
         }
         let Judged { posterior, .. } = judged;

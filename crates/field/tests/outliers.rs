@@ -4,7 +4,15 @@
 mod common;
 
 use common::{Measure, Truth, deviations, fit, root_mean_square, scara, six_axes};
-use truearm_field::Posterior;
+use truearm_field::{FieldFit, Posterior};
+
+/// Files keep these weights: standard deviations are to come out of them as out of the fit.
+fn assert_weights_are_of_the_posterior(fit: &FieldFit) {
+    let training = fit.posterior.training();
+    for (pose, weight) in fit.weights.iter().enumerate() {
+        assert!(training.rows(pose).all(|row| training.weight[row] == *weight), "pose {pose}: {weight}");
+    }
+}
 
 #[test]
 fn gross_errors_are_named_and_others_are_not() {
@@ -37,6 +45,7 @@ fn gross_errors_among_thousands_of_poses_are_named_and_spoil_nothing() {
     assert_eq!(with.judgement.outliers, wrong);
     let without: Vec<usize> = (0..2100).filter(|&pose| with.weights[pose] < 1.0).collect();
     assert_eq!(without, wrong);
+    assert_weights_are_of_the_posterior(&with);
     assert!((with.hyper.noise[0] / measure.noise - 1.0).abs() < 0.05, "{}", with.hyper.noise[0]);
 }
 
@@ -51,6 +60,7 @@ fn outliers_are_those_that_have_lost_their_weight() {
     }
     let fit = fit(&arm, &set).unwrap().field;
     let without: Vec<usize> = (0..120).filter(|&pose| fit.weights[pose] < 1.0).collect();
+    assert_weights_are_of_the_posterior(&fit);
     assert_eq!((without.as_slice(), fit.judgement.outliers.as_slice()), (&[3, 50, 97][..], &[3, 50, 97][..]));
 }
 
