@@ -23,7 +23,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_progress, told_stages
 from truearm.defaults import LARGEST_DEG, LARGEST_JOINT_DEG, LARGEST_MM, LARGEST_STD_MM, LEAST_SPACING_MM
 from truearm.errors import UsageError, typed
-from truearm.files import check_place, refuse_own_input, refuse_same, write_whole
+from truearm.files import check_place, make_directory, refuse_own_input, refuse_same, write_whole
 
 OnRefusal = Literal["stop", "keep-nominal"]
 
@@ -120,6 +120,8 @@ def _written(done: "ta.Rewritten", output: str | None, report: Path | None) -> l
 
     paths = [] if output is None or not done.changed.any() else done.save(output)
     if report is not None:
+        if output is not None and report.parent == Path(output):
+            make_directory(report.parent)  # which only what is written makes otherwise
         write_whole(report, report_text(report_of(done, paths)))
     return paths
 

@@ -4,11 +4,14 @@ A language says how digits follow from readings; telling them of a branch and fi
 target means are the same function, so that what is written is what is read.
 """
 
+from collections.abc import Sequence
 from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.programs.layouts import Layout
+from truearm.programs.tables import Targets
 from truearm.robot_data import RobotData
 
 Floats = NDArray[np.float64]
@@ -50,6 +53,18 @@ def meant(configuration: Configuration, wanted: Integers, candidates: Floats) ->
     shifts = (0.0, EDGE_RAD, -EDGE_RAD)
     agrees = [configuration.digits(candidates + shift) == wanted for shift in shifts]
     found: NDArray[np.bool_] = np.logical_or.reduce([wanted == ANY, *agrees]).all(axis=1)
+    return found
+
+
+def configured(targets: Targets, layouts: Sequence[Layout]) -> list[int]:
+    """The targets that state configuration data."""
+    found: list[int] = []
+    for number, layout in enumerate(layouts):
+        count = getattr(layout, "configuration", 0)
+        which = np.flatnonzero(targets.layout == number)
+        if count and len(which):
+            stated = np.isfinite(targets.of(targets.values, which, layout.width)[:, -count:]).any(axis=1)
+            found += which[stated].tolist()
     return found
 
 

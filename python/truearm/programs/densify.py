@@ -139,7 +139,9 @@ class Densifier:
         numbers = np.flatnonzero(lines).tolist()
         for done, move in enumerate(numbers):
             tell(done, len(numbers))
-            found = self._between(move, ends[move], nominal[ends[move]])
+            tool = self._program.environments[int(self._program.moves.environment[move])].tool
+            # Where the point that moves along the line is not known, neither is where waypoints belong.
+            found = tool.unknown or self._between(move, ends[move], nominal[ends[move]])
             if isinstance(found, str):
                 why[move] = found
             elif found:

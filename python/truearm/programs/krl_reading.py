@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
+from truearm.programs.configuration import configured
 from truearm.programs.environment import Environment, Environments, Frame
 from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
@@ -56,11 +57,11 @@ from truearm.programs.krl_values import (
     operands,
     structure,
 )
-from truearm.programs.layouts import EulerPose, Joints
+from truearm.programs.layouts import EulerPose, Joints, Layout
 from truearm.programs.lexing import Reader, Token
 from truearm.programs.program import Listed, Program, Unplaced
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, MoveTable, TargetTable
+from truearm.programs.tables import Motion, MoveTable, Targets, TargetTable
 from truearm.robot import Robot
 
 if TYPE_CHECKING:
@@ -146,25 +147,29 @@ class KrlReading:
                 for start, end in lines(source):
                     self._line(number, start, end)
         self._settle()
+        layouts, targets = (Joints.of(self._robot.joints), EulerPose(configuration=2)), self._targets.freeze()
         return Program(
             self._language,
             self._sources,
-            (Joints.of(self._robot.joints), EulerPose(configuration=2)),
-            self._targets.freeze(),
+            layouts,
+            targets,
             self._moves.freeze(),
             tuple(self._environments.all),
             tuple(sorted(self._listed)),
-            self._configuration(),
+            self._configuration(targets, layouts),
             fixed=self._fixed,
             unsure=self._unsure,
             unplaced=self._unplaced,
             accurate=TAUGHT_ACCURATE if self._accurate else "",
         )
 
-    def _configuration(self) -> StatusAndTurn | None:
+    def _configuration(self, targets: Targets, layouts: Sequence[Layout]) -> StatusAndTurn | None:
+        """How S and T are meant; None for an arm whose branches nobody can tell by them."""
         try:
             return StatusAndTurn(Branches.of(self._robot))
-        except InputError:
+        except InputError as unsuited:
+            for target in configured(targets, layouts):
+                self._fixed.setdefault(target, unsuited.what)
             return None
 
     def _data_first(self) -> list[int]:

@@ -184,7 +184,7 @@ def constant(text: str, at: int, *, joints: bool, joint_count: int) -> Constant 
         text: The text behind the equals sign.
         at: Its offset.
         joints: Whether it is of joints, which its variable's name says.
-        joint_count: Joints of the arm: five leave the fourth slot empty.
+        joint_count: Joints of the arm: five leave the fourth slot empty, four the last two.
     """
     found = _CONSTANT.match(text)
     if found is None:
@@ -199,7 +199,10 @@ def constant(text: str, at: int, *, joints: bool, joint_count: int) -> Constant 
 
 
 def _joints(values: Sequence[Number], joint_count: int) -> Constant:
-    slots = [slot for slot in range(SLOTS) if joint_count == SLOTS or slot != EMPTY_SLOT]
+    five = joint_count == SLOTS - 1
+    slots = [slot for slot in range(SLOTS) if slot != EMPTY_SLOT] if five else list(range(joint_count))
+    if joint_count > SLOTS:
+        return Constant(JOINTS, (), f"it has six slots, and the arm {joint_count} joints")
     if len(values) < SLOTS:
         return Constant(JOINTS, (), f"it has {len(values)} numbers, not one for each of six slots")
     outside = [number for slot, number in enumerate(values) if slot not in slots]

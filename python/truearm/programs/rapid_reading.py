@@ -9,6 +9,7 @@ import numpy as np
 
 from truearm.errors import InputError
 from truearm.programs.branches import Branches
+from truearm.programs.configuration import configured
 from truearm.programs.environment import Environment, Environments, Transform
 from truearm.programs.flow import Flow
 from truearm.programs.frames import Frames
@@ -179,15 +180,21 @@ class RapidReading:
         self._declarations.give(self._gifts)
         self._move()
         self._settle()
+        layouts, targets = (
+            (Joints.of(self._robot.joints), QuaternionPose(configuration=4)),
+            self._table.freeze(),
+        )
         try:
             configuration = Confdata(Branches.of(self._robot))
-        except InputError:
+        except InputError as unsuited:
             configuration = None
+            for target in configured(targets, layouts):
+                self._fixed.setdefault(target, unsuited.what)
         return Program(
             self._language,
             (self._source,),
-            (Joints.of(self._robot.joints), QuaternionPose(configuration=4)),
-            self._table.freeze(),
+            layouts,
+            targets,
             self._moves.freeze(),
             tuple(self._environments.all),
             tuple(sorted(self._listed)),
