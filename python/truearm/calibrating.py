@@ -49,7 +49,7 @@ from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
-from truearm.judging import check_judged, judge
+from truearm.judging import check_judged, judge, where_found
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE
@@ -59,7 +59,7 @@ from truearm.points_together import points_together
 from truearm.robot import Robot
 from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
-from truearm.splitting import Split, split_rows
+from truearm.splitting import Split, measured_on_both_sides, split_rows
 from truearm.standard_errors import standard_errors
 from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
@@ -110,6 +110,7 @@ def calibrate(
     task = _task(robot, given, chosen, threads, stages)
     notices += orientations_left_out(given, task.selection, chosen.use)
     split = split_rows(given, chosen.split)
+    notices += measured_on_both_sides(given, split)
     notices += check_judged(given.select(split.train), given.select(split.holdout), task.selection)
     task = replace(task, sizes=() if split.planned else given.sizes)
     order = np.random.default_rng(chosen.split.seed).permutation(len(given)) if chosen.refit else split.train
@@ -231,7 +232,7 @@ def _validate(
     """Errors of the fits without the drift; `given` are all rows as they were measured, and the split."""
     data, split = given
     models = trained.models(task.arm)
-    held = drift.taken_out(data).select(split.holdout)
+    held = where_found(trained.data, drift.taken_out(data).select(split.holdout), task.selection)
     errors = judge(task, models, held, trained.data)
     on_training = judge(task, models, trained.data, trained.data)
     validation = Validation(

@@ -17,7 +17,10 @@ MEASURED: Final = (*OF_ROWS, HELD)
 """Beginnings of the names of arrays in which NaN stands where nothing was measured."""
 INDICES: Final = frozenset(
     {
-        *(f"rows.{name}" for name in ("rows", "group", "sources", "anchor", "pair", "default_group")),
+        *(
+            f"rows.{name}"
+            for name in ("rows", "group", "sources", "anchor", "pair", "purpose", "default_group")
+        ),
         "outcome.side",
         "held.rows",
         "held.sources",

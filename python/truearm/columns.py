@@ -22,6 +22,7 @@ VALIDATE: Final = "validate"
 """In the column "purpose": a pose that was planned to judge by, not to fit to."""
 REPEAT: Final = "repeat"
 """In the same column: a pose that was planned to be come back to."""
+PURPOSES: Final = ("train", VALIDATE, REPEAT)
 APPROACH: Final = "approach"
 """Column: from which side all joints came, 1 from lower readings, -1 from higher, 0 from anywhere."""
 ONE_UNIT: Final = "Convert them to one unit, and end all names in it"

@@ -83,6 +83,19 @@ def list_rows(rows: Iterable[int], noun: str = "row") -> str:
     return f"{noun}s {', '.join(named[:-1])} and {named[-1]}"
 
 
+def short_names(files: Iterable[str]) -> dict[str, str]:
+    """The end of each path that tells it from the others: "m.csv", or "mon/m.csv" beside "tue/m.csv"."""
+    parts = {file: Path(file).parts for file in files}
+    found = {}
+    for file, own in parts.items():
+        others = [other for name, other in parts.items() if name != file]
+        lengths = range(1, len(own) + 1)
+        alike = (any(other[-n:] == own[-n:] for other in others) for n in lengths)
+        length = next((n for n, is_alike in zip(lengths, alike, strict=True) if not is_alike), len(own))
+        found[file] = Path(*own[-length:]).as_posix()
+    return found
+
+
 def list_outliers(outliers: Sequence[Mapping[str, Any]], *, several: bool) -> str:
     """Rows with their distances in words, the first five: "row 3 (24.98 mm), row 8 (12.10 mm) and 2 more".
 
@@ -90,8 +103,9 @@ def list_outliers(outliers: Sequence[Mapping[str, Any]], *, several: bool) -> st
         outliers: file, row and distance_mm of each, the worst first.
         several: Whether the rows are of several files, so that each has to be named.
     """
+    names = short_names({outlier["file"] for outlier in outliers})
     named = [
-        f"row {outlier['row']}{' of ' + Path(outlier['file']).name if several else ''}"
+        f"row {outlier['row']}{' of ' + names[outlier['file']] if several else ''}"
         f" ({distance_mm(outlier['distance_mm'])})"
         for outlier in outliers[:OUTLIERS_NAMED]
     ]

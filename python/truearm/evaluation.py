@@ -11,7 +11,7 @@ from truearm import kinds
 from truearm._core import Setup, fit_constant
 from truearm.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
 from truearm.calibration import Calibration
-from truearm.core_set import Use, core_set, rotations, select
+from truearm.core_set import Selection, Use, core_set, rotations, select
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts import NO_HELP, no_help
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
@@ -19,7 +19,7 @@ from truearm.fitted_rows import known_rows
 from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
 from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
-from truearm.judging import check_judged, judge, model_inputs
+from truearm.judging import check_judged, judge, model_inputs, where_found
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, ArmModel
@@ -139,7 +139,8 @@ def evaluate(
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
     frame, judged = _divide(data, chosen)
     found_by = data.select(frame if len(frame) else judged)
-    notices += check_judged(found_by, data.select(judged), selection)
+    chosen_rows, not_judged = _found_again(found_by, data.select(judged), selection, chosen)
+    notices += not_judged
     with stages("finding frame and tool"):
         models = {
             name: ArmModel(
@@ -151,7 +152,6 @@ def evaluate(
             for name, model in calibration.models.items()
         }
     with stages("judging"):
-        chosen_rows = data.select(judged)
         errors = judge(task, models, chosen_rows, found_by)
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
@@ -162,6 +162,16 @@ def evaluate(
     notices = [*notices, *of_no_use, *outliers]
     statistics = {name: found.statistics() for name, found in errors.items()}
     return Evaluation(len(frame), len(judged), statistics, tuple(notices), held)
+
+
+def _found_again(
+    found_by: Measurements, judged: Measurements, selection: Selection, options: EvaluationOptions
+) -> tuple[Measurements, list[Notice]]:
+    """The judged rows with the targets that are known on the tool, and a notice of the others."""
+    if (options.keep_frames or options.keep_tool) and not selection.judges_another:
+        return judged, []
+    notices = check_judged(found_by, judged, selection)
+    return where_found(found_by, judged, selection), notices
 
 
 def _divide(data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]:

@@ -443,9 +443,13 @@ def _check_set_ups(task: Task, data: Measurements) -> None:
             f"{unknowns} unknowns of frame and target of set-up {list_names([group])}",
             where=", ".join(rows.files or data.files),
             rule="In each set-up there must be more measured values than unknowns",
-            way_out="Measure more poses there. If device and target stood where they did in another set-up, "
-            'give the rows of both the same name in a column "group"',
+            way_out=f"Measure more poses there{_or_hold_out_fewer(task)}. If device and target stood where "
+            'they did in another set-up, give the rows of both the same name in a column "group"',
         )
+
+
+def _or_hold_out_fewer(task: Task) -> str:
+    return ", or hold out fewer of its rows (--holdout, or another --seed)" if task.sizes else ""
 
 
 def _measured_values(task: Task, data: Measurements) -> int:

@@ -80,13 +80,19 @@ class Expected:
 
     @cached_property
     def jacobian(self) -> Floats:
-        """Derivatives (n, 3, p) of these targets by motions of base and tool, as far as they are found."""
+        """Derivatives (n, 3, p) of these targets by motions of base and tool, as far as they are found.
+
+        Each target has its own place on the tool.
+        """
         joints = self.task.arm.robot.joints_from_readings(self.data.readings)
         flange = self.task.arm.flange_chain.pose(joints, np.ascontiguousarray(self.parameters))
         turned = flange[:, :3, :3]
         points = flange[:, :3, 3] + np.einsum("nij,nj->ni", turned, self.tools)
         parts = [rigid_motion(points)] if self.finds_frame else []
-        parts += [turned] if self.finds_tool else []
+        if self.finds_tool:
+            by_target = np.zeros((len(points), len(self.task.selection.targets), AXES, AXES))
+            by_target[np.arange(len(points)), first_measured(self.data, self.task.selection)] = turned
+            parts.append(by_target.transpose(0, 2, 1, 3).reshape(len(points), AXES, -1))
         return np.concatenate(parts, axis=2) if parts else np.empty((len(points), AXES, 0))
 
     def lengths_m(self, rows: Rows) -> Floats:
@@ -183,6 +189,7 @@ def _contradicted(found: Expected, rows: Rows) -> dict[int, float]:
     that is off draws the fit to itself and away from the others.
     """
     errors, jacobian = found.errors[rows], found.jacobian[rows]
+    jacobian = jacobian[:, :, jacobian.any(axis=(0, 1))]
     kept = np.ones(len(rows), dtype=np.bool_)
     while AXES * kept.sum() - jacobian.shape[2] > AXES:
         lengths = left_out(errors[kept], jacobian[kept]).lengths

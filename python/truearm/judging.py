@@ -1,13 +1,15 @@
 """Errors of fitted models on rows, at the target that they are judged at."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import Setup
 from truearm.core_set import Selection
-from truearm.errors import InputError, Notice, list_names
+from truearm.errors import InputError, Notice, count_of, list_names
 from truearm.fitting import Task, feature_values
 from truearm.identified import IdentifiedArm
 from truearm.measurements import Measurements
@@ -15,6 +17,10 @@ from truearm.models import ArmModel
 from truearm.validation import RowErrors, row_errors
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+UNUSUAL: Final = 9.0
+"""Times the median distance from the median point: what is farther off is no measurement of the target."""
 
 
 def model_inputs(arm: IdentifiedArm, data: Measurements, features: tuple[str, ...]) -> Floats:
@@ -24,7 +30,7 @@ def model_inputs(arm: IdentifiedArm, data: Measurements, features: tuple[str, ..
 
 
 def check_judged(fitted: Measurements, judged: Measurements, selection: Selection) -> list[Notice]:
-    """A notice of the set-ups that are not judged, where the judged target takes no part in the fit.
+    """A notice of the targets and set-ups that are not judged, since no row finds the point on the tool.
 
     Args:
         fitted: The rows that are to find its point in each set-up.
@@ -32,10 +38,10 @@ def check_judged(fitted: Measurements, judged: Measurements, selection: Selectio
         selection: What is used of them.
 
     Raises:
-        InputError: If no set-up has it in rows of both; names the set-ups.
+        InputError: If nothing is left to judge; names targets or set-ups.
     """
     if not selection.judges_another:
-        return []
+        return _never_found(fitted, judged, selection)
     found, held = _groups_with(fitted, selection.judge), _groups_with(judged, selection.judge)
     missing = [group for group in fitted.groups if group not in found]
     words = (
@@ -54,6 +60,62 @@ def check_judged(fitted: Measurements, judged: Measurements, selection: Selectio
     judging = [group for group in fitted.groups if group in found]
     text = f"{words[0].upper()}{words[1:]}: errors are those of the set-up {list_names(judging)} alone."
     return [Notice("not_judged", text)]
+
+
+def _never_found(fitted: Measurements, judged: Measurements, selection: Selection) -> list[Notice]:
+    """A notice of targets of judged rows that none of the fitted rows of their set-up holds."""
+    lost = _seen(judged, selection) & ~_found(fitted, judged, selection)
+    if not lost.any():
+        return []
+    places = [
+        f"target {selection.targets[k] + 1} of {list_names([group])}"
+        for group in judged.groups
+        for k in np.flatnonzero(lost[judged.group == group].any(axis=0))
+    ]
+    words = f"{', '.join(places)} was measured in none of the rows that find where it is on the tool"
+    unjudged = ~(_seen(judged, selection) & ~lost).any(axis=1)
+    if unjudged.all():
+        raise InputError(
+            words,
+            where=", ".join(judged.files),
+            rule="A target is judged where other rows of its set-up have found it",
+            way_out="Let rows with it find it as well, or judge at another target",
+        )
+    rest = (
+        f": {count_of(int(unjudged.sum()), 'row')} with no other target have no error"
+        if unjudged.any()
+        else ""
+    )
+    return [Notice("not_judged", f"{words[0].upper()}{words[1:]}, and is not judged{rest}.")]
+
+
+def where_found(fitted: Measurements, judged: Measurements, selection: Selection) -> Measurements:
+    """The judged rows without the points of targets that none of the fitted rows of their set-up holds.
+
+    What the model has for such a point is a guess.
+    """
+    if selection.judges_another or selection.distances:
+        return judged
+    lost = _seen(judged, selection) & ~_found(fitted, judged, selection)
+    if not lost.any():
+        return judged
+    targets = judged.targets.copy()
+    rows, places = np.nonzero(lost)
+    targets[rows, np.array(selection.targets)[places]] = np.nan
+    return replace(judged, targets=targets)
+
+
+def _seen(data: Measurements, selection: Selection) -> Mask:
+    """Which of the fitted targets each row holds (n, t)."""
+    return np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
+
+
+def _found(fitted: Measurements, judged: Measurements, selection: Selection) -> Mask:
+    """Which of the fitted targets rows of `fitted` hold in the set-up of each judged row (n, t)."""
+    seen, found = _seen(fitted, selection), np.zeros((len(judged), len(selection.targets)), dtype=np.bool_)
+    for group in judged.groups:
+        found[judged.group == group] = seen[fitted.group == group].any(axis=0)
+    return found
 
 
 def _groups_with(data: Measurements, target: int) -> set[str]:
@@ -88,7 +150,8 @@ def judge(
 def setup_of_judged(task: Task, data: Measurements, parameters: Floats, setup: Setup) -> Setup:
     """The set-up with the judged target as its only one, its point found from rows and nothing else moved.
 
-    The point is NaN where a set-up has no row with the judged target.
+    The point is NaN where a set-up has no row with the judged target. Rows far from where the others have it
+    take no part: no fit has judged them at this target.
 
     Args:
         task: What was fitted.
@@ -108,5 +171,11 @@ def setup_of_judged(task: Task, data: Measurements, parameters: Floats, setup: S
         world_from_flange = frames[number] @ base_from_flange[rows]
         offset = data.targets[rows, task.selection.judge] - world_from_flange[:, :3, 3]
         in_flange = np.einsum("nji,nj->ni", world_from_flange[:, :3, :3], offset)
-        points[number, 0] = in_flange.mean(axis=0)
+        points[number, 0] = _middle(in_flange)
     return Setup(frames, points, setup.rotations, setup.anchors)
+
+
+def _middle(points: Floats) -> Floats:
+    """Mean (3,) of points (n, 3) without those far from their median."""
+    distance = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    return np.asarray(points[distance <= UNUSUAL * np.median(distance)].mean(axis=0))

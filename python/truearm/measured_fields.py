@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.columns import (
     PURPOSE,
+    PURPOSES,
     QUATERNION,
     Column,
     Layout,
@@ -45,7 +46,7 @@ def read_fields(
     if measured or layout.targets:
         _check_measured(table, targets, distance)
     ends, assumed = _ends(table, layout, distance)
-    purpose = _purpose(table, layout)
+    purpose, unknown = _purpose(table, layout)
     features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
         "readings": readings,
@@ -60,7 +61,7 @@ def read_fields(
         "distance_m": distance,
         **ends,
         "purpose": purpose,
-        "notices": (*assumed, *notices),
+        "notices": (*assumed, *unknown, *notices),
         "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
 
@@ -221,11 +222,21 @@ def _check_pairs(table: Table, pair: Texts, distance: Floats) -> None:
         )
 
 
-def _purpose(table: Table, layout: Layout) -> Texts | None:
-    """What each pose was planned for, in words; None where there is no such column."""
+def _purpose(table: Table, layout: Layout) -> tuple[Texts | None, list[Notice]]:
+    """What each pose was planned for, in words that are known in small letters; None where there is no such
+    column. With a notice of words that are not known.
+    """
     if PURPOSE not in layout.others or table.is_numeric(PURPOSE):
-        return None
-    return table.texts(PURPOSE)
+        return None, []
+    words = table.texts(PURPOSE)
+    small = np.char.lower(np.char.strip(words))
+    known = np.isin(small, PURPOSES)
+    strange = sorted(set(words[~known & (small != "")].tolist()))
+    text = (
+        f'{table.where}: column "{PURPOSE}" holds {list_names(strange)}, which plans nothing: '
+        f"{list_names(PURPOSES)} are known."
+    )
+    return np.where(known, small, words), [Notice("purpose", text)] if strange else []
 
 
 def _features(table: Table, layout: Layout, known: tuple[str, ...]) -> tuple[pd.DataFrame, list[Notice]]:

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from truearm.columns import APPROACH
 from truearm.fitted_rows import FittedRows
 from truearm.measurements import Measurements
 from truearm.same_tables import called_as_files
@@ -15,7 +16,7 @@ Arrays = dict[str, NDArray[Any]]
 
 NUMBERS: Final = ("readings", "targets", "orientations", "sigma_m", "distance_m", "rows")
 CALLED: Final = "default_group"
-WORDS: Final = ("group", "sources", "anchor", "pair", CALLED)
+WORDS: Final = ("group", "sources", "anchor", "pair", "purpose", CALLED)
 OUTCOMES: Final = ("side", "weight", "residual", "score", "distance_m")
 OF_DRIFT: Final = ("moved", "progress")
 
@@ -33,14 +34,15 @@ def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str,
             known, index = np.unique(value, return_inverse=True)
             words[name] = known.tolist()
             arrays[f"rows.{name}"] = index.astype(np.int64)
-    for name in features:
+    kept = [*features, *_stated_sides(rows.data, features)]
+    for name in kept:
         arrays[f"rows.feature.{name}"] = rows.data.features[name].to_numpy(np.float64)
     for name in OUTCOMES:
         arrays[f"outcome.{name}"] = getattr(rows, name)
     for name in OF_DRIFT:
         if getattr(rows, name) is not None:
             arrays[f"outcome.{name}"] = getattr(rows, name)
-    return {"words": words, "features": list(features), "joint_units": list(rows.data.joint_units)}
+    return {"words": words, "features": kept, "joint_units": list(rows.data.joint_units)}
 
 
 def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
@@ -66,6 +68,13 @@ def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
     )
     known = [*OUTCOMES, *(name for name in OF_DRIFT if f"outcome.{name}" in arrays)]
     return FittedRows(data, **{name: np.array(arrays[f"outcome.{name}"]) for name in known})
+
+
+def _stated_sides(data: Measurements, features: Sequence[str]) -> list[str]:
+    """The column of the sides that poses were approached from, where it says something of every row."""
+    if APPROACH in features or APPROACH not in data.features.columns:
+        return []
+    return [APPROACH] if np.isfinite(data.features[APPROACH].to_numpy(np.float64)).all() else []
 
 
 def _called_otherwise(data: Measurements) -> NDArray[np.str_] | None:

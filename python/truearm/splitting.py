@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 from truearm import kinds
 from truearm.columns import VALIDATE
 from truearm.defaults import HOLDOUT, SEED
-from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
+from truearm.errors import InputError, Notice, UsageError, count_of, did_you_mean, list_names
 from truearm.measurements import Measurements
-from truearm.visits import visit_numbers
+from truearm.visits import pose_numbers, visit_numbers
 
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 NAMED: Final = 5
+FEW_KNOWN: Final = 0.05
+"""Share of held-out rows of poses that trained, which changes next to nothing in their errors."""
 RANGE_FORM: Final = re.compile(r"q([1-9]\d*):(low|high):(.+)")
 
 
@@ -247,6 +249,20 @@ def _tail(data: Measurements, rows: Rows, tail: HoldoutRange) -> Mask:
     readings = data.readings[rows, tail.joint - 1] * (1.0 if tail.high else -1.0)
     boundary = np.sort(readings)[_trained(len(rows), tail.share)]
     return np.asarray(readings >= boundary)
+
+
+def measured_on_both_sides(data: Measurements, split: Split) -> list[Notice]:
+    """A notice where many held-out rows are of poses that trained: of another visit, or in another file."""
+    pose = pose_numbers(data.readings, np.full(len(data), ""))
+    known = np.isin(pose[split.holdout], pose[split.train])
+    if known.mean() <= FEW_KNOWN:
+        return []
+    text = (
+        f"{known.sum()} of {count_of(len(known), 'held-out row')} are of poses that also trained, on another "
+        "visit or in another file: errors there say how the arm repeats, and less of what the model makes of "
+        "new poses. A column of numbers that tell poses apart keeps the rows of each together: --split-by."
+    )
+    return [Notice("known_poses", text)]
 
 
 def _drawn_keys(data: Measurements, rows: Rows, rule: SplitRule, rng: np.random.Generator) -> Mask:

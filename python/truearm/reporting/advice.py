@@ -17,7 +17,7 @@ from truearm.doubts import (
     WOULD_FIT,
     to_check,
 )
-from truearm.errors import count_of
+from truearm.errors import count_of, short_names
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE
 from truearm.reporting.facts import Facts
@@ -82,7 +82,9 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     outliers = facts.summary["outliers"]
     if not outliers:
         return
-    named = [f"{entry['row']}" for entry in outliers[:ROWS_NAMED]]
+    names = short_names(facts.files)
+    of_file = {file: f" of {name}" if len(names) > 1 else "" for file, name in names.items()}
+    named = [f"{entry['row']}{of_file[entry['file']]}" for entry in outliers[:ROWS_NAMED]]
     named += [f"{len(outliers) - ROWS_NAMED} more"] if len(outliers) > ROWS_NAMED else []
     rows = "row" if len(outliers) == 1 else "rows"
     largest = short(max(entry["distance_mm"] for entry in outliers))[0]

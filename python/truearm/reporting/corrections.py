@@ -1,14 +1,13 @@
 """Chapter: what compensation does: how large its corrections are, and what it refuses."""
 
 from collections import Counter
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.compensation import Compensated, Compensator
-from truearm.errors import count_of
+from truearm.errors import count_of, short_names
 from truearm.limits import Limits, Task
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
@@ -141,7 +140,7 @@ def largest(facts: Facts, data: Measurements, found: Compensated) -> list[Table]
 
 
 def _row_name(data: Measurements, k: int) -> str:
-    place = f" of {Path(str(data.sources[k])).name}" if len(data.files) > 1 else ""
+    place = f" of {short_names(data.files)[str(data.sources[k])]}" if len(data.files) > 1 else ""
     return f"{data.rows[k]}{place}"
 
 

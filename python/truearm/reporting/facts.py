@@ -117,6 +117,11 @@ class Facts:
             return {}
         return {name: MM_PER_METRE * found.distance_m for name, found in self.held.errors.items()}
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Of the measurements; none where rows were left out of the file."""
+        return () if self.calibration.rows is None else tuple(self.calibration.rows.data.files)
+
     @cached_property
     def outliers(self) -> Outliers:
         """Rows that are far off; none after an update, which leaves its own out."""

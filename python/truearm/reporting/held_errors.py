@@ -1,13 +1,12 @@
 """Chapter: errors on held-out poses, their distribution, where along the joints, and the worst."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import count_of
+from truearm.errors import count_of, short_names
 from truearm.held_rows import HeldRows
 from truearm.reporting.charts import axis, legend, line, log_axis, points, running_median
 from truearm.reporting.facts import Facts
@@ -206,11 +205,12 @@ def worst(held: HeldRows, facts: Facts) -> Table:
     errors = facts.errors_mm
     mine = np.nan_to_num(errors[facts.best], nan=-1.0)
     order = np.argsort(-mine, kind="stable")[:WORST]
-    several = len(set(held.sources.tolist())) > 1
+    names = short_names(set(held.sources.tolist()))
+    several = len(names) > 1
     shown = facts.shown(held.readings)
     rows = []
     for k in order:
-        place = [Path(str(held.sources[k])).name] if several else []
+        place = [names[str(held.sources[k])]] if several else []
         missed = [fixed(errors[name][k]) for name in facts.models]
         rows.append([str(held.rows[k]), *place, *missed, ", ".join(fixed(value, 1) for value in shown[k])])
     columns = ["row", *(["file"] if several else []), *(f"{name}, mm" for name in facts.models)]

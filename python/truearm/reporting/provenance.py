@@ -2,10 +2,9 @@
 
 import os
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
-from truearm.errors import count_of
+from truearm.errors import count_of, short_names
 from truearm.options import Options
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed
@@ -24,12 +23,11 @@ def provenance(facts: Facts) -> Section:
 def _origin(facts: Facts) -> Table:
     calibration, summary = facts.calibration, facts.summary
     robot = calibration.robot
-    files = [] if calibration.rows is None else [Path(file).name for file in calibration.rows.data.files]
     fitted = summary["n_fitted"]
     rows = [
         ["arm", robot.name],
         *([["source of the nominal parameters", robot.source]] if robot.source else []),
-        ["measurements", ", ".join(files) or "left out of the file"],
+        ["measurements", ", ".join(short_names(facts.files).values()) or "left out of the file"],
         ["SHA-256 of the measurements", summary["data_sha256"]],
         ["rows", _rows(facts, fitted)],
         ["truearm", summary["version"]],
@@ -93,8 +91,9 @@ def _outliers(facts: Facts) -> list[Table]:
     found = facts.summary["outliers"]
     if not found:
         return []
+    names = short_names(facts.files)
     rows = [
-        [str(entry["row"]), Path(entry["file"]).name, fixed(entry["distance_mm"]), f"{entry['score']:.1f}"]
+        [str(entry["row"]), names[entry["file"]], fixed(entry["distance_mm"]), f"{entry['score']:.1f}"]
         for entry in found
     ]
     fate = "taken out of the fits" if taken_out(facts.calibration) else "kept in the fit"
