@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.program_tools import Bend, reasons, rewritten
+from tests.program_tools import Bend, read, reasons, rewritten
 from truearm.cli import main
 from truearm.programs.densify import Spacing
 from truearm.programs.krl import KRL
@@ -84,3 +84,14 @@ def test_a_report_beside_files_that_are_not_written_is_written(tmp_path, monkeyp
     assert main([*words, "--report", "new/r.json"]) == 1
     assert "nothing was changed" in capsys.readouterr().err
     assert (tmp_path / "new" / "r.json").stat().st_size > 0
+
+
+def test_functions_that_call_each_other_many_times_are_walked_once():
+    depth, calls = 9, 8
+    lines = ["def prog():", f"  def f{depth}():", "    movel(p[0.4, 0.2, 0.5, 0, 3, 0])", "  end"]
+    for level in reversed(range(depth)):
+        lines += [f"  def f{level}():", *[f"    f{level + 1}()"] * calls, "  end"]
+    lines += ["  set_tcp(p[0, 0, 0.2, 0, 0, 0])", "  f0()", "end"]
+    program = read(UrScript(), "\n".join(lines), UR10)
+    move = int(np.flatnonzero(program.moves.moving)[0])
+    assert program.environments[int(program.moves.environment[move])].tool.true[2, 3] == pytest.approx(0.2)

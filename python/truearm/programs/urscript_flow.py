@@ -83,6 +83,7 @@ def states(steps: Sequence[Step], start: State) -> dict[int, State]:
     walker = _Walker(functions)
     for _ in range(_ROUNDS):
         before = dict(walker.entries)
+        walker.walked.clear()
         walker.run(root, start, _Ways())
         for name in functions:
             if name not in called:
@@ -123,11 +124,13 @@ class _Walker:
     Attributes:
         found: State behind each step, by offset.
         entries: What is set where a function is called from, by name.
+        walked: With what each function was walked, and what it left, by name: once for all calls alike.
     """
 
     def __init__(self, functions: dict[str, _Block]) -> None:
         self.found: dict[int, State] = {}
         self.entries: dict[str, State] = {}
+        self.walked: dict[str, tuple[State, State]] = {}
         self._functions = functions
         self._setting = _setting(functions)
         self._inside: list[str] = []
@@ -137,13 +140,13 @@ class _Walker:
         self.entries[name] = entry = _merged([self.entries.get(name, state), state]) or state
         if name in self._inside or len(self._inside) >= _DEEPEST_CALLS:
             return replace(state, tool=UNSURE, payload_kg=None) if name in self._setting else state
-        self._inside.append(name)
-        ways = _Ways()
-        left = self.run(self._functions[name], entry, ways)
-        self._inside.pop()
-        if name not in self._setting:
-            return state
-        return _merged([left, *ways.returns]) or state
+        if name not in self.walked or not self.walked[name][0].same_as(entry):
+            self._inside.append(name)
+            ways = _Ways()
+            left = self.run(self._functions[name], entry, ways)
+            self._inside.pop()
+            self.walked[name] = entry, _merged([left, *ways.returns]) or state
+        return self.walked[name][1] if name in self._setting else state
 
     def run(self, block: _Block, state: State, ways: _Ways) -> State | None:
         """The state at the end of a block; None if the end is not reached."""
