@@ -1,12 +1,15 @@
 """What a program states and this arm or what is known of it does not settle is listed, and not guessed."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import truearm as ta
 from tests.program_tools import Bend, read, reasons, rewritten
 from truearm.cli import main
+from truearm.programs.configuration import NearestTurns, with_turns
 from truearm.programs.densify import Spacing
 from truearm.programs.krl import KRL
 from truearm.programs.melfa import MelfaBasic
@@ -74,16 +77,32 @@ def test_the_fourth_joint_of_a_scara_is_in_the_fourth_slot():
     assert any("a joint that the arm has not" in reason for _, _, reason in reasons(done))
 
 
-def test_a_report_beside_files_that_are_not_written_is_written(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    arm = VirtualArm(UR10, seed=3)
-    arm.measure_table(arm.poses(60)).to_csv("m.csv", index=False)
-    assert main(["calibrate", "ur10", "m.csv", "-o", "out", "--model", "constant"]) == 0
-    (tmp_path / "none.script").write_text("def prog():\n  sleep(1.0)\nend\n")
-    words = ["compensate", "out/calibration.calib", "none.script", "--controller", "nominal", "-o", "new/"]
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory):
+    """Where there is a calibration of an UR10."""
+    place, arm = tmp_path_factory.mktemp("calibrated"), VirtualArm(UR10, seed=3)
+    ta.calibrate(UR10, arm.measure(arm.poses(60)), model="constant").save(place / "arm.calib")
+    return place
+
+
+def test_a_report_beside_files_that_are_not_written_is_written(calibrated, monkeypatch, capsys):
+    monkeypatch.chdir(calibrated)
+    Path("none.script").write_text("def prog():\n  sleep(1.0)\nend\n")
+    words = ["compensate", "arm.calib", "none.script", "--controller", "nominal", "-o", "new/"]
     assert main([*words, "--report", "new/r.json"]) == 1
     assert "nothing was changed" in capsys.readouterr().err
-    assert (tmp_path / "new" / "r.json").stat().st_size > 0
+    assert Path("new/r.json").stat().st_size > 0
+
+
+def test_fewer_joints_than_a_pose_needs_want_to_know_the_tool(calibrated, monkeypatch, capsys):
+    monkeypatch.chdir(calibrated)
+    Path("one.script").write_text("def prog():\n  movej([0.1, -1.2, 1.5, -1.8, -1.4, 0.2], a=1, v=1)\nend\n")
+    words = ["compensate", "arm.calib", "one.script", "--controller", "nominal", "--dry-run"]
+    assert main([*words, "--moving", "1,2,3"]) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert "3 joints meet the position of one point first" in told
+    assert main(words) == 0
+    assert "of one point first" not in capsys.readouterr().err
 
 
 def test_functions_that_call_each_other_many_times_are_walked_once():
@@ -95,3 +114,16 @@ def test_functions_that_call_each_other_many_times_are_walked_once():
     program = read(UrScript(), "\n".join(lines), UR10)
     move = int(np.flatnonzero(program.moves.moving)[0])
     assert program.environments[int(program.moves.environment[move])].tool.true[2, 3] == pytest.approx(0.2)
+
+
+def test_a_joint_that_drives_a_screw_is_not_turned_by_a_full_turn():
+    robot = Robot.load("adept-cobra-600")
+    coupling, limits = robot.coupling.copy(), robot.limits.copy()
+    coupling[2, 3], limits[3] = 0.02 / (2.0 * np.pi), [-7.0, 7.0]
+    screw = replace(robot, coupling=coupling, limits=limits)
+    branch, before = np.array([[[0.1, 0.2, 0.1, -2.0]]]), np.array([0.1, 0.2, 0.1, 4.0])
+    free = replace(robot, limits=limits)
+    assert len(with_turns(branch, free)[1]) == 2
+    assert len(with_turns(branch, screw)[1]) == 1
+    assert NearestTurns(free)(branch[0], before)[1][0, 3] == pytest.approx(2.0 * np.pi - 2.0)
+    assert NearestTurns(screw)(branch[0], before)[1][0, 3] == -2.0

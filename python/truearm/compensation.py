@@ -140,6 +140,11 @@ class Compensator:
         self._correctors: OrderedDict[tuple[bytes, ...], Corrector] = OrderedDict()
         self._keeping = Lock()
 
+    @property
+    def moving_count(self) -> int:
+        """How many joints may change."""
+        return self.calibration.robot.joint_count if self._moving is None else len(self._moving)
+
     def __repr__(self) -> str:
         name, model = self.programming.name, self.calibration.model_name
         return f"<Compensator of {name} by the {model} model, {self.task}>"

@@ -19,6 +19,7 @@ from truearm.programs.notices import (
     payload_notices,
     still_notices,
     tool_notices,
+    unknown_tool_notices,
     update_notices,
 )
 from truearm.programs.program import Language
@@ -88,6 +89,7 @@ def compensate_program(
             *update_notices(calibration),
             *still_notices(done, calibration),
             *tool_notices(done, calibration),
+            *unknown_tool_notices(done, compensator.moving_count),
             *object_notices(done),
             *beyond_notices(calibration, compensator.features),
         ],

@@ -79,8 +79,8 @@ def with_turns(branches: Floats, robot: RobotData) -> tuple[Integers, Floats]:
     limits = _limits(robot) + np.array([-EDGE_RAD, EDGE_RAD])
     rows, which = np.nonzero(np.isfinite(branches).all(axis=2))
     found = branches[rows, which]
-    for joint, kind in enumerate(robot.joints):
-        if kind == "revolute" and len(found) > 0:
+    for joint in np.flatnonzero(_turning(robot)).tolist():
+        if len(found) > 0:
             rows, found = _turned(rows, found, joint, limits[joint])
     order = np.argsort(rows, kind="stable")
     return rows[order], found[order]
@@ -91,7 +91,7 @@ class NearestTurns:
 
     def __init__(self, robot: RobotData) -> None:
         low, high = _limits(robot).T
-        self._turn = np.where([kind == "revolute" for kind in robot.joints], FULL_TURN, 0.0)
+        self._turn = np.where(_turning(robot), FULL_TURN, 0.0)
         self._per_turn = np.where(self._turn > 0.0, 1.0 / FULL_TURN, 0.0)
         self._low, self._high = low - EDGE_RAD, high + EDGE_RAD
 
@@ -110,6 +110,13 @@ class NearestTurns:
             (which,) = np.nonzero(((turned >= self._low) & (turned <= self._high)).all(axis=1))
             return which, turned[which]
         return np.arange(len(branches)), turned
+
+
+def _turning(robot: RobotData) -> NDArray[np.bool_]:
+    """Joints (N,) of which a full turn more is the same pose: all that is coupled to them turns fully too."""
+    revolute = np.array([kind == "revolute" for kind in robot.joints])
+    same = np.where(revolute[:, None], robot.coupling % 1.0 == 0.0, robot.coupling == 0.0)
+    return np.asarray(same.all(axis=0))
 
 
 def _turned(rows: Integers, q: Floats, joint: int, limits: Floats) -> tuple[Integers, Floats]:

@@ -18,6 +18,8 @@ from truearm.stillness import carried_joints, moved_joints, still_words
 SAME_PAYLOAD_KG: Final = 0.05
 MEASURED_M: Final = 1e-4
 """A tool this near to a measured point is that point."""
+POSE: Final = 6
+"""Joints that it takes to meet a position and an orientation."""
 IN_WORDS: Final[dict[Kind, str]] = {"tool": "tool", "object": "work object"}
 
 
@@ -129,6 +131,23 @@ def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
             f"Teach it again through the calibration: truearm frame CALIB touches.csv --tool {name}",
         )
     ]
+
+
+def unknown_tool_notices(done: Rewritten, moving: int) -> list[Notice]:
+    """That residuals are of another point than the program's, where joints are too few to meet a whole pose.
+
+    Args:
+        done: The rewritten program.
+        moving: How many joints may change.
+    """
+    unknown = [tool.unknown for tool in _tools_of(done) if tool.unknown]
+    if moving >= POSE or not unknown:
+        return []
+    text = (
+        f"{unknown[0]}: {moving} joints meet the position of one point first, and that of the robot file's "
+        "tool was taken. The program's own may miss by more than is told. Give its place: --frames FILE"
+    )
+    return [Notice("tool_unknown", text)]
 
 
 def object_notices(done: Rewritten) -> list[Notice]:
