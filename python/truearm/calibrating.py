@@ -110,8 +110,7 @@ def calibrate(
     task = _task(robot, given, chosen, threads, stages)
     notices += orientations_left_out(given, task.selection, chosen.use)
     split = split_rows(given, chosen.split)
-    notices += measured_on_both_sides(given, split)
-    notices += check_judged(given.select(split.train), given.select(split.holdout), task.selection)
+    notices += _of_split(task, given, split)
     task = replace(task, sizes=() if split.planned else given.sizes)
     order = np.random.default_rng(chosen.split.seed).permutation(len(given)) if chosen.refit else split.train
     trained, drift, final = _fit_both(task, given, split.train, order)
@@ -147,6 +146,12 @@ def calibrate(
         fitted_spread=_fitted_spread(task, final, variable),
     )
     return replace(found, notices=(*found.notices, *_doubts(task, found, given, stages)))
+
+
+def _of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:
+    """Of which held-out rows errors say less, and which are not judged."""
+    train, held = given.select(split.train), given.select(split.holdout)
+    return [*measured_on_both_sides(given, split), *check_judged(train, held, task.selection)]
 
 
 def _over_time(task: Task, data: Measurements, drift: Drift, judged: Validation) -> list[Notice]:
