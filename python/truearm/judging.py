@@ -64,7 +64,7 @@ def check_judged(fitted: Measurements, judged: Measurements, selection: Selectio
 
 def _never_found(fitted: Measurements, judged: Measurements, selection: Selection) -> list[Notice]:
     """A notice of targets of judged rows that none of the fitted rows of their set-up holds."""
-    lost = _seen(judged, selection) & ~_found(fitted, judged, selection)
+    lost = _lost(fitted, judged, selection)
     if not lost.any():
         return []
     places = [
@@ -94,9 +94,9 @@ def where_found(fitted: Measurements, judged: Measurements, selection: Selection
 
     What the model has for such a point is a guess.
     """
-    if selection.judges_another or selection.distances:
+    if selection.judges_another:
         return judged
-    lost = _seen(judged, selection) & ~_found(fitted, judged, selection)
+    lost = _lost(fitted, judged, selection)
     if not lost.any():
         return judged
     targets = judged.targets.copy()
@@ -110,12 +110,12 @@ def _seen(data: Measurements, selection: Selection) -> Mask:
     return np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
 
 
-def _found(fitted: Measurements, judged: Measurements, selection: Selection) -> Mask:
-    """Which of the fitted targets rows of `fitted` hold in the set-up of each judged row (n, t)."""
-    seen, found = _seen(fitted, selection), np.zeros((len(judged), len(selection.targets)), dtype=np.bool_)
+def _lost(fitted: Measurements, judged: Measurements, selection: Selection) -> Mask:
+    """Which of the fitted targets a judged row holds, and none of the fitted rows of its set-up (n, t)."""
+    held, found = _seen(judged, selection), _seen(fitted, selection)
     for group in judged.groups:
-        found[judged.group == group] = seen[fitted.group == group].any(axis=0)
-    return found
+        held[judged.group == group] &= ~found[fitted.group == group].any(axis=0)
+    return held
 
 
 def _groups_with(data: Measurements, target: int) -> set[str]:
