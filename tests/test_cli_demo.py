@@ -44,6 +44,10 @@ def test_the_demonstration_shows_the_whole_way_and_goes_on_where_it_was(tmp_path
     for command in commands:
         assert main(command) == 0
     assert ta.Calibration.load("demo/calibration.calib").robot == ta.Robot.load("rv-m2")
+    planned = (tmp_path / "demo" / "poses.csv").read_bytes()
+    assert main(["demo", "-n", "12", "--speed", "500"]) == 1
+    assert "demo/session.db" in capsys.readouterr().err
+    assert (tmp_path / "demo" / "poses.csv").read_bytes() == planned
 
 
 def test_a_file_in_the_way_is_left_alone(tmp_path, capsys):

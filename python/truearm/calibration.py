@@ -208,7 +208,7 @@ class Calibration:
         target: int | None = None,
         features: Features | None = None,
     ) -> Floats:
-        """Predicted points, (n, 3), m.
+        """Predicted points, (n, 3), m; where set-ups moved while they were measured, with their mean frame.
 
         Args:
             q: Readings.

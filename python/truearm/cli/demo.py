@@ -58,7 +58,6 @@ def command(
     check_directory(output)
     make_directory(output)
     text = demonstration_cell(speed)
-    write_whole(output / CELL, text)
     plan = _planned(text, count, output, quiet=as_json)
     data = _measured(text, plan, output, quiet=as_json)
     calibration, summary = _calibrated(data, output, quiet=as_json)
@@ -75,18 +74,24 @@ def command(
 def _planned(text: str, count: int, output: Path, *, quiet: bool) -> "Plan":
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import PlanOptions, plan_poses
-    from truearm.cell.plan_files import write
 
     cell = Cell.from_toml(text)
     with ends_promptly():
         plan = plan_poses(cell.arm, PlanOptions(count), cell=cell)
-    write(plan, output / PLANNED)
     if not quiet:
         say_wrapped(
             f"Planned: {len(plan.poses)} poses of a virtual {cell.arm.name} that table and touch panel can "
             f"measure, condition number {plan.choice.after['kappa']:.1f}."
         )
     return plan
+
+
+def _keep(text: str, plan: "Plan", output: Path) -> None:
+    """Write cell and poses of a session, which has refused none of them."""
+    from truearm.cell.plan_files import write
+
+    write_whole(output / CELL, text)
+    write(plan, output / PLANNED)
 
 
 def _measured(text: str, plan: "Plan", output: Path, *, quiet: bool) -> "Measurements":
@@ -100,8 +105,10 @@ def _measured(text: str, plan: "Plan", output: Path, *, quiet: bool) -> "Measure
         with Teller() as teller:
             measure_virtually(text, plan.poses, output / SESSION, teller.tell)
     except KeyboardInterrupt:
+        _keep(text, plan, output)
         tell(f"The session is in {output / SESSION}; the same command goes on with it.")
         end_at_once()
+    _keep(text, plan, output)
     with Session(output / SESSION, writing=False) as session:
         table, found = accepted_table(session), summary_of(session)
     write_whole(output / MEASURED, exported(table))

@@ -60,7 +60,7 @@ def _kinds(facts: Facts) -> str:
 
 
 def along(facts: Facts, which: int, effects: Floats) -> Figure:
-    """Curves of the parameters that vary most along an input, a joint's own first; effects (5 L,) in mm.
+    """Curves of the parameters that vary most along an input, and of a joint's own; effects (5 L,) in mm.
 
     Joints count from 0; features follow.
     """
@@ -114,12 +114,14 @@ def _moves(facts: Facts, feature: str) -> str:
 
 
 def _chosen(facts: Facts, which: int, effects: Floats) -> list[str]:
-    """Names of the parameters to show, a joint's own first."""
+    """Names of the parameters to show, by their effect; a joint's own is among them whatever its effect."""
     candidates = facts.calibration.arm.candidates
+    names = [candidates.names[k] for k in candidates.driven]
+    names.sort(key=lambda name: -effects[candidates.column(name)])
     own = own_name(facts.calibration, which) if which < len(facts.joints) else ""
-    others = [candidates.names[k] for k in candidates.driven if candidates.names[k] != own]
-    others.sort(key=lambda name: -effects[candidates.column(name)])
-    return [*([own] if own in candidates.names else []), *others][:SHOWN_ALONG]
+    if own not in candidates.names or own in names[:SHOWN_ALONG]:
+        return names[:SHOWN_ALONG]
+    return [*names[: SHOWN_ALONG - 1], own]
 
 
 def _surely(spread: Floats | None, k: int, unit: float) -> float | None:
