@@ -126,6 +126,20 @@ def test_strange_numbers_are_warned_of(tmp_path, capsys):
     assert "Warning: All links together are 1.19 mm long" in capsys.readouterr().err
 
 
+def test_limits_of_a_urdf_in_degrees_are_warned_of(tmp_path, capsys):
+    joints = "".join(
+        f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>'
+        f'<origin xyz="0 0 0.4"/><axis xyz="{axis}"/><limit lower="-{limit}" upper="{limit}"/></joint>'
+        for k, (axis, limit) in enumerate((("0 0 1", 90), ("0 1 0", 12.56), ("0 1 0", 2), ("1 0 0", 120)))
+    )
+    links = "".join(f'<link name="l{k}"/>' for k in range(5))
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<robot name="arm">{links}{joints}</robot>')
+    assert main(["robots", str(path)]) == 0
+    warned = " ".join(capsys.readouterr().err.split())
+    assert "A limit of 120 rad, 19.1 turns, in links 1 and 4 looks like degrees" in warned
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [

@@ -13,7 +13,10 @@ NO_LONGER: Final = f"No link is longer than {MAX_LENGTH_M:g} m"
 SHORTEST_ARM_M: Final = 0.02
 MAX_ANGLE_RAD: Final = 2.0 * np.pi + 1e-6
 MAX_LIMIT_RAD: Final = 40.0 * np.pi
+STRANGE_LIMIT_RAD: Final = 4.0 * np.pi
+"""Beyond two turns either way a limit that is a whole number of radians was meant in degrees."""
 RIGHT_ANGLE_TOLERANCE: Final = 1e-3
+WHOLE_TOLERANCE: Final = 1e-9
 ANGLES: Final = {0: "theta", 3: "alpha", 4: "beta"}
 LENGTHS: Final = {1: "d", 2: "a"}
 
@@ -53,7 +56,24 @@ def robot_notices(robot: RobotData) -> list[Notice]:
         value = written[strange][0]
         text = f"{value:.6g} deg in {list_rows(links, 'link')} looks like radians: check angle_unit."
         notices.append(Notice("radians_as_degrees", text, tuple(links)))
-    return notices
+    return notices + _limits_in_degrees(robot)
+
+
+def _limits_in_degrees(robot: RobotData) -> list[Notice]:
+    """A notice of revolute joints whose limits, in rad, are whole numbers beyond two turns."""
+    revolute = np.array([kind == "revolute" for kind in robot.joints])
+    limits = np.where(np.isfinite(robot.limits), np.abs(robot.limits), 0.0)
+    whole = np.abs(limits - np.round(limits)) < WHOLE_TOLERANCE
+    strange = revolute & ((limits > STRANGE_LIMIT_RAD) & whole).any(axis=1)
+    if not strange.any():
+        return []
+    links = (np.flatnonzero(strange) + 1).tolist()
+    most = float(limits[strange].max())
+    text = (
+        f"A limit of {most:g} rad, {most / (2.0 * np.pi):.1f} turns, in {list_rows(links, 'link')} looks "
+        "like degrees: the arm may be asked for readings that it cannot reach."
+    )
+    return [Notice("limits_as_radians", text, tuple(links))]
 
 
 def _refuse_large(robot: RobotData, column: int, name: str, bound: float, unit: tuple[str, str]) -> None:
