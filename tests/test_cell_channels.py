@@ -8,7 +8,14 @@ from typing import Any
 import pytest
 import serial
 
-from truearm.cell.channels import Channel, ConnectionEndedError, _Buffered, _Connection, _Terminal
+from truearm.cell.channels import (
+    Channel,
+    ConnectionEndedError,
+    _Buffered,
+    _Connection,
+    _Terminal,
+    open_tcp,
+)
 
 ENDED = "it is gone"
 
@@ -86,3 +93,17 @@ def test_what_nobody_takes_ends_within_the_limit():
     channel.close()
     os.close(own)
     os.close(other)
+
+
+def test_a_connection_that_is_closed_with_something_unread_is_not_reset():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        channel = open_tcp("device", *server.getsockname()[:2], 1.0)
+        device, _ = server.accept()
+        with device:
+            device.sendall(b"state" * 1000)
+            time.sleep(0.05)
+            channel.write(b"stopj(4)\n")
+            channel.close()
+            time.sleep(0.05)
+            assert device.recv(100) == b"stopj(4)\n"
+            assert device.recv(100) == b""

@@ -2,15 +2,19 @@
 
 import dataclasses
 import time
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from tests.cell_support import cell_text
 from tests.recorded import COUNT, Recorded
+from truearm.cell import Cell
 from truearm.cell.checks import unsure_steps
-from truearm.cell.in_a_row import UNSEEN, UNSEEN_IN_A_ROW, Far
+from truearm.cell.in_a_row import REPEATED, UNSEEN, UNSEEN_IN_A_ROW, Far
 from truearm.cell.measuring import DONE
 from truearm.cell.playback import PlaybackSensor
+from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Reading
 from truearm.cell.summary import summary_of
 from truearm.errors import WorkError
@@ -25,6 +29,7 @@ class Seen(Recorded):
     Attributes:
         unseen: Poses, from 0, at which nothing is seen.
         elsewhere: Poses, from 0, that are a metre from where they were recorded.
+        frozen: Poses, from 0, at which the point of the pose before is said again.
         at_once: Whether that is so from the beginning.
     """
 
@@ -32,6 +37,8 @@ class Seen(Recorded):
         super().__init__(folder)
         self.unseen: set[int] = set()
         self.elsewhere: set[int] = set()
+        self.frozen: set[int] = set()
+        self._last = A_METRE
         self.at_once = False
         measure = PlaybackSensor.measure
 
@@ -40,6 +47,9 @@ class Seen(Recorded):
             if self.at_once or self.begun():
                 if pose in self.unseen:
                     return Reading(None, 1e-5, time.time(), False, "-", "the beam is broken")
+                if pose in self.frozen:
+                    return dataclasses.replace(reading, point_in_world=self._last)
+                self._last = reading.point_in_world
                 if pose in self.elsewhere:
                     return dataclasses.replace(reading, point_in_world=reading.point_in_world + A_METRE)
             return reading
@@ -104,6 +114,25 @@ def test_a_few_that_are_hidden_are_skipped_at_once(seen):
     seen.unseen = {*range(8, 12), *range(13, 17)}
     assert seen.measure()[1] == DONE
     assert seen.skipped() == sorted(seen.unseen)
+
+
+def test_points_that_an_instrument_repeats_at_other_poses_do_not_count(seen):
+    seen.frozen = {12, 13}
+    assert seen.measure()[1] == DONE
+    assert seen.skipped() == [12, 13]
+    with seen.read() as session:
+        reasons = session.rows("SELECT DISTINCT reason FROM readings WHERE reason != ''")
+    assert reasons == [(REPEATED,)]
+
+
+def test_a_calibration_so_far_that_is_no_better_than_the_frame_judges_no_readings():
+    prediction, calibration = Prediction(Cell.from_toml(cell_text("tracker"))), Mock(groups=("a",))
+    prediction.register(np.eye(4), 2e-3)
+    registered_m = prediction.likely_m
+    assert not prediction.learn(calibration, 0.8)
+    assert prediction.likely_m == registered_m
+    assert prediction.learn(calibration, 1e-5)
+    assert prediction.likely_m < registered_m
 
 
 def test_what_a_device_refuses_in_between_is_no_end_of_the_row_and_is_tried_again(seen):

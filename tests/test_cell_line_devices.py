@@ -165,6 +165,56 @@ def test_lines_that_fit_nothing_are_counted_and_the_last_is_shown():
         sensor.measure()
 
 
+class Tracker(socketserver.StreamRequestHandler):
+    """Tells where the target was, a multiple of (1, 1, 1) mm: asked for, `late_s` later; or all the time."""
+
+    at, late_s, streams = 0.0, 0.0, False
+
+    def handle(self):
+        while self.streams:
+            try:
+                self.wfile.write(f"{self.at},{self.at},{self.at}\n".encode() * 200)
+            except OSError:
+                return
+            time.sleep(0.001)
+        for _ in self.rfile:
+            answer = f"{self.at},{self.at},{self.at}\n".encode()
+            threading.Timer(self.late_s, self._tell, [answer]).start()
+
+    def _tell(self, answer):
+        with contextlib.suppress(OSError, ValueError):  # nobody listens any more
+            self.wfile.write(answer)
+
+
+@contextlib.contextmanager
+def tracker_of(*, late_s=0.0, streams=False, **keys):
+    tracker = type("Own", (Tracker,), {"late_s": late_s, "streams": streams})
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), tracker) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+        port = f"tcp://127.0.0.1:{server.server_address[1]}"
+        settings = {"port": port, "answer": XYZ, "settle_s": 0.0, "timeout_s": 0.2}
+        with Connected(sensor := LineSensor(LineSensor.Settings(**settings | keys), SCARA)):
+            yield tracker, sensor
+        server.shutdown()
+
+
+@pytest.mark.parametrize("late_s", [0.3, 0.5])
+def test_an_answer_that_comes_late_is_not_believed_of_the_next_place(late_s):
+    with tracker_of(late_s=late_s, trigger="M") as (tracker, sensor):
+        for place in (1.0, 2.0, 3.0):
+            tracker.at = place
+            assert sensor.measure().point_in_world == pytest.approx([place * 1e-3] * 3)
+
+
+def test_lines_of_a_stream_do_not_grow_old_while_nothing_is_measured():
+    with tracker_of(streams=True) as (tracker, sensor):
+        time.sleep(1.5)
+        tracker.at = 7.0
+        time.sleep(0.05)
+        assert sensor.measure().point_in_world == pytest.approx([7e-3] * 3)
+
+
 def test_a_line_that_says_that_there_is_no_point_is_a_reading_that_is_not_valid():
     with sensor_of(lambda _: ["NO TARGET"], nothing="^NO", average=5) as sensor:
         reading = sensor.measure()
@@ -198,9 +248,10 @@ def test_instruments_may_measure_in_inches():
 class Controller:
     """What a Universal Robots controller streams: noise, and a script that starts late."""
 
-    def __init__(self, robot, mode=ur_packets.RUNNING, noise=1e-5):
+    def __init__(self, robot, mode=ur_packets.RUNNING, noise=1e-5, lasts_s=0.2):
         self.target, self.told_at, self.sent = np.zeros(6), np.inf, 0
         self._mode, self._noise, self._rng = mode, noise, np.random.default_rng(0)
+        self._lasts_s = lasts_s
         robot._script, robot._state = Mock(begin=self.send, where="UR"), self.state
         robot._wait_for_next = lambda _: time.sleep(0.005)
 
@@ -208,7 +259,7 @@ class Controller:
         self.sent, self.told_at = self.sent + 1, time.monotonic()
 
     def state(self):
-        share = np.clip((time.monotonic() - self.told_at - 0.25) / 0.2, 0.0, 1.0)
+        share = np.clip((time.monotonic() - self.told_at - 0.25) / self._lasts_s, 0.0, 1.0)
         speed = np.full(6, 1.0 if 0.0 < share < 1.0 else 0.0)
         readings = share * self.target + self._noise * self._rng.normal(size=6)
         return ur_packets.State(0.0, readings, speed, 30.0, ur_packets.NORMAL, self._mode)
@@ -220,6 +271,50 @@ def test_an_arm_whose_encoders_flicker_is_given_time_to_begin():
     controller.target = np.full(6, 0.2)
     robot.move_joints(controller.target)
     assert controller.sent == 1
+
+
+def test_an_arm_that_is_slower_than_it_was_told_to_be_is_waited_for():
+    keys = {"timeout_s": 0.4, "speed_rad_s": 10.0, "acceleration_rad_s2": 1000.0, "settle_s": 0.05}
+    robot = UniversalRobots(UniversalRobots.Settings(host="127.0.0.1", **keys), Robot.load("ur5e"))
+    controller = Controller(robot, lasts_s=1.5)
+    controller.target = np.full(6, 0.2)
+    robot.move_joints(controller.target)
+    assert controller.sent == 1
+
+
+def test_what_the_script_port_says_is_read_so_that_it_goes_on_saying_it():
+    class Port(socketserver.BaseRequestHandler):
+        said = 0
+
+        def handle(self):
+            with contextlib.suppress(OSError):
+                for Port.said in range(20000):
+                    self.request.sendall(b"x" * 1100)
+
+    class State(socketserver.BaseRequestHandler):
+        def handle(self):
+            still = ur_packets.State(0.0, np.zeros(6), np.zeros(6), 30.0, ur_packets.NORMAL)
+            with contextlib.suppress(OSError):
+                while True:
+                    self.request.sendall(ur_packets.build(still))
+                    time.sleep(0.01)
+
+    with (
+        socketserver.ThreadingTCPServer(("127.0.0.1", 0), Port) as script,
+        socketserver.ThreadingTCPServer(("127.0.0.1", 0), State) as state,
+    ):
+        for server in (script, state):
+            server.daemon_threads = True
+            threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+        ports = {"script_port": script.server_address[1], "realtime_port": state.server_address[1]}
+        settings = UniversalRobots.Settings(host="127.0.0.1", **ports)
+        with Connected(UniversalRobots(settings, Robot.load("ur5e"))):
+            until = time.monotonic() + 20.0
+            while Port.said < 19999 and time.monotonic() < until:
+                time.sleep(0.02)
+        assert Port.said == 19999
+        for server in (script, state):
+            server.shutdown()
 
 
 def test_an_arm_that_is_off_is_said_to_be():

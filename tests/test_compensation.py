@@ -239,6 +239,18 @@ def test_the_change_along_a_path_is_bounded(constant):
     assert tight.refusals[0].number == 2
 
 
+def test_an_arm_with_a_joint_to_spare_may_move_while_its_tool_rests():
+    robot = ta.Robot.load("franka-panda")
+    arm = VirtualArm(robot, seed=3)
+    calibration = ta.calibrate(robot, arm.measure(arm.poses(60)), model="constant", refit=False)
+    path = [np.array([0.2, -0.3, 0.1, -1.9, 0.2, 1.7, 0.4])]
+    for _ in range(40):
+        spare = np.linalg.svd(robot.joint_jacobian(path[-1][None], pose=True)[0])[2][-1]
+        path.append(path[-1] + 2e-3 * np.sign(spare[0]) * spare)
+    assert np.ptp(robot.pose(np.array(path))[:, :3, 3], axis=0).max() < 1e-4
+    assert ta.Compensator(calibration).joints(path).refusals == ()
+
+
 def test_standard_deviations_of_constants_are_the_calibrations(constant):
     found = ta.Compensator(constant, limits=OPEN).joints(PATH)
     exact = 1e3 * np.linalg.norm(constant.position_std(found.q), axis=1)

@@ -27,7 +27,7 @@ class Limits:
         largest_deg: Turn of the tool.
         largest_std_mm: Standard deviation of the tool's position that the calibration states there.
         change_mm_per_mm: Change of the shift from one waypoint to the next, for each mm that the tool goes; a
-            radian that it turns counts as 300 mm.
+            radian that it turns counts as 300 mm. Where a joint goes farther, counted likewise, that counts.
         change_mrad_per_rad: Change of the turn from one waypoint to the next, likewise for each rad.
         residual_mm: How far from its target the calibrated model may leave the tool; beside the plane that an
             arm cannot leave, `largest_mm` counts.

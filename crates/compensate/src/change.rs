@@ -2,7 +2,8 @@
 //!
 //! The shift of the tool may change by so much for each metre of the tool's way, its turn by so much for each radian
 //! that the tool turns; a radian counts as [`ANGLE_ARM`] metres, so that a tool that turns on the spot may
-//! be shifted differently as well.
+//! be shifted differently as well. So may one that rests while the joints move: the way of the joint that goes
+//! farthest counts where it is longer.
 
 use truearm_estimate::ANGLE_ARM;
 use truearm_kinematics::{LaneFrame, norm};
@@ -59,16 +60,24 @@ impl Corrector {
         {
             return None;
         }
-        let way = apart(&before.point, &after.point);
-        let turned = chord(&before.rotation, &after.rotation);
+        let way = apart(&before.point, &after.point) + ANGLE_ARM * chord(&before.rotation, &after.rotation);
+        let way = way.max(self.joint_way(from, to));
         let shift = apart(&before.correction.shift, &after.correction.shift);
         let turn = apart(&before.correction.turn, &after.correction.turn);
-        let shift_limit = limits.shift_change * (way + ANGLE_ARM * turned) + ALWAYS;
-        let turn_limit = limits.turn_change * (turned + way / ANGLE_ARM) + ALWAYS;
+        let shift_limit = limits.shift_change * way + ALWAYS;
+        let turn_limit = limits.turn_change * way / ANGLE_ARM + ALWAYS;
         if shift > shift_limit {
             return Some(Refusal::new(Reason::ShiftChange, shift, shift_limit));
         }
         (turn > turn_limit).then(|| Refusal::new(Reason::TurnChange, turn, turn_limit))
+    }
+
+    /// How far the joint goes that goes farthest between two readings, m; a radian counts as [`ANGLE_ARM`].
+    fn joint_way(&self, from: &[f64], to: &[f64]) -> f64 {
+        let chain = &self.calibrated.chain;
+        let each = from.iter().zip(to).enumerate();
+        each.map(|(joint, (a, b))| (a - b).abs() * if chain.slides(joint) { 1.0 } else { ANGLE_ARM })
+            .fold(0.0, f64::max)
     }
 }
 

@@ -1,5 +1,6 @@
 """Bytes to and from a device: a serial port, or a TCP connection."""
 
+import contextlib
 import errno
 import os
 import re
@@ -8,7 +9,6 @@ import socket
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final, Protocol
 
 import serial
@@ -33,6 +33,7 @@ CLOSED: Final = -1
 TCP: Final = "tcp://"
 TCP_PLACE: Final = re.compile(r"(?:\[(?P<bracketed>[^\[\]]+)\]|(?P<host>[^\[\]:/\s]+)):(?P<port>\d{1,5})")
 MOST_PORT: Final = 65535
+READS_AT_END: Final = 256
 
 
 class ConnectionEndedError(OSError):
@@ -111,6 +112,19 @@ class _Connection(_Waited):
         self._socket = opened
         opened.setblocking(False)
 
+    def close(self) -> None:
+        """See Wire.
+
+        What has come is read before: a connection that is closed with something unread is reset, and what was
+        sent last may be lost.
+        """
+        with contextlib.suppress(OSError, ValueError):
+            self._socket.shutdown(socket.SHUT_WR)
+            for _ in range(READS_AT_END):
+                if not self.receive(0.0):
+                    break
+        super().close()
+
     def _read(self) -> bytes:
         return self._socket.recv(CHUNK)
 
@@ -142,7 +156,7 @@ class _Buffered:
         self._port.close()
 
 
-@contextmanager
+@contextlib.contextmanager
 def _closed_in_mid_call() -> Iterator[None]:
     """Around a call of pyserial, which finds nothing where a port is closed meanwhile."""
     try:

@@ -1,9 +1,17 @@
-"""What is counted in a row: poses at which the target is not seen, and poses far from their prediction."""
+"""What is seen over several poses: none of the target, far from predictions, or the same point again."""
 
+import math
+from dataclasses import replace
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.cell.reading import Reading
 from truearm.cell.session import Session, Step
 from truearm.errors import WorkError
+
+Floats = NDArray[np.float64]
 
 UNSEEN_IN_A_ROW: Final = 5
 FAR_IN_A_ROW: Final = 3
@@ -13,10 +21,11 @@ TAKEN_BACK_BEFORE: Final = "SELECT 1 FROM events WHERE kind = ? AND step BETWEEN
 LAST_REASON: Final = (
     "SELECT reason FROM readings WHERE step <= ? AND reason != '' ORDER BY step DESC, attempt DESC LIMIT 1"
 )
+REPEATED: Final = "it repeats, to the last digit, the point of another pose"
 NOUNS: Final = {"registration": "contacts for the frame", "pose": "poses"}
 WAYS_OUT: Final = {
-    "registration": "See to the target and the line of sight, and to [target] and [world] in the cell file. "
-    "Then the same command measures these contacts again",
+    "registration": "See to the target and the line of sight, and to [world] in the cell file. Then the same "
+    "command measures these contacts again. With another [target] name a new session with -o",
     "pose": "See to the target and the line of sight. Then the same command measures these poses again, and "
     "skips those that it does not see then either",
 }
@@ -86,3 +95,20 @@ class Far:
             return False
         self._is_known = True
         return True
+
+
+class Frozen:
+    """Points that an instrument says again after the arm has gone on, as one does that stopped to follow."""
+
+    def __init__(self) -> None:
+        self._steps: dict[tuple[float, ...], int] = {}
+
+    def judged(self, step: Step, reading: Reading, predicted: Floats, likely_m: float) -> Reading:
+        """The reading; not valid where it is far from the prediction (3,) and, to the last digit, old."""
+        if not reading.valid or reading.point_in_world is None:
+            return reading
+        point = tuple(reading.point_in_world.tolist())
+        first = self._steps.setdefault(point, step.step)
+        if first == step.step or math.dist(point, predicted.tolist()) <= likely_m:
+            return reading
+        return replace(reading, valid=False, reason=REPEATED)

@@ -18,6 +18,7 @@ LONGEST_LINE: Final = 65536
 ENDS: Final = (b"\r", b"\n")
 TERMINATORS: Final = {"lf": b"\n", "cr": b"\r", "crlf": b"\r\n"}
 LONGEST_SHOWN: Final = 60
+PASSES_EVERY_S: Final = 0.05
 T = TypeVar("T")
 
 
@@ -208,7 +209,15 @@ class LinePort:
                 raise silent(self.device, self.address, limit, doing=doing)
         return self._lines.popleft()
 
-    def answer(self, meaning: Callable[[str], T | None], *, doing: str, key: str, way_out: str = "") -> T:
+    def answer(
+        self,
+        meaning: Callable[[str], T | None],
+        *,
+        doing: str,
+        key: str,
+        way_out: str = "",
+        limit_s: float | None = None,
+    ) -> T:
         """What the first line that has a meaning means; devices say other things before it, as they like.
 
         Args:
@@ -216,13 +225,15 @@ class LinePort:
             doing: What the device was asked to do, for the message.
             key: Of the cell file, which says what lines have a meaning.
             way_out: What else may be done about lines that have none, for the message.
+            limit_s: Time limit; that of the port by default.
 
         Raises:
-            DeviceSilentError: If no such line came within the limit of the port.
+            DeviceSilentError: If no such line came within the limit.
             DeviceGoneError: If the connection has ended.
             StoppedError: If another thread interrupted.
         """
-        until, lines, last = time.monotonic() + self.limit_s, 0, ""
+        limit = self.limit_s if limit_s is None else limit_s
+        until, lines, last = time.monotonic() + limit, 0, ""
         while (left := until - time.monotonic()) > 0.0:
             try:
                 last = self.receive(left, doing=doing)
@@ -233,9 +244,9 @@ class LinePort:
             if found is not None:
                 return found
         if not lines:
-            raise silent(self.device, self.address, self.limit_s, doing=doing)
+            raise silent(self.device, self.address, limit, doing=doing)
         raise DeviceSilentError(
-            f"{count_of(lines, 'line')} came within {self.limit_s:g} s, none fits `{key}`, "
+            f"{count_of(lines, 'line')} came within {limit:g} s, none fits `{key}`, "
             f'the last was "{last[:LONGEST_SHOWN]}"',
             where=self.where,
             way_out=f"Correct `{key}` of the cell file{way_out}",
@@ -249,6 +260,27 @@ class LinePort:
         """
         if self._interrupted.wait(seconds):
             raise stopped(self.device, self.address)
+
+    def pass_over(self, seconds: float) -> None:
+        """Wait, and forget all that comes meanwhile, so that nothing is kept waiting at the other side.
+
+        Raises:
+            DeviceGoneError: If the connection has ended.
+            StoppedError: If another thread interrupted.
+        """
+        until = time.monotonic() + seconds
+        while time.monotonic() < until:
+            self.drain()
+            self.pause(min(PASSES_EVERY_S, max(0.0, until - time.monotonic())))
+        self.drain()
+
+    def ignore(self) -> None:
+        """Wait a slice for what comes, and forget it unread; another thread may send meanwhile.
+
+        Raises:
+            DeviceGoneError: If the connection has ended.
+        """
+        self._read(wait=True)
 
     def drain(self) -> list[str]:
         """Forget what has come and was not asked for: these lines."""
@@ -270,11 +302,7 @@ class LinePort:
 
     def _take(self, *, wait: bool = True) -> bool:
         """Split what comes within a slice, or has come, into lines; whether anything came."""
-        channel = self._open_channel()
-        try:
-            data = channel.read(wait=wait)
-        except ConnectionEndedError as error:
-            raise gone(self.device, self.address, str(error)) from None
+        data = self._read(wait=wait)
         if not data:
             return False
         # Devices end lines as they like, and not always as they want them ended: an empty line means nothing.
@@ -282,6 +310,13 @@ class LinePort:
         self._rest = b"" if data.endswith(ENDS) else lines.pop()[-LONGEST_LINE:]
         self._lines.extend([line.decode("ascii", "replace") for line in lines if line])
         return True
+
+    def _read(self, *, wait: bool) -> bytes:
+        channel = self._open_channel()
+        try:
+            return channel.read(wait=wait)
+        except ConnectionEndedError as error:
+            raise gone(self.device, self.address, str(error)) from None
 
     def _open_channel(self) -> Channel:
         if self._channel is None:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from truearm.cell.device_errors import DeviceSilentError
+from truearm.cell.channels import tcp_place
+from truearm.cell.device_errors import DeviceError, DeviceSilentError
 from truearm.cell.line_port import LinePort, LineSection
 from truearm.cell.patterns import expression, numbers_in, pattern_of
 from truearm.cell.protocols import Managed
@@ -25,6 +26,8 @@ Numbers = dict[str, float]
 XYZ: Final = ("x", "y", "z")
 KNOWN: Final = (*XYZ, "sigma", "ok", "temperature")
 SENDINGS: Final = 3
+READ_EVERY_S: Final = 0.05
+ENDS_WITHIN_S: Final = 1.0
 NO_POINT: Final = ", or give `nothing`, which lines that mean that there is no point fit"
 
 
@@ -32,8 +35,11 @@ class LineSensor(Managed):
     """An instrument whose lines match `answer`, a pattern with groups x, y, z; sigma, ok, temperature if any.
 
     With `trigger` it is asked for every line; without, it streams, and the lines that come after the arm has
-    settled are averaged. A group `ok` must be 1 for the point to count. All other groups become features. A
-    line that matches `nothing` says that there is no point, as where a tracker does not see its target.
+    settled are averaged. Lines are read all the time then, so that none grows old on the way. Answers that a
+    former measurement has not waited for are waited for by the next one, and forgotten.
+
+    A group `ok` must be 1 for the point to count. All other groups become features. A line that matches
+    `nothing` says that there is no point, as where a tracker does not see its target.
     """
 
     class Settings(LineSection):
@@ -75,6 +81,9 @@ class LineSensor(Managed):
         self._nothing = None if settings.nothing is None else re.compile(settings.nothing)
         self._port = LinePort.of(self.name, settings, terminator=settings.terminator)
         self._busy = threading.RLock()
+        self._late = _Late(settings.timeout_s)
+        self._closed = threading.Event()
+        self._idle: threading.Thread | None = None
 
     @property
     def name(self) -> str:
@@ -88,9 +97,15 @@ class LineSensor(Managed):
 
     def connect(self) -> None:
         """Open the port and send the lines of `setup`."""
+        if tcp_place(self.address) is not None:
+            self._late.forget()
         with self._busy, self._port.opened():
             for line in self._settings.setup:
                 self._port.send(line)
+        if self._settings.trigger is None:
+            self._closed.clear()
+            self._idle = threading.Thread(target=self._read_on, daemon=True)
+            self._idle.start()
 
     def prepare(self, expected: Expected) -> None:
         """See Sensor. Nothing to do: the instrument follows its target."""
@@ -99,8 +114,8 @@ class LineSensor(Managed):
         """See Sensor. The mean of `average` lines; not valid if they spread, or the instrument says so."""
         lines: list[tuple[str, Numbers]] = []
         with self._busy:
-            self._port.pause(self._settings.settle_s)
-            self._port.drain()
+            self._wait_for_late()
+            self._port.pass_over(self._settings.settle_s)
             while len(lines) < self._settings.average:
                 line, numbers = self._line()
                 if not numbers:
@@ -117,7 +132,28 @@ class LineSensor(Managed):
 
     def close(self) -> None:
         """See Device."""
+        self._closed.set()
+        idle, self._idle = self._idle, None
+        if idle is not None:
+            idle.join(ENDS_WITHIN_S)
         self._port.close()
+
+    def _read_on(self) -> None:
+        """Forget the lines of a stream while nothing is measured; the next reading tells what ended it."""
+        with contextlib.suppress(DeviceError):
+            while not self._closed.wait(READ_EVERY_S):
+                with self._busy:
+                    self._port.drain()
+
+    def _wait_for_late(self) -> None:
+        """Forget answers that were asked for by a former measurement, where the arm stood elsewhere."""
+        while self._late.owed and (left := self._late.until_s - time.monotonic()) > 0.0:
+            try:
+                self._port.answer(self._meaning, doing="measure", key="answer", limit_s=left)
+            except DeviceSilentError:
+                break
+            self._late.answered()
+        self._late.forget()
 
     def _line(self) -> tuple[str, Numbers]:
         """The next line that says a point, or that there is none; asked for, and again where it is lost."""
@@ -129,9 +165,14 @@ class LineSensor(Managed):
         return self._next()
 
     def _asked(self, trigger: str) -> tuple[str, Numbers]:
-        self._port.drain()
+        for line in self._port.drain():
+            if self._meaning(line) is not None:
+                self._late.answered()
         self._port.send(trigger)
-        return self._next()
+        self._late.asked()
+        found = self._next()
+        self._late.answered()
+        return found
 
     def _next(self) -> tuple[str, Numbers]:
         return self._port.answer(self._meaning, doing="measure", key="answer", way_out=NO_POINT)
@@ -181,6 +222,40 @@ class LineSensor(Managed):
         if spread_m > to_si(self._settings.spread_mm, "mm"):
             return f"the lines spread by {MM_PER_METRE * spread_m:.2f} mm"
         return ""
+
+
+class _Late:
+    """How many answers are still owed, and until when they may come.
+
+    One that was lost never comes. One that is late takes about as long as the first one took at the most.
+    """
+
+    def __init__(self, limit_s: float) -> None:
+        self._limit_s = limit_s
+        self._first_s = self._last_s = self._took_s = 0.0
+        self.owed = 0
+
+    @property
+    def until_s(self) -> float:
+        """Time, of the monotonic clock, at which what has not come is lost."""
+        return self._last_s + self._took_s + self._limit_s
+
+    def asked(self) -> None:
+        """A trigger was sent."""
+        self._last_s = time.monotonic()
+        if not self.owed:
+            self._first_s = self._last_s
+        self.owed += 1
+        self._took_s = SENDINGS * self._limit_s
+
+    def answered(self) -> None:
+        """An answer has come."""
+        self.owed = max(0, self.owed - 1)
+        self._took_s = time.monotonic() - self._first_s
+
+    def forget(self) -> None:
+        """Nothing is owed any more."""
+        self.owed = 0
 
 
 def _mean(values: Floats) -> float | None:

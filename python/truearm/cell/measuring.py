@@ -24,7 +24,7 @@ from truearm.cell.device_errors import (
     RefusedError,
     StoppedError,
 )
-from truearm.cell.in_a_row import Far, Unseen
+from truearm.cell.in_a_row import Far, Frozen, Unseen
 from truearm.cell.judge import Rules, Verdict, judge
 from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Expected, Reading, checked_reading
@@ -48,6 +48,7 @@ DONE: Final = "all poses are done"
 ACCURATE: Final = "the target accuracy is met"
 DONE_STEPS: Final = "SELECT coalesce(max(step), -1) + 1 FROM outcomes"
 OTHERS_BETWEEN: Final = "SELECT 1 FROM steps WHERE step >= ? AND step < ? AND kind != 'check' LIMIT 1"
+NO_BETTER: Final = "readings are still judged by the registered frame, which predicts them no worse"
 UNCHECKED: Final = "no contact could be measured again: whether anything has moved is not known"
 CONTACTS_LEFT: Final = (
     "SELECT 1 FROM steps LEFT JOIN outcomes USING (step) "
@@ -86,7 +87,7 @@ class Process:
         self._prediction = Prediction(cell)
         self._halted, self._ended = threading.Event(), threading.Event()
         self._crew = Crew(cell, session.add_event, self._halted)
-        self._unseen, self._far = Unseen(session), Far()
+        self._unseen, self._far, self._frozen = Unseen(session), Far(), Frozen()
         self._recoveries = self._given_up = 0
         self._total = session.rows("SELECT count(*) FROM steps")[0][0]
         self._poses = session.rows("SELECT count(*) FROM steps WHERE kind = 'pose'")[0][0]
@@ -178,6 +179,7 @@ class Process:
                 self._crew.raise_if_halted()
                 with Calls(self._cell.sensor):
                     reading = checked_reading(self._cell.sensor.measure())
+                reading = self._frozen.judged(step, reading, point, likely_m)
             except RefusedError as error:
                 return self._refused(step, error)
             except DeviceError as error:
@@ -381,7 +383,8 @@ class Process:
         self._session.add_stretch(
             measured, stretch.model, stretch.mean_mm, stretch.p95_mm, stretch.expected_mm
         )
-        self._prediction.learn(stretch.calibration, stretch.p95_mm / MM_PER_METRE)
+        if not self._prediction.learn(stretch.calibration, stretch.p95_mm / MM_PER_METRE):
+            self._session.add_event("calibration", f"{measured} poses: {NO_BETTER}")
         self._say(
             f"{measured} poses, {stretch.model} model: {stretch.mean_mm:.3f} mm mean on held-out poses, "
             f"{stretch.expected_mm:.3f} mm expected"

@@ -46,6 +46,7 @@ class Prediction:
             turned = np.radians(world.uncertain_deg) * REACH_M
             self.radius_m += to_si(world.uncertain_mm, "mm") + float(turned)
         self.likely_m = np.inf if world is None else self.radius_m
+        self._registered_m = self.likely_m
         self._calibration: Calibration | None = None
         self._group = ""
 
@@ -54,12 +55,19 @@ class Prediction:
         self.world_from_base, self.is_registered = world_from_base, True
         self._seen = self._cell.target_seen_from(world_from_base)
         expected = to_si(self._cell.file.process.expected_mm, "mm")
-        self.radius_m = self.likely_m = max(expected, SIGMAS * residual_m)
+        self.radius_m = self.likely_m = self._registered_m = max(expected, SIGMAS * residual_m)
 
-    def learn(self, calibration: Calibration, error_m: float) -> None:
-        """Take over a calibration, whose errors reach to `error_m` on poses it has not seen."""
-        self._calibration, self._group = calibration, calibration.groups[0]
-        self.likely_m = max(LEAST_LIKELY_M, self._cell.file.process.suspicious * error_m)
+    def learn(self, calibration: Calibration, error_m: float) -> bool:
+        """Take over a calibration, whose errors reach to `error_m` on poses it has not seen; whether it was.
+
+        One that is worse than the registered frame alone, as after wrong readings, is not: it would let more
+        of them pass.
+        """
+        likely_m = max(LEAST_LIKELY_M, self._cell.file.process.suspicious * error_m)
+        if likely_m > self._registered_m:
+            return False
+        self._calibration, self._group, self.likely_m = calibration, calibration.groups[0], likely_m
+        return True
 
     def expected(self, step: Step) -> Expected:
         """What the sensor is prepared for; where nothing is known, the middle of nowhere with no bound."""

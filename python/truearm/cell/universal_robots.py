@@ -3,6 +3,7 @@
 Targets are absolute, so that a line that was lost is simply sent again, and one that came twice does nothing.
 """
 
+import contextlib
 import threading
 import time
 from typing import Final
@@ -15,6 +16,7 @@ from truearm.cell.channels import Channel, ConnectionEndedError, open_tcp, tcp_a
 from truearm.cell.device_errors import (
     DeviceError,
     DeviceRestartedError,
+    DeviceSilentError,
     EmergencyStopError,
     NotReadyError,
     ProtectiveStopError,
@@ -65,6 +67,7 @@ class UniversalRobots(Managed):
         address = tcp_address(settings.host, settings.script_port)
         self._script = LinePort(self.name, address, settings.timeout_s)
         self._stream: _Stream | None = None
+        self._unheard: _Unheard | None = None
         self._busy = threading.RLock()
 
     @property
@@ -80,6 +83,7 @@ class UniversalRobots(Managed):
     def connect(self) -> None:
         """Open both ports and wait for the first state."""
         self._script.open()
+        self._unheard = _Unheard(self._script, self._settings.timeout_s)
         try:
             host, port, limit = self._settings.host, self._settings.realtime_port, self._settings.timeout_s
             self._stream = _Stream(self.name, self.address, open_tcp(self.name, host, port, limit), limit)
@@ -127,6 +131,9 @@ class UniversalRobots(Managed):
         stream, self._stream = self._stream, None
         if stream is not None:
             stream.close()
+        unheard, self._unheard = self._unheard, None
+        if unheard is not None:
+            unheard.end()
         self._script.close()
 
     def _move(self, place: str, target: Floats | None) -> None:
@@ -158,9 +165,12 @@ class UniversalRobots(Managed):
             )
 
     def _arrives(self, target: Floats | None) -> bool:
-        """Wait for the end of a motion; False if it never began, or ended elsewhere."""
+        """Wait for the end of a motion; False if it never began, or ended elsewhere.
+
+        An arm may be slower than it was told to be, as by its speed slider: it has time while it gets nearer.
+        """
         begin = self._state()
-        limit = self._limit(begin.readings, target)
+        limit, left = self._limit(begin.readings, target), np.inf
         until, last_moved, moved = time.monotonic() + limit, time.monotonic(), False
         while time.monotonic() < until:
             state = self._state()
@@ -170,12 +180,19 @@ class UniversalRobots(Managed):
             if moves:
                 last_moved = time.monotonic()
             still_s = time.monotonic() - last_moved
-            if target is not None and not moves and np.abs(state.readings - target).max() < THERE_RAD:
+            away = 0.0 if target is None else float(np.abs(state.readings - target).max())
+            if target is not None and not moves and away < THERE_RAD:
                 return True
+            if moves and (target is None or away < left - THERE_RAD):
+                left, until = away, time.monotonic() + limit
             if still_s > self._settings.settle_s + (0.0 if moved else STARTS_WITHIN_S):
                 return moved and target is None
             self._wait_for_next(state)
-        raise silent(self.name, self.address, limit, doing="move")
+        raise DeviceSilentError(
+            f"the motion did not end: in {limit:.1f} s the arm came no nearer",
+            where=self._script.where,
+            way_out="See what its teach pendant says",
+        )
 
     def _limit(self, here: Floats, target: Floats | None) -> float:
         way = np.pi if target is None else float(np.abs(target - here).max())
@@ -217,6 +234,26 @@ def _within(target: Floats, low: Floats, high: Floats) -> Floats:
     """A target as it is sent: one at a limit is not rounded beyond it, where no arm would move to."""
     last = 10.0**DIGITS
     return np.clip(np.round(target, DIGITS), np.ceil(low * last) / last, np.floor(high * last) / last)
+
+
+class _Unheard:
+    """A thread that reads what the script port says, and forgets it, so that the port does not fill up."""
+
+    def __init__(self, port: LinePort, limit_s: float) -> None:
+        self._port, self._limit_s = port, limit_s
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        """End the thread."""
+        self._ended.set()
+        self._thread.join(self._limit_s)
+
+    def _run(self) -> None:
+        with contextlib.suppress(DeviceError):  # what is sent next tells it
+            while not self._ended.is_set():
+                self._port.ignore()
 
 
 class _Stream:

@@ -23,7 +23,7 @@ def command(
     if as_json:
         print_json({"robot": known.robot.address, "sensor": known.sensor.address, "readings": readings})
         return
-    say(f"{known.sensor.name} at {known.sensor.address} answers.")
+    say(f"{known.sensor.name} at {known.sensor.address} is connected; the first reading shows what it says.")
     say(f"{known.robot.name} at {known.robot.address} answers; its joints:")
     say("  " + ", ".join(f"{reading:.4f}" for reading in readings))
     suggest(f"truearm measure {typed(cell)} poses.csv --dry-run")
