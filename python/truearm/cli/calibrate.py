@@ -253,8 +253,8 @@ def print_results(calibration: "Calibration") -> None:
 
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
-    """Say what the model leaves unexplained, and the mean error of that; constants leave more than noise."""
-    from truearm.models import CONSTANT
+    """Say what the model leaves unexplained, and the mean error of that: few models leave noise alone."""
+    from truearm.models import CONSTANT, leaves_noise
     from truearm.summary import states_sigma
 
     per = "distance" if calibration.selection.distances else "coordinate"
@@ -262,10 +262,12 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
         per += " of all targets together"
     beyond = ", beyond the stated sigma" if states_sigma(calibration) else ""
     left = f"{summary['noise_floor_mm']:.3f} mm"
+    name = calibration.model_name
+    also = "with constants alone" if name == CONSTANT else f"with the model {name}"
     alone = (
-        f"It makes a mean error of {left}: noise and, with constants alone, what varies with the joints."
-        if calibration.model_name == CONSTANT
-        else f"Mean error that noise alone would leave: {left}."
+        f"Mean error that noise alone would leave: {left}."
+        if leaves_noise(name)
+        else f"It makes a mean error of {left}: noise and, {also}, what varies with the joints."
     )
     say_wrapped(
         f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "

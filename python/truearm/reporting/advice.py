@@ -19,7 +19,7 @@ from truearm.doubts import (
 )
 from truearm.errors import count_of, short_names
 from truearm.grids import BETWEEN
-from truearm.models import CONSTANT, VARIABLE
+from truearm.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import of_last_link, target_lever_mm
@@ -123,7 +123,7 @@ def _stated_sigma(facts: Facts) -> Iterator[Advice]:
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
-    if facts.best != VARIABLE or any(_stated_sigma(facts)):
+    if not leaves_noise(facts.best) or any(_stated_sigma(facts)):
         return
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)

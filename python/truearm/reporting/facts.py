@@ -142,7 +142,7 @@ class Facts:
 
     @cached_property
     def floor_mm(self) -> float:
-        """Mean position error that noise alone would leave, mm; with constants, with what varies in it."""
+        """Mean position error of what the model leaves, mm: noise and, unless it is variable, what varies."""
         return distance_at_floor_mm(self.calibration)
 
     @property
