@@ -22,9 +22,10 @@ from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
-from truearm.reporting.levers import of_last_link, target_lever_mm
+from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
 from truearm.reporting.numbers import fixed, listed, percent, short, shown_readings
 from truearm.row_order import ORDER_OF_POSES
+from truearm.summary import saw_orientations
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -38,8 +39,6 @@ LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
 ROWS_NAMED: Final = 5
-ON_THE_AXIS_MM: Final = 5.0
-"""Targets nearer to the last joint's axis than this hardly show how it turns."""
 SETUP_WORDS: Final = "the place of device or target"
 
 
@@ -259,8 +258,7 @@ def _range(facts: Facts, weak: Stretch) -> str:
 def _unseen(facts: Facts) -> Iterator[Advice]:
     found, selection = facts.calibration.identifiability, facts.calibration.selection
     pairs = zip(found.undetermined, found.words, strict=True)
-    lever = target_lever_mm(facts)
-    of_target = set() if lever is None or lever < ON_THE_AXIS_MM else of_last_link(facts)
+    of_target, lever = taken_over(facts), target_lever_mm(facts)
     hidden = [name for name, words in pairs if SETUP_WORDS not in words and name not in of_target]
     if hidden:
         is_on = lever is not None and lever < ON_THE_AXIS_MM
