@@ -277,13 +277,16 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
 
 def print_determined(calibration: "Calibration") -> None:
     """Say which parameters the measurements determine, and what the others cannot be told from."""
+    from truearm.summary import saw_orientations
+
     found = calibration.identifiability
     say(f"The poses determine {found.rank} of {found.parameters} parameters of the arm.")
     for words, names in _by_reason(found.undetermined, found.words).items():
         say_wrapped(f"  {', '.join(names)} {words}")
     if len(calibration.selection.targets) in (1, 2) and not calibration.selection.orientation:
+        was_not = "used (--use pose uses it)" if saw_orientations(calibration) else "measured"
         say_wrapped(
-            "Orientation was not measured: the tool's follows from positions alone, and nothing below "
+            f"Orientation was not {was_not}: the tool's follows from positions alone, and nothing below "
             "validates it."
         )
 

@@ -270,11 +270,16 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
         yield Advice("unseen_parameters", "Determine all parameters.", words, 0.1 * facts.mean_mm())
     if selection.distances or selection.orientation or len(selection.targets) > 2:
         return
-    words = (
-        "The orientation of the tool follows from positions alone, and nothing here validates it. If the "
-        "tool is long or its direction matters, measure its orientation, or three targets on it."
-    )
-    yield Advice("no_orientation", "Measure orientation.", words, 0.05 * facts.mean_mm())
+    words = "The orientation of the tool follows from positions alone, and nothing here validates it. "
+    weight = 0.05 * facts.mean_mm()
+    if saw_orientations(facts.calibration):
+        words += "It was measured, and not used: calibrate with --use pose."
+        yield Advice("orientation_not_used", "Use the orientations.", words, weight)
+    else:
+        words += (
+            "If the tool is long or its direction matters, measure its orientation, or three targets on it."
+        )
+        yield Advice("no_orientation", "Measure orientation.", words, weight)
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:
