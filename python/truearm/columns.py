@@ -112,7 +112,12 @@ def read_joint_layout(names: Sequence[str], stated: StatedUnits, *, where: str) 
 
 def lookalikes(names: Sequence[str]) -> list[str]:
     """Names that would mean something if case and blanks were written otherwise, such as "Sigma mm"."""
-    return [name for name in names if means_something(name.casefold().replace(" ", "_").replace("-", "_"))]
+    return [name for name in names if means_something(canonical(name))]
+
+
+def canonical(name: str) -> str:
+    """A name as columns that mean something are written."""
+    return name.casefold().replace(" ", "_").replace("-", "_")
 
 
 class _Finder:
