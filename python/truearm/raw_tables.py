@@ -37,6 +37,7 @@ BLANKS: Final = re.compile(r"[ \t]+")
 NUMBER: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?")
 WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
+BYTE_ORDER_MARK: Final = "\ufeff"
 NAMED: Final = 5
 SHOWN: Final = 60
 """Characters of a line that are shown in a message."""
@@ -436,7 +437,7 @@ def _decoded(content: bytes, marks: Marks, where: str) -> str:
             f"its first bytes say that it is UTF-8, not {encoding}", where=where, way_out="State that: utf-8"
         )
     try:
-        return content.decode(encoding)
+        return content.decode(encoding).removeprefix(BYTE_ORDER_MARK)
     except LookupError:
         raise UsageError(f'"{encoding}" is no known encoding', where=f"{marks.options}encoding") from None
     except UnicodeDecodeError as error:
