@@ -31,6 +31,11 @@ TABLES = {
     "one meaning twice": ("q1,x,x_mm,y,z", ["0,1,1,2,3"], 'columns "x" and "x_mm" mean the same'),
     "column without name behind an empty one": ("q1,,x,,y", ["0,,1,2,3"], "column 4 has no name"),
     "no header, delimiters behind": ("0,0,1,2,3,", ["0,0,1,2,3,"], "first line holds numbers only"),
+    "an index with gaps": (
+        ",q1,x,y,z",
+        ["0,0,1,2,3", "2,1,1,2,3"],
+        'column 1 has no name.*truearm import FILE --skip-lines 1 --columns "-,q1,x,y,...',
+    ),
     "delimiters alone": (",,", [",,"], "no column has a name"),
     "column without name": ("q1,x,,y,z", ["0,1,1,2,3"], "column 3 has no name"),
     "columns without names": (

@@ -75,7 +75,7 @@ class Imported(NamedTuple):
             measured. The column of a joint that is given as a length says so: q3_m.
         unused: Their columns that nothing was taken from.
         left_out: In words, rows that nothing was taken from.
-        remarks: In words, lines that are remarks.
+        remarks: In words, lines that are remarks, and columns that count the rows.
     """
 
     frame: pd.DataFrame
@@ -118,8 +118,7 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
     without = ", rows without a measurement left out" if empty else ""
     Measurements.from_dataframe(frame, name=f"{table.where}{without}")
     alone = [f"{rows}, as they are not in the other table" for rows in table.alone]
-    remarks = [f"{lines}, as remarks" for lines in table.remarks]
-    return Imported(frame, _unused(table, named, plan), [*alone, *empty], remarks)
+    return Imported(frame, _unused(table, named, plan), [*alone, *empty], table.remarks)
 
 
 def _by_target(

@@ -64,9 +64,13 @@ def read_fields(
         "distance_m": distance,
         **ends,
         "purpose": purpose,
-        "notices": (*assumed, *unknown, *notices),
+        "notices": (*_left_out(table), *assumed, *unknown, *notices),
         "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
+
+
+def _left_out(table: Table) -> list[Notice]:
+    return [Notice("row_numbers", f"Left out: {words}.") for words in table.remarks]
 
 
 def read_joint_columns(table: Table, stated: StatedUnits) -> Floats:

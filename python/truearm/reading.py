@@ -24,8 +24,10 @@ DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",":
 NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
 UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
 NAMELESS: Final = (
-    "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ..."
+    "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ...; to "
+    'leave columns out, with: truearm import FILE --skip-lines 1 --columns "{}" ...'
 )
+SHOWN_NAMES: Final = 4
 LOOKED_AT: Final = 4096
 """Bytes of a file in another encoding, an even number, from which its marks are told."""
 UNIT_WORDS: Final = frozenset(
@@ -48,11 +50,13 @@ class Table:
         where: File or other place it came from, for messages.
         columns: Text as in the file, or numbers as in a DataFrame, by column name.
         row_count: Number of data rows.
+        remarks: In words, columns of the file that are not among them.
     """
 
     where: str
     columns: dict[str, Texts | Floats]
     row_count: int
+    remarks: tuple[str, ...] = ()
     _numbers: dict[str, Floats] = field(default_factory=dict, repr=False)
 
     @property
@@ -247,8 +251,10 @@ def split_table(
 ) -> Table:
     """The fields of a text with a header line; every line must have as many as the header.
 
-    `uneven` is the way out where a line has another number, `nameless` where a column has no name. One with
-    neither name nor content is left out: some programs end lines with a delimiter.
+    `uneven` is the way out where a line has another number, `nameless` where a column has no name; its {}
+    becomes the names of all columns, "-" for none. One with neither name nor content is left out: some
+    programs end lines with a delimiter. So is a first one without a name that counts the rows, as pandas
+    writes it.
 
     Raises:
         InputError: If a name is missing or repeated, a line has another number of fields, or there
@@ -273,11 +279,19 @@ def split_table(
     if not rows:
         raise InputError("there are no data rows below the header", where=where)
     named = [k for k, name in enumerate(header) if name or any(row[k].strip() for row in rows)]
+    counts = named[:1] == [0] and not header[0] and _counts([row[0].strip() for row in rows])
+    remarks = (f"the first column of {where}, which has no name and counts the rows",) if counts else ()
+    named = named[counts:]
     if not named:
-        raise InputError("no column has a name", where=where, way_out=nameless)
+        raise InputError("no column has a name", where=where, way_out="Name the columns in the first line")
     _check_names({k + 1: header[k] for k in named}, where, nameless)
     cells = np.array(rows, dtype=np.str_)
-    return Table(where, {header[k]: cells[:, k] for k in named}, len(rows))
+    return Table(where, {header[k]: cells[:, k] for k in named}, len(rows), remarks)
+
+
+def _counts(cells: Sequence[str]) -> bool:
+    """Whether cells count themselves, from 0 or from 1."""
+    return list(cells) in [[str(first + k) for k in range(len(cells))] for first in (0, 1)]
 
 
 def quoted_delimiter(mark: str) -> str:
@@ -311,7 +325,7 @@ def _check_names(names: Mapping[int, str], where: str, nameless: str) -> None:
         raise InputError(
             f"{list_rows(empty, 'column')} {'has' if len(empty) == 1 else 'have'} no name",
             where=where,
-            way_out=nameless,
+            way_out=nameless.format(_all_names(names)),
         )
     header = list(names.values())
     repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
@@ -322,6 +336,12 @@ def _check_names(names: Mapping[int, str], where: str, nameless: str) -> None:
             rule="Columns are told apart by their names",
             way_out="Give each a name of its own in the first line",
         )
+
+
+def _all_names(names: Mapping[int, str]) -> str:
+    """Names by their position as truearm import takes them, the first few; "-" leaves a column out."""
+    each = [names.get(position) or "-" for position in range(1, max(names) + 1)]
+    return ",".join([*each[:SHOWN_NAMES], *["..."][: len(each) - SHOWN_NAMES]])
 
 
 def _in_words(number: float) -> str:
