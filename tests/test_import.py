@@ -183,6 +183,9 @@ def test_missing_orientations_stay_missing(tmp_path: Path) -> None:
     ).frame
     assert table["qw"].isna().tolist() == [False, True]
     assert len(Measurements.from_dataframe(table)) == 2
+    incomplete = write(tmp_path, text.replace("1,1,2,3,,,", "1,1,2,3,10,,30"))
+    with pytest.raises(InputError, match='only some of "rx", "ry" and "rz" are given in row 2'):
+        import_table(incomplete, ImportPlan(rotation=rotation, joint_unit="rad", length_unit="m"))
 
 
 def test_what_is_left_out_is_told(tmp_path: Path) -> None:
