@@ -67,6 +67,8 @@ def test_every_order_of_a_quaternion_is_recognised():
         with pytest.raises(ta.InputError, match=told) as caught:
             check_turns(wrong, robot)
         assert ("turn the other way" in str(caught.value)) == (sense < 0.0)
+        assert ("the other sign of qx, qy and qz turns them" in str(caught.value)) == (sense < 0.0)
+        assert ("truearm import --rotation" in str(caught.value)) == (order != (0, 1, 2, 3))
 
 
 @pytest.mark.parametrize(
