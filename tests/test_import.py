@@ -375,7 +375,21 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         {"columns": {}},
         "none of its columns has a name of ours. They are J1, J2, PX, PY, PZ. .*--map q1=COLUMN:deg",
     ),
-    "no position": (PLAIN, {"columns": {"q1": "J1"}}, "No position x, y, z"),
+    "no position": (
+        PLAIN,
+        {"columns": {"q1": "J1"}},
+        "No position x, y, z.*Its columns are J1, J2, px, py, pz. Say which is which: --map q1=COLUMN",
+    ),
+    "an incomplete point behind rows of none": (
+        PLAIN + "1,2,,,\n3,4,,,\n5,6,7,,8\n",
+        {},
+        'only some of "x", "y" and "z" are given in row 5',
+    ),
+    "no joint behind a row of no point": (
+        PLAIN + "1,2,,,\n3,,6,7,8\n",
+        {},
+        'column "q2" is empty in row 4',
+    ),
 }
 
 

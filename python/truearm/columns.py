@@ -120,6 +120,10 @@ def canonical(name: str) -> str:
     return name.casefold().replace(" ", "_").replace("-", "_")
 
 
+class MissingColumnError(InputError):
+    """A column that is needed is not there."""
+
+
 class _Finder:
     def __init__(self, names: Sequence[str], stated: StatedUnits, where: str) -> None:
         self.names, self.stated, self.where = names, stated, where
@@ -177,9 +181,9 @@ class _Finder:
                 self._claim(found, pattern.pattern, Column(name, match[1] or ""))
         return self._length(next(iter(found.values()))) if found else None
 
-    def missing(self, name: str, what: str) -> InputError:
+    def missing(self, name: str, what: str) -> MissingColumnError:
         others = [other for other in self.names if other not in self.used]
-        return InputError(
+        return MissingColumnError(
             what,
             where=self.where,
             rule=did_you_mean(name, others),

@@ -59,7 +59,7 @@ def read_fields(
         "group": _group(table, layout, default_group),
         "features": features,
         "sources": np.full(table.row_count, table.where),
-        "rows": np.arange(1, table.row_count + 1),
+        "rows": table.row_numbers,
         "joint_units": tuple(column.unit for column in layout.joints),
         "distance_m": distance,
         **ends,
@@ -286,5 +286,5 @@ def _refuse(
     table: Table, bad: Mask, what: str, rule: str, way_out: str = "Correct or remove the rows"
 ) -> None:
     if bad.any():
-        rows = list_rows((np.flatnonzero(bad) + 1).tolist())
+        rows = list_rows(table.row_numbers[bad].tolist())
         raise InputError(f"{what} {rows}", where=table.where, rule=rule, way_out=way_out)

@@ -18,6 +18,7 @@ from truearm.errors import InputError, list_rows, typed
 from truearm.files import UTF_16, ZIP, decode_text, name_in_text, read_bytes
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Texts = NDArray[np.str_]
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
@@ -51,18 +52,26 @@ class Table:
         columns: Text as in the file, or numbers as in a DataFrame, by column name.
         row_count: Number of data rows.
         remarks: In words, columns of the file that are not among them.
+        numbers_of_rows: What the rows are called in messages (n,), where they are not counted from 1: those
+            of a file of which some were left out.
     """
 
     where: str
     columns: dict[str, Texts | Floats]
     row_count: int
     remarks: tuple[str, ...] = ()
+    numbers_of_rows: Integers | None = None
     _numbers: dict[str, Floats] = field(default_factory=dict, repr=False)
 
     @property
     def names(self) -> list[str]:
         """Names of the columns in their order."""
         return list(self.columns)
+
+    @property
+    def row_numbers(self) -> Integers:
+        """What the rows are called in messages (n,)."""
+        return np.arange(1, self.row_count + 1) if self.numbers_of_rows is None else self.numbers_of_rows
 
     def texts(self, name: str) -> Texts:
         """A column as text, without blanks around it."""
@@ -106,7 +115,7 @@ class Table:
 
     def _checked(self, name: str, values: Floats, bad: NDArray[np.bool_]) -> Floats:
         if bad.any():
-            rows = list_rows((np.flatnonzero(bad) + 1).tolist())
+            rows = list_rows(self.row_numbers[bad].tolist())
             raise InputError(
                 f'column "{name}" holds NaN or infinite values in {rows}',
                 where=self.where,
@@ -124,7 +133,7 @@ class Table:
         if not row_out and "," in cell and "." not in cell:
             way_out = 'If this is a decimal comma, bring it in by truearm import with --decimal ","'
         return InputError(
-            f'column "{name}" holds "{cell}" in row {row + 1}',
+            f'column "{name}" holds "{cell}" in row {self.row_numbers[row]}',
             where=self.where,
             rule="It must hold numbers",
             way_out=way_out,
@@ -142,8 +151,8 @@ class Table:
         return ""
 
 
-def table_from_frame(frame: pd.DataFrame, *, where: str) -> Table:
-    """The columns of a DataFrame: numbers where pandas has numbers, else text."""
+def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers | None = None) -> Table:
+    """The columns of a DataFrame: numbers where pandas has numbers, else text; `row_numbers` as in Table."""
     columns: dict[str, Texts | Floats] = {}
     for name in frame.columns:
         column = frame[name]
@@ -153,7 +162,7 @@ def table_from_frame(frame: pd.DataFrame, *, where: str) -> Table:
             columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.str_)
     if len(columns) != len(frame.columns):
         raise InputError("two columns have the same name", where=where)
-    return Table(where, columns, len(frame))
+    return Table(where, columns, len(frame), numbers_of_rows=row_numbers)
 
 
 def read_csv_table(path: Path) -> Table:
