@@ -125,6 +125,28 @@ def test_what_the_file_held_becomes_what_the_controller_has(capsys):
     assert np.allclose(again.controller[:3, 3], [0.02, -0.05, 0.179]), "the controller still has the first"
 
 
+def test_what_was_found_before_is_not_taken_for_what_the_controller_has(capsys):
+    words = ["frame", "arm.calib", "touches.csv", "--tool", "tGripper", "-o", "cell.toml"]
+    assert main([*words, "--orientation", "0,0,0"]) == 0
+    first = Frames.load(Path("cell.toml")).tool("tGripper").true
+    capsys.readouterr()
+    assert main([*words, "--orientation", "10,0,0"]) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert 'held tool "tGripper" as it was found before, xyz = [' in told
+    assert "the new numbers replace that" in told
+    assert "stands under" not in told
+    entry = tomllib.loads(Path("cell.toml").read_text())["tool"]["tGripper"]
+    assert "controller" not in entry
+    tool = Frames.load(Path("cell.toml")).tool("tGripper")
+    assert np.array_equal(tool.controller, tool.true)
+    assert not np.allclose(tool.true, first)
+    held = "[tool.tGripper]\nxyz = [20, -50, 179]\n[tool.tGripper.controller]\nxyz = [20, -50, 178]\n"
+    Path("cell.toml").write_text(held)
+    assert main([*words, "--orientation", "0,0,0"]) == 0
+    assert "stands under" not in capsys.readouterr().err
+    assert Frames.load(Path("cell.toml")).tool("tGripper").controller[2, 3] == pytest.approx(0.178)
+
+
 def test_the_proposed_command_declares_a_controller_where_one_is_needed(capsys):
     words = ["--tool", "tGripper", "--orientation", "0,0,0", "-o", "my cell.toml"]
     assert main(["frame", "arm.calib", "touches.csv", *words]) == 0

@@ -98,6 +98,12 @@ def test_a_robot_as_json_is_the_robot(capsys):
     assert Robot.from_dict(content) == Robot.load("fanuc-lr-mate-200id")
 
 
+def test_no_zero_of_a_coupling_has_a_sign(capsys):
+    assert main(["robots", "kuka-kr-6-r900"]) == 0
+    rows = capsys.readouterr().out.partition("coupling: ")[2].splitlines()[1:7]
+    assert [row.split()[0] for row in rows] == ["-1", "0", "0", "0", "0", "0"]
+
+
 def test_what_is_fixed_coupled_and_carried_is_shown(tmp_path, capsys):
     path = tmp_path / "arm.toml"
     text = Robot.load("fanuc-lr-mate-200id").to_toml()

@@ -381,11 +381,15 @@ def test_nothing_to_gain_is_said_of_small_errors_and_of_noise_alone(before, afte
     assert no_help(after, before, "mean error", floor) == []
 
 
-@pytest.mark.parametrize("alone", [True, False])
-def test_what_constants_leave_is_not_called_noise(alone):
-    said = str(no_help(1.69, 1.7, "mean error", 1.6, constants_alone=alone)[0])
-    assert ("calibrate with --model variable" in said) == alone
-    assert ("Noise alone would leave 1.6 mm" in said) != alone
+@pytest.mark.parametrize(
+    ("model", "who"),
+    [("constant", "Constants gain nothing"), ("fcmac", "The model fcmac gains nothing"), ("variable", "")],
+)
+def test_what_models_leave_that_do_not_follow_what_varies_is_not_called_noise(model, who):
+    said = str(no_help(1.69, 1.7, "mean error", 1.6, best=model)[0])
+    assert said.startswith(who or "There is nothing to gain")
+    assert ("calibrate with --model variable" in said) == bool(who)
+    assert ("Noise alone would leave 1.6 mm" in said) != bool(who)
 
 
 def test_poses_that_others_stood_for_are_told():

@@ -15,6 +15,7 @@ from truearm.cli import main
 from truearm.errors import InputError, UsageError
 from truearm.importing import ImportPlan, import_table
 from truearm.measurements import Measurements
+from truearm.raw_tables import Marks, read_raw
 from truearm.rotation_columns import RotationColumns
 from truearm.units import unit_in_header
 
@@ -72,6 +73,7 @@ def test_columns_with_our_names_need_no_mapping(tmp_path: Path) -> None:
         ("Station 1\nsome words, and more\n" + PLAIN, {"skip_lines": 2}),
         (PLAIN.replace("\n", "\r\n"), {}),
         ("\ufeff" + PLAIN, {}),
+        (PLAIN.replace("1000", '"1000,0"').replace("2500", '"2500,5"'), {"decimal": ","}),
         ("// AT960; mm; deg\n" + PLAIN, {"comments": ("//",)}),
         (PLAIN.replace("\n", "\n# a remark, of two fields\n"), {"comments": ("#", "//")}),
         (PLAIN.replace(",", "   ").replace("\n", " \n  "), {"delimiter": " "}),
@@ -94,6 +96,32 @@ def test_other_encodings(tmp_path: Path) -> None:
         import_table(path, plan(columns=columns))
     with pytest.raises(UsageError, match='"klingon" is no known encoding'):
         import_table(path, plan(columns=columns, encoding="klingon"))
+
+
+def test_a_byte_order_mark_is_no_part_of_a_name(tmp_path: Path) -> None:
+    path = write(tmp_path, "\ufeff" + PLAIN, "utf-16-le")
+    assert read_raw(path, Marks(encoding="utf-16-le")).names == ["J1", "J2", "px", "py", "pz"]
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_column_without_a_name_that_counts_the_rows_is_left_out(first: int, tmp_path: Path) -> None:
+    header, *rows = PLAIN.split()
+    text = "\n".join([f",{header}", *(f"{first + k},{row}" for k, row in enumerate(rows))])
+    path = write(tmp_path, text)
+    imported = import_table(path, plan())
+    assert imported.frame.equals(import_table(write(tmp_path, PLAIN), plan()).frame)
+    assert imported.unused == []
+    assert imported.remarks == [f"the first column of {path}, which has no name and counts the rows"]
+
+
+def test_the_option_that_leaves_a_column_without_a_name_out_is_named_and_does(tmp_path: Path) -> None:
+    header, *rows = PLAIN.split()
+    path = write(tmp_path, "\n".join([f",{header}", *(f"{7 + k},{row}" for k, row in enumerate(rows))]))
+    with pytest.raises(
+        InputError, match='column 1 has no name.*--skip-lines 1 --columns "-,J1,J2,px,...[.]?"'
+    ):
+        import_table(path, plan())
+    assert len(import_table(path, plan(skip_lines=1, names=("-", *header.split(",")))).frame) == 2
 
 
 angles = st.floats(-3.0, 3.0)
@@ -155,6 +183,9 @@ def test_missing_orientations_stay_missing(tmp_path: Path) -> None:
     ).frame
     assert table["qw"].isna().tolist() == [False, True]
     assert len(Measurements.from_dataframe(table)) == 2
+    incomplete = write(tmp_path, text.replace("1,1,2,3,,,", "1,1,2,3,10,,30"))
+    with pytest.raises(InputError, match='only some of "rx", "ry" and "rz" are given in row 2'):
+        import_table(incomplete, ImportPlan(rotation=rotation, joint_unit="rad", length_unit="m"))
 
 
 def test_what_is_left_out_is_told(tmp_path: Path) -> None:
@@ -206,6 +237,11 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         PLAIN.replace(",", ";").replace("90;", "90,5;"),
         {"delimiter": ";"},
         '"90,5".*give --decimal ","',
+    ),
+    "both marks, uneven": (
+        PLAIN.replace("1000", "1000,5"),
+        {"decimal": ","},
+        'row 1 has another number of fields.*Numbers that hold "," need quotes',
     ),
     "both marks": (PLAIN, {"delimiter": ",", "decimal": ","}, '"," is both delimiter and decimal mark'),
     "thousands": (
@@ -339,7 +375,21 @@ BAD: dict[str, tuple[str, dict[str, Any], str]] = {
         {"columns": {}},
         "none of its columns has a name of ours. They are J1, J2, PX, PY, PZ. .*--map q1=COLUMN:deg",
     ),
-    "no position": (PLAIN, {"columns": {"q1": "J1"}}, "No position x, y, z"),
+    "no position": (
+        PLAIN,
+        {"columns": {"q1": "J1"}},
+        "No position x, y, z.*Its columns are J1, J2, px, py, pz. Say which is which: --map q1=COLUMN",
+    ),
+    "an incomplete point behind rows of none": (
+        PLAIN + "1,2,,,\n3,4,,,\n5,6,7,,8\n",
+        {},
+        'only some of "x", "y" and "z" are given in row 5',
+    ),
+    "no joint behind a row of no point": (
+        PLAIN + "1,2,,,\n3,,6,7,8\n",
+        {},
+        'column "q2" is empty in row 4',
+    ),
 }
 
 

@@ -85,7 +85,7 @@ def test_lines_above_the_header_and_remarks_are_rows(tmp_path: Path) -> None:
     table = read_raw(workbook(tmp_path, day=rows), Marks(skip_lines=2, comments=("#",)))
     assert table.names == ["J1", "J2", "px", "py", "pz"]
     np.testing.assert_array_equal(table.numbers("J1"), [90.0, -90.0])
-    assert table.remarks == [f"1 line of {tmp_path / 'book.xlsx'}"]
+    assert table.remarks == [f"1 line of {tmp_path / 'book.xlsx'}, as remarks"]
 
 
 def test_cells_say_what_they_show(tmp_path: Path) -> None:

@@ -128,6 +128,21 @@ def test_names_in_other_letters_are_noticed(tmp_path: Path) -> None:
     assert '"Sigma mm" and "QW"' in data.notices[0].message
 
 
+def test_a_first_column_that_counts_the_rows_is_left_out_and_named(tmp_path: Path) -> None:
+    data = read(tmp_path, ",q1,x,y,z", ["0,0,1,2,3", "1,1,1,2,3"])
+    assert list(data.features.columns) == []
+    assert [notice.kind for notice in data.notices] == ["row_numbers"]
+    assert "which has no name and counts the rows" in data.notices[0].message
+
+
+def test_text_in_other_letters_is_not_said_to_be_kept(tmp_path: Path) -> None:
+    data = read(tmp_path, "q1,x,y,z,Group,operator", ["0,1,2,3,A,Ann", "1,1,2,3,B,Bo"])
+    (notice,) = data.notices
+    assert notice.message.endswith(
+        'as not numeric: "Group" and "operator"; what means something is written in small letters: "group".'
+    )
+
+
 def test_distances_to_anchors_and_within_pairs(tmp_path: Path) -> None:
     header = "q1,distance_mm,anchor,pair"
     data = read(tmp_path, header, ["0,500,bar,", "1,300,,p", "2,300,,p"])

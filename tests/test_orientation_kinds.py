@@ -1,5 +1,6 @@
 """Orientations that are noted in another way than stated: order and sense of quaternions, kinds of angles."""
 
+from dataclasses import replace
 from itertools import permutations, product
 from pathlib import Path
 
@@ -9,8 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import truearm as ta
-from truearm.cli.calibrate import suggest_next
+from truearm.cli.calibrate import print_determined, suggest_next
 from truearm.euler_orders import VECTOR, otherwise_read, twin
+from truearm.reporting.advice import advise
+from truearm.reporting.facts import Facts
 from truearm.rotations import quaternion_from_euler
 from truearm.simulation import VirtualArm
 from truearm.turning_sense import check_turns
@@ -64,6 +67,8 @@ def test_every_order_of_a_quaternion_is_recognised():
         with pytest.raises(ta.InputError, match=told) as caught:
             check_turns(wrong, robot)
         assert ("turn the other way" in str(caught.value)) == (sense < 0.0)
+        assert ("the other sign of qx, qy and qz turns them" in str(caught.value)) == (sense < 0.0)
+        assert ("truearm import --rotation" in str(caught.value)) == (order != (0, 1, 2, 3))
 
 
 @pytest.mark.parametrize(
@@ -178,3 +183,16 @@ def test_orientations_beside_several_targets_are_told_to_be_left_out():
     (message,) = told()
     assert message.startswith("Orientations of 40 rows are left out")
     assert told(use="targets") == told(use="pose") == []
+
+
+def test_orientations_that_are_not_used_are_not_said_to_be_unmeasured(tmp_path, capsys):
+    robot, table = posed()
+    data = ta.Measurements.from_dataframe(table)
+    found = ta.calibrate(robot, data, model="constant", use="position")
+    found.save(tmp_path / "arm.calib")
+    for calibration in (found, ta.Calibration.load(tmp_path / "arm.calib")):
+        print_determined(calibration)
+        assert "Orientation was not used (--use pose uses it): the tool's" in capsys.readouterr().out
+        assert "orientation_not_used" in [advice.kind for advice in advise(Facts(calibration), None)]
+    print_determined(ta.calibrate(robot, replace(data, orientations=None), model="constant"))
+    assert "Orientation was not measured: " in capsys.readouterr().out

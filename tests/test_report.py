@@ -279,6 +279,11 @@ def test_a_variable_model_that_does_worse_is_not_said_to_gain(calibrations):
     assert "constant_suffices" not in surely
 
 
+def test_compensation_uses_what_varies_where_it_takes_the_model(reports):
+    for model in ("variable", "regions", "fcmac"):
+        assert ("Compensation uses the latter" in words_of(reports[model].html)) == (model == "variable")
+
+
 @pytest.mark.parametrize(("step_deg", "wanted"), [(10.0, "between_the_grid"), (0.01, "noise_floor")])
 def test_on_a_grid_the_noise_floor_is_not_said_to_be_reached(step_deg, wanted):
     arm = VirtualArm(ta.Robot.load("ur10"), seed=1, imperfections=Imperfections(share=0.0, noise_mm=0.05))

@@ -7,6 +7,7 @@ import pytest
 
 import truearm as ta
 from tests.report_support import figures_of, repeated_measurements, small_calibration, words_of
+from tests.test_distance_zero import wire
 from truearm.cli import main
 from truearm.reporting.advice import advise
 from truearm.reporting.curves import in_words
@@ -86,6 +87,25 @@ def test_every_cell_with_measured_poses_is_filled_and_good_ones_are_dark(drawn, 
             column = np.argmin(np.abs(np.array(cells["x"]) - x))
             row = np.argmin(np.abs(np.array(cells["y"]) - y))
             assert np.isfinite(z[row, column])
+
+
+@pytest.mark.parametrize(("use", "compared"), [("variable", True), ("constant", False), ("bounds", False)])
+def test_standard_deviations_are_compared_with_errors_where_both_are_of_one_kind(variable, use, compared):
+    found = small_calibration("constant") if use == "constant" else variable
+    text = words_of(report(found.without_rows() if use == "bounds" else found).html)
+    assert ("in brighter cells they are known worse" in text) == compared
+    assert ("with what the constants leave (root" in text) == (use == "constant")
+    assert ("without noise of the measurement (root" in text) == (use != "constant")
+
+
+def test_a_report_on_distances_names_one_point_and_compares_no_error_with_it():
+    made = report(ta.calibrate(ta.Robot.load("ur5e"), wire(0.0), model="constant", refit=False))
+    text = words_of(made.html)
+    assert "moves the flange by" in text
+    assert "Standard deviation of the flange as" in text
+    assert "of the flange, as the robot file names no tool)" in text
+    assert "robot file's tool" not in text
+    assert "known worse" not in text
 
 
 def test_arrows_and_arm_lie_within_the_axes_that_the_page_fits_into_view(drawn):
@@ -178,4 +198,14 @@ def test_a_scara_is_not_told_to_determine_what_no_target_could():
     arm = VirtualArm(ta.Robot.load("adept-cobra-600"), seed=2)
     found = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
     assert "alpha4" in found.identifiability.undetermined
+    assert "unseen_parameters" not in [advice.kind for advice in advise(Facts(found), None)]
+
+
+def test_a_gantry_is_not_told_to_turn_what_no_motion_turns():
+    link = '[[link]]\njoint = "prismatic"\ntheta = {t}\nd = 0\na = 0\nalpha = {t}\nlimits = [0, 1000]\n'
+    head = 'name = "gantry"\nconvention = "standard"\nlength_unit = "mm"\nangle_unit = "deg"\n'
+    gantry = ta.Robot.from_toml(head + "".join(link.format(t=angle) for angle in (-90, -90, 0)))
+    arm = VirtualArm(gantry, seed=2)
+    found = ta.calibrate(gantry, arm.measure(arm.poses(60)), model="constant")
+    assert "alpha3" in found.identifiability.undetermined
     assert "unseen_parameters" not in [advice.kind for advice in advise(Facts(found), None)]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.report_support import words_of
 from truearm import Calibration, Options, Robot, UsageError, WorkError, calibrate, evaluate
 from truearm.cli import main
 from truearm.compensation import Compensator
@@ -162,6 +163,9 @@ def test_from_the_command_line(arm, tmp_path, capsys):
     assert "truearm evaluate" in printed
     assert "truearm compensate" not in printed
     assert "repeatability" in printed
+    assert "noise and, with the model regions, what varies with the joints." in " ".join(printed.split())
+    for told in (printed, words_of((out / "report.html").read_text())):
+        assert "noise alone" not in told
     summary = json.loads((out / "summary.json").read_text())
     ratio = summary["error_to_repeatability"]["regions"]
     assert ratio == pytest.approx(summary["holdout"]["regions"]["mean_mm"] / 0.1)

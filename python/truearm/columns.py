@@ -112,7 +112,16 @@ def read_joint_layout(names: Sequence[str], stated: StatedUnits, *, where: str) 
 
 def lookalikes(names: Sequence[str]) -> list[str]:
     """Names that would mean something if case and blanks were written otherwise, such as "Sigma mm"."""
-    return [name for name in names if means_something(name.casefold().replace(" ", "_").replace("-", "_"))]
+    return [name for name in names if means_something(canonical(name))]
+
+
+def canonical(name: str) -> str:
+    """A name as columns that mean something are written."""
+    return name.casefold().replace(" ", "_").replace("-", "_")
+
+
+class MissingColumnError(InputError):
+    """A column that is needed is not there."""
 
 
 class _Finder:
@@ -172,9 +181,9 @@ class _Finder:
                 self._claim(found, pattern.pattern, Column(name, match[1] or ""))
         return self._length(next(iter(found.values()))) if found else None
 
-    def missing(self, name: str, what: str) -> InputError:
+    def missing(self, name: str, what: str) -> MissingColumnError:
         others = [other for other in self.names if other not in self.used]
-        return InputError(
+        return MissingColumnError(
             what,
             where=self.where,
             rule=did_you_mean(name, others),

@@ -17,7 +17,7 @@ from truearm.held_tool import TURN_MORE, held_tool, held_words
 from truearm.identified import IdentifiedArm
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
+from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel, leaves_noise
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
 from truearm.stillness import still_warning
@@ -46,10 +46,6 @@ NOISY_MM: Final = 5.0
 AS_THE_TABLE: Final = (
     "As far as these poses tell the arm is where its table has it: use the arm without a calibration, or "
     "measure more poses."
-)
-MAY_VARY: Final = (
-    "What they leave may be noise, or vary with the joints, which constants cannot tell apart: calibrate "
-    "with --model variable."
 )
 LIKE_NOISE: Final = 0.2
 """Part of what noise leaves by which a mean error may differ from it: that of some twenty rows does."""
@@ -125,7 +121,7 @@ def doubts(
     floor_mm: float,
     outliers: Outliers | None = None,
 ) -> list[Notice]:
-    """What speaks against a calibration whose model `best` is used; noise alone leaves `floor_mm`."""
+    """What speaks against a calibration whose model `best` is used; noise would leave `floor_mm`."""
     before, after = (validation.holdout[name].position.mean for name in (NOMINAL, best))
     if before < COMPUTED_MM:
         return [_computed()]
@@ -133,7 +129,7 @@ def doubts(
     return [
         *(
             _single_rows(before, after, best, what, outliers)
-            or no_help(before, after, what, floor_mm, outliers, constants_alone=best == CONSTANT)
+            or no_help(before, after, what, floor_mm, outliers, best=best)
         ),
         *_turns_otherwise(validation, best),
         *_far_from_nominal(arm, [models[CONSTANT], models[best]]),
@@ -290,7 +286,7 @@ def no_help(
     floor_mm: float,
     outliers: Outliers | None = None,
     *,
-    constants_alone: bool = False,
+    best: str = VARIABLE,
 ) -> list[Notice]:
     """A warning where a calibration is of no use.
 
@@ -300,14 +296,14 @@ def no_help(
         what: What these are.
         floor_mm: What noise alone would leave on average.
         outliers: Rows that are far off, if any are known.
-        constants_alone: Whether its own has constants alone, which take what varies for noise.
+        best: Name of its own model.
     """
     if helps(before_mm, after_mm):
         return []
     if nothing_to_gain(before_mm, after_mm, floor_mm):
         start, why = "There is nothing to gain", AS_THE_TABLE
-        if before_mm >= NEAR_MM and constants_alone:
-            start, why = "Constants gain nothing", MAY_VARY
+        if before_mm >= NEAR_MM and not leaves_noise(best):
+            start, why = gains_nothing(best)
         elif before_mm >= NEAR_MM:
             why = (
                 f"Noise alone would leave {length_mm(floor_mm, 4)}: what the arm errs by is hidden in it. "
@@ -323,6 +319,16 @@ def no_help(
         f"{length_mm(before_mm, 4)}. Do not use it until the reason is found. {to_check(outliers)}"
     )
     return [Notice(NO_HELP, text)]
+
+
+def gains_nothing(best: str) -> tuple[str, str]:
+    """That a model gains nothing which takes what varies for noise, and what that may mean."""
+    constants = best == CONSTANT
+    return (
+        "Constants gain nothing" if constants else f"The model {best} gains nothing",
+        "What is left may be noise, or vary with the joints, which "
+        f"{'constants cannot' if constants else 'it does not'} tell apart: calibrate with --model variable.",
+    )
 
 
 def to_check(outliers: Outliers | None) -> str:

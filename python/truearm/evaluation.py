@@ -22,7 +22,7 @@ from truearm.held_rows import HeldRows
 from truearm.judging import check_judged, judge, model_inputs, where_found
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT, NOMINAL, ArmModel
+from truearm.models import NOMINAL, ArmModel
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
 from truearm.registration import register
@@ -217,7 +217,7 @@ def _of_no_use(errors: Mapping[str, RowErrors], best: str, floor_mm: float) -> l
     """A warning where the calibration does not help; medians, since single rows may be wrong."""
     before, after = (MM_PER_METRE * float(np.nanmedian(errors[name].distance_m)) for name in (NOMINAL, best))
     what = "median error on the rows that were judged"
-    return no_help(before, after, what, floor_mm, constants_alone=best == CONSTANT)
+    return no_help(before, after, what, floor_mm, best=best)
 
 
 def _moved(

@@ -9,10 +9,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from truearm.columns import DISTANCE, JOINT, QUATERNION, SIGMA, TARGET, WORDS
+from truearm.columns import (
+    DISTANCE,
+    JOINT,
+    QUATERNION,
+    SIGMA,
+    TARGET,
+    WORDS,
+    MissingColumnError,
+    StatedUnits,
+)
 from truearm.errors import InputError, UsageError, did_you_mean, list_names, list_rows, typed
+from truearm.measured_fields import read_fields
 from truearm.measurements import Measurements
 from truearm.raw_tables import Marks, RawTable, join_tables, read_raw
+from truearm.reading import table_from_frame
 from truearm.rotation_columns import RotationColumns
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si, unit_in_header
 
@@ -23,6 +34,7 @@ WHICH: Final = "target"
 """Which of several points on the tool was measured in a row, from 1, where x, y, z are of one each."""
 POINT: Final = ("x", "y", "z")
 MOST_TARGETS: Final = 100
+WHICH_IS_WHICH: Final = "Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on"
 
 
 @dataclass(frozen=True)
@@ -75,7 +87,7 @@ class Imported(NamedTuple):
             measured. The column of a joint that is given as a length says so: q3_m.
         unused: Their columns that nothing was taken from.
         left_out: In words, rows that nothing was taken from.
-        remarks: In words, lines that are remarks.
+        remarks: In words, lines that are remarks, and columns that count the rows.
     """
 
     frame: pd.DataFrame
@@ -110,16 +122,29 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
             "none of its columns has a name of ours",
             where=table.where,
             rule=f"They are {', '.join(table.names)}",
-            way_out="Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on",
+            way_out=WHICH_IS_WHICH,
         )
     if WHICH in plan.columns:
         columns = _by_target(columns, table)
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
-    without = ", rows without a measurement left out" if empty else ""
-    Measurements.from_dataframe(frame, name=f"{table.where}{without}")
+    _check(frame, table)
     alone = [f"{rows}, as they are not in the other table" for rows in table.alone]
-    remarks = [f"{lines}, as remarks" for lines in table.remarks]
-    return Imported(frame, _unused(table, named, plan), [*alone, *empty], remarks)
+    return Imported(
+        frame.reset_index(drop=True), _unused(table, named, plan), [*alone, *empty], table.remarks
+    )
+
+
+def _check(frame: pd.DataFrame, table: RawTable) -> None:
+    """Raise InputError if rows of a table, whose numbers are the index of `frame`, break a rule."""
+    numbers = frame.index.to_numpy(dtype=np.int64) + 1
+    checked = table_from_frame(frame, where=table.where, row_numbers=numbers)
+    try:
+        Measurements(**read_fields(checked, StatedUnits(), default_group=table.where))
+    except MissingColumnError as error:
+        names = ", ".join(table.names)
+        raise InputError(
+            error.what, where=table.where, rule=f"Its columns are {names}", way_out=WHICH_IS_WHICH
+        ) from None
 
 
 def _by_target(
@@ -163,7 +188,7 @@ def _with_measurements(frame: pd.DataFrame, table: RawTable) -> tuple[pd.DataFra
         return frame, []
     rows = list_rows((np.flatnonzero(~measured) + 1).tolist())
     words = f"{rows} of {table.where}, as nothing was measured"
-    return frame[measured].reset_index(drop=True), [words]
+    return frame[measured], [words]
 
 
 def _unused(table: RawTable, named: Mapping[str, str], plan: ImportPlan) -> list[str]:

@@ -13,6 +13,7 @@ from truearm.columns import (
     Column,
     Layout,
     StatedUnits,
+    canonical,
     lookalikes,
     read_joint_layout,
     read_layout,
@@ -27,6 +28,8 @@ Mask = NDArray[np.bool_]
 
 LARGEST_SIGMA_M: Final = 10.0
 """No instrument is less sure of a point that it has seen."""
+SAME_PLACE_M: Final = 1e-9
+"""Coordinates that differ by less are one, in whatever unit they were written."""
 ONE_ANCHOR: Final = "anchor 1"
 """The fixed point of distances that nothing names."""
 
@@ -56,14 +59,18 @@ def read_fields(
         "group": _group(table, layout, default_group),
         "features": features,
         "sources": np.full(table.row_count, table.where),
-        "rows": np.arange(1, table.row_count + 1),
+        "rows": table.row_numbers,
         "joint_units": tuple(column.unit for column in layout.joints),
         "distance_m": distance,
         **ends,
         "purpose": purpose,
-        "notices": (*assumed, *unknown, *notices),
+        "notices": (*_left_out(table), *assumed, *unknown, *notices),
         "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
+
+
+def _left_out(table: Table) -> list[Notice]:
+    return [Notice("row_numbers", f"Left out: {words}.") for words in table.remarks]
 
 
 def read_joint_columns(table: Table, stated: StatedUnits) -> Floats:
@@ -96,7 +103,22 @@ def _targets(table: Table, layout: Layout) -> Floats:
         names = list_names([column.name for column in columns])
         rule = "A point is measured with all three coordinates, or all three cells are empty"
         _refuse(table, _is_partial(empty), f"only some of {names} are given in", rule)
+        _refuse_again(table, targets[:, : number + 1], names)
     return targets
+
+
+def _refuse_again(table: Table, targets: Floats, names: str) -> None:
+    """Raise InputError if the last of targets (n, k, 3), whose columns are `names`, is one before it."""
+    *before, last = targets.swapaxes(0, 1)
+    if np.isfinite(last).any() and any(
+        np.allclose(last, one, rtol=0.0, atol=SAME_PLACE_M, equal_nan=True) for one in before
+    ):
+        raise InputError(
+            f"{names} hold the same as the columns of another target in all rows",
+            where=table.where,
+            rule="Targets are several points on the tool; one that is there twice tells no more than once",
+            way_out="Remove these columns",
+        )
 
 
 def _orientations(table: Table) -> Floats:
@@ -245,10 +267,12 @@ def _features(table: Table, layout: Layout, known: tuple[str, ...]) -> tuple[pd.
     notices = []
     texts = [name for name in layout.others if name not in (*numeric, *known)]
     if texts:
+        small = [canonical(name) for name in lookalikes(texts)]
+        written = f"; what means something is written in small letters: {list_names(small)}" if small else ""
         notices.append(
-            Notice("text_columns", f"{table.where}: left out, as not numeric: {list_names(texts)}.")
+            Notice("text_columns", f"{table.where}: left out, as not numeric: {list_names(texts)}{written}.")
         )
-    alike = lookalikes(layout.others)
+    alike = lookalikes(numeric)
     if alike:
         text = (
             f"{table.where}: {list_names(alike)} kept as plain features; names are written in small letters."
@@ -262,5 +286,5 @@ def _refuse(
     table: Table, bad: Mask, what: str, rule: str, way_out: str = "Correct or remove the rows"
 ) -> None:
     if bad.any():
-        rows = list_rows((np.flatnonzero(bad) + 1).tolist())
+        rows = list_rows(table.row_numbers[bad].tolist())
         raise InputError(f"{what} {rows}", where=table.where, rule=rule, way_out=way_out)

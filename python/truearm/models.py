@@ -16,6 +16,11 @@ CONSTANT: Final = "constant"
 VARIABLE: Final = "variable"
 
 
+def leaves_noise(name: str) -> bool:
+    """Whether what a model leaves is noise: what others leave holds what varies with the joints, too."""
+    return name == VARIABLE
+
+
 @dataclass(frozen=True, eq=False)
 class ArmModel:
     """Parameters of the arm, with the set-ups that were fitted together with them.

@@ -37,6 +37,7 @@ BLANKS: Final = re.compile(r"[ \t]+")
 NUMBER: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?")
 WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
+BYTE_ORDER_MARK: Final = "\ufeff"
 NAMED: Final = 5
 SHOWN: Final = 60
 """Characters of a line that are shown in a message."""
@@ -134,7 +135,7 @@ class RawTable:
         parts: Each column.
         row_count: Number of rows.
         alone: In words, which rows of two files are in one of them only.
-        remarks: In words, how many lines were left out as remarks.
+        remarks: In words, how many lines were left out as remarks, and a column that counts the rows.
     """
 
     where: str
@@ -189,24 +190,39 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
     text = "".join(kept)
     check_is_table(text, where=where)
     delimiter = stated or _plain_delimiter(text, where, marks.options)
-    if delimiter == marks.decimal:
-        raise UsageError(f'"{delimiter}" is both delimiter and decimal mark', where=where)
     if delimiter == BLANK:
         text = "\n".join(map(_with_single_blanks, kept))
     if marks.names:
         text = _header(marks, text, delimiter, where) + text
+    quotes = f'. Numbers that hold "{delimiter}" need quotes' if delimiter == marks.decimal else ""
     uneven = (
         f"Correct or remove them; {marks.options}skip-lines leaves out lines above the header, "
-        "--comment those of remarks"
+        f"--comment those of remarks{quotes}"
     )
-    nameless = f"Name them; {marks.options}skip-lines leaves out lines above the header"
+    nameless = (
+        f"Name them; {marks.options}skip-lines leaves out lines above the header. To leave columns out: "
+        f'{marks.options}skip-lines {marks.skip_lines + 1} {marks.options}columns "{{}}"'
+    )
     whole = split_table(text, delimiter, where=where, uneven=uneven, nameless=nameless)
+    if delimiter == marks.decimal:
+        _check_quoted(whole, delimiter)
     table = _without(whole, marks.missing)
     rows = np.arange(table.row_count)
     parts = {name: Part(table, name, rows, marks) for name in table.names if name not in marks.unnamed}
     left_out = len(below) - len(kept)
-    remarks = [f"{count_of(left_out, 'line')} of {where}"] if left_out else []
+    remarks = [f"{count_of(left_out, 'line')} of {where}, as remarks"] if left_out else []
+    remarks += whole.remarks
     return RawTable(where, parts, table.row_count, remarks=remarks)
+
+
+def _check_quoted(table: Table, mark: str) -> None:
+    """Raise UsageError if no field holds the mark that is between fields, which is the decimal one, too."""
+    if not any(np.char.find(table.texts(name), mark).max() >= 0 for name in table.names):
+        raise UsageError(
+            f'"{mark}" is both delimiter and decimal mark',
+            where=table.where,
+            rule="Numbers that hold what is between fields are written in quotes, here none is",
+        )
 
 
 def join_tables(first: RawTable, second: RawTable, on: str | None) -> RawTable:
@@ -436,7 +452,7 @@ def _decoded(content: bytes, marks: Marks, where: str) -> str:
             f"its first bytes say that it is UTF-8, not {encoding}", where=where, way_out="State that: utf-8"
         )
     try:
-        return content.decode(encoding)
+        return content.decode(encoding).removeprefix(BYTE_ORDER_MARK)
     except LookupError:
         raise UsageError(f'"{encoding}" is no known encoding', where=f"{marks.options}encoding") from None
     except UnicodeDecodeError as error:

@@ -18,14 +18,17 @@ from truearm.errors import InputError, list_rows, typed
 from truearm.files import UTF_16, ZIP, decode_text, name_in_text, read_bytes
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 Texts = NDArray[np.str_]
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
 NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
 UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
 NAMELESS: Final = (
-    "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ..."
+    "Name them; if the header is lower, bring the file in with: truearm import FILE --skip-lines 1 ...; to "
+    'leave columns out, with: truearm import FILE --skip-lines 1 --columns "{}" ...'
 )
+SHOWN_NAMES: Final = 4
 LOOKED_AT: Final = 4096
 """Bytes of a file in another encoding, an even number, from which its marks are told."""
 UNIT_WORDS: Final = frozenset(
@@ -48,17 +51,27 @@ class Table:
         where: File or other place it came from, for messages.
         columns: Text as in the file, or numbers as in a DataFrame, by column name.
         row_count: Number of data rows.
+        remarks: In words, columns of the file that are not among them.
+        numbers_of_rows: What the rows are called in messages (n,), where they are not counted from 1: those
+            of a file of which some were left out.
     """
 
     where: str
     columns: dict[str, Texts | Floats]
     row_count: int
+    remarks: tuple[str, ...] = ()
+    numbers_of_rows: Integers | None = None
     _numbers: dict[str, Floats] = field(default_factory=dict, repr=False)
 
     @property
     def names(self) -> list[str]:
         """Names of the columns in their order."""
         return list(self.columns)
+
+    @property
+    def row_numbers(self) -> Integers:
+        """What the rows are called in messages (n,)."""
+        return np.arange(1, self.row_count + 1) if self.numbers_of_rows is None else self.numbers_of_rows
 
     def texts(self, name: str) -> Texts:
         """A column as text, without blanks around it."""
@@ -102,7 +115,7 @@ class Table:
 
     def _checked(self, name: str, values: Floats, bad: NDArray[np.bool_]) -> Floats:
         if bad.any():
-            rows = list_rows((np.flatnonzero(bad) + 1).tolist())
+            rows = list_rows(self.row_numbers[bad].tolist())
             raise InputError(
                 f'column "{name}" holds NaN or infinite values in {rows}',
                 where=self.where,
@@ -120,7 +133,7 @@ class Table:
         if not row_out and "," in cell and "." not in cell:
             way_out = 'If this is a decimal comma, bring it in by truearm import with --decimal ","'
         return InputError(
-            f'column "{name}" holds "{cell}" in row {row + 1}',
+            f'column "{name}" holds "{cell}" in row {self.row_numbers[row]}',
             where=self.where,
             rule="It must hold numbers",
             way_out=way_out,
@@ -138,8 +151,8 @@ class Table:
         return ""
 
 
-def table_from_frame(frame: pd.DataFrame, *, where: str) -> Table:
-    """The columns of a DataFrame: numbers where pandas has numbers, else text."""
+def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers | None = None) -> Table:
+    """The columns of a DataFrame: numbers where pandas has numbers, else text; `row_numbers` as in Table."""
     columns: dict[str, Texts | Floats] = {}
     for name in frame.columns:
         column = frame[name]
@@ -149,7 +162,7 @@ def table_from_frame(frame: pd.DataFrame, *, where: str) -> Table:
             columns[str(name)] = column.fillna("").astype(str).to_numpy(dtype=np.str_)
     if len(columns) != len(frame.columns):
         raise InputError("two columns have the same name", where=where)
-    return Table(where, columns, len(frame))
+    return Table(where, columns, len(frame), numbers_of_rows=row_numbers)
 
 
 def read_csv_table(path: Path) -> Table:
@@ -247,8 +260,10 @@ def split_table(
 ) -> Table:
     """The fields of a text with a header line; every line must have as many as the header.
 
-    `uneven` is the way out where a line has another number, `nameless` where a column has no name. One with
-    neither name nor content is left out: some programs end lines with a delimiter.
+    `uneven` is the way out where a line has another number, `nameless` where a column has no name; its {}
+    becomes the names of all columns, "-" for none. One with neither name nor content is left out: some
+    programs end lines with a delimiter. So is a first one without a name that counts the rows, as pandas
+    writes it.
 
     Raises:
         InputError: If a name is missing or repeated, a line has another number of fields, or there
@@ -273,11 +288,19 @@ def split_table(
     if not rows:
         raise InputError("there are no data rows below the header", where=where)
     named = [k for k, name in enumerate(header) if name or any(row[k].strip() for row in rows)]
+    counts = named[:1] == [0] and not header[0] and _counts([row[0].strip() for row in rows])
+    remarks = (f"the first column of {where}, which has no name and counts the rows",) if counts else ()
+    named = named[counts:]
     if not named:
-        raise InputError("no column has a name", where=where, way_out=nameless)
+        raise InputError("no column has a name", where=where, way_out="Name the columns in the first line")
     _check_names({k + 1: header[k] for k in named}, where, nameless)
     cells = np.array(rows, dtype=np.str_)
-    return Table(where, {header[k]: cells[:, k] for k in named}, len(rows))
+    return Table(where, {header[k]: cells[:, k] for k in named}, len(rows), remarks)
+
+
+def _counts(cells: Sequence[str]) -> bool:
+    """Whether cells count themselves, from 0 or from 1."""
+    return list(cells) in [[str(first + k) for k in range(len(cells))] for first in (0, 1)]
 
 
 def quoted_delimiter(mark: str) -> str:
@@ -311,7 +334,7 @@ def _check_names(names: Mapping[int, str], where: str, nameless: str) -> None:
         raise InputError(
             f"{list_rows(empty, 'column')} {'has' if len(empty) == 1 else 'have'} no name",
             where=where,
-            way_out=nameless,
+            way_out=nameless.format(_all_names(names)),
         )
     header = list(names.values())
     repeated = [name for name in dict.fromkeys(header) if header.count(name) > 1]
@@ -322,6 +345,12 @@ def _check_names(names: Mapping[int, str], where: str, nameless: str) -> None:
             rule="Columns are told apart by their names",
             way_out="Give each a name of its own in the first line",
         )
+
+
+def _all_names(names: Mapping[int, str]) -> str:
+    """Names by their position as truearm import takes them, the first few; "-" leaves a column out."""
+    each = [names.get(position) or "-" for position in range(1, max(names) + 1)]
+    return ",".join([*each[:SHOWN_NAMES], *["..."][: len(each) - SHOWN_NAMES]])
 
 
 def _in_words(number: float) -> str:

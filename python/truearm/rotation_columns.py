@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.arrays import rotation_fault
-from truearm.errors import InputError, UsageError, list_rows
+from truearm.errors import InputError, UsageError, list_names, list_rows
 from truearm.rotations import (
     check_euler_sequence,
     quaternion_from_euler,
@@ -70,11 +70,21 @@ class RotationColumns:
         """Quaternions (n, 4), w first, of the columns' values (n, 3), (n, 4) or (n, 9); NaN rows stay NaN.
 
         Raises:
-            InputError: If what should be a rotation matrix is none, or an angle is longer than a turn.
+            InputError: If a row has some of the values and not all, what should be a rotation matrix is none,
+                or an angle is longer than a turn.
         """
+        given = np.isfinite(values).all(axis=1)
+        partial = np.isfinite(values).any(axis=1) & ~given
+        if partial.any():
+            raise InputError(
+                f"only some of {list_names(self.columns)} are given in "
+                f"{list_rows((np.flatnonzero(partial) + 1).tolist())}",
+                where="--rotation",
+                rule=f"An orientation has all {len(self.columns)} numbers, or all these cells are empty",
+                way_out="Correct or remove the rows",
+            )
         if self.kind == "quaternion":
             return values if self.order == "wxyz" else values[:, [3, 0, 1, 2]]
-        given = np.isfinite(values).all(axis=1)
         quaternions = np.full((len(values), 4), np.nan)
         if self.kind == "matrix":
             quaternions[given] = quaternion_from_matrix(_rotations(values[given], np.flatnonzero(given)))

@@ -97,6 +97,11 @@ def taken_out(calibration: "Calibration") -> int:
     return 0 if calibration.variable is None or rows is None else len(rows.outliers())
 
 
+def saw_orientations(calibration: "Calibration") -> bool:
+    """Whether rows hold orientations, used or not; not known of a calibration without its rows."""
+    return calibration.rows is not None and calibration.rows.data.orientations is not None
+
+
 def states_sigma(calibration: "Calibration") -> bool:
     """Whether rows say something of their own noise."""
     return bool(np.any(stated_sigma_mm(calibration)))

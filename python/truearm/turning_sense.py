@@ -34,6 +34,9 @@ STILL: Final = 0.05
 SAME: Final = 1e-3
 """Orientations that are within so much of one of them, rad, were not measured where the arm turned."""
 
+IN_ORDER: Final = (0, 1, 2, 3)
+NOTED: Final = "truearm import --rotation"
+OTHER_SIGN: Final = "the other sign of qx, qy and qz turns them about"
 COMPONENTS: Final = "wxyz"
 READINGS: Final = tuple(product(permutations(range(4)), (False, True)))[1:]
 """Other readings of the four columns: which component each holds, and whether conjugate."""
@@ -123,14 +126,18 @@ def check_turns(measurements: Measurements, robot: Robot) -> None:
         if arm.misfit(poses[1]) < MISFIT:
             continue
         _check_they_turn(rows, poses[1], group)
-        ways = [_other_columns(arm, poses[1]), _other_angles(arm, poses[1])]
+        held, conjugate = _other_columns(arm, poses[1]) or (IN_ORDER, False)
+        ways = [_words(held, conjugate=conjugate), _other_angles(arm, poses[1])]
         if any(ways):
             fitting = ", or if ".join(filter(None, ways))
+            noted = [NOTED] if held != IN_ORDER or ways[1] else []
+            both = " or " if held == IN_ORDER else " and "
+            how = both.join([*noted, *([OTHER_SIGN] if conjugate else [])])
             raise InputError(
                 f"the orientations do not turn as {robot.name} does. They would if {fitting}",
                 where=f"{', '.join(rows.files)}, group {group}",
                 rule="qw qx qy qz, w first, turn vectors of the target into the world",
-                way_out="Put that right (truearm import --rotation), or use positions alone: --use position",
+                way_out=f"Put that right ({how}), or use positions alone: --use position",
             )
 
 
@@ -146,13 +153,13 @@ def _check_they_turn(rows: Measurements, quaternions: Floats, group: str) -> Non
     )
 
 
-def _other_columns(arm: _Arm, quaternions: Floats) -> str:
-    """In words, the order and sense of the quaternions that fit; "" where none does."""
+def _other_columns(arm: _Arm, quaternions: Floats) -> tuple[tuple[int, ...], bool] | None:
+    """The order of the quaternions that fits, and whether they are conjugate; None where nothing fits."""
     for held, conjugate in READINGS:
         sense = np.where((np.arange(4) > 0) & conjugate, -1.0, 1.0)
         if arm.misfit(quaternions[:, np.argsort(held)] * sense) < FIT:
-            return _words(held, conjugate)
-    return ""
+            return held, conjugate
+    return None
 
 
 def _other_angles(arm: _Arm, quaternions: Floats) -> str:
@@ -174,12 +181,12 @@ def _other_angles(arm: _Arm, quaternions: Floats) -> str:
     return f"the angles that were taken for {pairs} (capitals: moving axes, small letters: fixed axes)"
 
 
-def _words(held: tuple[int, ...], conjugate: bool) -> str:
-    """A reading in words: what its columns hold, and how it turns."""
+def _words(held: tuple[int, ...], *, conjugate: bool) -> str:
+    """A reading in words: what its columns hold, and how it turns; "" of the stated one."""
     order = f"the columns qw qx qy qz hold {' '.join(COMPONENTS[part] for part in held)}"
     turn = "they turn the other way: target_from_world, where world_from_target is wanted"
-    if held == (0, 1, 2, 3):
-        return turn
+    if held == IN_ORDER:
+        return turn if conjugate else ""
     return f"{order}, and {turn}" if conjugate else order
 
 

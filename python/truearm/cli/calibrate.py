@@ -253,8 +253,8 @@ def print_results(calibration: "Calibration") -> None:
 
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
-    """Say what the model leaves unexplained, and the mean error of that; constants leave more than noise."""
-    from truearm.models import CONSTANT
+    """Say what the model leaves unexplained, and the mean error of that: few models leave noise alone."""
+    from truearm.models import CONSTANT, leaves_noise
     from truearm.summary import states_sigma
 
     per = "distance" if calibration.selection.distances else "coordinate"
@@ -262,10 +262,12 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
         per += " of all targets together"
     beyond = ", beyond the stated sigma" if states_sigma(calibration) else ""
     left = f"{summary['noise_floor_mm']:.3f} mm"
+    name = calibration.model_name
+    also = "with constants alone" if name == CONSTANT else f"with the model {name}"
     alone = (
-        f"It makes a mean error of {left}: noise and, with constants alone, what varies with the joints."
-        if calibration.model_name == CONSTANT
-        else f"Mean error that noise alone would leave: {left}."
+        f"Mean error that noise alone would leave: {left}."
+        if leaves_noise(name)
+        else f"It makes a mean error of {left}: noise and, {also}, what varies with the joints."
     )
     say_wrapped(
         f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "
@@ -275,13 +277,16 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
 
 def print_determined(calibration: "Calibration") -> None:
     """Say which parameters the measurements determine, and what the others cannot be told from."""
+    from truearm.summary import saw_orientations
+
     found = calibration.identifiability
     say(f"The poses determine {found.rank} of {found.parameters} parameters of the arm.")
     for words, names in _by_reason(found.undetermined, found.words).items():
         say_wrapped(f"  {', '.join(names)} {words}")
     if len(calibration.selection.targets) in (1, 2) and not calibration.selection.orientation:
+        was_not = "used (--use pose uses it)" if saw_orientations(calibration) else "measured"
         say_wrapped(
-            "Orientation was not measured: the tool's follows from positions alone, and nothing below "
+            f"Orientation was not {was_not}: the tool's follows from positions alone, and nothing below "
             "validates it."
         )
 

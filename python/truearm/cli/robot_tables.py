@@ -64,7 +64,7 @@ def _print_coupling(robot: Robot) -> None:
         return
     say("coupling: joint values from readings, directions included")
     for row in robot.coupling:
-        say("  " + " ".join(f"{value:5g}" for value in row))
+        say("  " + " ".join(f"{value + 0.0:5g}" for value in row))
 
 
 def _print_verdict(robot: Robot, notices: list[Notice]) -> None:

@@ -1,7 +1,7 @@
 """Frames that were found, written into a frames file beside what it holds already."""
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,6 +22,15 @@ Floats = NDArray[np.float64]
 
 PLACEMENT: Final = ("xyz", *ORIENTATIONS)
 FORMAT: Final = 1
+DECIMALS: Final = 6
+CONTROLLERS: Final = (
+    'already; what it held stands under "controller" now, as what the controller computes with. Take it out '
+    "when the new numbers are in the controller"
+)
+FOUND_BEFORE: Final = (
+    "as it was found before, {}; the new numbers replace that. If the controller computes with the former "
+    'ones, state them under "controller"'
+)
 
 
 def former_entry(path: str | Path, kind: str, name: str) -> tuple[FrameEntry, float] | None:
@@ -47,44 +56,45 @@ def write_frame(path: str | Path, name: str, found: IdentifiedFrame, data_hash: 
     """Write a frame into a file, which is made if it is not there; other frames stay.
 
     Where the file held the frame already, what it held becomes what the controller has, unless it said
-    what the controller has. Comments of the file stay where they can.
+    what the controller has, or was found too: then the new numbers replace it. Comments of the file stay
+    where they can.
 
     Raises:
         InputError: If the file breaks a rule or cannot be written.
     """
     held = _text(Path(path))
     content = parsed(held, where=str(path))
-    former = _put(content, name, found, data_hash)
+    notices = _put(content, name, found, data_hash)
     edited = _edited(held, lambda document: _put(document, name, found, data_hash))
     text = edited if _says(edited, content) else tomli_w.dumps(content)
     Frames.parse(text, where=str(path))
     write_whole(Path(path), text)
-    if not former:
-        return []
-    return [
-        Notice(
-            "former_frame",
-            f'{path} held {found.kind} "{name}" already; what it held stands under "controller" now, as what '
-            "the controller computes with. Take it out when the new numbers are in the controller",
-        )
-    ]
+    return [Notice("former_frame", f'{path} held {found.kind} "{name}" {words}') for words in notices]
 
 
-def _put(content: Any, name: str, found: IdentifiedFrame, data_hash: str) -> dict[str, Any]:  # noqa: ANN401
-    """Put a frame into plain values or into a document with comments; gives what was in its place."""
+def _put(content: Any, name: str, found: IdentifiedFrame, data_hash: str) -> list[str]:  # noqa: ANN401
+    """Put a frame into plain values or into a document with comments; gives what became of a former one."""
     content.setdefault("format", FORMAT)
     unit = LENGTHS_M[str(content.setdefault("length_unit", "mm"))]
     written = {**_placement(found.transform, unit), "identified": _identified(found, data_hash)}
     key = _key(content, found.kind, name)
     if key is None:
         content.setdefault(found.kind, {})[name] = written
-        return {}
+        return []
     entry = content[found.kind][key]
+    was_found, states_controller = "identified" in entry, "controller" in entry
     former = {part: _plain(entry.pop(part)) for part in PLACEMENT if part in entry}
     entry.update(written)
-    if former:
-        entry.setdefault("controller", former)
-    return former
+    if not former or states_controller:
+        return []
+    if was_found:
+        return [FOUND_BEFORE.format(", ".join(f"{part} = {_rounded(of)}" for part, of in former.items()))]
+    entry["controller"] = former
+    return [CONTROLLERS]
+
+
+def _rounded(values: Sequence[float]) -> list[float]:
+    return [round(value, DECIMALS) for value in values]
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401

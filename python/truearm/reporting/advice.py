@@ -19,12 +19,13 @@ from truearm.doubts import (
 )
 from truearm.errors import count_of, short_names
 from truearm.grids import BETWEEN
-from truearm.models import CONSTANT, VARIABLE
+from truearm.models import CONSTANT, VARIABLE, leaves_noise
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
-from truearm.reporting.levers import of_last_link, target_lever_mm
+from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
 from truearm.reporting.numbers import fixed, listed, percent, short, shown_readings
 from truearm.row_order import ORDER_OF_POSES
+from truearm.summary import saw_orientations
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -38,8 +39,6 @@ LONG_TAIL: Final = 5.0
 """The 99 % quantile over the mean: 2.1 where errors are normal and alike in all directions."""
 COVERED: Final = 0.88
 ROWS_NAMED: Final = 5
-ON_THE_AXIS_MM: Final = 5.0
-"""Targets nearer to the last joint's axis than this hardly show how it turns."""
 SETUP_WORDS: Final = "the place of device or target"
 
 
@@ -123,7 +122,7 @@ def _stated_sigma(facts: Facts) -> Iterator[Advice]:
 
 
 def _noise_or_poses(facts: Facts) -> Iterator[Advice]:
-    if facts.best != VARIABLE or any(_stated_sigma(facts)):
+    if not leaves_noise(facts.best) or any(_stated_sigma(facts)):
         return
     floor, mean = facts.floor_mm, facts.mean_mm()
     left, noise = short(mean, floor)
@@ -259,8 +258,7 @@ def _range(facts: Facts, weak: Stretch) -> str:
 def _unseen(facts: Facts) -> Iterator[Advice]:
     found, selection = facts.calibration.identifiability, facts.calibration.selection
     pairs = zip(found.undetermined, found.words, strict=True)
-    lever = target_lever_mm(facts)
-    of_target = set() if lever is None or lever < ON_THE_AXIS_MM else of_last_link(facts)
+    of_target, lever = taken_over(facts), target_lever_mm(facts)
     hidden = [name for name, words in pairs if SETUP_WORDS not in words and name not in of_target]
     if hidden:
         is_on = lever is not None and lever < ON_THE_AXIS_MM
@@ -272,11 +270,16 @@ def _unseen(facts: Facts) -> Iterator[Advice]:
         yield Advice("unseen_parameters", "Determine all parameters.", words, 0.1 * facts.mean_mm())
     if selection.distances or selection.orientation or len(selection.targets) > 2:
         return
-    words = (
-        "The orientation of the tool follows from positions alone, and nothing here validates it. If the "
-        "tool is long or its direction matters, measure its orientation, or three targets on it."
-    )
-    yield Advice("no_orientation", "Measure orientation.", words, 0.05 * facts.mean_mm())
+    words = "The orientation of the tool follows from positions alone, and nothing here validates it. "
+    weight = 0.05 * facts.mean_mm()
+    if saw_orientations(facts.calibration):
+        words += "It was measured, and not used: calibrate with --use pose."
+        yield Advice("orientation_not_used", "Use the orientations.", words, weight)
+    else:
+        words += (
+            "If the tool is long or its direction matters, measure its orientation, or three targets on it."
+        )
+        yield Advice("no_orientation", "Measure orientation.", words, weight)
 
 
 def _few_held(facts: Facts) -> Iterator[Advice]:

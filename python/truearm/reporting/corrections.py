@@ -37,12 +37,12 @@ def compensation(facts: Facts) -> Section:
     data = rows.data.select(np.arange(min(len(rows.data), MOST_POSES)))
     task = _task(len(facts.joints))
     alone = Limits(change_mm_per_mm=None, change_mrad_per_rad=None)
-    named = not np.array_equal(calibration.robot.tool, np.eye(4))
     found = Compensator(calibration, task=task, limits=alone, features=facts.features or None).joints(
-        data.readings, tool=None if named else facts.point
+        data.readings, tool=None if facts.names_tool else facts.point
     )
-    of = "the robot file's tool" if named else "the measured target, as the robot file names no tool"
-    words = _overall(found, (task, of), len(rows.data)) + facts.at_features
+    point = "flange" if calibration.selection.distances else "measured target"
+    whose = "robot file's tool" if facts.names_tool else f"{point}, as the robot file names no tool"
+    words = _overall(found, (task, f"the {whose}"), len(rows.data)) + facts.at_features
     parts: list[Part] = [Text(words), *_sizes(facts, found)]
     return Section(title, [*parts, *largest(facts, data, found), *_refusals(data, found)])
 

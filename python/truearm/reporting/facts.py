@@ -83,7 +83,14 @@ class Facts:
     @property
     def point_name(self) -> str:
         """What `point` is called in sentences."""
-        return "robot file's tool" if self.calibration.selection.distances else "measured point"
+        if not self.calibration.selection.distances:
+            return "measured point"
+        return "robot file's tool" if self.names_tool else "flange"
+
+    @property
+    def names_tool(self) -> bool:
+        """Whether the robot file names a tool."""
+        return not np.array_equal(self.calibration.robot.tool, np.eye(4))
 
     @cached_property
     def without_waves(self) -> ArmModel:
@@ -142,7 +149,7 @@ class Facts:
 
     @cached_property
     def floor_mm(self) -> float:
-        """Mean position error that noise alone would leave, mm; with constants, with what varies in it."""
+        """Mean position error of what the model leaves, mm: noise and, unless it is variable, what varies."""
         return distance_at_floor_mm(self.calibration)
 
     @property

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.models import CONSTANT
 from truearm.reporting.charts import axis, data_points, heatmap
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import STRETCHES, Known, configurations, means_along, std_mm
@@ -25,7 +26,7 @@ FEWEST_IN_CELL: Final = 2
 POOL: Final = 8192
 """Configurations among which those are looked for that a cell lacks."""
 SCALE: Final = 2.0
-"""Colours go at least to so many times the mean error: what is known as well as the judged poses is dark."""
+"""Colours go at least to so many times the mean error, or the median: what is known that well is dark."""
 DRAWN: Final = 1500
 MAPPED_JOINTS: Final = 3
 
@@ -72,26 +73,42 @@ def _overall(facts: Facts, found: Known) -> str:
     median, tenth, near = short(*values, float(np.median(found.at_rows_mm)))
     kind = "exact" if found.is_exact else "upper bounds, which compensation judges by"
     where = "the measured poses" if facts.readings is not None else "poses in the usual ranges of the joints"
+    noise = "with what the constants leave" if facts.best == CONSTANT else "without noise of the measurement"
     return (
-        f"Standard deviation of the {facts.point_name} as the arm's model gives it, without noise of the "
-        f"measurement (root of the summed variances of x, y and z): the median over {where} is {near} mm, "
+        f"Standard deviation of the {facts.point_name} as the arm's model gives it, {noise} "
+        f"(root of the summed variances of x, y and z): the median over {where} is {near} mm, "
         f"over all configurations in the joints' whole ranges {median} mm, and 90 % of these are below "
         f"{tenth} mm. The values are {kind}, at {len(found.std_mm)} configurations.{facts.at_features}"
     )
 
 
+def _is_like_errors(facts: Facts, found: Known) -> bool:
+    """Whether the values compare with the mean error.
+
+    Those of constants, which all calibrations from distances have, hold all that these leave; bounds are
+    larger than the values that they are of.
+    """
+    return found.is_exact and facts.best != CONSTANT
+
+
 def _top_mm(facts: Facts, found: Known) -> float:
     """Where the colours of all maps end."""
-    return max(float(np.quantile(found.std_mm, 0.98)), SCALE * facts.mean_mm())
+    usual = facts.mean_mm() if _is_like_errors(facts, found) else float(np.median(found.std_mm))
+    return max(float(np.quantile(found.std_mm, 0.98)), SCALE * usual)
 
 
 def _colours(facts: Facts, found: Known) -> str:
     """What the colours of the maps mean."""
     mean, top = short(facts.mean_mm(), _top_mm(facts, found))
+    compared = (
+        f" The {facts.mean_error} on {facts.judged} poses is {mean} mm: where the standard deviation is "
+        "below it, predictions are known as well as they were found to be; in brighter cells they are known "
+        "worse."
+        if _is_like_errors(facts, found)
+        else ""
+    )
     return (
-        f"Colours go from 0 to {top} mm in all maps. The {facts.mean_error} on {facts.judged} poses is "
-        f"{mean} mm: where the standard deviation is below it, predictions are known as well as they were "
-        "found to be; in brighter cells they are known worse. Cells without a colour are out of the arm's "
+        f"Colours go from 0 to {top} mm in all maps.{compared} Cells without a colour are out of the arm's "
         "reach."
     )
 

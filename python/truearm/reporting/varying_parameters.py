@@ -45,8 +45,10 @@ def varying_parameters(facts: Facts) -> Table:
     of = "measured poses" if facts.readings is not None else "poses in the usual ranges of the joints"
     says = (
         "Corrections to the nominal values: the constant part, then constant part and what varies together "
-        f"at {len(poses)} {of}. Compensation uses the latter."
+        f"at {len(poses)} {of}."
     )
+    if calibration.scheme is None:
+        says += " Compensation uses the latter."
     if unknown:
         says += f" Where the poses do not determine a constant, the maker's value stays: {NOMINAL}."
     if spread is not None:

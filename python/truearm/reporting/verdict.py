@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from truearm.doubts import MAY_VARY, NEAR_MM, helps, nothing_to_gain
+from truearm.doubts import NEAR_MM, gains_nothing, helps, nothing_to_gain
 from truearm.errors import count_of
-from truearm.models import CONSTANT, NOMINAL
+from truearm.models import NOMINAL, leaves_noise
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
@@ -69,8 +69,9 @@ def verdict(facts: Facts) -> str:
     if facts.is_spoilt_by_rows:
         return f"{said} Single rows are far off: correct them or leave them out, and calibrate again."
     if nothing_to_gain(nominal.mean, after.mean, facts.floor_mm):
-        if facts.best == CONSTANT and nominal.mean >= NEAR_MM:
-            return f"{said} Constants gain nothing. {MAY_VARY}"
+        if nominal.mean >= NEAR_MM and not leaves_noise(facts.best):
+            start, why = gains_nothing(facts.best)
+            return f"{said} {start}. {why}"
         return f"{said} There is nothing to gain: the arm is where its table has it, as far as they tell."
     if facts.is_of_no_help:
         return f"{said} The calibration does not help: do not use it until the reason is found."
@@ -118,7 +119,7 @@ def cards(facts: Facts) -> list[Card]:
         *_card_without_outliers(facts),
         Card(p95, "mm", f"95 % of the {facts.judged} poses have a smaller error"),
     ]
-    if facts.best != CONSTANT and not facts.is_of_no_help:
+    if leaves_noise(facts.best) and not facts.is_of_no_help:
         floor = facts.floor_mm
         several = " on all targets together" if len(facts.calibration.selection.targets) > 1 else ""
         found.append(Card(*_short_mm(floor), f"mean error that noise alone would leave{several}"))
