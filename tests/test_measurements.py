@@ -135,6 +135,14 @@ def test_a_first_column_that_counts_the_rows_is_left_out_and_named(tmp_path: Pat
     assert "which has no name and counts the rows" in data.notices[0].message
 
 
+def test_a_target_that_repeats_another_is_told(tmp_path: Path) -> None:
+    header, rows = "q1,x_mm,y_mm,z_mm,x2_mm,y2_mm,z2_mm", ["0,126.655,2,3,126.655,2,3"]
+    data = read(tmp_path, header, [*rows, "1,4,5,6.1,4,5,6.1"])
+    assert [notice.kind for notice in data.notices] == ["repeated_target"]
+    assert '"x2_mm", "y2_mm" and "z2_mm" hold the same as' in data.notices[0].message
+    assert not read(tmp_path, header, [*rows, "1,4,5,6.1,4,5,6.2"]).notices
+
+
 def test_text_in_other_letters_is_not_said_to_be_kept(tmp_path: Path) -> None:
     data = read(tmp_path, "q1,x,y,z,Group,operator", ["0,1,2,3,A,Ann", "1,1,2,3,B,Bo"])
     (notice,) = data.notices

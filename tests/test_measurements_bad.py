@@ -20,11 +20,6 @@ TABLES = {
     "misspelt axis": ("q1,x,y,Z", ["0,1,2,3"], 'Column "z" is missing. Did you mean "Z"'),
     "misspelt positions": ("q1,X,Y,Z", ["0,1,2,3"], 'No position x, y, z and no distance. Did you mean "X"'),
     "half a second target": ("q1,x,y,z,x2,y2", ["0,1,2,3,4,5"], 'Column "z2" is missing'),
-    "one target twice": (
-        "q1,x_mm,y_mm,z_mm,x2_mm,y2_mm,z2_mm",
-        ["0,126.655,2,3,126.655,2,3", "1,4,5,6.1,4,5,6.1", "2,,,,,,"],
-        '"x2_mm", "y2_mm" and "z2_mm" hold the same as the columns of another target in all rows',
-    ),
     "third target, no second": ("q1,x,y,z,x3,y3,z3", ["0,1,2,3,4,5,6"], "Target 3 is there without"),
     "half a quaternion": ("q1,x,y,z,qw,qx,qy", ["0,1,2,3,1,0,0"], 'Column "qz" of the quaternion is missing'),
     "one name twice": ("q1,x,x,y,z", ["0,1,1,2,3"], 'column "x" occurs more than once'),

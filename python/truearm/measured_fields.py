@@ -64,7 +64,7 @@ def read_fields(
         "distance_m": distance,
         **ends,
         "purpose": purpose,
-        "notices": (*_left_out(table), *assumed, *unknown, *notices),
+        "notices": (*_left_out(table), *_repeated(table, layout, targets), *assumed, *unknown, *notices),
         "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
 
@@ -103,22 +103,26 @@ def _targets(table: Table, layout: Layout) -> Floats:
         names = list_names([column.name for column in columns])
         rule = "A point is measured with all three coordinates, or all three cells are empty"
         _refuse(table, _is_partial(empty), f"only some of {names} are given in", rule)
-        _refuse_again(table, targets[:, : number + 1], names)
     return targets
 
 
-def _refuse_again(table: Table, targets: Floats, names: str) -> None:
-    """Raise InputError if the last of targets (n, k, 3), whose columns are `names`, is one before it."""
-    *before, last = targets.swapaxes(0, 1)
-    if np.isfinite(last).any() and any(
-        np.allclose(last, one, rtol=0.0, atol=SAME_PLACE_M, equal_nan=True) for one in before
-    ):
-        raise InputError(
-            f"{names} hold the same as the columns of another target in all rows",
-            where=table.where,
-            rule="Targets are several points on the tool; one that is there twice tells no more than once",
-            way_out="Remove these columns",
+def _repeated(table: Table, layout: Layout, targets: Floats) -> list[Notice]:
+    """Notices of targets (n, T, 3) that are where one before them is in all rows."""
+    each = targets.swapaxes(0, 1)
+    return [
+        Notice(
+            "repeated_target",
+            f"{table.where}: {list_names([column.name for column in layout.targets[number]])} hold the same "
+            "as the columns of another target in all rows, and count as a second point on the tool. A point "
+            "that is there twice tells no more than once: remove these columns.",
         )
+        for number in range(1, len(each))
+        if np.isfinite(each[number]).any()
+        and any(
+            np.allclose(each[number], one, rtol=0.0, atol=SAME_PLACE_M, equal_nan=True)
+            for one in each[:number]
+        )
+    ]
 
 
 def _orientations(table: Table) -> Floats:
