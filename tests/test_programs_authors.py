@@ -33,6 +33,19 @@ def off(robot, scale=1e-3):
     return replace(robot, table=table)
 
 
+@pytest.mark.parametrize("controller", ["nominal", Controller.nominal(ABB)])
+def test_a_nominal_controller_is_the_catalogues_whoever_the_author(irb, controller, tmp_path):
+    """So are the postures of configuration data: the author's wrist axes need not meet."""
+    author = off(ABB)
+    moves = "\n".join(f"MoveJ {numbers(q, author=author)},{GO}" for q in TAUGHT_DEG)
+    (tmp_path / "a.mod").write_text(module(moves), "latin-1")
+    compensator = ta.Compensator(irb, programming=author, limits=WIDE)
+    done = ta.compensate_program(tmp_path / "a.mod", compensator, controller=controller)
+    assert [one.reason for one in done.listed] == []
+    assert np.abs(np.rad2deg(done.nominal) - TAUGHT_DEG).max() < 1e-3
+    assert np.abs(obeyed(again(done, ABB), ABB, done.corrected) - done.corrected).max() < 1e-5
+
+
 def test_a_path_without_a_declared_controller_is_of_the_catalogues(irb, tmp_path):
     """Poses are of the tool in the author's robot file."""
     tool = np.eye(4)

@@ -1,5 +1,6 @@
 """Compensating a program: the public call."""
 
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -64,7 +65,9 @@ def compensate_program(
     declared = _declared(controller, written_in, calibration.robot)
     refuse_another_arm(declared, calibration.robot)
     known = _frames(frames).fresh()
-    program = read_program(Path(path), written_in, author, known)
+    # Configuration data tells of the catalogue's postures; poses are of the tool that the author had.
+    postured = replace(calibration.robot, tool=author.tool)
+    program = read_program(Path(path), written_in, postured, known)
     refuse_contradiction(program, declared, force=chosen.force)
     positions_only = not calibration.selection.orientation
     beyond = tuple(beyond_learnt(calibration, compensator.features))

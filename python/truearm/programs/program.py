@@ -170,7 +170,8 @@ class Language(Protocol):
 
         Args:
             sources: The files, the named one first.
-            robot: The arm, for its joints and for geometry that configuration data depends on.
+            robot: The nominal arm, for its joints and limits and for geometry that configuration data depends
+                on, with the author's tool.
             frames: Tools and objects from outside the program.
 
         Raises:
