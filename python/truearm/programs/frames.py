@@ -3,7 +3,7 @@
 A TOML file with a table `[tool.NAME]` or `[object.NAME]` a frame; docs/reference/programs.md has all keys.
 """
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
@@ -159,8 +159,8 @@ class Frames:
             ) from None
         unit = LENGTHS_M[content.length_unit]
         return cls(
-            {name.casefold(): _frame(name, entry, unit) for name, entry in content.tool.items()},
-            {name.casefold(): _frame(name, entry, unit) for name, entry in content.object.items()},
+            {key: _frame(name, entry, unit) for key, name, entry in _folded("tool", content.tool, where)},
+            {key: _frame(name, entry, unit) for key, name, entry in _folded("object", content.object, where)},
             {n.casefold(): e.payload_kg for n, e in content.tool.items() if e.payload_kg is not None},
             where,
         )
@@ -219,6 +219,27 @@ def written_out(word: str, distinct: Iterable[Written]) -> dict[Written, str]:
 def name_at_start(word: str, *, written: bool) -> str:
     """The name of what holds until a program sets another: with 0 where the word is of one written out."""
     return f"{word} 0" if written else word
+
+
+def _folded(
+    kind: Kind, entries: Mapping[str, FrameEntry], where: str
+) -> Iterator[tuple[str, str, FrameEntry]]:
+    """Each entry of a kind with its name as it is compared and as it is written.
+
+    Raises:
+        InputError: If two names are compared as the same.
+    """
+    seen: dict[str, str] = {}
+    for name, entry in entries.items():
+        other = seen.setdefault(name.casefold(), name)
+        if other != name:
+            raise InputError(
+                f'it has both "{kind}.{other}" and "{kind}.{name}"',
+                where=where,
+                rule="Names are compared with case ignored",
+                way_out="Keep one of them",
+            )
+        yield name.casefold(), name, entry
 
 
 def _frame(name: str, entry: FrameEntry, unit_m: float) -> Frame:
