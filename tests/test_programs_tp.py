@@ -79,7 +79,7 @@ def configuration(robot):
 def config_text(robot, q, order=ORDERS[0]):
     digits = configuration(robot).digits(np.atleast_2d(q))[0]
     letters = " ".join(known[digit] for known, digit in zip(LETTERS, digits, strict=False))
-    found = dict(zip((0, 3, 4, 5), digits[3:], strict=True))
+    found = dict(zip((0, 3, 4, 5), digits[3:7], strict=True))
     return f"{letters}, {', '.join(str(found[joint]) for joint in order)}"
 
 
@@ -245,6 +245,16 @@ def test_the_order_of_turn_numbers_follows_from_limits(robot):
         result = rewritten(TP, text, robot, by=SHIFT)
         assert np.abs(result.nominal[0] - q).max() < 1e-4
         assert np.abs(says(TP, result.contents[0], robot)[0] - q - SHIFT).max() < 1e-4
+
+
+@pytest.mark.parametrize(("j2", "j3"), [(50, -75), (50, -85), (140, -135), (-95, 275), (-60, 225), (0, 0)])
+def test_an_elbow_that_is_read_against_the_horizontal_is_not_a_turn_away(robot, j2, j3):
+    """J3 and J3 + 360 deg both lie within -140 and 280 deg; the forearm cannot pass the upper arm."""
+    q = np.deg2rad([20, j2, j3, 10, -40, 30])
+    result = rewritten(TP, program(["J P[1] 100% FINE"], [pose(robot, 1, q)]), robot, by=SHIFT)
+    assert reasons(result) == []
+    assert np.abs(result.nominal[0] - q).max() < 1e-4
+    assert np.abs(says(TP, result.contents[0], robot)[0] - q - SHIFT).max() < 1e-4
 
 
 @pytest.fixture(scope="module")
