@@ -378,6 +378,19 @@ def test_waypoints_are_lines_and_positions_of_their_own(robot, ending):
     assert reasons(rewritten(TP, content, robot)) == []
 
 
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_the_count_of_lines_counts_remarks_and_waypoints(robot, ending):
+    """Not the positions, each a line or more of /POS."""
+    text = long_line(robot, "L P[4:END] 250mm/sec FINE").replace("/ATTR\n", "/ATTR\nLINE_COUNT\t= 9;\n")
+    text = text.replace("\n", ending)
+    plain = rewritten(TP, text, robot, by=Bend()).contents[0]
+    assert b"LINE_COUNT\t= 9;" in plain
+    done = rewritten(TP, text, robot, by=Bend(), spacing=FINE_STEPS, mark="compensated by somebody")
+    lines = [one.partition(b"/MN")[2].partition(b"/POS")[0].count(b"\n") for one in (plain, done.contents[0])]
+    assert lines[1] - lines[0] == done.inserted + 1
+    assert f"LINE_COUNT\t= {9 + done.inserted + 1};{ending}OWNER".encode() in done.contents[0]
+
+
 def off(points, corners):
     """How far points are from straight lines between corners, at the most."""
     starts, ways = corners[:-1], np.diff(corners, axis=0)
