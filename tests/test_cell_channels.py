@@ -97,7 +97,7 @@ def test_what_nobody_takes_ends_within_the_limit():
 
 def test_a_connection_that_is_closed_with_something_unread_is_not_reset():
     with socket.create_server(("127.0.0.1", 0)) as server:
-        channel = open_tcp("device", *server.getsockname()[:2], 1.0)
+        channel = open_tcp("device", "127.0.0.1", server.getsockname()[1], 1.0)
         device, _ = server.accept()
         with device:
             device.sendall(b"state" * 1000)

@@ -49,6 +49,7 @@ class Seen(Recorded):
                     return Reading(None, 1e-5, time.time(), False, "-", "the beam is broken")
                 if pose in self.frozen:
                     return dataclasses.replace(reading, point_in_world=self._last)
+                assert reading.point_in_world is not None
                 self._last = reading.point_in_world
                 if pose in self.elsewhere:
                     return dataclasses.replace(reading, point_in_world=reading.point_in_world + A_METRE)

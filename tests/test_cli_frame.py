@@ -154,6 +154,44 @@ def test_the_proposed_command_declares_a_controller_where_one_is_needed(capsys):
     assert proposed in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("world", ["$WORLD", "wobj0"])
+def test_an_object_is_written_in_the_world_that_the_file_has(world, capsys):
+    """As the controller holds it, so that programs find it where it was touched."""
+    turned = "xyz = [10, 20, -100]\neuler_zyx_deg = [30, 0, 5]\n"
+    Path("cell.toml").write_text(f'[object."{world}"]\n{turned}')
+    words = ["points.csv", "--object", "2", "--with-tool=20,-50,180"]
+    assert main(["frame", "arm.calib", *words, "-o", "cell.toml"]) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert f'the controller\'s world, object "{world}": object "2" is written in it' in told
+    assert main(["frame", "arm.calib", *words, "-o", "plain.toml"]) == 0
+    held, plain = (Frames.load(name).objects["2"] for name in ("cell.toml", "plain.toml"))
+    stated = Frames.load("cell.toml").world()
+    assert stated is not None
+    placed = stated.then(held)
+    assert np.abs(placed.true - plain.true).max() < 1e-12
+    assert np.allclose(np.array(placed.covariance), np.array(plain.covariance), atol=1e-18)
+    assert np.linalg.norm(plain.true[:3, 3] - ORIGIN) < 1e-4
+    axes = tomllib.loads(Path("cell.toml").read_text())["object"]["2"]["identified"]["covariance_of"]
+    assert axes.endswith(f"along the axes of the world, {world}")
+
+
+def test_the_world_itself_is_written_in_the_base(capsys):
+    Path("cell.toml").write_text("[object.wobj0]\nxyz = [0, 0, -100]\n")
+    words = ["points.csv", "--object", "WOBJ0", "--with-tool=20,-50,180"]
+    assert main(["frame", "arm.calib", *words, "-o", "cell.toml"]) == 0
+    assert "is written in it" not in capsys.readouterr().err
+    assert np.linalg.norm(Frames.load("cell.toml").objects["wobj0"].true[:3, 3] - ORIGIN) < 1e-4
+
+
+def test_worlds_of_two_controllers_leave_open_which_an_object_is_in(capsys):
+    held = '[object.wobj0]\nxyz = [0, 0, -100]\n[object."$WORLD"]\nxyz = [0, 0, 0]\n'
+    Path("cell.toml").write_text(held)
+    words = ["points.csv", "--object", "2", "--with-tool=20,-50,180", "-o", "cell.toml"]
+    assert main(["frame", "arm.calib", *words]) == 1
+    assert "cell.toml: it has two worlds, $WORLD and wobj0" in capsys.readouterr().err
+    assert Path("cell.toml").read_text() == held
+
+
 def test_json_is_all_that_is_printed(capsys):
     words = ["points.csv", "--object", "wTable", "--with-tool=20,-50,180", "-o", "cell.toml", "--json"]
     assert main(["frame", "arm.calib", *words]) == 0

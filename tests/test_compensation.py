@@ -263,6 +263,7 @@ def test_standard_deviations_of_constants_are_the_calibrations(constant):
         (lambda c: ta.Compensator(c, task="tool"), '"tool" is not known'),  # type: ignore[arg-type]
         (lambda c: ta.Compensator(c, moving=(0, 1)), "Some of the joints 1 to 6"),
         (lambda c: ta.Compensator(c, moving=()), "Some of the joints 1 to 6"),
+        (lambda c: ta.Compensator(c, moving=(1, 5, 5)), r"joints \[1, 5, 5\]\. .*, each once"),
         (lambda c: ta.Compensator(c, programming=ta.Robot.load("rv-m2")), "was calibrated with"),
         (lambda c: ta.Compensator(c, features={"t": 1.0}), "The calibration needs none"),
         (lambda c: ta.Compensator(c).joints(np.zeros((2, 5))), "must be \\(n, 6\\)"),

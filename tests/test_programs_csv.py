@@ -160,7 +160,9 @@ BAD = {
     "q1,q2,q3,q4,q5,q6\n1,2,3,4,5\n": r"line 2, column 1: there are 5 fields, and 6 in the header",
     "q1,q2,q3,q4,q5,q6\n1,2,3,nan,5,6\n": r'line 2, column 7: "nan" in column "q4" is no number',
     "q1,q2,q3,q4,q5,q6\n1,2,,4,5,6\n": r'line 2, column 1: there is nothing in column "q3"',
-    "x,y,z,qw,qx,qy,qz\n1,0,0,1,0,0,0\n1,0,0,0,0,0,0\n": "line 3, column 1: a quaternion of length zero",
+    "x,y,z,qw,qx,qy,qz\n1,0,0,1,0,0,0\n1,0,0,0,0,0,0\n": "line 3, column 1: the quaternion .* length 0",
+    "x,y,z,qw,qx,qy,qz\n1,0,0,1,0,0,0\n1,0,0,0.5,0,0,0\n": "has length 0.5. Orientations are unit",
+    "x,y,z,qw,qx,qy,qz\n1,0,0,0.8,0.8,0,0\n": "line 2, column 1: .* has length 1.13137",
     "q1,q2,q3,q4,q5,q6\n": r"line 1, column 1: there are no rows below the header",
     "": r"line 1, column 1: the file is empty",
 }

@@ -29,10 +29,10 @@ SEEN = {
 }
 
 
-def numbers(q_deg, tool=TOOL, placed=TABLE, decimals=4):
+def numbers(q_deg, tool=TOOL, placed=TABLE, decimals=4, author=ABB):
     """The text of a robtarget that means readings, with confdata by the vendor's definition."""
     q = np.deg2rad(np.asarray(q_deg, dtype=float))
-    pose = np.linalg.inv(placed) @ ABB.pose(q) @ tool
+    pose = np.linalg.inv(placed) @ author.pose(q) @ tool
     quarter = np.floor(np.rad2deg(q)[[0, 3, 5]] / 90.0).astype(int)
     arm = Branches.of(ABB)
     cfx = 4 * (arm.reach(q[None])[0] < 0) + 2 * (arm.elbow(q[None])[0] < 0) + (q[4] < 0)

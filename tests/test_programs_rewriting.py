@@ -317,6 +317,7 @@ def test_frames_files_say_what_is_wrong_in_them():
         "[tool.a]\nxyz = [1, 2, 3]\nquaternion_wxyz = [1, 0, 0, 0]\neuler_zyx_deg = [0, 0, 0]\n": "give one",
         "[tools.a]\nxyz = [1, 2, 3]\n": "tools",
         "tool = [": "not TOML",
+        "[tool.tG]\nxyz = [0, 0, 1]\n[tool.TG]\nxyz = [0, 0, 2]\n": 'both "tool.tG" and "tool.TG"',
         "[tool.a]\nxyz = [1, 2, 3]\nidentified = {covariance = [[1.0], [2.0, 3.0]]}\n": "six rows",
     }.items():
         with pytest.raises(InputError, match=words):

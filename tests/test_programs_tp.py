@@ -79,7 +79,7 @@ def configuration(robot):
 def config_text(robot, q, order=ORDERS[0]):
     digits = configuration(robot).digits(np.atleast_2d(q))[0]
     letters = " ".join(known[digit] for known, digit in zip(LETTERS, digits, strict=False))
-    found = dict(zip((0, 3, 4, 5), digits[3:], strict=True))
+    found = dict(zip((0, 3, 4, 5), digits[3:7], strict=True))
     return f"{letters}, {', '.join(str(found[joint]) for joint in order)}"
 
 
@@ -247,6 +247,16 @@ def test_the_order_of_turn_numbers_follows_from_limits(robot):
         assert np.abs(says(TP, result.contents[0], robot)[0] - q - SHIFT).max() < 1e-4
 
 
+@pytest.mark.parametrize(("j2", "j3"), [(50, -75), (50, -85), (140, -135), (-95, 275), (-60, 225), (0, 0)])
+def test_an_elbow_that_is_read_against_the_horizontal_is_not_a_turn_away(robot, j2, j3):
+    """J3 and J3 + 360 deg both lie within -140 and 280 deg; the forearm cannot pass the upper arm."""
+    q = np.deg2rad([20, j2, j3, 10, -40, 30])
+    result = rewritten(TP, program(["J P[1] 100% FINE"], [pose(robot, 1, q)]), robot, by=SHIFT)
+    assert reasons(result) == []
+    assert np.abs(result.nominal[0] - q).max() < 1e-4
+    assert np.abs(says(TP, result.contents[0], robot)[0] - q - SHIFT).max() < 1e-4
+
+
 @pytest.fixture(scope="module")
 def turning_arm(robot):
     """The same arm with joints that can all make a turn."""
@@ -366,6 +376,19 @@ def test_waypoints_are_lines_and_positions_of_their_own(robot, ending):
     said = says(TP, content, robot)[again.moves.target]
     assert (np.diff(said[:, 0]) > 0.0).all(), "in the order of the way"
     assert reasons(rewritten(TP, content, robot)) == []
+
+
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_the_count_of_lines_counts_remarks_and_waypoints(robot, ending):
+    """Not the positions, each a line or more of /POS."""
+    text = long_line(robot, "L P[4:END] 250mm/sec FINE").replace("/ATTR\n", "/ATTR\nLINE_COUNT\t= 9;\n")
+    text = text.replace("\n", ending)
+    plain = rewritten(TP, text, robot, by=Bend()).contents[0]
+    assert b"LINE_COUNT\t= 9;" in plain
+    done = rewritten(TP, text, robot, by=Bend(), spacing=FINE_STEPS, mark="compensated by somebody")
+    lines = [one.partition(b"/MN")[2].partition(b"/POS")[0].count(b"\n") for one in (plain, done.contents[0])]
+    assert lines[1] - lines[0] == done.inserted + 1
+    assert f"LINE_COUNT\t= {9 + done.inserted + 1};{ending}OWNER".encode() in done.contents[0]
 
 
 def off(points, corners):

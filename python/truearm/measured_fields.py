@@ -20,7 +20,7 @@ from truearm.columns import (
 )
 from truearm.errors import InputError, Notice, list_names, list_rows
 from truearm.reading import Table, Texts
-from truearm.rotations import UNIT_TOLERANCE
+from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
@@ -137,7 +137,7 @@ def _orientations(table: Table) -> Floats:
         table,
         off,
         f"the quaternion qw qx qy qz has not length 1 (up to {worst:.6g}) in",
-        "Orientations are unit quaternions, w first",
+        UNIT_QUATERNIONS,
         "Other notations come in by: truearm import --rotation",
     )
     return q / length[:, None]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 UNIT_TOLERANCE: Final = 1e-3
+UNIT_QUATERNIONS: Final = "Orientations are unit quaternions, w first"
 
 
 def matrix_from_quaternion(quaternion_wxyz: ArrayLike) -> NDArray[np.float64]:

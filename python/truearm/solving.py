@@ -70,13 +70,15 @@ def core_options(robot: Robot, task: Task, moving: Sequence[int] | None, limits:
         raise UsageError(f'"{task}" is not known', where="task", rule=f"One of {', '.join(TASKS)}")
     if moving is not None and not isinstance(moving, Sequence | np.ndarray):
         raise UsageError(f"{moving!r}", where="moving", rule="A list of joints, counted from 1")
-    if moving is not None and (len(moving) == 0 or not set(moving) <= set(range(1, robot.joint_count + 1))):
+    joints = None if moving is None else list(moving)
+    known = range(1, robot.joint_count + 1)
+    if joints is not None and (not joints or len(set(joints)) < len(joints) or not set(joints) <= set(known)):
         raise UsageError(
-            f"joints {list(moving)}",
+            f"joints {joints}",
             where="moving",
-            rule=f"Some of the joints 1 to {robot.joint_count} of {robot.name}",
+            rule=f"Some of the joints 1 to {robot.joint_count} of {robot.name}, each once",
         )
-    chosen = None if moving is None else sorted({joint - 1 for joint in moving})
+    chosen = None if joints is None else sorted(joint - 1 for joint in joints)
     return {"task": task, "moving": chosen, **limits.core(robot)}
 
 

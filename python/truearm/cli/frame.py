@@ -46,7 +46,8 @@ def command(
     (and qw to qz) they are the tool's positions or poses, measured by a device that stands anywhere.
 
     A work object: joint readings at touches of three or more of its points, with their true places
-    x, y, z in the object's own frame.
+    x, y, z in the object's own frame. Where FRAMES has the controller's world, $WORLD of KRL or wobj0 of
+    RAPID, the object is written in that world, else in the arm's base.
 
     Examples:
       truearm frame arm.calib touches.csv --tool tGripper -o frames.toml

@@ -15,8 +15,10 @@ from tomlkit.items import Item
 from truearm.errors import Notice
 from truearm.files import parsed, read_text, write_whole
 from truearm.framing.identified_frame import IdentifiedFrame
-from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, FrameEntry, Frames
+from truearm.programs.environment import Frame
+from truearm.programs.frames import LENGTHS_M, ORIENTATIONS, WORLDS, FrameEntry, Frames
 from truearm.rotations import quaternion_from_matrix
+from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
 
@@ -56,32 +58,57 @@ def write_frame(path: str | Path, name: str, found: IdentifiedFrame, data_hash: 
     """Write a frame into a file, which is made if it is not there; other frames stay.
 
     Where the file held the frame already, what it held becomes what the controller has, unless it said
-    what the controller has, or was found too: then the new numbers replace it. Comments of the file stay
-    where they can.
+    what the controller has, or was found too: then the new numbers replace it. An object is written in the
+    controller's world where the file has that. Comments of the file stay where they can.
 
     Raises:
-        InputError: If the file breaks a rule or cannot be written.
+        InputError: If the file breaks a rule or cannot be written, or has two worlds.
     """
     held = _text(Path(path))
     content = parsed(held, where=str(path))
-    notices = _put(content, name, found, data_hash)
-    edited = _edited(held, lambda document: _put(document, name, found, data_hash))
+    world = _world(held, found.kind, name, where=str(path))
+    told = found if world is None else found.told_in(world.true)
+    identified = _identified(told, data_hash, "base" if world is None else f"world, {world.name}")
+    words = _put(content, name, told, identified)
+    edited = _edited(held, lambda document: _put(document, name, told, identified))
     text = edited if _says(edited, content) else tomli_w.dumps(content)
     Frames.parse(text, where=str(path))
     write_whole(Path(path), text)
-    return [Notice("former_frame", f'{path} held {found.kind} "{name}" {words}') for words in notices]
+    former = [Notice("former_frame", f'{path} held {told.kind} "{name}" {each}') for each in words]
+    return [*_world_notices(path, name, told, world), *former]
 
 
-def _put(content: Any, name: str, found: IdentifiedFrame, data_hash: str) -> list[str]:  # noqa: ANN401
+def _world(held: str, kind: str, name: str, *, where: str) -> Frame | None:
+    """The world that the frame is told in, of the text of a file; None for the arm's base and the flange."""
+    if kind == "tool" or name.casefold() in {world.casefold() for world in WORLDS}:
+        return None
+    return Frames.parse(held, where=where).world()
+
+
+def _world_notices(path: str | Path, name: str, told: IdentifiedFrame, world: Frame | None) -> list[Notice]:
+    if world is None:
+        return []
+    x, y, z = MM_PER_METRE * told.transform[:3, 3]
+    return [
+        Notice(
+            "world",
+            f'{path} has the controller\'s world, object "{world.name}": object "{name}" is written in it, '
+            f"as the controller holds objects, at {x:.3f} {y:.3f} {z:.3f} mm. What else is told is in the "
+            "arm's base",
+        )
+    ]
+
+
+def _put(content: Any, name: str, told: IdentifiedFrame, identified: dict[str, Any]) -> list[str]:  # noqa: ANN401
     """Put a frame into plain values or into a document with comments; gives what became of a former one."""
     content.setdefault("format", FORMAT)
     unit = LENGTHS_M[str(content.setdefault("length_unit", "mm"))]
-    written = {**_placement(found.transform, unit), "identified": _identified(found, data_hash)}
-    key = _key(content, found.kind, name)
+    written = {**_placement(told.transform, unit), "identified": identified}
+    key = _key(content, told.kind, name)
     if key is None:
-        content.setdefault(found.kind, {})[name] = written
+        content.setdefault(told.kind, {})[name] = written
         return []
-    entry = content[found.kind][key]
+    entry = content[told.kind][key]
     was_found, states_controller = "identified" in entry, "controller" in entry
     former = {part: _plain(entry.pop(part)) for part in PLACEMENT if part in entry}
     entry.update(written)
@@ -142,7 +169,8 @@ def _placement(transform: Floats, unit_m: float) -> dict[str, Any]:
     }
 
 
-def _identified(found: IdentifiedFrame, data_hash: str) -> dict[str, Any]:
+def _identified(found: IdentifiedFrame, data_hash: str, outer: str) -> dict[str, Any]:
+    """How well a frame is known; `outer` is what an object is told in."""
     return {
         "how": found.how,
         "residual_mm": float(np.sqrt(np.square(found.distances_mm).mean())),
@@ -151,6 +179,6 @@ def _identified(found: IdentifiedFrame, data_hash: str) -> dict[str, Any]:
         "std_mrad": found.std_mrad.tolist(),
         "covariance": (found.covariance * 1e6).tolist(),
         "covariance_of": "x, y, z in mm and rotation vector in mrad, along the axes of "
-        + ("the flange" if found.kind == "tool" else "the base"),
+        + ("the flange" if found.kind == "tool" else f"the {outer}"),
         "calibration": data_hash,
     }

@@ -1,13 +1,13 @@
 """A tool or a work object as it was found, and how well."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import Notice
-from truearm.rotations import quaternion_from_matrix
+from truearm.rotations import quaternion_from_matrix, rigid_inverse
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -45,6 +45,13 @@ class IdentifiedFrame:
     def __repr__(self) -> str:
         x, y, z = MM_PER_METRE * self.transform[:3, 3]
         return f"<IdentifiedFrame: {self.kind} at {x:.3f} {y:.3f} {z:.3f} mm, from {self.how}>"
+
+    def told_in(self, outer: Floats) -> "IdentifiedFrame":
+        """The same told in a frame (4, 4) of the base, its covariance along the axes of that frame."""
+        inward = rigid_inverse(outer)
+        turned = np.kron(np.eye(2), inward[:3, :3])
+        covariance = turned @ self.covariance @ turned.T
+        return replace(self, transform=inward @ self.transform, covariance=covariance)
 
     @property
     def distances_mm(self) -> Floats:

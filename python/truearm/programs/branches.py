@@ -83,10 +83,17 @@ class Branches:
         reach: Floats = (self._to_wrist.position(values) - self._on_axis_1) @ self._forward
         return reach
 
+    def bent(self, q: Floats) -> Floats:
+        """How far axis 3 is turned from the stretched arm, rad, (n,), in its own sense, whole turns included.
+
+        Within half a turn for every arm that cannot fold through itself.
+        """
+        bent: Floats = self._sense * (self.robot.joints_from_readings(q)[:, 2] - self._stretched)
+        return bent
+
     def elbow(self, q: Floats) -> Floats:
-        """How far axis 3 is turned from the stretched arm, rad, (n,), in its own sense."""
-        bent = self.robot.joints_from_readings(q)[:, 2] - self._stretched
-        return self._sense * _half_turn(bent)
+        """The same within half a turn."""
+        return _half_turn(self.bent(q))
 
     def wrist(self, q: Floats) -> Floats:
         """How far axis 5 is turned from where axes 4 and 6 are in line, rad, (n,), within half a turn."""

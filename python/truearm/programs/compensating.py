@@ -1,5 +1,6 @@
 """Compensating a program: the public call."""
 
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -61,11 +62,12 @@ def compensate_program(
     compensator = required(compensator, Compensator, "the compensator")
     calibration, author = compensator.calibration, compensator.programming
     written_in = language_of(Path(path), chosen.language)
-    declared = _declared(controller, written_in, author)
-    if declared.robot is not author:
-        refuse_another_arm(declared, calibration.robot)
+    declared = _declared(controller, written_in, calibration.robot)
+    refuse_another_arm(declared, calibration.robot)
     known = _frames(frames).fresh()
-    program = read_program(Path(path), written_in, author, known)
+    # Configuration data tells of the catalogue's postures; poses are of the tool that the author had.
+    postured = replace(calibration.robot, tool=author.tool)
+    program = read_program(Path(path), written_in, postured, known)
     refuse_contradiction(program, declared, force=chosen.force)
     positions_only = not calibration.selection.orientation
     beyond = tuple(beyond_learnt(calibration, compensator.features))
@@ -107,19 +109,19 @@ def _facts(compensator: Compensator, declared: Controller, chosen: Choices) -> d
     }
 
 
-def _declared(given: Controller | str | Path | None, language: Language, author: Robot) -> Controller:
-    """The controller's model as it is declared.
+def _declared(given: Controller | str | Path | None, language: Language, arm: Robot) -> Controller:
+    """The controller's model as it is declared for the nominal arm that was calibrated, whoever the author.
 
     Raises:
         UsageError: If it must be declared and is not, or is of another kind of arm.
     """
     if given is None or isinstance(given, str | Path):
-        declared = declared_controller(None if given is None else str(given), language, author)
+        declared = declared_controller(None if given is None else str(given), language, arm)
     else:
         declared = required(given, Controller, "the controller")
-    if declared.robot.joints != author.joints:
+    if declared.robot.joints != arm.joints:
         raise UsageError(
-            f"the controller's model {declared.robot.name} has other joints than {author.name}",
+            f"the controller's model {declared.robot.name} has other joints than {arm.name}",
             way_out="Declare the controller of this arm",
         )
     return declared

@@ -25,6 +25,7 @@ from truearm.programs.source import Source
 from truearm.programs.tables import Motion, MoveTable, TargetTable
 from truearm.reading import DELIMITERS
 from truearm.robot import Robot
+from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
@@ -156,11 +157,11 @@ class _Reader:
 
     def _check_turns(self, layout: Layout, values: Floats, at: Integers) -> None:
         if isinstance(layout, QuaternionPose):
-            none = np.linalg.norm(values[:, 3:7], axis=1) == 0.0
-            if none.any():
-                self._source.fail(
-                    int(at[none][0]), "a quaternion of length zero", rule="It is a turn: w x y z of length 1"
-                )
+            lengths = np.linalg.norm(values[:, 3:7], axis=1)
+            off = np.flatnonzero(np.abs(lengths - 1.0) > UNIT_TOLERANCE)
+            if len(off):
+                what = f"the quaternion qw qx qy qz has length {lengths[off[0]]:.6g}"
+                self._source.fail(int(at[off[0]]), what, rule=UNIT_QUATERNIONS)
 
     def _columns(
         self, part: _Part, places: list[int | None], lines: Integers, width: int

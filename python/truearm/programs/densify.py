@@ -27,6 +27,9 @@ Bools = NDArray[np.bool_]
 
 MOST_SAMPLES: Final = 4000
 WITHIN: Final = 4
+LEAST_SAMPLES: Final = 2 * WITHIN
+TURN_RAD: Final = np.deg2rad(5.0)
+"""Of the tool from one sample to the next at most."""
 MOVES_NAMED: Final = 5
 UNREACHED: Final = "the nominal arm does not reach all of the line"
 BLENDED: Final = "how far it is blended with its neighbours is not written as a number"
@@ -171,9 +174,7 @@ class Densifier:
         poses = self._robot.flange_chain.pose(np.ascontiguousarray(self._robot.joints_from_readings(ends)))
         if start != end:
             poses[0] = rigid_inverse(_moved(displacement)) @ _moved(uses.displacements[start]) @ poses[0]
-        line = _line(poses @ tool, self._spacing.least_m)
-        if line is None:
-            return []
+        line, within = _line(poses @ tool, self._spacing.least_m)
         seeds = ends[0] + np.linspace(0.0, 1.0, len(line))[:, None] * (ends[1] - ends[0])
         nominal = self._inverse.near_or_nan(line @ rigid_inverse(tool), seeds)
         nominal[-1] = ends[-1]
@@ -193,24 +194,27 @@ class Densifier:
         self._deviation_mm[move] = MM_PER_METRE * deviation_m
         if deviation_m <= self._spacing.deviation_m:
             return []
-        chosen = self._chosen(move, points)
+        chosen = self._chosen(move, points, within)
         if isinstance(chosen, str):
             return chosen
         return self._steps(move, environment, found.q[list(chosen)], tuple(chosen.values()))
 
-    def _chosen(self, move: int, points: Floats) -> dict[int, float] | str:
-        """Which of the points (n, 3) become waypoints of a move, and the room in m that each of them has; or
-        why they cannot.
+    def _chosen(self, move: int, points: Floats, within: int) -> dict[int, float] | str:
+        """Which of the points (n, 3), `within` steps in the least spacing, become waypoints of a move, and
+        the room in m that each of them has; or why they cannot.
         """
+        least_mm = MM_PER_METRE * self._spacing.least_m
+        if within == 0:
+            return f"it is shorter than twice the least spacing of {least_mm:g} mm"
         blends = self._program.language.blends(self._program, move)
         if blends is None:
             return BLENDED
         clear = _clear_of(blends, points, self._spacing.least_m / 2.0)
         if not clear:
             return NO_ROOM
-        chosen = _needed(points, self._spacing.deviation_m, clear)
+        chosen = _needed(points, self._spacing.deviation_m, clear, within)
         if chosen is None:
-            return f"the least spacing of {MM_PER_METRE * self._spacing.least_m:g} mm is too wide"
+            return f"the least spacing of {least_mm:g} mm is too wide"
         rooms = _rooms(points[[0, *chosen, len(points) - 1]], blends)
         return dict(zip(chosen, rooms, strict=True))
 
@@ -253,19 +257,25 @@ def _moved(displacement: Transform | None) -> Transform:
     return np.eye(4) if displacement is None else displacement
 
 
-def _line(ends: Floats, least_m: float) -> Floats | None:
-    """Poses (n, 4, 4) on the straight line between two, both ends included; None for a short one."""
+def _line(ends: Floats, least_m: float) -> tuple[Floats, int]:
+    """Poses (n, 4, 4) on the straight line between two, both ends included, and how many steps lie in the
+    least spacing; 0 where no waypoint has that on both sides.
+    """
+    first, last = ends[:, :3, :3]
+    turn = rotation_vector_from_matrix(first.T @ last)
+    least = max(LEAST_SAMPLES, int(np.ceil(np.linalg.norm(turn) / TURN_RAD)))
     length = float(np.linalg.norm(ends[1, :3, 3] - ends[0, :3, 3]))
     count = min(int(length / least_m) * WITHIN, MOST_SAMPLES)
-    if count < 2 * WITHIN:
-        return None
+    if count < LEAST_SAMPLES:
+        count, within = least, 0
+    else:
+        finer = -(-least // count)
+        count, within = count * finer, WITHIN * finer
     along = np.linspace(0.0, 1.0, count + 1)
     poses = np.tile(np.eye(4), (count + 1, 1, 1))
     poses[:, :3, 3] = ends[0, :3, 3] + along[:, None] * (ends[1, :3, 3] - ends[0, :3, 3])
-    first, last = ends[:, :3, :3]
-    turn = rotation_vector_from_matrix(first.T @ last)
     poses[:, :3, :3] = first @ matrix_from_rotation_vector(along[:, None] * turn)
-    return poses
+    return poses, within
 
 
 def _clear_of(blends: tuple[float, float], points: Floats, margin_m: float) -> range:
@@ -295,17 +305,17 @@ def _rooms(points: Floats, blends: tuple[float, float]) -> list[float]:
     return rooms
 
 
-def _needed(points: Floats, deviation_m: float, clear: range) -> list[int] | None:
+def _needed(points: Floats, deviation_m: float, clear: range, within: int) -> list[int] | None:
     """Which of the points (n, 3), ends apart, a chain of straight lines needs; None if they do not suffice.
 
-    Equal steps lie between the points, WITHIN of them in the least spacing, so a line from point i to point j
-    passes each point between at an equal share of its way. Points that are not `clear` are not used: there
-    the arm leaves the lines anyway, for it is blended.
+    Equal steps lie between the points, `within` of them in the least spacing, so a line from point i to
+    point j passes each point between at an equal share of its way. Points that are not `clear` are not used:
+    there the arm leaves the lines anyway, for it is blended.
     """
     chosen: list[int] = []
     start, last = 0, len(points) - 1
-    while not chosen or clear.stop - start > WITHIN:
-        end = _farthest(points, start, deviation_m)
+    while not chosen or clear.stop - start > within:
+        end = _farthest(points, start, deviation_m, within)
         if end is None:
             return None
         if end == last:
@@ -315,12 +325,12 @@ def _needed(points: Floats, deviation_m: float, clear: range) -> list[int] | Non
     return chosen
 
 
-def _farthest(points: Floats, start: int, deviation_m: float) -> int | None:
+def _farthest(points: Floats, start: int, deviation_m: float, within: int) -> int | None:
     """The last point to which a straight line from `start` stays within the deviation; None without one."""
     last = len(points) - 1
     if _deviation(points[start:]) <= deviation_m:
         return last
-    low, high = start + WITHIN, last - WITHIN
+    low, high = start + within, last - within
     if high < low or _deviation(points[start : low + 1]) > deviation_m:
         return None
     while high - low > 1:

@@ -28,6 +28,7 @@ def edited(program: Program, written: Written, inserted: Mapping[int, Sequence[W
     out = []
     for number, source in enumerate(program.sources):
         numbers, words = _in_file(program, written, number), list(inserted.get(number, ()))
+        words += _recounted(program, words) if number == 0 else []
         if lettered:
             numbers, spelled = _spelled(numbers, lettered)
             words += spelled
@@ -36,6 +37,17 @@ def edited(program: Program, written: Written, inserted: Mapping[int, Sequence[W
         words.sort(key=lambda word: word[:2])
         out.append(splice_numbers(source.content, (starts, ends), values, decimals, words))
     return out
+
+
+def _recounted(program: Program, words: Sequence[Words]) -> list[Words]:
+    """How many lines the first file has with words in it, where it says so."""
+    count, source = program.line_count, program.sources[0]
+    if count is None:
+        return []
+    newline, (first, last) = source.newline.encode(), count.lines
+    added = sum(text.count(newline) for start, _, text in words if first <= start <= last)
+    stated = int(source.part(count.start, count.end))
+    return [(count.start, count.end, b"%d" % (stated + added))] if added else []
 
 
 def _in_file(program: Program, written: Written, number: int) -> Columns:

@@ -3,7 +3,7 @@
 A TOML file with a table `[tool.NAME]` or `[object.NAME]` a frame; docs/reference/programs.md has all keys.
 """
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
@@ -29,6 +29,10 @@ LENGTHS_M: Final = {"mm": 1e-3, "m": 1.0}
 MM_AND_MRAD: Final = 1e-3
 """Unit of an entry's covariance, whatever the file's unit of lengths: mm and mrad."""
 ORIENTATIONS: Final = ("quaternion_wxyz", "euler_zyx_deg", "rotation_vector_rad")
+KRL_WORLD: Final = "$WORLD"
+RAPID_WORLD: Final = "wobj0"
+WORLDS: Final = (KRL_WORLD, RAPID_WORLD)
+"""Objects that are a controller's world in the arm's base; the other objects of its programs are in it."""
 
 
 class _Section(BaseModel):
@@ -123,7 +127,8 @@ class Frames:
 
     Attributes:
         tools: flange_from_tool of each.
-        objects: base_from_object of each.
+        objects: Each as the controller holds it: in the controller's world where the file has that (WORLDS),
+            else in the arm's base.
         payloads_kg: Payloads of the tools that state one.
         where: The file, for messages; empty without one.
         asked: What was looked up.
@@ -159,8 +164,8 @@ class Frames:
             ) from None
         unit = LENGTHS_M[content.length_unit]
         return cls(
-            {name.casefold(): _frame(name, entry, unit) for name, entry in content.tool.items()},
-            {name.casefold(): _frame(name, entry, unit) for name, entry in content.object.items()},
+            {key: _frame(name, entry, unit) for key, name, entry in _folded("tool", content.tool, where)},
+            {key: _frame(name, entry, unit) for key, name, entry in _folded("object", content.object, where)},
             {n.casefold(): e.payload_kg for n, e in content.tool.items() if e.payload_kg is not None},
             where,
         )
@@ -185,6 +190,22 @@ class Frames:
         """The tool or object of that name where the file holds it."""
         self.asked.names[kind].setdefault(name.casefold(), name)
         return self.of(kind).get(name.casefold())
+
+    def world(self) -> Frame | None:
+        """The controller's world in the arm's base; None where the file has none.
+
+        Raises:
+            InputError: If it has those of two controllers, and they are different places.
+        """
+        found = [self.objects[name.casefold()] for name in WORLDS if name.casefold() in self.objects]
+        if len(found) > 1 and not np.allclose(found[0].true, found[1].true, rtol=0.0, atol=1e-9):
+            raise InputError(
+                f"it has two worlds, {' and '.join(one.name for one in found)}, at different places",
+                where=self.where,
+                rule="Objects are told in the world of their controller",
+                way_out="Give each controller a frames file of its own",
+            )
+        return found[0] if found else None
 
     def at_start(self, kind: Kind, name: str) -> Frame:
         """What holds until the program sets another: asked for only where a motion has it."""
@@ -219,6 +240,27 @@ def written_out(word: str, distinct: Iterable[Written]) -> dict[Written, str]:
 def name_at_start(word: str, *, written: bool) -> str:
     """The name of what holds until a program sets another: with 0 where the word is of one written out."""
     return f"{word} 0" if written else word
+
+
+def _folded(
+    kind: Kind, entries: Mapping[str, FrameEntry], where: str
+) -> Iterator[tuple[str, str, FrameEntry]]:
+    """Each entry of a kind with its name as it is compared and as it is written.
+
+    Raises:
+        InputError: If two names are compared as the same.
+    """
+    seen: dict[str, str] = {}
+    for name, entry in entries.items():
+        other = seen.setdefault(name.casefold(), name)
+        if other != name:
+            raise InputError(
+                f'it has both "{kind}.{other}" and "{kind}.{name}"',
+                where=where,
+                rule="Names are compared with case ignored",
+                way_out="Keep one of them",
+            )
+        yield name.casefold(), name, entry
 
 
 def _frame(name: str, entry: FrameEntry, unit_m: float) -> Frame:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from truearm.programs.environment import Frame, Transform
-from truearm.programs.frames import Frames, name_at_start, written_out
+from truearm.programs.frames import KRL_WORLD, Frames, name_at_start, written_out
 from truearm.programs.krl_order import Order
 from truearm.programs.krl_routines import Routines
 from truearm.programs.krl_storage import KrlStorage
@@ -114,7 +114,7 @@ class KrlFrames:
     ) -> None:
         self._storage, self._frames, self._sources = storage, frames, sources
         self._routines, self._order = routines, order
-        self._world = frames.held("object", "$WORLD") or Frame.of(np.eye(4), "$WORLD")
+        self._world = frames.held("object", KRL_WORLD) or Frame.of(np.eye(4), KRL_WORLD)
         self._written = {kind: self._names_of_written(kind) for kind in KINDS}
 
     def _names_of_written(self, kind: str) -> dict[bytes, str]:

@@ -50,6 +50,21 @@ class Unplaced:
     blended: bool
 
 
+@dataclass(frozen=True)
+class LineCount:
+    """A number in a file that says how many lines a part of it has.
+
+    Attributes:
+        start: Offset of its first digit.
+        end: Offset behind its last one.
+        lines: Offsets between which lines are counted, both included.
+    """
+
+    start: int
+    end: int
+    lines: tuple[int, int]
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """What a reader found.
@@ -69,6 +84,7 @@ class Program:
             says, by number; False where that is not certain.
         unplaced: Motions that are listed as they lead to no numbers of the program.
         accurate: Why the controller is known to compute with a model of its own, where the program says so.
+        line_count: Where its first file says how many lines it has; None where it does not.
     """
 
     language: "Language"
@@ -84,6 +100,7 @@ class Program:
     unsure: Set[int] = frozenset()
     nearest: Mapping[int, bool] = field(default_factory=dict)
     unplaced: Sequence[Unplaced] = ()
+    line_count: LineCount | None = None
 
 
 @dataclass(frozen=True)
@@ -170,7 +187,8 @@ class Language(Protocol):
 
         Args:
             sources: The files, the named one first.
-            robot: The arm, for its joints and for geometry that configuration data depends on.
+            robot: The nominal arm, for its joints and limits and for geometry that configuration data depends
+                on, with the author's tool.
             frames: Tools and objects from outside the program.
 
         Raises:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from truearm.programs.environment import Frame
-from truearm.programs.frames import Frames
+from truearm.programs.frames import RAPID_WORLD, Frames
 from truearm.programs.lexing import Token
 from truearm.programs.rapid_data import Declarations
 from truearm.programs.rapid_values import Aggregate, Value, pose_of, truth
@@ -30,7 +30,7 @@ class RapidFrames:
 
     def __init__(self, declarations: Declarations, frames: Frames) -> None:
         self._declarations, self._frames = declarations, frames
-        self._world = frames.held("object", "wobj0") or Frame.of(np.eye(4), "wobj0")
+        self._world = frames.held("object", RAPID_WORLD) or Frame.of(np.eye(4), RAPID_WORLD)
 
     def tool(self, given: Sequence[Token]) -> Found:
         """The tool that an argument names."""
@@ -51,7 +51,7 @@ class RapidFrames:
     def work_object(self, given: Sequence[Token]) -> Found:
         """The work object that an argument names; wobj0 without one."""
         name = given[0].text if len(given) == 1 else ""
-        if not given or name.lower() == "wobj0":
+        if not given or name.lower() == RAPID_WORLD:
             return Found(self._world)
         value = self._value(name, "wobjdata")
         if isinstance(value, str):

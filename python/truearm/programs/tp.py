@@ -15,7 +15,7 @@ from truearm.programs.layouts import Joints
 from truearm.programs.program import BlendsShortened, LinearStep, Program, StepTexts
 from truearm.programs.source import Source
 from truearm.programs.tp_configuration import ConfiguredPose
-from truearm.programs.tp_positions import section
+from truearm.programs.tp_positions import line_count, section
 from truearm.programs.tp_reader import Reader
 from truearm.programs.tp_steps import inserted
 from truearm.robot import Robot
@@ -51,6 +51,7 @@ class FanucTp(BlendsShortened):
             fixed=reader.fixed,
             unsure=reader.unsure,
             unplaced=reader.unplaced,
+            line_count=line_count(sources[0]),
         )
 
     def mark(self, source: Source, text: str) -> tuple[int, str]:

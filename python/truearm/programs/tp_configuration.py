@@ -6,6 +6,9 @@ centre is in front of the axis of J1; B: behind it. A turn number is 0 within ha
 539 deg, -1 from -180 to -539 deg. Of which joints is written differently: of J1, J4 and J6, or of J4, J5 and
 J6 (KAREL Reference Manual, CONFIG). What a program and the limits of the arm rule out is not meant; where
 both are left, only what is the same in both can be said.
+
+J3 has no turn number. Read against the horizontal it may go through more than a turn, but the forearm cannot
+pass the upper arm: of readings a turn apart, that within half a turn of the stretched arm is meant.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,6 +31,7 @@ Integers = NDArray[np.int64]
 LETTERS: Final = ("NF", "UD", "TB")
 ORDERS: Final = ((0, 3, 5), (3, 4, 5))
 TURNING: Final = (0, 3, 4, 5)
+ELBOW: Final = len(LETTERS) + len(TURNING)
 FULL_TURN: Final = 2.0 * np.pi
 MOST_TURNS: Final = 99
 SAME_M, SAME_RAD = 1e-3, 1e-3
@@ -54,7 +58,7 @@ class ConfiguredPose(EulerPose):
 
 @dataclass(frozen=True, eq=False)
 class FanucConfiguration:
-    """Seven digits: three letters, and the turn numbers of J1, J4, J5 and J6.
+    """Eight digits: three letters, the turn numbers of J1, J4, J5 and J6, and whole turns of the elbow.
 
     Attributes:
         branches: Postures of the arm.
@@ -72,12 +76,13 @@ class FanucConfiguration:
             self.branches.elbow(q) * np.sign(up) < 0.0,
             self.branches.reach(q) < 0.0,
         ]
-        found: Integers = np.column_stack([*letters, turns(q[:, TURNING])]).astype(np.int64)
+        turned = turns(q[:, TURNING]), turns(self.branches.bent(q))
+        found: Integers = np.column_stack([*letters, *turned]).astype(np.int64)
         return found
 
     def digits_of_text(self, values: Floats) -> Integers:
         """As in Configuration; a joint without a turn number has none."""
-        found = np.zeros((len(values), len(LETTERS) + len(TURNING)), dtype=np.int64)
+        found = np.zeros((len(values), ELBOW + 1), dtype=np.int64)
         written = np.nan_to_num(values, nan=ANY + 1).astype(np.int64)
         found[:, : len(LETTERS)] = written[:, : len(LETTERS)]
         numbers = written[:, len(LETTERS) :]
@@ -85,15 +90,15 @@ class FanucConfiguration:
         turned = chosen[0]
         for other in chosen[1:]:
             turned = np.where((turned == other).all(axis=1)[:, None], turned, ANY + 1)
-        found[:, len(LETTERS) :] = turned
+        found[:, len(LETTERS) : ELBOW] = turned
         return found
 
     def text_of_digits(self, digits: Integers, values: Floats) -> Floats:
         """As in Configuration; NaN where the order of the turn numbers matters and is not known."""
         text = np.array(values)
         text[:, : len(LETTERS)] = digits[:, : len(LETTERS)]
-        written = [self._gathered(digits[:, len(LETTERS) :], order) for order in self.orders]
-        alike = np.all([one == written[0] for one in written], axis=0).all(axis=1)
+        written = [self._gathered(digits[:, len(LETTERS) : ELBOW], order) for order in self.orders]
+        alike = np.all([one == written[0] for one in written], axis=0).all(axis=1) & (digits[:, ELBOW] == 0)
         text[:, len(LETTERS) :] = np.where(alike[:, None], written[0], np.nan)
         return text
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from truearm.programs.program import LineCount
 from truearm.programs.source import Source
 from truearm.programs.tables import ABSENT, Number
 from truearm.programs.tp_configuration import LETTERS
@@ -23,6 +24,9 @@ _CONFIG: Final = re.compile(
 )
 _CARTESIAN: Final = "XYZWPR"
 CURRENT: Final = "F"
+
+
+_LINE_COUNT: Final = re.compile(r"^LINE_COUNT[ \t]*=[ \t]*(\d{1,9})\b", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,13 @@ class Position:
     frame: str
     tool: str
     problem: str = ""
+
+
+def line_count(source: Source) -> LineCount | None:
+    """Where /ATTR says how many lines /MN has."""
+    lines = section(source, "MN")
+    found = _LINE_COUNT.search(source.text_with_line_feeds, 0, lines[0])
+    return None if found is None else LineCount(*found.span(1), lines)
 
 
 def section(source: Source, name: str) -> tuple[int, int]:
