@@ -286,6 +286,13 @@ def _fit_scheme(
             way_out="Give --model constant (model='constant')",
         )
     determined = task.columns(found.determined)
+    if not determined:
+        raise WorkError(
+            "the rows determine no parameter of the arm",
+            where=", ".join(data.files),
+            rule="The paper's schemes are made of the parameters that the rows determine",
+            way_out="Give --model constant (model='constant'), or measure where the arm's parameters tell",
+        )
     columns = well_determined(task.problem(measured, determined), constant, determined)
     values = task.arm.robot.joints_from_readings(data.readings)
     rows = SchemeRows(task.problem(measured, columns), columns, constant, values, task.options.split.seed)
