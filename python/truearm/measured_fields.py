@@ -45,14 +45,15 @@ def read_fields(
     distance = _distances(table, layout)
     if measured or layout.targets:
         _check_measured(table, targets, distance)
-    ends, assumed = _ends(table, layout, distance)
+    sigma = _sigma(table, layout.sigma) if layout.sigma else None
+    ends, assumed = _ends(table, layout, distance, sigma)
     purpose, unknown = _purpose(table, layout)
     features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
         "readings": readings,
         "targets": targets,
         "orientations": _orientations(table) if layout.quaternion else None,
-        "sigma_m": _sigma(table, layout.sigma) if layout.sigma else None,
+        "sigma_m": sigma,
         "group": _group(table, layout, default_group),
         "features": features,
         "sources": np.full(table.row_count, table.where),
@@ -166,7 +167,7 @@ def _group(table: Table, layout: Layout, default: str) -> Texts:
 
 
 def _ends(
-    table: Table, layout: Layout, distance: Floats | None
+    table: Table, layout: Layout, distance: Floats | None, sigma: Floats | None
 ) -> tuple[dict[str, Texts | None], list[Notice]]:
     """What the distances lead to: `anchor` and `pair`, each None where there is none; and notices.
 
@@ -185,6 +186,9 @@ def _ends(
     _refuse(table, measured & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
     if pair is not None:
         _check_pairs(table, pair, distance)
+        _check_alike(table, pair, "distances", distance)
+        if sigma is not None:
+            _check_alike(table, pair, "sigmas", sigma)
     return {"anchor": anchor, "pair": pair}, []
 
 
@@ -212,13 +216,17 @@ def _check_pairs(table: Table, pair: Texts, distance: Floats) -> None:
     _refuse(table, lonely, 'not exactly two rows share the name in "pair" in', "A pair is two rows")
     empty = (pair != "") & np.isnan(distance)
     _refuse(table, empty, "the distance of a pair is empty in", "Both rows of a pair hold the same distance")
+
+
+def _check_alike(table: Table, pair: Texts, what: str, values: Floats) -> None:
+    """Refuse a pair whose two rows hold different values (n,), m."""
     for name in np.unique(pair[pair != ""]):
-        first, second = distance[pair == name]
+        first, second = values[pair == name]
         _refuse(
             table,
             (pair == name) & (first != second),
-            f'pair "{name}" has two distances, {first:g} m and {second:g} m, in',
-            "Both rows of a pair hold the same distance",
+            f'pair "{name}" has two {what}, {first:g} m and {second:g} m, in',
+            f"Both rows of a pair hold the same {what[:-1]}",
         )
 
 
