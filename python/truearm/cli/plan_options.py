@@ -46,11 +46,14 @@ Order: TypeAlias = Annotated[
 SigmaMm: TypeAlias = Annotated[float, typer.Option(metavar="MM", help="Noise of a measured coordinate.")]
 FloorMm: TypeAlias = Annotated[
     float | None,
-    typer.Option(metavar="MM", help="Height in the base frame that arm and tool stay above."),
+    typer.Option(
+        metavar="MM",
+        help="Height in the base frame that arm and tool, with --from the measured targets, stay above.",
+    ),
 ]
 BoxMm: TypeAlias = Annotated[
     str | None,
-    typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the target."),
+    typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the targets."),
 ]
 Seed: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of the candidates.")]
 Picture: TypeAlias = Annotated[
