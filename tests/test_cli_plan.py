@@ -119,6 +119,21 @@ def test_a_room_that_is_none_is_told(words, message, tmp_path, capsys):
     assert message in " ".join(capsys.readouterr().err.split())
 
 
+def test_poses_of_another_plan_are_written_over_only_where_their_file_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plan", "rv-m2", "-n", "8"]) == 0
+    first = Path("poses.csv").read_bytes()
+    assert main(["plan", "rv-m2", "-n", "8", "--picture", "same.png"]) == 0
+    capsys.readouterr()
+    assert main(["plan", "rv-m2", "-n", "9", "--picture", "other.png"]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "poses.csv is there already, with other poses. To write over it name it: -o poses.csv" in told
+    assert Path("poses.csv").read_bytes() == first
+    assert not Path("other.png").exists()
+    assert main(["plan", "rv-m2", "-n", "9", "-o", "poses.csv"]) == 0
+    assert Path("poses.csv").read_bytes() != first
+
+
 def assert_repeats(table, joints):
     """Each repeated pose comes at once from the other side, and at the end from its first side."""
     poses = table[joints].apply(tuple, axis=1)

@@ -19,7 +19,11 @@ COUNT: Final = 60
 Count: TypeAlias = Annotated[
     int | None, typer.Option("-n", "--count", metavar="N", help=f"Poses to fit to.  [default: {COUNT}]")
 ]
-Output: TypeAlias = Annotated[Path, typer.Option("-o", "--output", metavar="CSV", help="Where the poses go.")]
+OUTPUT: Final = Path("poses.csv")
+Output: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="CSV", help=f"Where the poses go.  [default: {OUTPUT}]"),
+]
 CellReaching: TypeAlias = Annotated[
     Path | None, typer.Option(metavar="CELL", help="A cell file whose sensor has to reach the poses.")
 ]
