@@ -57,17 +57,52 @@ def test_poses_stay_above_a_floor_and_in_a_box(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     arm = Robot.load("ur10")
     calibrated = VirtualArm(arm, seed=1)
-    ta.calibrate(arm, calibrated.measure(calibrated.poses(60)), model="constant").save(Path("a.calib"))
+    known = ta.calibrate(arm, calibrated.measure(calibrated.poses(60)), model="constant")
+    known.save(Path("a.calib"))
     room = ["--floor-mm", "50", "--box-mm", "-900,-900,100,900,900,1200", "-o", "poses.csv", "--json"]
     for words in (["plan", "ur10", "-n", "20"], ["plan", "--next", "5", "--from", "a.calib"]):
         assert main([*words, *room]) == 0
         told = json.loads(capsys.readouterr().out)
         readings = Poses.read_csv("poses.csv", arm).readings
         points = arm.position(readings)
+        if "--from" in words:
+            points = places_of(arm, readings, known.model.setup.targets[0, 0])
         assert (np.abs(points[:, :2]) <= 0.9).all()
         assert ((points[:, 2] >= 0.1) & (points[:, 2] <= 1.2)).all()
         assert told["lowest_mm"] >= 50.0
-        assert told["lowest_mm"] == pytest.approx(1e3 * lowest(arm, readings, tool=arm.tool))
+        low = np.minimum(points[:, 2].min(), lowest(arm, readings, tool=arm.tool))
+        assert told["lowest_mm"] == pytest.approx(1e3 * low)
+
+
+def places_of(arm, readings, point):
+    """Points (n, 3) of the nominal arm's flange in its base frame."""
+    flanges = arm.flange_chain.pose(readings)
+    return flanges[:, :3, 3] + flanges[:, :3, :3] @ point
+
+
+def test_each_target_that_the_calibration_found_stays_in_the_room(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arm = Robot.load("ur10")
+    points = np.array([[0.1, 0.0, 0.25], [-0.2, 0.1, 0.05], [0.0, 0.0, 3.0]])
+    rng = np.random.default_rng(1)
+    readings = rng.uniform(-2.0, 2.0, (60, 6))
+    table = pd.DataFrame(readings, columns=[f"q{k}" for k in range(1, 7)])
+    for number, point in zip(("", "2", "3"), points, strict=True):
+        table[[f"{axis}{number}" for axis in "xyz"]] = places_of(arm, readings, point) + rng.normal(
+            0.0, 3e-5, (60, 3)
+        )
+    table["group"] = np.where(np.arange(60) < 30, "one", "two")
+    table.loc[30:, ["x3", "y3", "z3"]] = np.nan
+    data = ta.Measurements.from_dataframe(table)
+    ta.calibrate(arm, data, model="constant").save(Path("a.calib"))
+    room = ["--floor-mm", "50", "--box-mm", "-900,-900,100,900,900,1200", "--json"]
+    assert main(["plan", "--acceptance", "5", "--from", "a.calib", "-o", "poses.csv", *room]) == 0
+    assert json.loads(capsys.readouterr().out)["lowest_mm"] >= 50.0
+    poses = Poses.read_csv("poses.csv", arm).readings
+    for point in points[:2]:
+        at = places_of(arm, poses, point)
+        assert (at >= [-0.901, -0.901, 0.099]).all()
+        assert (at <= [0.901, 0.901, 1.201]).all()
 
 
 @pytest.mark.parametrize(
@@ -82,6 +117,21 @@ def test_poses_stay_above_a_floor_and_in_a_box(tmp_path, capsys, monkeypatch):
 def test_a_room_that_is_none_is_told(words, message, tmp_path, capsys):
     assert main(["plan", "ur10", "-n", "20", "-o", str(tmp_path / "poses.csv"), *words]) != 0
     assert message in " ".join(capsys.readouterr().err.split())
+
+
+def test_poses_of_another_plan_are_written_over_only_where_their_file_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plan", "rv-m2", "-n", "8"]) == 0
+    first = Path("poses.csv").read_bytes()
+    assert main(["plan", "rv-m2", "-n", "8", "--picture", "same.png"]) == 0
+    capsys.readouterr()
+    assert main(["plan", "rv-m2", "-n", "9", "--picture", "other.png"]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "poses.csv is there already, with other poses. To write over it name it: -o poses.csv" in told
+    assert Path("poses.csv").read_bytes() == first
+    assert not Path("other.png").exists()
+    assert main(["plan", "rv-m2", "-n", "9", "-o", "poses.csv"]) == 0
+    assert Path("poses.csv").read_bytes() != first
 
 
 def assert_repeats(table, joints):

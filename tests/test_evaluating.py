@@ -82,6 +82,19 @@ def test_a_kept_tool_needs_few_rows(known):
     assert kept.errors["variable"].position.mean < free.errors["variable"].position.mean
 
 
+def test_frame_and_tool_are_found_from_more_values_than_unknowns(known):
+    arm, calibration = known
+    poses = moved(arm).poses(10, seed=3)
+    data = moved(arm).measure(poses)
+    found = [ta.evaluate(calibration, data, seed=seed) for seed in range(4)]
+    assert {each.n_frame for each in found} == {4}
+    assert ta.evaluate(calibration, data, frame_rows=3, keep_tool=True).n_frame == 3
+    turned = moved(arm).measure(poses, orientation=True)
+    assert ta.evaluate(calibration, turned).n_frame == 3
+    with pytest.raises(ta.InputError, match=r"9 measured values in 3 frame rows .* the 9 .*--frame-rows 4"):
+        ta.evaluate(calibration, data, frame_rows=3)
+
+
 def test_a_kept_tool_and_its_orientation():
     arm = VirtualArm.paper(seed=2)
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(80), orientation=True), model="constant")

@@ -21,6 +21,7 @@ from truearm.fleet import Fleet, run_fleet
 from truearm.fleet.attention import Reason, order, reasons
 from truearm.fleet.drift import MOVED, drift_of
 from truearm.fleet.fleet_file import LimitsSection
+from truearm.fleet.inputs import find_inputs
 from truearm.fleet.page import fleet_page
 from truearm.fleet.rows import Judged
 from truearm.simulation import Imperfections, VirtualArm
@@ -302,6 +303,19 @@ def test_what_noise_alone_would_leave_holds_the_sigma_of_rows(tmp_path):
     found = by_name(run_fleet(Fleet.from_toml(text, folder=tmp_path), tmp_path / "out", workers=1))
     assert found["silent"].row["floor_mm"] < 1.0
     assert found["stated"].row["floor_mm"] > 3.0
+
+
+@pytest.mark.parametrize("pattern", ["o*.csv", "{folder}/nov/o*.csv"])
+def test_a_folder_with_brackets_is_no_pattern(tmp_path, pattern):
+    folder = tmp_path / "a [1]"
+    (folder / "nov").mkdir(parents=True)
+    (tmp_path / "nov").mkdir()
+    for place in (folder, tmp_path / "nov"):
+        (place / "oct.csv").write_text("q1\n")
+    text = HEAD + f'[[arm]]\nname = "R1"\nmeasurements = "{pattern.format(folder=tmp_path)}"\n'
+    (entry,) = Fleet.from_toml(text, folder=folder).arms
+    found = find_inputs(entry, tmp_path / "out").files
+    assert found == ((folder if pattern == "o*.csv" else tmp_path / "nov") / "oct.csv",)
 
 
 def test_outliers_are_named_on_the_page_which_may_have_no_report_to_look_into(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 import truearm as ta
 from tests.nests import a_target_a_row
 from tests.remastered import remastered
-from truearm.fleet.drift import MOST_POSES, drift_of
+from truearm.fleet.drift import MOST_POSES, check_comparable, drift_of
 from truearm.fleet.task import ArmTask, calibrate_arm
 from truearm.simulation import VirtualArm
 
@@ -32,6 +32,42 @@ def test_a_scara_whose_joint_was_mastered_anew_has_drifted_and_another_has_not(s
     (previous, moved, same), (_, rows, others) = scara
     assert drift_of(previous, moved, rows)["share_beyond"] > CLEARLY
     assert drift_of(previous, same, others)["share_beyond"] < 1.0 - CLEARLY
+
+
+def lifted(z_m):
+    """A turned transform (4, 4) that lifts."""
+    turned = np.eye(4)
+    turned[:3, :3] = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    turned[2, 3] = z_m
+    return turned
+
+
+def test_another_tool_flange_or_base_in_the_robot_file_is_no_drift(scara):
+    (previous, _, same), (_, _, rows) = scara
+    exact = drift_of(previous, same, rows)
+    tool = {"tool": lifted(0.15)}
+    shifted = previous.robot.flange @ lifted(0.1)
+    flange = {"flange": shifted, "tool": np.linalg.inv(lifted(0.1)) @ previous.robot.tool}
+    for changes in (tool, flange, {"base": lifted(0.5) @ previous.robot.base, "base_row": None}):
+        other = replace(same, robot=replace(same.robot, **changes))
+        found = drift_of(previous, other, rows)
+        assert found["mean_mm"] == pytest.approx(exact["mean_mm"], rel=0.0 if "base" in changes else 0.5)
+        assert found["share_beyond"] < 1.0 - CLEARLY
+
+
+@pytest.mark.parametrize(
+    ("frame", "mirrored", "words"),
+    [
+        ("world", False, r'made with frame "free".*with "world".*frame = "free", or leave its previous out'),
+        ("free", True, "whose joints turn or are coupled otherwise"),
+    ],
+)
+def test_calibrations_that_mean_something_else_are_not_compared(scara, frame, mirrored, words):
+    previous = scara[0][0]
+    robot = replace(previous.robot, coupling=(-1.0 if mirrored else 1.0) * previous.robot.coupling)
+    check_comparable(previous, previous.robot, "free", "previous.calib")
+    with pytest.raises(ta.InputError, match=words):
+        check_comparable(previous, robot, frame, "previous.calib")
 
 
 def test_without_measurements_the_bounds_of_the_standard_deviation_serve(scara):

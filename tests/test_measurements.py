@@ -372,9 +372,25 @@ def test_distances_that_nothing_names_lead_to_one_anchor() -> None:
     wire = pd.DataFrame({"q1": [0.0, 1.0, 2.0], "distance": [1.0, 2.0, 3.0]})
     data = Measurements.from_dataframe(wire)
     assert data.anchor is not None
-    assert data.anchor.tolist() == ["anchor 1"] * 3
+    assert data.anchor.tolist() == ["anchor of data"] * 3
     assert [notice.kind for notice in data.notices] == ["one_anchor"]
     assert not Measurements.from_dataframe(wire.assign(anchor="box")).notices
+
+
+def test_tables_that_are_set_ups_of_their_own_have_anchors_of_their_own() -> None:
+    wires = [pd.DataFrame({"q1": [0.0, 1.0], "distance": [1.0, k]}) for k in (2.0, 3.0)]
+    first, second = (Measurements.from_dataframe(wire) for wire in wires)
+    both = Measurements.concatenate([first, second, first.select([1])])
+    assert both.anchor is not None
+    assert both.group.tolist() == ["data", "data", "data 2", "data 2", "data"]
+    assert both.anchor.tolist() == [f"anchor of {group}" for group in both.group]
+    again = Measurements.concatenate([both, second])
+    assert again.anchor is not None
+    assert again.anchor.tolist() == [*both.anchor.tolist(), *["anchor of data 2"] * 2]
+    named = [Measurements.from_dataframe(wire.assign(group="a"), name=wire.columns[0]) for wire in wires]
+    joined = Measurements.concatenate(named).anchor
+    assert joined is not None
+    assert set(joined.tolist()) == {"anchor 1"}
 
 
 BY_HAND: dict[str, Any] = {

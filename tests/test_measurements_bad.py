@@ -101,6 +101,11 @@ TABLES = {
         ["0,1,p", "1,2,p"],
         'pair "p" has two distances, 1 m and 2 m',
     ),
+    "two sigmas of a pair": (
+        "q1,distance,pair,sigma_mm",
+        ["0,1,p,0.02", "1,1,p,1"],
+        'pair "p" has two sigmas, 2e-05 m and 0.001 m, in rows 1 and 2. Both rows .* the same sigma',
+    ),
     "pair without distance": (
         "q1,x,y,z,distance,pair",
         ["0,1,2,3,,p", "1,1,2,3,1,p"],

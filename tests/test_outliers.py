@@ -10,7 +10,7 @@ import truearm as ta
 from tests.report_support import words_of
 from truearm.cli import main
 from truearm.reporting.report import report
-from truearm.simulation import VirtualArm
+from truearm.simulation import Imperfections, VirtualArm
 
 
 def test_outliers_are_listed_and_kept_in_the_held_out_errors():
@@ -83,6 +83,36 @@ def test_what_is_fitted_is_said_to_be_without_outliers_that_were_taken_out(tmp_p
     assert "They were taken out of the fits;" in text
     assert main(["calibrate", "rv-m2", "m.csv", "-o", "constant", "--model", "constant"]) == 0
     assert "fitted to all 60 rows." in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("model", ["constant", "variable"])
+def test_an_outlier_by_its_orientation_is_told_with_its_turn(tmp_path, monkeypatch, capsys, model):
+    monkeypatch.chdir(tmp_path)
+    arm = VirtualArm.paper(seed=2, imperfections=Imperfections(share=0.0, noise_mm=0.02))
+    table, columns = arm.measure_table(arm.poses(60), orientation=True), ["qw", "qx", "qy", "qz"]
+    row = int(np.random.default_rng(7).permutation(60)[50])
+    w, x, y, z = table[columns].to_numpy()[row]
+    small, whole = np.sin(np.radians(2.5)), np.cos(np.radians(2.5))
+    turned = whole * np.array([w, x, y, z]) + small * np.array([-x, w, -z, y])
+    table.loc[[row], columns] = turned[None]
+    table.to_csv("m.csv", index=False)
+    assert main(["calibrate", "rv-m2", "m.csv", "-o", "out", "--model", model]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    calibration = ta.Calibration.load("out/calibration.calib")
+    (outlier,) = calibration.summary["outliers"]
+    assert (outlier["row"], outlier["turn_mrad"]) == (row + 1, pytest.approx(np.radians(5e3), rel=0.02))
+    named = f"row {row + 1} ({outlier['distance_mm']:.2f} mm, {outlier['turn_mrad']:.1f} mrad)"
+    assert f": {named}." in printed
+    without = re.findall(
+        rf"held-out ones among them: .*{model} [\d.]+ mm; nominal.*{model} ([\d.]+) mrad", printed
+    )
+    errors = calibration.validation.holdout[model].orientation
+    assert errors is not None
+    assert float(without[0]) < 0.2 * errors.mean
+    text = words_of(report(calibration).html)
+    assert "turn, mrad" in text
+    assert f"{outlier['turn_mrad']:.3f}" in text
+    assert re.search(r"up to [\d.]+ mm and 8[67][.\d]* mrad off", text)
 
 
 def test_of_the_outliers_the_advice_has_the_largest_distance():

@@ -114,6 +114,14 @@ def test_what_a_scheme_cannot_do_is_refused(calibrations, arm):
         Compensator(found)
 
 
+def test_a_scheme_of_an_arm_without_determined_parameters_is_refused():
+    text = 'name = "table"\nconvention = "standard"\nlength_unit = "m"\nangle_unit = "deg"\n'
+    robot = Robot.from_toml(text + '[[link]]\njoint = "revolute"\nd = 0.3\na = 0.5\n')
+    arm = VirtualArm(robot, seed=1, imperfections=Imperfections(share=0.0))
+    with pytest.raises(WorkError, match=r"determine no parameter of the arm.*--model constant"):
+        calibrate(robot, arm.measure(arm.poses(40)), model="regions", scheme_joints=(1,))
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [

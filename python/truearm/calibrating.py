@@ -59,6 +59,7 @@ from truearm.points_together import points_together
 from truearm.robot import Robot
 from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
+from truearm.shots import shots_notices
 from truearm.splitting import Split, measured_on_both_sides, split_rows
 from truearm.standard_errors import standard_errors
 from truearm.summary import distance_at_floor_mm
@@ -173,7 +174,7 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     elif any(notice.kind in (NO_HELP, FAR_FROM_NOMINAL) for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
-    return doubted if shifted else [*exchanged_notices(found), *doubted]
+    return doubted if shifted else [*shots_notices(found), *exchanged_notices(found), *doubted]
 
 
 def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Outliers | None) -> list[Notice]:

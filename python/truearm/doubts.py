@@ -1,7 +1,7 @@
 """Whether what a calibration found can be true: signs of wrong data or of another robot."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -92,12 +92,14 @@ class Outliers:
         means_mm: Mean errors of the models on the judged rows without them; empty where none is judged.
         judged: Which of them are judged, in words.
         entries: Each with file, row and distance_mm.
+        means_mrad: As means_mm, of the orientation; empty where it was not fitted.
     """
 
     named: str
     means_mm: Mapping[str, float]
     judged: str = ""
     entries: Sequence[Mapping[str, Any]] = ()
+    means_mrad: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "Outliers":
@@ -108,9 +110,10 @@ class Outliers:
         found, several = rows.outliers(), len(rows.data.files) > 1
         held = None if calibration.selection.distances else calibration.held
         means = {} if held is None else held.means_without_mm(found)
+        turns = {} if held is None else held.turns_without_mrad(found)
         judged = held.among(found, calibration.model_name) if held is not None and means else []
         named, among = (list_outliers(each, several=several) for each in (found, judged))
-        return cls(named, means, among, found)
+        return cls(named, means, among, found, turns)
 
 
 def doubts(

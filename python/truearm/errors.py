@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from truearm.lengths import distance_mm
+from truearm.lengths import how_far
 
 MAX_ROWS_NAMED = 10
 OUTLIERS_NAMED = 5
@@ -100,13 +100,13 @@ def list_outliers(outliers: Sequence[Mapping[str, Any]], *, several: bool) -> st
     """Rows with their distances in words, the first five: "row 3 (24.98 mm), row 8 (12.10 mm) and 2 more".
 
     Args:
-        outliers: file, row and distance_mm of each, the worst first.
+        outliers: file, row, distance_mm and, with orientation, turn_mrad of each, the worst first.
         several: Whether the rows are of several files, so that each has to be named.
     """
     names = short_names({outlier["file"] for outlier in outliers})
     named = [
         f"row {outlier['row']}{' of ' + names[outlier['file']] if several else ''}"
-        f" ({distance_mm(outlier['distance_mm'])})"
+        f" ({how_far(outlier['distance_mm'], outlier.get('turn_mrad'))})"
         for outlier in outliers[:OUTLIERS_NAMED]
     ]
     more = f" and {len(outliers) - len(named)} more" if len(outliers) > len(named) else ""

@@ -1,5 +1,6 @@
 """Errors of a calibration on measurements that it has not seen, mostly in a new set-up."""
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -16,7 +17,16 @@ from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts import NO_HELP, no_help
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
 from truearm.fitted_rows import known_rows
-from truearm.fitting import Stages, Task, core_errors, fit_options, no_stages
+from truearm.fitting import (
+    Stages,
+    Task,
+    core_errors,
+    fit_options,
+    frame_unknowns,
+    group_unknowns,
+    measured_values,
+    no_stages,
+)
 from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
 from truearm.judging import check_judged, judge, model_inputs, where_found
@@ -46,7 +56,8 @@ class EvaluationOptions:
     Attributes:
         seed: Seed of the draw of frame rows.
         use: What of the measurements to use, as in calibrate.
-        frame_rows: Rows of each set-up that find its frame and tool; a third by default, 400 at most.
+        frame_rows: Rows of each set-up that find its frame and tool; a third by default, 400 at most, and as
+            many as hold more measured values than frame and tool have unknowns.
         keep_tool: Whether the tool stays as it was calibrated, so that the rows find the frame alone.
         keep_frames: Whether the set-ups are those of the calibration, so that all rows are judged.
         judge_target: Measured target, from 1, at which errors are judged. Where several were fitted, a row
@@ -137,7 +148,7 @@ def evaluate(
     if selection.orientation:
         check_turns(data, calibration.robot)
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
-    frame, judged = _divide(data, chosen)
+    frame, judged = _divide(task, data, chosen)
     found_by = data.select(frame if len(frame) else judged)
     chosen_rows, not_judged = _found_again(found_by, data.select(judged), selection, chosen)
     notices += not_judged
@@ -174,14 +185,16 @@ def _found_again(
     return where_found(found_by, judged, selection), notices
 
 
-def _divide(data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]:
+def _divide(task: Task, data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]:
     """Rows that find the frames, and rows that are judged; each set-up for itself."""
     if options.keep_frames:
         return np.empty(0, dtype=np.int64), np.arange(len(data))
     frame, judged = [], []
     for group in data.groups:
         rows = np.flatnonzero(data.group == group)
-        count = options.frame_rows or min(len(rows) // 3, MOST_FRAME_ROWS)
+        order = rows[np.random.default_rng(options.seed).permutation(len(rows))]
+        enough, share = _enough(task, data.select(order), options), min(len(rows) // 3, MOST_FRAME_ROWS)
+        count = options.frame_rows or (share if share < FEWEST_FRAME_ROWS else max(share, enough))
         if not FEWEST_FRAME_ROWS <= count < len(rows):
             raise InputError(
                 f"{count_of(len(rows), 'row')} of set-up {list_names([group])}, of which {count} would find "
@@ -190,10 +203,39 @@ def _divide(data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]
                 rule=f"At least {FEWEST_FRAME_ROWS} rows find the frame, and some must be left to judge",
                 way_out="Measure more poses or give another --frame-rows",
             )
-        order = rows[np.random.default_rng(options.seed).permutation(len(rows))]
+        if count < enough:
+            raise _too_few(task, data.select(order[:count]), enough, options)
         frame.append(order[:count])
         judged.append(order[count:])
     return np.concatenate(frame), np.concatenate(judged)
+
+
+def _enough(task: Task, rows: Measurements, options: EvaluationOptions) -> int:
+    """How many of the rows of a set-up, the first ones, hold more values than they find unknowns."""
+
+    def are_enough(count: int) -> bool:
+        first = rows.select(np.arange(count))
+        return measured_values(task, first) > _found_unknowns(task, first, options)
+
+    counts = range(FEWEST_FRAME_ROWS, len(rows))
+    return FEWEST_FRAME_ROWS + bisect_left(counts, True, key=are_enough)
+
+
+def _found_unknowns(task: Task, rows: Measurements, options: EvaluationOptions) -> int:
+    """Unknowns of the set-up of `rows` that they find."""
+    return frame_unknowns(task) if options.keep_tool else group_unknowns(task, rows)
+
+
+def _too_few(task: Task, rows: Measurements, enough: int, options: EvaluationOptions) -> InputError:
+    """That frame rows of a set-up were stated that are fewer than `enough`."""
+    values, unknowns = measured_values(task, rows), _found_unknowns(task, rows, options)
+    return InputError(
+        f"{values} measured values in {count_of(len(rows), 'frame row')} cannot determine the {unknowns} "
+        f"unknowns of the frame and tool of set-up {list_names(rows.groups)}",
+        where=", ".join(rows.files),
+        rule="There must be more measured values than unknowns",
+        way_out=f"Give --frame-rows {enough} or more",
+    )
 
 
 def _setup(

@@ -1,6 +1,6 @@
 """The rows that a calibration was fitted to, and what became of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +11,7 @@ from truearm.errors import Notice, count_of
 from truearm.fitting import Fits
 from truearm.measurements import Measurements
 from truearm.splitting import Split
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +38,7 @@ class FittedRows:
             `distance_m` are without it, `data` is as it was measured.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
             where no drift was taken out.
+        orientation: Whether orientation was fitted, so that `residual` ends with it.
     """
 
     data: Measurements
@@ -48,6 +49,7 @@ class FittedRows:
     distance_m: Floats
     moved: Floats | None = None
     progress: Floats | None = None
+    orientation: bool = False
 
     def __repr__(self) -> str:
         return f"<FittedRows: {count_of(len(self.side), 'row')}, {count_of(len(self.outliers()), 'outlier')}>"
@@ -59,10 +61,20 @@ class FittedRows:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)
             score, distance = _judge_constant(fits, residual, selection), _farthest(residual, selection)
-            return cls(fits.data, side, fits.constant.weights, residual, score, distance)
-        variable = fits.variable
-        distance = np.maximum(variable.distances, _farthest(variable.residuals, selection))
-        return cls(fits.data, side, variable.weights, variable.residuals, variable.scores, distance)
+            found = cls(fits.data, side, fits.constant.weights, residual, score, distance)
+        else:
+            variable = fits.variable
+            distance = np.maximum(variable.distances, _farthest(variable.residuals, selection))
+            found = cls(fits.data, side, variable.weights, variable.residuals, variable.scores, distance)
+        return replace(found, orientation=selection.orientation)
+
+    @property
+    def turn_rad(self) -> Floats:
+        """How far each row (n,) is turned from how the model has it; NaN where orientation was not fitted."""
+        if not self.orientation or self.data.orientations is None:
+            return np.full(len(self.side), np.nan)
+        measured = np.isfinite(self.data.orientations).all(axis=1)
+        return np.where(measured, np.linalg.norm(self.residual[:, -3:], axis=1), np.nan)
 
     def among(self, data: Measurements) -> NDArray[np.bool_]:
         """Which rows (n,) of other measurements are among these: by readings and first point."""
@@ -70,14 +82,17 @@ class FittedRows:
         return np.array([mark in known for mark in _marks(data)], dtype=np.bool_)
 
     def outliers(self) -> list[dict[str, Any]]:
-        """File, row, score and distance_mm of each outlier, the worst first."""
-        found = np.flatnonzero(self.score > 1.0)
+        """File, row, score and distance_mm of each outlier, the worst first; turn_mrad where orientation was
+        fitted.
+        """
+        found, turn_mrad = np.flatnonzero(self.score > 1.0), MRAD_PER_RAD * self.turn_rad
         return [
             {
                 "file": str(self.data.sources[k]),
                 "row": int(self.data.rows[k]),
                 "score": float(self.score[k]),
                 "distance_mm": float(self.distance_m[k] * MM_PER_METRE),
+                **({"turn_mrad": float(turn_mrad[k])} if np.isfinite(turn_mrad[k]) else {}),
             }
             for k in found[np.argsort(-self.score[found], kind="stable")]
         ]

@@ -286,6 +286,13 @@ def _fit_scheme(
             way_out="Give --model constant (model='constant')",
         )
     determined = task.columns(found.determined)
+    if not determined:
+        raise WorkError(
+            "the rows determine no parameter of the arm",
+            where=", ".join(data.files),
+            rule="The paper's schemes are made of the parameters that the rows determine",
+            way_out="Give --model constant (model='constant'), or measure where the arm's parameters tell",
+        )
     columns = well_determined(task.problem(measured, determined), constant, determined)
     values = task.arm.robot.joints_from_readings(data.readings)
     rows = SchemeRows(task.problem(measured, columns), columns, constant, values, task.options.split.seed)
@@ -384,7 +391,7 @@ def feature_ranges(values: Floats) -> list[float]:
 
 def _check_enough(task: Task, data: Measurements, rank: int) -> None:
     """Refuse rows that leave nothing to tell the unknowns from the noise with."""
-    values = _measured_values(task, data)
+    values = measured_values(task, data)
     if values > rank:
         return
     unknowns = max(rank, _full_rank(task, data))
@@ -435,7 +442,7 @@ def _check_set_ups(task: Task, data: Measurements) -> None:
     """Refuse a set-up whose rows cannot find its own frame and target."""
     for group in task.groups:
         rows = data.select(data.group == group)
-        values, unknowns = _measured_values(task, rows), group_unknowns(task, rows)
+        values, unknowns = measured_values(task, rows), group_unknowns(task, rows)
         if task.selection.distances or values > unknowns:
             continue
         raise WorkError(
@@ -452,7 +459,8 @@ def _or_hold_out_fewer(task: Task) -> str:
     return ", or hold out fewer of its rows (--holdout, or another --seed)" if task.sizes else ""
 
 
-def _measured_values(task: Task, data: Measurements) -> int:
+def measured_values(task: Task, data: Measurements) -> int:
+    """Numbers that were measured of what is fitted."""
     if task.selection.distances:
         return distance_count(data)
     points = np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2).sum()

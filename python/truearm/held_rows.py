@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import count_of, list_names
 from truearm.measurements import Measurements
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 from truearm.validation import RowErrors
 from truearm.visits import pose_numbers
 
@@ -57,15 +57,20 @@ class HeldRows:
     def among(self, outliers: Sequence[Mapping[str, Any]], model: str) -> list[Mapping[str, Any]]:
         """Those of the outliers, given with file and row, that are among these rows.
 
-        Their distance_mm is what the model missed there before it saw them, where that is known.
+        Their distance_mm and turn_mrad are what the model missed there before it saw them, where that is
+        known.
         """
         rows = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
-        own = dict(zip(rows, (MM_PER_METRE * self.errors[model].distance_m).tolist(), strict=True))
-        found = [(entry, own.get((entry["file"], entry["row"]))) for entry in outliers]
+        known = {
+            "distance_mm": MM_PER_METRE * self.errors[model].distance_m,
+            "turn_mrad": MRAD_PER_RAD * self.errors[model].turn_rad,
+        }
+        place = {row: k for k, row in enumerate(rows)}
+        found = [(entry, place.get((entry["file"], entry["row"]))) for entry in outliers]
         return [
-            {**entry, "distance_mm": missed} if math.isfinite(missed) else entry
-            for entry, missed in found
-            if missed is not None
+            {**entry, **{name: float(each[k]) for name, each in known.items() if np.isfinite(each[k])}}
+            for entry, k in found
+            if k is not None
         ]
 
     def means_without_mm(self, outliers: Sequence[Mapping[str, Any]]) -> dict[str, float]:
@@ -77,6 +82,16 @@ class HeldRows:
             name: float(MM_PER_METRE * np.nanmean(found.distance_m[kept]))
             for name, found in self.errors.items()
         }
+
+    def turns_without_mrad(self, outliers: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+        """Mean orientation error of each model at the other rows, mrad; empty where none was measured there,
+        or without an outlier here.
+        """
+        kept = self.without(outliers)
+        turns = {name: MRAD_PER_RAD * found.turn_rad[kept] for name, found in self.errors.items()}
+        if kept.all() or not all(np.isfinite(each).any() for each in turns.values()):
+            return {}
+        return {name: float(np.nanmean(each)) for name, each in turns.items()}
 
     def lead_mm(self, ahead: str, behind: str, outliers: Sequence[Mapping[str, Any]]) -> tuple[float, float]:
         """How much smaller the errors of the model `ahead` are, mm: the mean over poses, its standard error.

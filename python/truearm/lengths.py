@@ -18,3 +18,8 @@ def length_mm(value: float, digits: int) -> str:
 def distance_mm(value: float) -> str:
     """A distance of `value` mm with two decimals: "24.98 mm"; a long one with four digits: "131.2 m"."""
     return f"{value:.2f} mm" if abs(value) < IN_METRES_MM else length_mm(value, 4)
+
+
+def how_far(distance: float, turn: float | None) -> str:
+    """A distance in mm and, where one is known, a turn in mrad: "24.98 mm", "0.02 mm, 87.3 mrad"."""
+    return distance_mm(distance) if turn is None else f"{distance_mm(distance)}, {turn:.1f} mrad"

@@ -21,6 +21,7 @@ from truearm.columns import (
 from truearm.errors import InputError, Notice, list_names, list_rows
 from truearm.reading import Table, Texts
 from truearm.rotations import UNIT_QUATERNIONS, UNIT_TOLERANCE
+from truearm.same_tables import own_anchor
 from truearm.units import to_si
 
 Floats = NDArray[np.float64]
@@ -31,7 +32,7 @@ LARGEST_SIGMA_M: Final = 10.0
 SAME_PLACE_M: Final = 1e-9
 """Coordinates that differ by less are one, in whatever unit they were written."""
 ONE_ANCHOR: Final = "anchor 1"
-"""The fixed point of distances that nothing names."""
+"""The fixed point of distances that nothing names, in tables whose set-ups a column names."""
 
 
 def read_fields(
@@ -48,14 +49,16 @@ def read_fields(
     distance = _distances(table, layout)
     if measured or layout.targets:
         _check_measured(table, targets, distance)
-    ends, assumed = _ends(table, layout, distance)
+    sigma = _sigma(table, layout.sigma) if layout.sigma else None
+    own = ONE_ANCHOR if "group" in layout.words else str(own_anchor(np.array(default_group)))
+    ends, assumed = _ends(table, layout, (distance, sigma), own)
     purpose, unknown = _purpose(table, layout)
     features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
         "readings": readings,
         "targets": targets,
         "orientations": _orientations(table) if layout.quaternion else None,
-        "sigma_m": _sigma(table, layout.sigma) if layout.sigma else None,
+        "sigma_m": sigma,
         "group": _group(table, layout, default_group),
         "features": features,
         "sources": np.full(table.row_count, table.where),
@@ -192,32 +195,37 @@ def _group(table: Table, layout: Layout, default: str) -> Texts:
 
 
 def _ends(
-    table: Table, layout: Layout, distance: Floats | None
+    table: Table, layout: Layout, measured: tuple[Floats | None, Floats | None], own: str
 ) -> tuple[dict[str, Texts | None], list[Notice]]:
     """What the distances lead to: `anchor` and `pair`, each None where there is none; and notices.
 
-    Distances without either column lead to one fixed point.
+    Distances without either column lead to one fixed point, `own`. `measured` are distances and sigmas.
     """
+    distance, sigma = measured
     anchor = table.texts("anchor") if "anchor" in layout.words else None
     pair = table.texts("pair") if "pair" in layout.words else None
     if distance is None:
         return {"anchor": anchor, "pair": pair}, []
     if anchor is None and pair is None:
-        return {"anchor": np.where(np.isfinite(distance), ONE_ANCHOR, ""), "pair": None}, [_one_anchor(table)]
+        anchor = np.where(np.isfinite(distance), own, "")
+        return {"anchor": anchor, "pair": None}, [_one_anchor(table, own)]
     has_anchor, has_pair = (_is_given(word, table.row_count) for word in (anchor, pair))
     rule = 'A distance leads to a fixed point named in "anchor", or to the other row of the same "pair"'
-    measured = np.isfinite(distance)
-    _refuse(table, measured & ~has_anchor & ~has_pair, "the distance leads nowhere in", rule)
-    _refuse(table, measured & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
+    found = np.isfinite(distance)
+    _refuse(table, found & ~has_anchor & ~has_pair, "the distance leads nowhere in", rule)
+    _refuse(table, found & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
     if pair is not None:
         _check_pairs(table, pair, distance)
+        _check_alike(table, pair, "distances", distance)
+        if sigma is not None:
+            _check_alike(table, pair, "sigmas", sigma)
     return {"anchor": anchor, "pair": pair}, []
 
 
-def _one_anchor(table: Table) -> Notice:
+def _one_anchor(table: Table, own: str) -> Notice:
     text = (
         f"{table.where}: no column says where the distances lead: all are taken as measured to one fixed "
-        f'point, "{ONE_ANCHOR}". If there are several, name them in a column anchor; distances between two '
+        f'point, "{own}". If there are several, name them in a column anchor; distances between two '
         "poses have a column pair."
     )
     return Notice("one_anchor", text)
@@ -238,13 +246,17 @@ def _check_pairs(table: Table, pair: Texts, distance: Floats) -> None:
     _refuse(table, lonely, 'not exactly two rows share the name in "pair" in', "A pair is two rows")
     empty = (pair != "") & np.isnan(distance)
     _refuse(table, empty, "the distance of a pair is empty in", "Both rows of a pair hold the same distance")
+
+
+def _check_alike(table: Table, pair: Texts, what: str, values: Floats) -> None:
+    """Refuse a pair whose two rows hold different values (n,), m."""
     for name in np.unique(pair[pair != ""]):
-        first, second = distance[pair == name]
+        first, second = values[pair == name]
         _refuse(
             table,
             (pair == name) & (first != second),
-            f'pair "{name}" has two distances, {first:g} m and {second:g} m, in',
-            "Both rows of a pair hold the same distance",
+            f'pair "{name}" has two {what}, {first:g} m and {second:g} m, in',
+            f"Both rows of a pair hold the same {what[:-1]}",
         )
 
 

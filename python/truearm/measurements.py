@@ -288,10 +288,11 @@ class Measurements:
 
         Points, orientations and features that a part lacks become NaN. Pairs never reach from one part to
         another. Groups that a column names keep their names: equal names mean the same set-up. Those that
-        are called after their file are set-ups of their own, as with `read_files`: files of one name are
-        called by their folders as well, and tables of one name are numbered, "data" and "data 2". Rows that
-        were selected from the same table belong to the same set-up. Of tables that were not read at once,
-        as one that has grown or the rows of a loaded calibration, it is told by the rows that both have.
+        are called after their file are set-ups of their own, as with `read_files`, and so is the fixed point
+        that their distances lead to where nothing names it: files of one name are called by their folders
+        as well, and tables of one name are numbered, "data" and "data 2". Rows that were selected from the
+        same table belong to the same set-up. Of tables that were not read at once, as one that has grown or
+        the rows of a loaded calibration, it is told by the rows that both have.
 
         Raises:
             InputError: If there are no parts or the numbers of joints differ.

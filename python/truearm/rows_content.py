@@ -45,8 +45,8 @@ def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str,
     return {"words": words, "features": kept, "joint_units": list(rows.data.joint_units)}
 
 
-def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
-    """The rows that `pack` described.
+def unpack(content: Mapping[str, Any], arrays: Arrays, *, orientation: bool) -> FittedRows:
+    """The rows that `pack` described; `orientation` says whether it was fitted.
 
     Raises:
         KeyError: If an array is missing.
@@ -67,7 +67,8 @@ def unpack(content: Mapping[str, Any], arrays: Arrays) -> FittedRows:
         joint_units=tuple(content["joint_units"]),
     )
     known = [*OUTCOMES, *(name for name in OF_DRIFT if f"outcome.{name}" in arrays)]
-    return FittedRows(data, **{name: np.array(arrays[f"outcome.{name}"]) for name in known})
+    outcomes: dict[str, Any] = {name: np.array(arrays[f"outcome.{name}"]) for name in known}
+    return FittedRows(data, **outcomes, orientation=orientation)
 
 
 def _stated_sides(data: Measurements, features: Sequence[str]) -> list[str]:

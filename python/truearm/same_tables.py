@@ -15,9 +15,14 @@ if TYPE_CHECKING:
 
 Texts = NDArray[np.str_]
 
-NAMES: Final = ("group0", "pair0")
+NAMES: Final = ("group0", "anchor0", "pair0")
 """Columns of names, which tables are given other ones of when they are put together."""
 IDENTITY_BYTES: Final = 8
+
+
+def own_anchor(group: Texts) -> Texts:
+    """The fixed point that distances lead to where nothing names it, by the set-up's name (n,)."""
+    return np.char.add("anchor of ", group)
 
 
 def identities(data: "Measurements") -> NDArray[np.int64]:
@@ -117,5 +122,8 @@ def _renamed(part: "Measurements", mask: NDArray[np.bool_], **names: Texts) -> "
         return part
     if "group" in names:
         names["default_group"] = names["group"]
+        if part.anchor is not None:
+            is_own = part.anchor == own_anchor(part.group)
+            names["anchor"] = np.where(is_own, own_anchor(names["group"]), part.anchor)
     changes: dict[str, Any] = {key: np.where(mask, text, getattr(part, key)) for key, text in names.items()}
     return replace(part, **changes)

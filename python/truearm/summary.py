@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 from truearm.validation import mean_distance
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-MRAD_PER_RAD: Final = 1e3
 AXES: Final = 3
 WAVE: Final = "wave"
 OWN: Final = "own"

@@ -18,6 +18,7 @@ STATED_LENGTH_UNITS: Final = ("in", *LENGTH_UNITS)
 ANGLE_UNITS: Final = ("rad", "deg")
 RADIANS_PER_DEGREE: Final = math.pi / 180.0
 MM_PER_METRE: Final = 1e3
+MRAD_PER_RAD: Final = 1e3
 MM_PER_INCH: Final = 25.4
 
 HEADER_UNITS: Final = {

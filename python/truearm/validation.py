@@ -93,6 +93,13 @@ class RowErrors:
         """Lengths of the position errors (n,)."""
         return np.asarray(np.linalg.norm(self.position, axis=1))
 
+    @property
+    def turn_rad(self) -> Floats:
+        """Angles of the orientation errors (n,); NaN where orientation took no part."""
+        if self.orientation is None:
+            return np.full(len(self.position), np.nan)
+        return np.asarray(np.linalg.norm(self.orientation, axis=1))
+
     def statistics(self) -> Errors:
         """Statistics over the rows that were measured; there must be one."""
         position = Statistics.of(_measured(self.position))

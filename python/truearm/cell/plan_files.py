@@ -10,7 +10,8 @@ import pandas as pd
 from truearm.cell.plan import Plan
 from truearm.cell.proposed import Proposed
 from truearm.columns import REPEAT
-from truearm.files import write_whole
+from truearm.errors import UsageError
+from truearm.files import read_bytes, write_whole
 from truearm.units import MM_PER_METRE
 
 COLOURS: Final = {
@@ -21,13 +22,22 @@ COLOURS: Final = {
 }
 
 
-def write(plan: Plan | Proposed, path: Path) -> None:
-    """Write the poses: q1 ... qN in rad and m, approach, purpose, and the set-up that is meant, if one is."""
+def write(plan: Plan | Proposed, path: Path, *, over: bool = True) -> None:
+    """Write the poses: q1 ... qN in rad and m, approach, purpose, and the set-up that is meant, if one is.
+
+    Raises:
+        UsageError: If other poses are there and are not to be written `over`.
+    """
     columns = {f"q{j + 1}": column for j, column in enumerate(plan.poses.readings.T)}
     table = pd.DataFrame(columns | {"approach": plan.poses.approach, "purpose": plan.poses.purpose})
     if plan.poses.group is not None:
         table["group"] = plan.poses.group
-    write_whole(path, table.to_csv(index=False, lineterminator="\n"))
+    text = table.to_csv(index=False, lineterminator="\n")
+    if not over and path.exists() and read_bytes(path) != text.encode():
+        raise UsageError(
+            f"{path} is there already, with other poses", way_out=f"To write over it name it: -o {path}"
+        )
+    write_whole(path, text)
 
 
 def draw(plan: Plan | Proposed, path: Path) -> None:

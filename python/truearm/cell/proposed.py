@@ -20,8 +20,10 @@ from truearm.cell.plan import (
 from truearm.cell.poses_file import Poses
 from truearm.cell.reaching import within_reach
 from truearm.defaults import THERE_AND_BACK
+from truearm.endpoints import at_target
 from truearm.errors import UsageError
-from truearm.planning.accessibility import Rule, lowest
+from truearm.measurements import Measurements
+from truearm.planning.accessibility import Mask, Places, Rule, accessible, lowest
 from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
 from truearm.robot import Robot
 from truearm.stillness import still_joints
@@ -45,7 +47,8 @@ class ProposalOptions:
         seed: Seed of the candidates, and of the workspace.
         order: "there-and-back", "short" or "paper".
         group: Set-up in which they will be measured; the calibration's last one by default.
-        rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these.
+        rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these, with
+            each target that the calibration found in the set-up, or the cell's.
     """
 
     count: int
@@ -61,7 +64,7 @@ class Proposed:
 
     Attributes:
         poses: With purpose "train" or "acceptance", approached from both sides in turn.
-        points: Targets in the base frame (n, 3), m.
+        points: The first of these targets in the base frame (n, 3), m.
         seconds: Time of the motions of the joints in each order by name.
         found: What was chosen, and what is expected of it.
         lowest_m: The lowest place of the arm and its tool, in the base frame.
@@ -102,7 +105,12 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
     """
     candidates = _candidates(calibration, options, cell)
     workspace = measurable_pool(
-        calibration.robot, cell, WORKSPACE, options.seed + 1, options.rules, _held(calibration)
+        calibration.robot,
+        cell,
+        WORKSPACE,
+        options.seed + 1,
+        _rules(calibration, options, cell),
+        _held(calibration),
     )
     found = next_poses(candidates, workspace, options.count)
     proposed = _ordered(candidates, found, found.rows, "train", options, cell)
@@ -164,8 +172,43 @@ def _candidates(calibration: Calibration, options: ProposalOptions, cell: Cell |
             way_out="Measure some, calibrate and ask again, or plan afresh with truearm plan ROBOT -n N",
         )
     size = min(max(LEAST_POOL, POOL_PER_POSE * options.count), MOST_CANDIDATES)
-    pool = measurable_pool(calibration.robot, cell, size, options.seed, options.rules, _held(calibration))
+    rules = _rules(calibration, options, cell)
+    pool = measurable_pool(calibration.robot, cell, size, options.seed, rules, _held(calibration))
     return Candidates(calibration, pool, options.group)
+
+
+def _rules(calibration: Calibration, options: ProposalOptions, cell: Cell | None) -> tuple[Rule, ...]:
+    """The rules, kept to with each target that is measured."""
+    tools = _tools(calibration, options.group, cell)
+
+    def with_each(places: Places) -> Mask:
+        allowed = [accessible(places.robot, places.readings, options.rules, tool=tool) for tool in tools]
+        return np.asarray(np.all(allowed, axis=0))
+
+    return (with_each,) if options.rules else ()
+
+
+def _tools(calibration: Calibration, group: str | None, cell: Cell | None) -> list[Floats]:
+    """Transforms (4, 4) from the flange to what is measured: the cell's target, else those that the
+    calibration found in a set-up; the arm's own tool where it found none.
+    """
+    if cell is not None:
+        return [cell.flange_from_target]
+    known, rows, selection = calibration.groups, calibration.learned_from, calibration.selection
+    group = known[-1] if group is None else group
+    if group not in known:
+        return [calibration.robot.tool]
+    ends = [
+        at_target(calibration, None, group, target + 1).flange_from_end
+        for target in selection.targets
+        if rows is None or _holds(rows.data, group, target)
+    ]
+    return [end for end in ends if np.isfinite(end).all()] or [calibration.robot.tool]
+
+
+def _holds(data: Measurements, group: str, target: int) -> bool:
+    """Whether any row of a set-up holds a target, from 0: where none does, its place is a guess."""
+    return bool(np.isfinite(data.targets[data.group == group, target]).all(axis=1).any())
 
 
 def _ordered(
@@ -178,8 +221,8 @@ def _ordered(
 ) -> Proposed:
     arm = candidates.calibration.robot
     readings = candidates.readings[rows]
-    tool = arm.tool if cell is None else cell.flange_from_target
-    points = targets_of(arm, readings, tool)
+    tools = _tools(candidates.calibration, options.group, cell)
+    points = targets_of(arm, readings, tools[0])
     orders = orders_of(points, readings)
     lists = {name: in_order(readings, [purpose] * len(rows), each, 0)[0] for name, each in orders.items()}
     if cell is not None:
@@ -187,8 +230,8 @@ def _ordered(
     poses, seconds = lists[options.order], {name: seconds_of(each) for name, each in lists.items()}
     return Proposed(
         poses,
-        targets_of(arm, poses.readings, tool),
+        targets_of(arm, poses.readings, tools[0]),
         seconds,
         found,
-        lowest(arm, readings, tool=tool),
+        min(lowest(arm, readings, tool=tool) for tool in tools),
     )

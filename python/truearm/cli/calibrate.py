@@ -329,6 +329,12 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
             " Constants, frame and tool are without them where they bend these.",
         )
     say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, several=several)}.{hint}")
-    if means := Outliers.of(calibration).means_mm:
-        said = ", ".join(f"{name} {mean:.3f}" for name, mean in means.items())
-        say_wrapped(f"Mean error without the held-out ones among them: {said} mm.")
+    without = Outliers.of(calibration)
+    units = {"mm": without.means_mm, "mrad": without.means_mrad}
+    said = [
+        f"{', '.join(f'{name} {mean:.3f}' for name, mean in means.items())} {unit}"
+        for unit, means in units.items()
+        if means
+    ]
+    if said:
+        say_wrapped(f"Mean error without the held-out ones among them: {'; '.join(said)}.")

@@ -32,7 +32,7 @@ PICTURES: Final = (".png", ".svg", ".pdf")
 def command(
     robot: option.RobotOrNone = None,
     count: option.Count = None,
-    output: option.Output = Path("poses.csv"),
+    output: option.Output = None,
     cell: option.CellReaching = None,
     criterion: option.Criterion = "d",
     next_count: option.NextCount = None,
@@ -68,7 +68,8 @@ def command(
 
     _check_words(criterion, order)
     _check_counts({"--next": next_count, "--acceptance": acceptance, "--count": count})
-    _check_outputs(output, picture, robot, known, cell)
+    target = output or option.OUTPUT
+    _check_outputs(target, picture, robot, known, cell)
     rules = room(floor_mm, box_mm)
     if known is not None or next_count is not None or acceptance is not None:
         if count is not None:
@@ -92,9 +93,9 @@ def command(
         with told_stages()("choosing poses"):
             plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
         _save(plan, output, picture)
-    _print(plan, output, order, arm.joints, as_json=as_json)
+    _print(plan, target, order, arm.joints, as_json=as_json)
     if not as_json and cell is not None:
-        suggest(f"truearm measure {typed(cell)} {typed(output)} --dry-run")
+        suggest(f"truearm measure {typed(cell)} {typed(target)} --dry-run")
     elif not as_json:
         suggest(f"truearm calibrate {typed(robot)} {NEW_FILE} -o result", when=MEASURED)
 
@@ -181,7 +182,7 @@ class _Asked:
     rules: "tuple[Rule, ...]"
 
 
-def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -> None:
+def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: bool) -> None:
     from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
     from truearm.cell.proposed import (
@@ -211,12 +212,12 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
         with told_stages()("choosing poses"):
             proposed = choose(calibration, options, cell=cell)
         _save(proposed, output, picture)
-    kept = kept_still(calibration)
+    kept, target = kept_still(calibration), output or option.OUTPUT
     if as_json:
         by_joint = {str(joint): at for joint, at in kept.items()}
-        print_json({"poses": str(output), "order": asked.order, **proposed.to_dict(), "kept": by_joint})
+        print_json({"poses": str(target), "order": asked.order, **proposed.to_dict(), "kept": by_joint})
         return
-    _print_proposed(proposed, output, calibration.robot.joints)
+    _print_proposed(proposed, target, calibration.robot.joints)
     _print_still(kept, calibration.robot.joints)
     _print_features(calibration.options.features)
     if asked.acceptance is not None:
@@ -225,11 +226,11 @@ def _propose(asked: _Asked, output: Path, picture: Path | None, as_json: bool) -
         _suggest_again(calibrate_again(calibration, asked.robot, NEW_FILE), asked.calibration)
 
 
-def _save(plan: "Plan | Proposed", output: Path, picture: Path | None) -> None:
-    """Write the poses, and draw them where a picture is asked for."""
+def _save(plan: "Plan | Proposed", output: Path | None, picture: Path | None) -> None:
+    """Write the poses, over others only in a file that is named, and draw them where that is asked for."""
     from truearm.cell.plan_files import draw, write
 
-    write(plan, output)
+    write(plan, output or option.OUTPUT, over=output is not None)
     if picture is not None:
         draw(plan, picture)
 

@@ -19,7 +19,11 @@ COUNT: Final = 60
 Count: TypeAlias = Annotated[
     int | None, typer.Option("-n", "--count", metavar="N", help=f"Poses to fit to.  [default: {COUNT}]")
 ]
-Output: TypeAlias = Annotated[Path, typer.Option("-o", "--output", metavar="CSV", help="Where the poses go.")]
+OUTPUT: Final = Path("poses.csv")
+Output: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="CSV", help=f"Where the poses go.  [default: {OUTPUT}]"),
+]
 CellReaching: TypeAlias = Annotated[
     Path | None, typer.Option(metavar="CELL", help="A cell file whose sensor has to reach the poses.")
 ]
@@ -46,11 +50,14 @@ Order: TypeAlias = Annotated[
 SigmaMm: TypeAlias = Annotated[float, typer.Option(metavar="MM", help="Noise of a measured coordinate.")]
 FloorMm: TypeAlias = Annotated[
     float | None,
-    typer.Option(metavar="MM", help="Height in the base frame that arm and tool stay above."),
+    typer.Option(
+        metavar="MM",
+        help="Height in the base frame that arm and tool, with --from the measured targets, stay above.",
+    ),
 ]
 BoxMm: TypeAlias = Annotated[
     str | None,
-    typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the target."),
+    typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the targets."),
 ]
 Seed: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of the candidates.")]
 Picture: TypeAlias = Annotated[

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.errors import InputError, WorkError
+from truearm.identified import Frame
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT
 from truearm.nominal_misfit import some_rows
@@ -28,28 +29,36 @@ MOVED: Final = 4.0
 """A parameter that changed by more standard errors moved; one unmoved arm in a thousand is suspected."""
 
 
-def check_comparable(previous: Calibration, robot: Robot, where: str) -> None:
-    """Raise InputError if a calibration is of an arm with other joints, or a table far from this."""
-    known = previous.robot
+def check_comparable(previous: Calibration, robot: Robot, frame: Frame, where: str) -> None:
+    """Raise InputError if a calibration is of an arm with other joints, a table far from this or readings
+    that mean something else, or its positions are in another frame.
+    """
+    known, way_out = previous.robot, "Correct previous of this arm"
     if known.joints != robot.joints:
         what, rule = f"with {known.joint_count} joints", f"The arm has {robot.joint_count}"
     elif (np.abs(known.table - robot.table) > FAR).any():
         what, rule = "whose Denavit-Hartenberg table is another", f"The arm is {robot.name}"
+    elif not np.allclose(known.coupling, robot.coupling):
+        what, rule = (
+            "whose joints turn or are coupled otherwise",
+            "Readings of the arm mean something else now",
+        )
+    elif previous.options.frame != frame:
+        what, rule = f'made with frame "{previous.options.frame}"', f'The arm is calibrated with "{frame}"'
+        way_out = f'Give this arm frame = "{previous.options.frame}", or leave its previous out'
     else:
         return
     raise InputError(
-        f"this is a calibration of {known.name}, {what}",
-        where=where,
-        rule=rule,
-        way_out="Correct previous of this arm",
+        f"this is a calibration of {known.name}, {what}", where=where, rule=rule, way_out=way_out
     )
 
 
 def drift_of(previous: Calibration, now: Calibration, data: Measurements) -> dict[str, Any]:
     """What changed from one calibration of an arm to another, over the poses of `data`; JSON values.
 
-    Positions are those of the robot file's tool in its base frame. How uncertain their change is follows
-    from both calibrations' standard deviations at some of the poses, where both know them.
+    Positions are those of the tool of `now`'s robot file in its base frame, so that another tool or base
+    there is no change of the arm. How uncertain their change is follows from both calibrations' standard
+    deviations at some of the poses, where both know them.
     """
     change_m = _change_m(previous, now, data)
     worst = int(np.argmax(change_m))
@@ -91,30 +100,41 @@ def _features(calibration: Calibration, data: Measurements) -> dict[str, Floats]
 def _change_m(previous: Calibration, now: Calibration, data: Measurements) -> Floats:
     """How far positions (n,) moved, m."""
     before, after = (
-        calibration.position(data.readings, features=_features(calibration, data))
+        calibration.position(
+            data.readings, tool=_tool(calibration, now.robot), features=_features(calibration, data)
+        )
         for calibration in (previous, now)
     )
+    if not now.arm.world_is_known:
+        moved = now.robot.base @ np.linalg.inv(previous.robot.base)
+        before = before @ moved[:3, :3].T + moved[:3, 3]
     return np.asarray(np.linalg.norm(after - before, axis=1))
+
+
+def _tool(calibration: Calibration, robot: Robot) -> Floats:
+    """The tool (4, 4) of a robot file from the flange of a calibration, whose file may have it elsewhere."""
+    return np.asarray(np.linalg.inv(calibration.robot.flange) @ robot.flange @ robot.tool)
 
 
 def _uncertain(previous: Calibration, now: Calibration, data: Measurements) -> Floats | None:
     """Standard deviation (n,) of the change, m: that of its length, as if both were independent."""
-    stds = [_std(calibration, data) for calibration in (previous, now)]
+    stds = [_std(calibration, data, _tool(calibration, now.robot)) for calibration in (previous, now)]
     known = [std for std in stds if std is not None]
     return np.asarray(np.hypot(*known)) if len(known) == len(stds) else None
 
 
-def _std(calibration: Calibration, data: Measurements) -> Floats | None:
+def _std(calibration: Calibration, data: Measurements, tool: Floats) -> Floats | None:
     """Standard deviation (n,) of positions, m, their coordinates together, or its bound where the rows were
     left out of the file; None where neither is known.
     """
     features = _features(calibration, data)
     try:
-        return np.asarray(np.linalg.norm(calibration.position_std(data.readings, features=features), axis=1))
+        stds = calibration.position_std(data.readings, tool=tool, features=features)
+        return np.asarray(np.linalg.norm(stds, axis=1))
     except WorkError:
         if not calibration.has_conservative:
             return None
-        return calibration.conservative_std(data.readings, features=features)[:, 0]
+        return calibration.conservative_std(data.readings, tool=tool, features=features)[:, 0]
 
 
 def _moved(previous: Calibration, now: Calibration) -> Iterator[dict[str, Any]]:

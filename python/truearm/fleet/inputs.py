@@ -77,8 +77,9 @@ def _matching(folder: Path, pattern: str) -> list[Path]:
     file = folder / pattern
     if file.is_file() or not PATTERN & set(pattern):
         return [file]
-    start = Path(file.anchor) if file.is_absolute() else folder
-    found = sorted(start.glob(str(file.relative_to(start))))
+    named = Path(pattern)
+    start = Path(named.anchor) if named.is_absolute() else folder
+    found = sorted(start.glob(str(named.relative_to(named.anchor))))
     if not found:
         raise InputError("no file is like this", where=str(file), way_out="Correct measurements of this arm")
     return found

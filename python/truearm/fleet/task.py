@@ -72,7 +72,7 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
     previous = None
     if task.previous is not None:
         previous = Calibration.from_bytes(task.previous, where=task.previous_name)
-        check_comparable(previous, robot, task.previous_name)
+        check_comparable(previous, robot, task.options.frame, task.previous_name)
     made = calibrate(robot, task.data, task.options)
     poses, _ = points_together(task.data.deduplicated())
     return ArmMade(

@@ -86,11 +86,15 @@ def _outliers(facts: Facts) -> Iterator[Advice]:
     named = [f"{entry['row']}{of_file[entry['file']]}" for entry in outliers[:ROWS_NAMED]]
     named += [f"{len(outliers) - ROWS_NAMED} more"] if len(outliers) > ROWS_NAMED else []
     rows = "row" if len(outliers) == 1 else "rows"
-    largest = short(max(entry["distance_mm"] for entry in outliers))[0]
+    largest = [
+        f"{short(max(entry[name] for entry in outliers if name in entry))[0]} {unit}"
+        for name, unit in (("distance_mm", "mm"), ("turn_mrad", "mrad"))
+        if any(name in entry for entry in outliers)
+    ]
     share = sum(entry["distance_mm"] for entry in outliers) / facts.summary["n_fitted"]
     words = (
         f"{count_of(len(outliers), 'measurement')} cannot be of the arm that the others show: {rows} "
-        f"{listed(named)}, up to {largest} mm off. Measure these poses again. Usual causes are an "
+        f"{listed(named)}, up to {listed(largest)} off. Measure these poses again. Usual causes are an "
         "interrupted beam, a loose target, or an arm that had not settled."
     )
     yield Advice("outliers", "Check the outliers.", words, facts.mean_mm() + share)

@@ -92,14 +92,21 @@ def _outliers(facts: Facts) -> list[Table]:
     if not found:
         return []
     names = short_names(facts.files)
+    turned = any("turn_mrad" in entry for entry in found)
     rows = [
-        [str(entry["row"]), names[entry["file"]], fixed(entry["distance_mm"]), f"{entry['score']:.1f}"]
+        [
+            str(entry["row"]),
+            names[entry["file"]],
+            fixed(entry["distance_mm"]),
+            *([fixed(entry["turn_mrad"]) if "turn_mrad" in entry else ""] if turned else []),
+            f"{entry['score']:.1f}",
+        ]
         for entry in found
     ]
     fate = "taken out of the fits" if taken_out(facts.calibration) else "kept in the fit"
     table = Table(
         "Outliers",
-        ["row", "file", "distance, mm", "score"],
+        ["row", "file", "distance, mm", *(["turn, mrad"] if turned else []), "score"],
         rows,
         says=f"They were {fate}; the held-out errors include them. Scores are squared standardised "
         "residuals over the limit: above one is an outlier.",

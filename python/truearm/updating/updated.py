@@ -126,4 +126,5 @@ def _rows(scene: Scene, found: Estimate) -> FittedRows:
         residual,
         np.zeros(len(scene.data)),
         np.linalg.norm(residual[:, :3], axis=1),
+        orientation=scene.task.selection.orientation,
     )
