@@ -1,6 +1,6 @@
 """The rows that a calibration was fitted to, and what became of each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -64,6 +64,11 @@ class FittedRows:
         distance = np.maximum(variable.distances, _farthest(variable.residuals, selection))
         return cls(fits.data, side, variable.weights, variable.residuals, variable.scores, distance)
 
+    @property
+    def fitted(self) -> Measurements:
+        """The rows as they were fitted: without the drift."""
+        return without_drift(self.data, self.moved)
+
     def among(self, data: Measurements) -> NDArray[np.bool_]:
         """Which rows (n,) of other measurements are among these: by readings and first point."""
         known = set(_marks(self.data))
@@ -81,6 +86,11 @@ class FittedRows:
             }
             for k in found[np.argsort(-self.score[found], kind="stable")]
         ]
+
+
+def without_drift(data: Measurements, moved: Floats | None) -> Measurements:
+    """The rows as if their set-ups had not been `moved` in world (n, 3), m; themselves with None."""
+    return data if moved is None else replace(data, targets=data.targets - moved[:, None])
 
 
 def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:

@@ -192,10 +192,9 @@ class VariableSpread:
                 way_out="Use the file that still has them",
             )
         task = task_of(calibration)
-        measured = core_set(
-            calibration.robot, rows.data, calibration.selection, calibration.groups, rows.weight
-        )
-        values = feature_values(rows.data, calibration.options.features)
+        data = rows.fitted
+        measured = core_set(calibration.robot, data, calibration.selection, calibration.groups, rows.weight)
+        values = feature_values(data, calibration.options.features)
         names = calibration.identifiability.determined
         options = field_options(task, names, values, details.feature_ranges, KnownHyper(details.hyper))
         columns = list(calibration.arm.candidates.columns)
@@ -204,7 +203,7 @@ class VariableSpread:
             posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
         except CoreError as error:
             raise InputError(str(error), where="the calibration's variable model") from None
-        place = SetupPlace.of(task, rows.data)
+        place = SetupPlace.of(task, data)
         return cls(columns, posterior, details.inflation, noises_of(details.hyper), place)
 
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
