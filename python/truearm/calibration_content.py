@@ -122,7 +122,7 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         "variable": _read_variable(content["variable"]),
         "scheme": SchemeDetails(**content["scheme"]) if content.get("scheme") else None,
         "validation": Validation.from_dict(content["validation"]),
-        "rows": None if rows is None else rows_content.unpack(rows, arrays),
+        "rows": None if rows is None else rows_content.unpack(rows, arrays, distances=selection["distances"]),
         "held": None if held is None else HeldRows.unpack(held, arrays),
         "data_hash": content["data_sha256"],
         "version": content["version"],

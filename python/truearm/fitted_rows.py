@@ -31,9 +31,11 @@ class FittedRows:
         side: For each row (n,) whether it was UNUSED, TRAINED or HELD_OUT when the errors were judged.
         weight: Weights in the final fit (n,).
         residual: Measured minus predicted (n, m), base frame: three a target in m, then three of the
-            orientation in rad; zero where not measured. For distances (d, 1).
+            orientation in rad; zero where not measured. For distances (d, 1), in the order of the rows, a
+            pair once.
         score: Squared standardised residuals over the limit (n,); above one is an outlier.
-        distance_m: How far the farthest target of each row is from where the model has it (n,).
+        distance_m: How far the farthest target of each row is from where the model has it (n,); zero for
+            distances.
         moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
             `distance_m` are without it, `data` is as it was measured.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
@@ -58,7 +60,8 @@ class FittedRows:
         if fits.variable is None:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)
-            score, distance = _judge_constant(fits, residual, selection), _farthest(residual, selection)
+            score = _judge_constant(fits, residual, selection)
+            distance = np.zeros(len(side)) if selection.distances else _farthest(residual, selection)
             return cls(fits.data, side, fits.constant.weights, residual, score, distance)
         variable = fits.variable
         distance = np.maximum(variable.distances, _farthest(variable.residuals, selection))
@@ -130,9 +133,7 @@ def sides(count: int, split: Split) -> NDArray[np.int64]:
 
 
 def _farthest(residual: Floats, selection: Selection) -> Floats:
-    """How far the farthest target of each row (n,) is from where the model has it, m; zero for distances."""
-    if selection.distances:
-        return np.zeros(len(residual))
+    """How far the farthest target of each row (n,) is from where the model has it, m."""
     count = len(selection.targets)
     return np.asarray(np.linalg.norm(residual[:, : 3 * count].reshape(-1, count, 3), axis=2).max(axis=1))
 
