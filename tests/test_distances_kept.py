@@ -10,6 +10,7 @@ import truearm as ta
 from tests.calibration_file_support import read_calibration_file, write_calibration_file
 from truearm.calibration_file import NO_DIGEST
 from truearm.cli import main
+from truearm.points_together import points_together
 from truearm.simulation import VirtualArm
 
 IRB = ta.Robot.load("abb-irb-120")
@@ -69,3 +70,26 @@ def test_distances_of_pairs_are_counted_once(pairs, tmp_path, capsys):
     assert held is not None
     assert told is not None
     assert 2 * int(told[1]) == len(held)
+
+
+def test_distances_beside_points_change_nothing_and_are_told():
+    arm = VirtualArm(IRB, seed=3)
+    table = arm.measure_table(np.repeat(arm.poses(40), 2, axis=0))
+    second = np.arange(80) % 2 == 1
+    for axis in "xyz":
+        table[f"{axis}2"] = np.where(second, table[axis] + 0.1, np.nan)
+        table[axis] = np.where(second, np.nan, table[axis])
+    made = {}
+    for name, more in (
+        ("without", {}),
+        ("empty", {"distance": np.nan}),
+        (
+            "full",
+            {"distance": np.tile(np.linspace(0.8, 1.2, 40), 2), "pair": [f"p{k % 40}" for k in range(80)]},
+        ),
+    ):
+        data = ta.Measurements.from_dataframe(table.assign(**more))
+        made[name] = points_together(data)[0], [notice.kind for notice in data.notices]
+    assert [len(data) for data, _ in made.values()] == [40, 40, 40]
+    assert made["empty"][0].hash() == made["without"][0].hash()
+    assert [told for _, told in made.values()] == [[], [], ["distances_left_out"]]

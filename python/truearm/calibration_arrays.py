@@ -13,7 +13,7 @@ Shape = Sequence[int | str]
 
 OF_ROWS: Final = ("rows", "outcome")
 OF_DISTANCES: Final = ("outcome.residual", "outcome.distance_m")
-"""Where distances were fitted these may have a row for each of them: files of earlier versions have both so."""
+"""Where distances were fitted these may have a row for each: in files of earlier versions both have."""
 HELD: Final = "held"
 MEASURED: Final = (*OF_ROWS, HELD)
 """Beginnings of the names of arrays in which NaN stands where nothing was measured."""

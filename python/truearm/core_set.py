@@ -52,7 +52,7 @@ def select(data: Measurements, use: Use | None, judge_target: int = FIRST_TARGET
         UsageError: If what is asked for was not measured.
         InputError: If only some rows hold distances.
     """
-    if _holds_distances(data):
+    if holds_distances(data):
         if use is not None or judge_target != FIRST_TARGET:
             raise UsageError("distances were measured, not points", where=", ".join(data.files))
         return Selection((), distances=True)
@@ -187,7 +187,12 @@ def _numbers(given: Floats | None, count: int) -> list[float]:
     return [np.nan] * count if given is None else [float(number) for number in given]
 
 
-def _holds_distances(data: Measurements) -> bool:
+def holds_distances(data: Measurements) -> bool:
+    """Whether distances are what is used of `data`: beside points they are left out.
+
+    Raises:
+        InputError: If only some rows hold distances.
+    """
     if data.distance_m is None:
         return False
     has_point = np.asarray(np.any(np.all(np.isfinite(data.targets), axis=2), axis=1))

@@ -45,7 +45,7 @@ def read_fields(
     distance = _distances(table, layout)
     if measured or layout.targets:
         _check_measured(table, targets, distance)
-    ends, assumed = _ends(table, layout, distance)
+    ends = _ends(table, layout, distance)
     purpose, unknown = _purpose(table, layout)
     features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
@@ -61,7 +61,7 @@ def read_fields(
         "distance_m": distance,
         **ends,
         "purpose": purpose,
-        "notices": (*assumed, *unknown, *notices),
+        "notices": (*_of_distances(table, layout, targets, distance), *unknown, *notices),
         "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
 
@@ -132,9 +132,12 @@ def _sigma(table: Table, column: Column) -> Floats:
 
 
 def _distances(table: Table, layout: Layout) -> Floats | None:
+    """Measured distances (n,), NaN where there is none; None where there is none at all."""
     if layout.distance is None:
         return None
     distance = _si(table, layout.distance)
+    if np.isnan(distance).all():
+        return None
     _refuse(
         table,
         distance <= 0.0,
@@ -165,19 +168,17 @@ def _group(table: Table, layout: Layout, default: str) -> Texts:
     return groups
 
 
-def _ends(
-    table: Table, layout: Layout, distance: Floats | None
-) -> tuple[dict[str, Texts | None], list[Notice]]:
-    """What the distances lead to: `anchor` and `pair`, each None where there is none; and notices.
+def _ends(table: Table, layout: Layout, distance: Floats | None) -> dict[str, Texts | None]:
+    """What the distances lead to: `anchor` and `pair`, each None where there is none.
 
     Distances without either column lead to one fixed point.
     """
     anchor = table.texts("anchor") if "anchor" in layout.words else None
     pair = table.texts("pair") if "pair" in layout.words else None
     if distance is None:
-        return {"anchor": anchor, "pair": pair}, []
+        return {"anchor": anchor, "pair": pair}
     if anchor is None and pair is None:
-        return {"anchor": np.where(np.isfinite(distance), ONE_ANCHOR, ""), "pair": None}, [_one_anchor(table)]
+        return {"anchor": np.where(np.isfinite(distance), ONE_ANCHOR, ""), "pair": None}
     has_anchor, has_pair = (_is_given(word, table.row_count) for word in (anchor, pair))
     rule = 'A distance leads to a fixed point named in "anchor", or to the other row of the same "pair"'
     measured = np.isfinite(distance)
@@ -185,16 +186,24 @@ def _ends(
     _refuse(table, measured & has_anchor & has_pair, "the distance leads to an anchor and a pair in", rule)
     if pair is not None:
         _check_pairs(table, pair, distance)
-    return {"anchor": anchor, "pair": pair}, []
+    return {"anchor": anchor, "pair": pair}
 
 
-def _one_anchor(table: Table) -> Notice:
+def _of_distances(table: Table, layout: Layout, targets: Floats, distance: Floats | None) -> list[Notice]:
+    """A notice of distances that are left out, or of which nothing says where they lead."""
+    if distance is None:
+        return []
+    if np.isfinite(targets).any():
+        text = f"{table.where}: distances are left out: points were measured as well, and points are fitted."
+        return [Notice("distances_left_out", text)]
+    if "anchor" in layout.words or "pair" in layout.words:
+        return []
     text = (
         f"{table.where}: no column says where the distances lead: all are taken as measured to one fixed "
         f'point, "{ONE_ANCHOR}". If there are several, name them in a column anchor; distances between two '
         "poses have a column pair."
     )
-    return Notice("one_anchor", text)
+    return [Notice("one_anchor", text)]
 
 
 def _is_given(words: Texts | None, count: int) -> Mask:
