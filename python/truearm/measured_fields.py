@@ -99,9 +99,12 @@ def _targets(table: Table, layout: Layout) -> Floats:
     return targets
 
 
-def _orientations(table: Table) -> Floats:
+def _orientations(table: Table) -> Floats | None:
+    """Measured orientations (n, 4), NaN where there is none; None where there is none at all."""
     q = np.column_stack([table.numbers(name) for name in QUATERNION])
     empty = np.isnan(q)
+    if empty.all():
+        return None
     rule = "An orientation has all four numbers, or all four cells are empty"
     _refuse(table, _is_partial(empty), 'only some of "qw" to "qz" are given in', rule)
     length: Floats = np.sqrt(np.square(q).sum(axis=1))
