@@ -1,9 +1,13 @@
 """What no row, or no row of a set-up, measured: no part of the fit, no answer, no share in what is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import truearm as ta
+from tests.calibration_file_support import read_calibration_file, write_calibration_file
+from truearm.calibration_file import NO_DIGEST
 from truearm.simulation import Imperfections, VirtualArm
 
 UR10 = ta.Robot.load("ur10")
@@ -73,3 +77,53 @@ def test_what_was_measured_in_no_row_cannot_be_asked_for(table):
     for use, words in (("targets", "one point was measured"), ("pose", "no orientation was measured")):
         with pytest.raises(ta.UsageError, match=words):
             constants(empty, use=use)
+
+
+@pytest.fixture(scope="module")
+def by_set_up(arm, table):
+    """Of set-up A, the smaller one, everything was measured, of B the first target alone; no orientations."""
+    parts = table.drop(columns=QUATERNION).assign(group=np.where(np.arange(ROWS) < 24, "A", "B"))
+    parts.loc[24:, SECOND] = np.nan
+    return constants(parts)
+
+
+@pytest.fixture(scope="module")
+def turned_in_a(table):
+    """Orientations were measured in set-up A, the smaller one, alone."""
+    parts = table.drop(columns=SECOND).assign(group=np.where(np.arange(ROWS) < 24, "A", "B"))
+    parts.loc[24:, QUATERNION] = np.nan
+    return constants(parts)
+
+
+def test_a_target_of_another_set_up_makes_no_standard_deviation_large(arm, table, by_set_up):
+    q = arm.poses(20, seed=4)
+    assert by_set_up.position_std(q).max() < 1e-4
+    assert by_set_up.position_std(q, group="A", target=2).max() < 1e-4
+    assert by_set_up.conservative_std(q)[:, 0].max() < 2e-4
+    nearly = table.drop(columns=QUATERNION)
+    nearly.loc[24:, SECOND] = np.nan
+    variable = ta.calibrate(UR10, measured(nearly.assign(group=np.where(np.arange(ROWS) < 24, "A", "B"))))
+    for known in (variable, replace(variable, fitted_spread=None)):
+        assert known.position_std(q).max() < 1e-4
+
+
+def test_a_file_without_its_rows_tells_the_same(arm, by_set_up, turned_in_a):
+    q = arm.poses(5, seed=4)
+    for whole in (by_set_up, turned_in_a):
+        stripped = ta.Calibration.from_bytes(whole.to_bytes(with_rows=False), where="without rows")
+        assert stripped.position_std(q).tolist() == whole.position_std(q).tolist()
+        assert stripped.measured.pack() == whole.measured.pack()
+
+
+def test_files_that_do_not_say_what_was_measured_are_read(by_set_up, tmp_path):
+    for with_rows in (True, False):
+        by_set_up.save(tmp_path / "arm.calib", with_rows=with_rows)
+        arrays, content = read_calibration_file(tmp_path / "arm.calib")
+        del content["measured"]
+        write_calibration_file(tmp_path / "old.calib", arrays, {**content, "sha256": NO_DIGEST})
+        old = ta.Calibration.load(tmp_path / "old.calib").measured
+        assert old.targets.tolist() == ([[24, 24], [36, 0]] if with_rows else [[1, 1], [1, 1]])
+    content["measured"] = {"rows": [1], "targets": [[1, 1], [1, 0]], "orientations": [0, 0]}
+    write_calibration_file(tmp_path / "odd.calib", arrays, {**content, "sha256": NO_DIGEST})
+    with pytest.raises(ta.InputError, match=r"'measured.rows' has shape \(1,\)"):
+        ta.Calibration.load(tmp_path / "odd.calib")
