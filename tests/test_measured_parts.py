@@ -8,6 +8,7 @@ import pytest
 import truearm as ta
 from tests.calibration_file_support import read_calibration_file, write_calibration_file
 from truearm.calibration_file import NO_DIGEST
+from truearm.evaluation import EvaluationOptions
 from truearm.simulation import Imperfections, VirtualArm
 
 UR10 = ta.Robot.load("ur10")
@@ -127,3 +128,59 @@ def test_files_that_do_not_say_what_was_measured_are_read(by_set_up, tmp_path):
     write_calibration_file(tmp_path / "odd.calib", arrays, {**content, "sha256": NO_DIGEST})
     with pytest.raises(ta.InputError, match=r"'measured.rows' has shape \(1,\)"):
         ta.Calibration.load(tmp_path / "odd.calib")
+
+
+def test_targets_that_a_set_up_did_not_measure_are_no_answer(arm, by_set_up):
+    q = arm.poses(5, seed=4)
+    off = by_set_up.position(q, group="A", target=2) - second_in_world(arm, q)
+    assert np.abs(off).max() < 2e-4
+    for ask in (by_set_up.position, by_set_up.position_std):
+        with pytest.raises(ta.WorkError, match='target 2 was not measured in the set-up "B"'):
+            ask(q, group="B", target=2)
+    assert np.isfinite(by_set_up.position(q, group="B")).all()
+
+
+def test_orientations_are_known_where_they_were_measured(arm, turned_in_a):
+    q = arm.poses(5, seed=4)
+    assert turned_in_a.pose_std(q, group="A")[:, 3:].max() < 1e-3
+    with pytest.raises(ta.WorkError, match="orientation of the target on the tool is not known"):
+        turned_in_a.pose(q, group="B")
+    assert np.isfinite(turned_in_a.position(q, group="B")).all()
+
+
+@pytest.mark.parametrize("kept", [EvaluationOptions(keep_tool=True), EvaluationOptions(keep_frames=True)])
+def test_what_a_kept_set_up_did_not_measure_is_not_judged(arm, by_set_up, kept):
+    table = with_second(arm, arm.poses(30, seed=8)).drop(columns=QUATERNION).assign(group="B")
+    found = ta.evaluate(by_set_up, measured(table), kept)
+    assert found.errors["constant"].position.max < 0.2
+    told = [notice.message for notice in found.notices if notice.kind == "not_judged"]
+    assert [words.split(" was measured in none of the rows")[0] for words in told] == ['Target 2 of "B"']
+    lone = measured(table.assign(x=np.nan, y=np.nan, z=np.nan))
+    with pytest.raises(ta.InputError, match='target 2 of "B" was measured in none of the rows'):
+        ta.evaluate(by_set_up, lone, kept)
+
+
+def test_orientations_that_a_kept_set_up_did_not_measure_are_not_judged(arm, turned_in_a):
+    table = with_second(arm, arm.poses(30, seed=8)).drop(columns=SECOND).assign(group="B")
+    found = ta.evaluate(turned_in_a, measured(table), keep_tool=True)
+    assert found.errors["constant"].position.max < 0.2
+    assert found.errors["constant"].orientation is None
+    assert [notice.kind for notice in found.notices] == ["not_judged"]
+
+
+def test_held_out_orientations_of_a_set_up_that_trained_without_are_not_judged(table):
+    purpose = np.where(np.arange(ROWS) % 3 == 0, "validate", "train")
+    group = np.where(np.arange(ROWS) < 24, "A", "B")
+    parts = table.drop(columns=SECOND).assign(group=group, purpose=purpose)
+    parts.loc[(group == "B") & (purpose == "train"), QUATERNION] = np.nan
+    found = constants(parts)
+    turned = found.validation.holdout["constant"].orientation
+    assert turned is not None
+    assert turned.max < 1.0
+
+
+def test_an_update_compares_with_nothing_that_was_not_measured(arm, by_set_up):
+    later = measured(with_second(arm, arm.poses(20, seed=8)).drop(columns=QUATERNION).assign(group="B"))
+    assert ta.update(by_set_up, later).verdict == "holds"
+    with pytest.raises(ta.UsageError, match='no frame and tool of set-up "B" that could be kept'):
+        ta.update(by_set_up, later, keep_tool=True)

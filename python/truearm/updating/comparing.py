@@ -161,7 +161,7 @@ def update(
     task = _task(calibration, data, chosen, stages)
     if task.selection.orientation:
         check_turns(data, calibration.robot)
-    unknowns = Unknowns.of(calibration, task, chosen)
+    unknowns = Unknowns.of(calibration, task, chosen, data)
     _check_kept(calibration, task, unknowns, chosen)
     _check_enough(data, task, unknowns)
     _check_groups(data, task)
