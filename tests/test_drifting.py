@@ -97,6 +97,18 @@ def test_the_rows_stay_as_they_were_measured(measured, settled, tmp_path):
     assert again.validation.drift == settled.validation.drift
 
 
+def test_a_file_tells_the_standard_deviations_that_the_fit_told():
+    """Poses measured there and back: how much shots of a pose differ tells the noise."""
+    arm = VirtualArm(ta.Robot.load("abb-irb-120"), seed=5)
+    there = arm.poses(50)
+    data = arm.measure(np.vstack([there, there[::-1]]))
+    found = ta.calibrate(arm.robot, moved(data, np.linspace(0.0, 4.0, 100)[:, None] * FAR), refit=False)
+    drift_of(found)
+    again = ta.Calibration.from_bytes(found.to_bytes(), where="the same")
+    q = arm.poses(20, seed=4)
+    assert again.position_std(q) == pytest.approx(found.position_std(q), rel=1e-6)
+
+
 def test_rows_in_any_order_give_the_same_drift(measured, settled):
     """Their numbers say when they were measured."""
     arm, _, data = measured

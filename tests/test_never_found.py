@@ -123,3 +123,15 @@ def test_a_file_knows_from_which_side_its_poses_were_approached(arm, tmp_path):
     assert kept.rows is not None
     assert kept.rows.data.purpose is not None
     assert kept.rows.data.purpose.tolist() == table["purpose"].to_numpy()[made.rows.data.rows - 1].tolist()
+
+
+def test_held_out_rows_of_the_judged_target_alone_have_no_intervals(arm):
+    table = in_nests(arm, 60, np.zeros(60, dtype=int))
+    table[["x2", "y2", "z2"]] = table[["x", "y", "z"]]
+    table = table.assign(purpose=np.repeat(["train", "validate"], [40, 20]))
+    table.loc[40:, ["x", "y", "z"]] = np.nan
+    table = table[[name for name in table.columns if name[1:] not in ("3", "4") or name[0] == "q"]]
+    found = ta.calibrate(UR10, ta.Measurements.from_dataframe(table), judge_target=2, refit=False)
+    assert found.validation.coverage_95 is None
+    again = ta.Calibration.from_bytes(found.to_bytes(), where="the same")
+    assert again.validation == found.validation

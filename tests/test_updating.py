@@ -428,7 +428,7 @@ def test_set_up_derivatives_are_those_of_finite_differences(known):
     arm, calibration = known
     data = arm.measure(arm.poses(6, seed=3))
     task = Task(calibration.arm, select(data, None), data.groups, calibration.options)
-    unknowns = Unknowns.of(calibration, task, UpdateOptions())
+    unknowns = Unknowns.of(calibration, task, UpdateOptions(), data)
     scene = Scene(task, data, calibration, unknowns)
     state = scene.first()
     linear = scene.linear(state)

@@ -51,6 +51,7 @@ from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge, where_found
 from truearm.lengths import length_mm
+from truearm.measured_parts import MeasuredParts
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE
 from truearm.options import Options
@@ -106,8 +107,7 @@ def calibrate(
     robot, given = kinds.required(robot, Robot, "the robot"), Measurements.of(data)
     notices = check_against(given, robot)
     given, together = points_together(given.deduplicated())
-    notices += together
-    notices += stood_still(robot, given.readings) + seen_at_values(robot, given.readings)
+    notices += [*together, *stood_still(robot, given.readings), *seen_at_values(robot, given.readings)]
     task = _task(robot, given, chosen, threads, stages)
     notices += orientations_left_out(given, task.selection, chosen.use)
     split = split_rows(given, chosen.split)
@@ -127,6 +127,7 @@ def calibrate(
         options=chosen,
         groups=tuple(task.groups),
         selection=task.selection,
+        measured=_measured(task, final),
         models=final.models(task.arm),
         identifiability=final.identifiability,
         constant=_constant_details(task, final),
@@ -297,8 +298,13 @@ def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> V
     if fits.variable is None or details is None:
         return None
     columns = list(task.arm.candidates.columns)
-    noises, place = noises_of(details.hyper), SetupPlace.of(task, fits.data)
+    noises, place = noises_of(details.hyper), SetupPlace.of(task, _measured(task, fits))
     return VariableSpread(columns, fits.variable.posterior, details.inflation, noises, place)
+
+
+def _measured(task: Task, fits: Fits) -> MeasuredParts:
+    """What the rows of each set-up hold of what was fitted."""
+    return MeasuredParts.of(fits.data, task.selection, task.groups)
 
 
 def _fit_both(

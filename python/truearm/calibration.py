@@ -27,6 +27,7 @@ from truearm.inputs import Features, feature_columns
 from truearm.kinds import words
 from truearm.lengths import length_mm
 from truearm.limits import Task
+from truearm.measured_parts import MeasuredParts
 from truearm.models import CONSTANT, ArmModel
 from truearm.options import Options
 from truearm.revision import Revision
@@ -56,6 +57,7 @@ class Calibration:
         options: How it was calibrated.
         groups: Names of the set-ups.
         selection: What of the measurements was used.
+        measured: How many rows of each set-up hold it.
         models: The fitted models by name: "nominal", "constant" and, if fitted, one that varies.
         identifiability: Which parameters the measurements determined.
         constant: More about the constant model.
@@ -79,6 +81,7 @@ class Calibration:
     options: Options
     groups: tuple[str, ...]
     selection: Selection
+    measured: MeasuredParts
     models: Mapping[str, ArmModel]
     identifiability: Identifiability
     constant: ConstantDetails
@@ -214,8 +217,11 @@ class Calibration:
             q: Readings.
             tool: Transform (4, 4) from flange to tool, or a point (3,) in the flange frame.
             group: Name of the set-up whose world is meant.
-            target: Measured target, from 1.
+            target: Measured target, from 1; by default the first that the set-up measured.
             features: Features by name.
+
+        Raises:
+            WorkError: If the target was not measured in the set-up.
         """
         end = self._endpoint(tool, group, target)
         rows, single = self._readings(q)
@@ -236,7 +242,7 @@ class Calibration:
         """Predicted poses, (n, 4, 4); arguments as for position.
 
         Raises:
-            WorkError: If the orientation of the target was not measured.
+            WorkError: If the target, or its orientation, was not measured in the set-up.
         """
         end = self._oriented(tool, group, target)
         rows, single = self._readings(q)
@@ -296,7 +302,7 @@ class Calibration:
         Where the orientation of a target was measured, how it is turned on the flange is seen as well.
 
         Raises:
-            WorkError: If the orientation of the target was not measured.
+            WorkError: If the target, or its orientation, was not measured in the set-up.
         """
         return self._std(q, self._oriented(tool, group, target), features, pose=True)
 

@@ -12,6 +12,8 @@ Arrays = Mapping[str, NDArray[Any]]
 Shape = Sequence[int | str]
 
 OF_ROWS: Final = ("rows", "outcome")
+OF_DISTANCES: Final = ("outcome.residual", "outcome.distance_m")
+"""Where distances were fitted these may have a row for each: in files of earlier versions both have."""
 HELD: Final = "held"
 MEASURED: Final = (*OF_ROWS, HELD)
 """Beginnings of the names of arrays in which NaN stands where nothing was measured."""
@@ -56,7 +58,8 @@ def check_arrays(arrays: Arrays, content: Mapping[str, Any], table: tuple[int, i
     if content["rows"] is not None:
         _check_shape(arrays, "rows.readings", ("any", joints))
         _check_shape(arrays, "rows.targets", ("any", "any", 3))
-        _check_lengths(arrays, OF_ROWS, len(arrays["rows.readings"]))
+        exempt = OF_DISTANCES if content["selection"]["distances"] else ()
+        _check_lengths(arrays, OF_ROWS, len(arrays["rows.readings"]), exempt)
     if content.get(HELD) is not None:
         _check_shape(arrays, "held.readings", ("any", joints))
 
@@ -90,7 +93,8 @@ def _check_shape(arrays: Arrays, name: str, shape: Shape) -> None:
         raise InputError(f"'{name}' has shape {found}", rule=f"It must be ({wanted})")
 
 
-def _check_lengths(arrays: Arrays, beginnings: Sequence[str], rows: int) -> None:
+def _check_lengths(arrays: Arrays, beginnings: Sequence[str], rows: int, exempt: Sequence[str]) -> None:
     for name, values in arrays.items():
-        if name.partition(".")[0] in beginnings and values.shape[:1] != (rows,):
+        is_of_rows = name.partition(".")[0] in beginnings and name not in exempt
+        if is_of_rows and values.shape[:1] != (rows,):
             raise InputError(f"'{name}' has shape {values.shape}", rule=f"There are {rows} rows")

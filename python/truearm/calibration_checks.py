@@ -23,6 +23,12 @@ class _Selection(_Part):
     judge: Count
 
 
+class _Measured(_Part):
+    rows: list[Count]
+    targets: list[list[Count]]
+    orientations: list[Count]
+
+
 class _Identifiability(_Part):
     parameters: Count
     determined: list[str]
@@ -65,6 +71,7 @@ class _Content(_Part):
     constant: _Constant
     variable: _Variable | None
     notices: list[_Notice] = []
+    measured: _Measured | None = None
 
 
 def check_plain(content: Mapping[str, Any]) -> None:

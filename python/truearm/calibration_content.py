@@ -16,9 +16,11 @@ from truearm.core_set import Selection
 from truearm.defaults import NO_DRIFT
 from truearm.details import ConstantDetails, VariableDetails
 from truearm.errors import InputError, Notice, UsageError
+from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
+from truearm.measured_parts import MeasuredParts
 from truearm.models import ArmModel
 from truearm.options import Options
 from truearm.robot import Robot
@@ -51,6 +53,7 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         "options": calibration.options.to_dict(),
         "groups": list(calibration.groups),
         "selection": {**asdict(calibration.selection), "targets": list(calibration.selection.targets)},
+        "measured": calibration.measured.pack(),
         "identifiability": calibration.identifiability.to_dict(),
         "constant": _constant(calibration.constant),
         "variable": _variable(calibration.variable),
@@ -101,8 +104,8 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     options = _read_options(content["options"])
     robot = Robot.from_dict(content["robot"])
     arm = IdentifiedArm(robot, options.frame)
-    selection = content["selection"]
-    constant, rows, held = content["constant"], content["rows"], content.get("held")
+    selection = Selection(**{**content["selection"], "targets": tuple(content["selection"]["targets"])})
+    constant, held = content["constant"], content.get("held")
     bounds = content.get("conservative")
     check_arrays(arrays, content, arm.table.shape, robot.joint_count)
     inputs = robot.joint_count + len(options.features)
@@ -111,20 +114,20 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     }
     for model in models.values():
         check_set_ups(len(content["groups"]), len(model.setup.frames))
+    rows = _read_rows(content, arrays, selection)
     return {
         "robot": robot,
         "options": options,
         "groups": tuple(content["groups"]),
-        "selection": Selection(**{**selection, "targets": tuple(selection["targets"])}),
+        "selection": selection,
+        "measured": _read_measured(content, selection, rows),
         "models": models,
         "identifiability": Identifiability.from_dict(content["identifiability"]),
         "constant": _read_constant(constant, arrays),
         "variable": _read_variable(content["variable"]),
         "scheme": SchemeDetails(**content["scheme"]) if content.get("scheme") else None,
         "validation": Validation.from_dict(content["validation"]),
-        "rows": None
-        if rows is None
-        else rows_content.unpack(rows, arrays, orientation=selection["orientation"]),
+        "rows": rows,
         "held": None if held is None else HeldRows.unpack(held, arrays),
         "data_hash": content["data_sha256"],
         "version": content["version"],
@@ -134,6 +137,23 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
         else conservative.unpack(bounds, arrays, robot.flange_chain),
         "revision": revision.unpack(content["update"], arrays) if content.get("update") else None,
     }
+
+
+def _read_rows(content: Mapping[str, Any], arrays: Arrays, selection: Selection) -> FittedRows | None:
+    rows = content["rows"]
+    return None if rows is None else rows_content.unpack(rows, arrays, selection=selection)
+
+
+def _read_measured(
+    content: Mapping[str, Any], selection: Selection, rows: FittedRows | None
+) -> MeasuredParts:
+    """What each set-up measured; of files of earlier versions, which do not say, from their rows."""
+    groups = content["groups"]
+    if content.get("measured"):
+        return MeasuredParts.unpack(content["measured"], selection, len(groups))
+    if rows is None:
+        return MeasuredParts.whole(selection, len(groups))
+    return MeasuredParts.of(rows.data, selection, groups)
 
 
 def _read_options(content: Mapping[str, Any]) -> Options:

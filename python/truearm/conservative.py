@@ -100,7 +100,7 @@ def conservative_of(calibration: "Calibration") -> Conservative:
     """
     reach, rng = Reach.of(calibration), np.random.default_rng(SEED)
     count = _sample_count(calibration)
-    centre: Floats = calibration.model.setup.targets.mean(axis=(0, 1))
+    centre: Floats = calibration.measured.points(calibration.model.setup.targets).mean(axis=0)
     (fitted, prior), (fresh, _) = (_exact(calibration, centre, reach.draw(count, rng)) for _ in range(2))
     largest = np.maximum(PRIOR_MARGIN * prior.max(axis=0), np.maximum(fitted[1], fresh[1]).max(axis=0))
     robot = calibration.robot

@@ -46,24 +46,24 @@ class Selection:
 def select(data: Measurements, use: Use | None, judge_target: int = FIRST_TARGET) -> Selection:
     """What to use of `data`: with None targets, else pose, else position, as far as was measured.
 
-    A target other than the first that errors are judged at takes no part in the fit.
+    Columns without a point or an orientation count for nothing. A target other than the first that was
+    measured, at which errors are judged, takes no part in the fit.
 
     Raises:
         UsageError: If what is asked for was not measured.
         InputError: If only some rows hold distances.
     """
-    if _holds_distances(data):
+    if holds_distances(data):
         if use is not None or judge_target != FIRST_TARGET:
             raise UsageError("distances were measured, not points", where=", ".join(data.files))
         return Selection((), distances=True)
     _check_asked(data, use, judge_target)
-    judge = judge_target - 1
+    first, *further = _measured_targets(data)
+    judge = first if judge_target == FIRST_TARGET else judge_target - 1
+    others = tuple(target for target in further if target != judge)
     if use is None:
-        several = data.target_count - (judge > 0) > 1
-        use = "targets" if several else "position" if data.orientations is None else "pose"
-    points = range(data.target_count) if use == "targets" else (0,)
-    targets = tuple(point for point in points if point != judge or judge == 0)
-    return Selection(targets, orientation=use == "pose", judge=judge)
+        use = "targets" if others else "pose" if _measures_orientation(data) else "position"
+    return Selection((first, *(others if use == "targets" else ())), orientation=use == "pose", judge=judge)
 
 
 def first_measured(data: Measurements, selection: Selection) -> Rows:
@@ -187,7 +187,12 @@ def _numbers(given: Floats | None, count: int) -> list[float]:
     return [np.nan] * count if given is None else [float(number) for number in given]
 
 
-def _holds_distances(data: Measurements) -> bool:
+def holds_distances(data: Measurements) -> bool:
+    """Whether distances are what is used of `data`: beside points they are left out.
+
+    Raises:
+        InputError: If only some rows hold distances.
+    """
     if data.distance_m is None:
         return False
     has_point = np.asarray(np.any(np.all(np.isfinite(data.targets), axis=2), axis=1))
@@ -205,11 +210,11 @@ def _check_asked(data: Measurements, use: Use | None, judge_target: int) -> None
     where = ", ".join(data.files)
     if use is not None and use not in USES:
         raise UsageError(f'"{use}" is not known', where="use", rule="Either position, pose or targets")
-    if use == "pose" and data.orientations is None:
+    if use == "pose" and not _measures_orientation(data):
         raise UsageError(
             "no orientation was measured", where=where, rule="A pose needs the columns qw qx qy qz"
         )
-    if use == "targets" and data.target_count < 2:
+    if use == "targets" and len(_measured_targets(data)) < 2:
         raise UsageError(
             "one point was measured", where=where, rule="Further targets are columns x2 y2 z2, x3 y3 z3, ..."
         )
@@ -219,3 +224,14 @@ def _check_asked(data: Measurements, use: Use | None, judge_target: int) -> None
             where=where,
             rule=f"There {'is' if data.target_count == 1 else 'are'} {count_of(data.target_count, 'target')}",
         )
+
+
+def _measured_targets(data: Measurements) -> list[int]:
+    """The points that some row holds, indices from 0."""
+    held = np.isfinite(data.targets).all(axis=2).any(axis=0)
+    return [int(point) for point in np.flatnonzero(held)]
+
+
+def _measures_orientation(data: Measurements) -> bool:
+    """Whether some row holds an orientation."""
+    return data.orientations is not None and bool(np.isfinite(data.orientations).all(axis=1).any())

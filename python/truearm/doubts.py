@@ -193,6 +193,8 @@ def orientations_left_out(data: Measurements, selection: Selection, use: str | N
     if use is not None or selection.orientation or data.orientations is None:
         return []
     count = int(np.isfinite(data.orientations).all(axis=1).sum())
+    if not count:
+        return []
     text = (
         f"Orientations of {count_of(count, 'row')} are left out: where rows hold several targets these are "
         "fitted, and tell of orientation as well. For orientations, and the first target alone: --use pose."

@@ -16,6 +16,7 @@ from truearm._core import FieldFit, Setup, find_drift
 from truearm.defaults import NO_DRIFT
 from truearm.details import ANOTHER_PLACE, DriftDetails, Jump
 from truearm.errors import Notice
+from truearm.fitted_rows import without_drift
 from truearm.fitting import Fits, KnownHyper, Task, core_errors, fit_rows
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, VARIABLE
@@ -90,7 +91,7 @@ class Drift:
 
     def taken_out(self, data: Measurements) -> Measurements:
         """The rows as if nothing had moved."""
-        return replace(data, targets=data.targets - self.moved[:, None]) if self else data
+        return without_drift(data, self.moved if self else None)
 
     def spans(self, data: Measurements) -> dict[str, float]:
         """How far apart each set-up that moved has been, at the most, m."""

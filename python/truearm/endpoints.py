@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers, check_finite, rigid
-from truearm.errors import InputError, UsageError, did_you_mean, list_names
+from truearm.errors import InputError, UsageError, WorkError, did_you_mean, list_names
 from truearm.robot import Robot
 from truearm.rotations import rigid_motion
 
@@ -91,10 +91,11 @@ def at_target(
         calibration: Knows the set-ups.
         tool: A tool instead of a target.
         group: Name of the set-up; may be None where there is one.
-        target: Measured target from 1; the first by default.
+        target: Measured target from 1; by default the first that was measured in the set-up.
 
     Raises:
         UsageError: If there is no such set-up or target.
+        WorkError: If the target was not measured in the set-up.
     """
     number = _group_number(calibration, group)
     setup, selection = calibration.model.setup, calibration.selection
@@ -104,14 +105,22 @@ def at_target(
             raise UsageError("a tool and a target were given", rule="A prediction is of one of them")
         return Endpoint(at_tool(calibration.robot, tool), world_from_base)
     known = [k + 1 for k in selection.targets] or [1]
-    wanted = known[0] if target is None else target
+    held = calibration.measured.targets[number]
+    wanted = known[int((held > 0).argmax())] if target is None else target
     if wanted not in known:
         raise UsageError(f"there is no target {wanted}", rule=f"Targets {known} were fitted")
+    if not held[known.index(wanted)]:
+        raise WorkError(
+            f"target {wanted} was not measured in the set-up {list_names([calibration.groups[number]])}",
+            rule="Where it is on the tool there no other set-up tells",
+            way_out="Ask for a target that was, or give a tool",
+        )
     transform = np.eye(4)
     transform[:3, 3] = setup.targets[number, known.index(wanted)]
-    if selection.orientation:
+    turned = bool(calibration.measured.orientations[number])
+    if turned:
         transform[:3, :3] = setup.rotations[number]
-    return Endpoint(transform, world_from_base, selection.orientation, turn_is_fitted=selection.orientation)
+    return Endpoint(transform, world_from_base, turned, turn_is_fitted=turned)
 
 
 def _group_number(calibration: "Calibration", group: str | None) -> int:

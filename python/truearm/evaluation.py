@@ -29,8 +29,9 @@ from truearm.fitting import (
 )
 from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
-from truearm.judging import check_judged, judge, model_inputs, where_found
+from truearm.judging import check_judged, judge, model_inputs, never_found, where_found, without_parts
 from truearm.lengths import length_mm
+from truearm.measured_parts import held_parts
 from truearm.measurements import Measurements
 from truearm.models import NOMINAL, ArmModel
 from truearm.plausibility import check_against
@@ -44,6 +45,7 @@ from truearm.validation import Errors, RowErrors, means_in_words
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 MOST_FRAME_ROWS: Final = 400
 FEWEST_FRAME_ROWS: Final = 3
@@ -138,19 +140,15 @@ def evaluate(
     data, together = points_together(data.deduplicated())
     notices += together
     notices += [*known_rows(calibration.learned_from, data), *rows_beyond_learnt(calibration, data)]
-    selection = select(data, chosen.use, chosen.judge_target)
-    if selection.distances:
-        raise InputError(
-            "distances were measured, not points",
-            where=", ".join(data.files),
-            rule="A calibration is judged at measured points",
-        )
+    selection = _selection(data, chosen)
     if selection.orientation:
         check_turns(data, calibration.robot)
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
+    given, lost = data, _lost_parts(task, calibration, data, chosen)
+    data = without_parts(lost, data, selection)
     frame, judged = _divide(task, data, chosen)
     found_by = data.select(frame if len(frame) else judged)
-    chosen_rows, not_judged = _found_again(found_by, data.select(judged), selection, chosen)
+    chosen_rows, not_judged = _found_again(found_by, given.select(judged), selection, (chosen, lost[judged]))
     notices += not_judged
     with stages("finding frame and tool"):
         models = {
@@ -169,18 +167,43 @@ def evaluate(
         spoiled, outliers, changed = _gross(task, calibration, models[best], found_by, rows, chosen)
     of_no_use = spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration)) or changed
     if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
-        of_no_use = _moved(calibration, data, chosen, errors[best]) or of_no_use
+        of_no_use = _moved(calibration, given, chosen, errors[best]) or of_no_use
     notices = [*notices, *of_no_use, *outliers]
     statistics = {name: found.statistics() for name, found in errors.items()}
     return Evaluation(len(frame), len(judged), statistics, tuple(notices), held)
 
 
+def _selection(data: Measurements, options: EvaluationOptions) -> Selection:
+    selection = select(data, options.use, options.judge_target)
+    if selection.distances:
+        raise InputError(
+            "distances were measured, not points",
+            where=", ".join(data.files),
+            rule="A calibration is judged at measured points",
+        )
+    return selection
+
+
+def _lost_parts(task: Task, calibration: Calibration, data: Measurements, options: EvaluationOptions) -> Mask:
+    """What rows hold and the calibration has not measured in the set-up that is kept (n, t + 1)."""
+    held = held_parts(data, task.selection)
+    if not (options.keep_frames or options.keep_tool):
+        return np.zeros_like(held)
+    numbers, chosen = _kept(task, calibration)
+    found = calibration.measured.held(chosen)[numbers]
+    return held & ~found[[task.groups.index(name) for name in data.group]]
+
+
 def _found_again(
-    found_by: Measurements, judged: Measurements, selection: Selection, options: EvaluationOptions
+    found_by: Measurements, judged: Measurements, selection: Selection, given: tuple[EvaluationOptions, Mask]
 ) -> tuple[Measurements, list[Notice]]:
-    """The judged rows with the targets that are known on the tool, and a notice of the others."""
+    """The judged rows with what is known on the tool, and a notice of what is not.
+
+    `given` are the options, and what of the rows is not known in the set-up that is kept.
+    """
+    options, lost = given
     if (options.keep_frames or options.keep_tool) and not selection.judges_another:
-        return judged, []
+        return without_parts(lost, judged, selection), never_found(lost, judged, selection)
     notices = check_judged(found_by, judged, selection)
     return where_found(found_by, judged, selection), notices
 
@@ -322,8 +345,10 @@ def _gross(
     return gross_frame_rows(of_frame), outliers, changed
 
 
-def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:
-    """The calibration's own set-up for each of the task's groups: by name, or its only one."""
+def _kept(task: Task, calibration: Calibration) -> tuple[list[int], list[int]]:
+    """The calibration's own set-up for each of the task's groups: by name, or its only one; and the places of
+    the task's targets among its own.
+    """
     known = calibration.groups
     numbers = [
         0 if len(known) == 1 else known.index(group)
@@ -346,7 +371,12 @@ def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:
             rule="Only what was fitted can be kept",
             way_out="Give --use position, or let the set-up be found",
         )
-    chosen = [fitted.index(target) for target in wanted]
+    return numbers, [fitted.index(target) for target in wanted]
+
+
+def _stored(task: Task, calibration: Calibration, setup: Setup) -> Setup:
+    """The calibration's own set-up for each of the task's groups, with the task's targets."""
+    numbers, chosen = _kept(task, calibration)
     return Setup(
         np.ascontiguousarray(setup.frames[numbers]),
         np.ascontiguousarray(setup.targets[numbers][:, chosen]),
@@ -375,5 +405,9 @@ def _registered(
         seen = np.isfinite(measured[rows]).all(axis=2)
         with_turn = np.isfinite(turned[rows]).all(axis=(1, 2)) & task.selection.orientation
         predicted = flange[rows][with_turn, :3, :3] @ known.rotations[number]
-        frames.append(register(points[seen], measured[rows][seen], predicted, turned[rows][with_turn], lever))
+        # Where no row holds what is known on the tool nothing is judged.
+        frame = known.frames[number]
+        if seen.any():
+            frame = register(points[seen], measured[rows][seen], predicted, turned[rows][with_turn], lever)
+        frames.append(frame)
     return Setup(np.stack(frames), known.targets, known.rotations, known.anchors)

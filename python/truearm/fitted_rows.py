@@ -31,9 +31,11 @@ class FittedRows:
         side: For each row (n,) whether it was UNUSED, TRAINED or HELD_OUT when the errors were judged.
         weight: Weights in the final fit (n,).
         residual: Measured minus predicted (n, m), base frame: three a target in m, then three of the
-            orientation in rad; zero where not measured. For distances (d, 1).
+            orientation in rad; zero where not measured. For distances (d, 1), in the order of the rows, a
+            pair once.
         score: Squared standardised residuals over the limit (n,); above one is an outlier.
-        distance_m: How far the farthest target of each row is from where the model has it (n,).
+        distance_m: How far the farthest target of each row is from where the model has it (n,); zero for
+            distances.
         moved: Drift in world that was taken out of each row (n, 3), m; None where nothing was. `residual` and
             `distance_m` are without it, `data` is as it was measured.
         progress: When each row was measured, from 0 for the first of its set-up to 1 for the last (n,); None
@@ -60,7 +62,8 @@ class FittedRows:
         if fits.variable is None:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)
-            score, distance = _judge_constant(fits, residual, selection), _farthest(residual, selection)
+            score = _judge_constant(fits, residual, selection)
+            distance = np.zeros(len(side)) if selection.distances else _farthest(residual, selection)
             found = cls(fits.data, side, fits.constant.weights, residual, score, distance)
         else:
             variable = fits.variable
@@ -75,6 +78,11 @@ class FittedRows:
             return np.full(len(self.side), np.nan)
         measured = np.isfinite(self.data.orientations).all(axis=1)
         return np.where(measured, np.linalg.norm(self.residual[:, -3:], axis=1), np.nan)
+
+    @property
+    def fitted(self) -> Measurements:
+        """The rows as they were fitted: without the drift."""
+        return without_drift(self.data, self.moved)
 
     def among(self, data: Measurements) -> NDArray[np.bool_]:
         """Which rows (n,) of other measurements are among these: by readings and first point."""
@@ -96,6 +104,11 @@ class FittedRows:
             }
             for k in found[np.argsort(-self.score[found], kind="stable")]
         ]
+
+
+def without_drift(data: Measurements, moved: Floats | None) -> Measurements:
+    """The rows as if their set-ups had not been `moved` in world (n, 3), m; themselves with None."""
+    return data if moved is None else replace(data, targets=data.targets - moved[:, None])
 
 
 def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:
@@ -135,9 +148,7 @@ def sides(count: int, split: Split) -> NDArray[np.int64]:
 
 
 def _farthest(residual: Floats, selection: Selection) -> Floats:
-    """How far the farthest target of each row (n,) is from where the model has it, m; zero for distances."""
-    if selection.distances:
-        return np.zeros(len(residual))
+    """How far the farthest target of each row (n,) is from where the model has it, m."""
     count = len(selection.targets)
     return np.asarray(np.linalg.norm(residual[:, : 3 * count].reshape(-1, count, 3), axis=2).max(axis=1))
 

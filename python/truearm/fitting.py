@@ -25,6 +25,7 @@ from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
 from truearm.inputs import is_payload
 from truearm.kinds import settle
+from truearm.measured_parts import held_parts
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.one_turn import one_turn
@@ -463,11 +464,7 @@ def measured_values(task: Task, data: Measurements) -> int:
     """Numbers that were measured of what is fitted."""
     if task.selection.distances:
         return distance_count(data)
-    points = np.isfinite(data.targets[:, list(task.selection.targets)]).all(axis=2).sum()
-    turned = 0
-    if task.selection.orientation and data.orientations is not None:
-        turned = np.isfinite(data.orientations).all(axis=1).sum()
-    return 3 * int(points + turned)
+    return 3 * int(held_parts(data, task.selection).sum())
 
 
 def frame_unknowns(task: Task) -> int:
@@ -484,10 +481,7 @@ def setup_unknowns(task: Task) -> int:
 
 def group_unknowns(task: Task, rows: Measurements) -> int:
     """Unknowns of the one set-up of `rows`, as far as they measured of it: what was not measured is none."""
-    seen = np.isfinite(rows.targets[:, list(task.selection.targets)]).all(axis=2).any(axis=0).sum()
-    turns = rows.orientations if task.selection.orientation else None
-    turned = turns is not None and np.isfinite(turns).all(axis=1).any()
-    return frame_unknowns(task) + 3 * int(seen) + (3 if turned else 0)
+    return frame_unknowns(task) + 3 * int(held_parts(rows, task.selection).any(axis=0).sum())
 
 
 @contextmanager

@@ -22,6 +22,8 @@ MOST_ROWS: Final = 500
 def interval_coverage(task: Task, fits: Fits, held: Measurements) -> float | None:
     """Share of the coordinates of held-out rows within their 95 % intervals; None without a field.
 
+    None also where they hold nothing that was fitted, as where they are judged at another target alone.
+
     The intervals hold the uncertainty of arm and set-up, the noise, and the rows' own sigma.
 
     Args:
@@ -41,4 +43,4 @@ def interval_coverage(task: Task, fits: Fits, held: Measurements) -> float | Non
     covariance = fit.posterior.measurement_covariance(problem, parameters, model.setup, inputs)
     bound = NORMAL_95 * fit.inflation * np.sqrt(np.einsum("nii->ni", covariance))
     was_measured = left != 0.0
-    return float((np.abs(left) <= bound)[was_measured].mean())
+    return float((np.abs(left) <= bound)[was_measured].mean()) if was_measured.any() else None

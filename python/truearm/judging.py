@@ -12,6 +12,7 @@ from truearm.core_set import Selection
 from truearm.errors import InputError, Notice, count_of, list_names
 from truearm.fitting import Task, feature_values
 from truearm.identified import IdentifiedArm
+from truearm.measured_parts import held_parts
 from truearm.measurements import Measurements
 from truearm.models import ArmModel
 from truearm.validation import RowErrors, row_errors
@@ -41,7 +42,7 @@ def check_judged(fitted: Measurements, judged: Measurements, selection: Selectio
         InputError: If nothing is left to judge; names targets or set-ups.
     """
     if not selection.judges_another:
-        return _never_found(fitted, judged, selection)
+        return never_found(_lost(fitted, judged, selection), judged, selection)
     found, held = _groups_with(fitted, selection.judge), _groups_with(judged, selection.judge)
     missing = [group for group in fitted.groups if group not in found]
     words = (
@@ -62,18 +63,27 @@ def check_judged(fitted: Measurements, judged: Measurements, selection: Selectio
     return [Notice("not_judged", text)]
 
 
-def _never_found(fitted: Measurements, judged: Measurements, selection: Selection) -> list[Notice]:
-    """A notice of targets of judged rows that none of the fitted rows of their set-up holds."""
-    lost = _lost(fitted, judged, selection)
+def never_found(lost: Mask, judged: Measurements, selection: Selection) -> list[Notice]:
+    """A notice of what judged rows hold, and nothing has found in their set-up.
+
+    Args:
+        lost: Which of the fitted targets, and of orientations, are such (n, t + 1).
+        judged: The rows.
+        selection: What is used of them.
+
+    Raises:
+        InputError: If nothing is left to judge; names targets.
+    """
     if not lost.any():
         return []
+    names = [*(f"target {target + 1}" for target in selection.targets), "the orientation"]
     places = [
-        f"target {selection.targets[k] + 1} of {list_names([group])}"
+        f"{names[k]} of {list_names([group])}"
         for group in judged.groups
         for k in np.flatnonzero(lost[judged.group == group].any(axis=0))
     ]
     words = f"{', '.join(places)} was measured in none of the rows that find where it is on the tool"
-    unjudged = ~(_seen(judged, selection) & ~lost).any(axis=1)
+    unjudged = ~(held_parts(judged, selection) & ~lost)[:, :-1].any(axis=1)
     if unjudged.all():
         raise InputError(
             words,
@@ -90,29 +100,27 @@ def _never_found(fitted: Measurements, judged: Measurements, selection: Selectio
 
 
 def where_found(fitted: Measurements, judged: Measurements, selection: Selection) -> Measurements:
-    """The judged rows without the points of targets that none of the fitted rows of their set-up holds.
-
-    What the model has for such a point is a guess.
-    """
+    """The judged rows without the targets and orientations that no fitted row of their set-up holds."""
     if selection.judges_another:
         return judged
-    lost = _lost(fitted, judged, selection)
+    return without_parts(_lost(fitted, judged, selection), judged, selection)
+
+
+def without_parts(lost: Mask, judged: Measurements, selection: Selection) -> Measurements:
+    """Rows without what nothing has found in their set-up (n, t + 1): what a model has for it is a guess."""
     if not lost.any():
         return judged
-    targets = judged.targets.copy()
-    rows, places = np.nonzero(lost)
+    targets, orientations = judged.targets.copy(), judged.orientations
+    rows, places = np.nonzero(lost[:, :-1])
     targets[rows, np.array(selection.targets)[places]] = np.nan
-    return replace(judged, targets=targets)
-
-
-def _seen(data: Measurements, selection: Selection) -> Mask:
-    """Which of the fitted targets each row holds (n, t)."""
-    return np.asarray(np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2))
+    if orientations is not None:
+        orientations = np.where(lost[:, -1:], np.nan, orientations)
+    return replace(judged, targets=targets, orientations=orientations)
 
 
 def _lost(fitted: Measurements, judged: Measurements, selection: Selection) -> Mask:
-    """Which of the fitted targets a judged row holds, and none of the fitted rows of its set-up (n, t)."""
-    held, found = _seen(judged, selection), _seen(fitted, selection)
+    """What a judged row holds, and none of the fitted rows of its set-up: targets, orientation (n, t + 1)."""
+    held, found = held_parts(judged, selection), held_parts(fitted, selection)
     for group in judged.groups:
         held[judged.group == group] &= ~found[fitted.group == group].any(axis=0)
     return held

@@ -51,7 +51,7 @@ def read_fields(
         _check_measured(table, targets, distance)
     sigma = _sigma(table, layout.sigma) if layout.sigma else None
     own = ONE_ANCHOR if "group" in layout.words else str(own_anchor(np.array(default_group)))
-    ends, assumed = _ends(table, layout, (distance, sigma), own)
+    ends = _ends(table, layout, (distance, sigma), own)
     purpose, unknown = _purpose(table, layout)
     features, notices = _features(table, layout, known=() if purpose is None else (PURPOSE,))
     return {
@@ -67,7 +67,13 @@ def read_fields(
         "distance_m": distance,
         **ends,
         "purpose": purpose,
-        "notices": (*_left_out(table), *_repeated(table, layout, targets), *assumed, *unknown, *notices),
+        "notices": (
+            *_left_out(table),
+            *_repeated(table, layout, targets),
+            *_of_distances(table, layout, (targets, distance), own),
+            *unknown,
+            *notices,
+        ),
         "default_group": None if "group" in layout.words else np.full(table.row_count, default_group),
     }
 
@@ -128,9 +134,12 @@ def _repeated(table: Table, layout: Layout, targets: Floats) -> list[Notice]:
     ]
 
 
-def _orientations(table: Table) -> Floats:
+def _orientations(table: Table) -> Floats | None:
+    """Measured orientations (n, 4), NaN where there is none; None where there is none at all."""
     q = np.column_stack([table.numbers(name) for name in QUATERNION])
     empty = np.isnan(q)
+    if empty.all():
+        return None
     rule = "An orientation has all four numbers, or all four cells are empty"
     _refuse(table, _is_partial(empty), 'only some of "qw" to "qz" are given in', rule)
     length: Floats = np.sqrt(np.square(q).sum(axis=1))
@@ -161,9 +170,12 @@ def _sigma(table: Table, column: Column) -> Floats:
 
 
 def _distances(table: Table, layout: Layout) -> Floats | None:
+    """Measured distances (n,), NaN where there is none; None where there is none at all."""
     if layout.distance is None:
         return None
     distance = _si(table, layout.distance)
+    if np.isnan(distance).all():
+        return None
     _refuse(
         table,
         distance <= 0.0,
@@ -196,8 +208,8 @@ def _group(table: Table, layout: Layout, default: str) -> Texts:
 
 def _ends(
     table: Table, layout: Layout, measured: tuple[Floats | None, Floats | None], own: str
-) -> tuple[dict[str, Texts | None], list[Notice]]:
-    """What the distances lead to: `anchor` and `pair`, each None where there is none; and notices.
+) -> dict[str, Texts | None]:
+    """What the distances lead to: `anchor` and `pair`, each None where there is none.
 
     Distances without either column lead to one fixed point, `own`. `measured` are distances and sigmas.
     """
@@ -205,10 +217,9 @@ def _ends(
     anchor = table.texts("anchor") if "anchor" in layout.words else None
     pair = table.texts("pair") if "pair" in layout.words else None
     if distance is None:
-        return {"anchor": anchor, "pair": pair}, []
+        return {"anchor": anchor, "pair": pair}
     if anchor is None and pair is None:
-        anchor = np.where(np.isfinite(distance), own, "")
-        return {"anchor": anchor, "pair": None}, [_one_anchor(table, own)]
+        return {"anchor": np.where(np.isfinite(distance), own, ""), "pair": None}
     has_anchor, has_pair = (_is_given(word, table.row_count) for word in (anchor, pair))
     rule = 'A distance leads to a fixed point named in "anchor", or to the other row of the same "pair"'
     found = np.isfinite(distance)
@@ -219,16 +230,30 @@ def _ends(
         _check_alike(table, pair, "distances", distance)
         if sigma is not None:
             _check_alike(table, pair, "sigmas", sigma)
-    return {"anchor": anchor, "pair": pair}, []
+    return {"anchor": anchor, "pair": pair}
 
 
-def _one_anchor(table: Table, own: str) -> Notice:
+def _of_distances(
+    table: Table, layout: Layout, measured: tuple[Floats, Floats | None], own: str
+) -> list[Notice]:
+    """A notice of distances that are left out, or of which nothing says where they lead.
+
+    `measured` are targets and distances.
+    """
+    targets, distance = measured
+    if distance is None:
+        return []
+    if np.isfinite(targets).any():
+        text = f"{table.where}: distances are left out: points were measured as well, and points are fitted."
+        return [Notice("distances_left_out", text)]
+    if "anchor" in layout.words or "pair" in layout.words:
+        return []
     text = (
         f"{table.where}: no column says where the distances lead: all are taken as measured to one fixed "
         f'point, "{own}". If there are several, name them in a column anchor; distances between two '
         "poses have a column pair."
     )
-    return Notice("one_anchor", text)
+    return [Notice("one_anchor", text)]
 
 
 def _is_given(words: Texts | None, count: int) -> Mask:

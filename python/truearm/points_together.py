@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from truearm.core_set import holds_distances
 from truearm.errors import Notice
 from truearm.measurements import Measurements
 from truearm.visits import means, visit_numbers
@@ -23,8 +24,11 @@ def points_together(data: Measurements) -> tuple[Measurements, list[Notice]]:
     another, and the field would follow what the arm does not repeat. The row has the number, the further
     columns and the set-up of the first one, and the mean of the readings. Rows with distances, rows whose
     sigma differs, and all but one of those with an orientation stay rows of their own. A notice says so.
+
+    Raises:
+        InputError: If only some rows hold distances.
     """
-    if data.distance_m is not None or data.target_count < 2:
+    if data.target_count < 2 or holds_distances(data):
         return data, []
     number = _numbers(data)
     first = np.flatnonzero(np.diff(number, prepend=-1))
@@ -60,7 +64,8 @@ def _numbers(data: Measurements) -> Rows:
 def _words(data: Measurements) -> list[list[str]]:
     """What rows that are taken together have alike, in words."""
     given = [data.sources, data.group]
-    given += [words for words in (data.purpose, data.anchor, data.pair) if words is not None]
+    if data.purpose is not None:
+        given.append(data.purpose)
     columns = [words.tolist() for words in given]
     if data.sigma_m is not None:
         columns.append([repr(sigma) for sigma in data.sigma_m.tolist()])

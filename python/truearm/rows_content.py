@@ -1,6 +1,7 @@
 """The rows of a calibration as arrays and JSON values, and back, bit for bit."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -8,6 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.columns import APPROACH
+from truearm.core_set import Selection, distance_count
+from truearm.errors import InputError
 from truearm.fitted_rows import FittedRows
 from truearm.measurements import Measurements
 from truearm.same_tables import called_as_files
@@ -45,11 +48,12 @@ def pack(rows: FittedRows, features: Sequence[str], arrays: Arrays) -> dict[str,
     return {"words": words, "features": kept, "joint_units": list(rows.data.joint_units)}
 
 
-def unpack(content: Mapping[str, Any], arrays: Arrays, *, orientation: bool) -> FittedRows:
-    """The rows that `pack` described; `orientation` says whether it was fitted.
+def unpack(content: Mapping[str, Any], arrays: Arrays, *, selection: Selection) -> FittedRows:
+    """The rows that `pack` described, of which what `selection` names was fitted.
 
     Raises:
         KeyError: If an array is missing.
+        InputError: If there are not as many residuals as distances.
     """
     index = pd.RangeIndex(len(arrays["rows.readings"]))
     words: dict[str, Any] = {
@@ -68,7 +72,20 @@ def unpack(content: Mapping[str, Any], arrays: Arrays, *, orientation: bool) -> 
     )
     known = [*OUTCOMES, *(name for name in OF_DRIFT if f"outcome.{name}" in arrays)]
     outcomes: dict[str, Any] = {name: np.array(arrays[f"outcome.{name}"]) for name in known}
-    return FittedRows(data, **outcomes, orientation=orientation)
+    found = FittedRows(data, **outcomes, orientation=selection.orientation)
+    return _of_distances(found) if selection.distances else found
+
+
+def _of_distances(rows: FittedRows) -> FittedRows:
+    """Rows whose residuals are those of their distances; none of them is far from a point.
+
+    Raises:
+        InputError: If there are not as many residuals as distances.
+    """
+    count = distance_count(rows.data)
+    if rows.residual.shape != (count, 1):
+        raise InputError(f"the residuals have shape {rows.residual.shape}", rule=f"It must be ({count}, 1)")
+    return replace(rows, distance_m=np.zeros(len(rows.data)))
 
 
 def _stated_sides(data: Measurements, features: Sequence[str]) -> list[str]:

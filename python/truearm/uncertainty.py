@@ -19,7 +19,7 @@ from truearm.fitting import (
     frame_unknowns,
     setup_unknowns,
 )
-from truearm.measurements import Measurements
+from truearm.measured_parts import MeasuredParts
 from truearm.models import CONSTANT
 
 if TYPE_CHECKING:
@@ -65,33 +65,46 @@ class SetupPlace:
 
     Attributes:
         motion: Motion (12, S) of the base (translation, rotation vector), of the tool (translation in the
-            flange's frame, that of the targets' middle) and of the measured orientation (rotation vector in
-            the target's frame) with them; zero where nothing was fitted.
+            flange's frame, that of the middle of the targets that were measured) and of the measured
+            orientation (rotation vector in the target's frame) with them; zero where nothing was fitted. It
+            is that of the set-up with most rows.
+        turning: The same of the set-up with most orientations, for how a target is turned.
     """
 
     motion: Floats
+    turning: Floats
 
     @classmethod
-    def of(cls, task: Task, data: Measurements | None) -> "SetupPlace":
-        """Of the set-up with most rows, or the first where rows were left out of the file."""
-        groups, frame, count = list(task.groups), frame_unknowns(task), setup_unknowns(task)
-        often = groups[0] if data is None else max(groups, key=lambda name: (data.group == name).sum())
-        start = groups.index(often) * (count // len(groups))
-        motion = np.zeros((MOTIONS + AXES, count))
-        motion[:frame, start : start + frame] = np.eye(frame)
-        for k in range(len(task.selection.targets)):
-            target = start + frame + AXES * k
-            motion[FRAME_UNKNOWNS:MOTIONS, target : target + AXES] = np.eye(AXES) / len(
-                task.selection.targets
-            )
-        if task.selection.orientation:
-            end = start + count // len(groups)
-            motion[MOTIONS:, end - AXES : end] = np.eye(AXES)
-        return cls(motion)
+    def of(cls, task: Task, measured: MeasuredParts) -> "SetupPlace":
+        """Of the set-ups with most rows and most orientations, or the first where the file does not say."""
+        often = int(measured.rows.argmax())
+        turned = int(measured.orientations.argmax()) if measured.orientations.any() else often
+        return cls(_motion(task, measured, often), _motion(task, measured, turned))
 
     def among_all(self, moved: Floats | None) -> Floats | None:
         """Derivatives (n, m, S) by all of them, of those (n, m, k) by the first k motions."""
-        return None if moved is None else np.ascontiguousarray(moved @ self.motion[: moved.shape[2]])
+        if moved is None:
+            return None
+        found = moved @ self.motion[: moved.shape[2]]
+        if moved.shape[2] > MOTIONS:
+            found[:, AXES:] = moved[:, AXES:] @ self.turning
+        return np.ascontiguousarray(found)
+
+
+def _motion(task: Task, measured: MeasuredParts, group: int) -> Floats:
+    """Motion (12, S) of base, tool and measured orientation with the unknowns of one set-up."""
+    frame, count = frame_unknowns(task), setup_unknowns(task)
+    width = count // len(task.groups)
+    start, end = group * width, (group + 1) * width
+    motion = np.zeros((MOTIONS + AXES, count))
+    motion[:frame, start : start + frame] = np.eye(frame)
+    held = np.flatnonzero(measured.targets[group, : len(task.selection.targets)])
+    for k in held:
+        target = start + frame + AXES * k
+        motion[FRAME_UNKNOWNS:MOTIONS, target : target + AXES] = np.eye(AXES) / len(held)
+    if measured.orientations[group]:
+        motion[MOTIONS:, end - AXES : end] = np.eye(AXES)
+    return motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +129,7 @@ class ConstantSpread:
         scale = calibration.constant.prior_scale if scaled else 1.0
         before = scale * np.where(np.isin(np.array(columns) % 5, LENGTHS), length, angle)
         details = calibration.constant
-        data = None if calibration.rows is None else calibration.rows.data
-        place = SetupPlace.of(task_of(calibration), data)
+        place = SetupPlace.of(task_of(calibration), calibration.measured)
         noises = details.noise_m, details.noise_rad
         return cls(columns, details.covariance, before**2, noises, place)
 
@@ -192,10 +204,9 @@ class VariableSpread:
                 way_out="Use the file that still has them",
             )
         task = task_of(calibration)
-        measured = core_set(
-            calibration.robot, rows.data, calibration.selection, calibration.groups, rows.weight
-        )
-        values = feature_values(rows.data, calibration.options.features)
+        data = rows.fitted
+        measured = core_set(calibration.robot, data, calibration.selection, calibration.groups, rows.weight)
+        values = feature_values(data, calibration.options.features)
         names = calibration.identifiability.determined
         options = field_options(task, names, values, details.feature_ranges, KnownHyper(details.hyper))
         columns = list(calibration.arm.candidates.columns)
@@ -204,7 +215,7 @@ class VariableSpread:
             posterior = Posterior(task.problem(measured, columns), point.constants, point.setup, options)
         except CoreError as error:
             raise InputError(str(error), where="the calibration's variable model") from None
-        place = SetupPlace.of(task, rows.data)
+        place = SetupPlace.of(task, calibration.measured)
         return cls(columns, posterior, details.inflation, noises_of(details.hyper), place)
 
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:

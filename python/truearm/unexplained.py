@@ -5,18 +5,20 @@ from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M, FieldFit
 from truearm.fitting import Task
+from truearm.measured_parts import MeasuredParts
 from truearm.measurements import Measurements
 
 Floats = NDArray[np.float64]
 
 
 def unexplained(task: Task, fit: FieldFit, data: Measurements) -> float:
-    """Standard deviation of a coordinate of the first fitted target, m, over the rows of `data`.
+    """Standard deviation of a coordinate of the first target that was measured, m, over the rows of `data`.
 
     It adds up the noise of positions and what the joints, each for itself, miss anew at every pose.
     """
     end = np.eye(4)
-    end[:3, 3] = fit.setup.targets[0, 0]
+    measured = MeasuredParts.of(data, task.selection, task.groups)
+    end[:3, 3] = measured.points(fit.setup.targets)[0]
     chain = task.arm.chain(task.arm.robot.flange @ end)
     jacobian = chain.joint_jacobian(task.arm.robot.joints_from_readings(data.readings))
     levers = np.where(np.array(task.arm.robot.joints) == "prismatic", ANGLE_ARM_M, 1.0)

@@ -132,7 +132,7 @@ class Validation:
         holdout: Errors of "nominal", "constant" and, if fitted, "variable" on these rows.
         train: The same on training rows.
         coverage_95: Share of the held-out coordinates that lie within the 95 % intervals of the variable
-            model; None where there is none.
+            model; None where there is none, or they hold nothing that was fitted.
         left_out: Whether each row was judged by what the other rows gave, as after an update; else the rows
             were held out of one fit.
         n_planned: How many rows were held out because they were planned to validate.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import same_poses
+from truearm.core_set import holds_distances
 from truearm.measurements import Measurements
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,7 @@ def one_row_a_visit(data: Measurements) -> Measurements:
         seen = np.column_stack([seen, np.isfinite(data.orientations).all(axis=1)])
     _, first = np.unique(visits, return_index=True)
     alike = (seen == seen[first][visits]).all(axis=1)
-    if data.distance_m is not None or not alike.all() or len(first) == len(data):
+    if holds_distances(data) or not alike.all() or len(first) == len(data):
         return data
     orientations = data.orientations
     if orientations is not None:

@@ -233,9 +233,7 @@ def print_results(calibration: "Calibration") -> None:
     say_wrapped(f"{calibration.robot.name}, {', '.join(calibration.groups)}: {trained}.")
     print_determined(calibration)
     of = "distance" if calibration.selection.distances else "position"
-    shots = validation.n_holdout_poses < validation.n_holdout
-    rows = validation.poses_judged if shots else count_of(validation.n_holdout, "held-out row")
-    print_errors(validation.holdout, rows, of)
+    print_errors(validation.holdout, _judged_in_words(calibration), of)
     if validation.drift is not None:
         say_wrapped(validation.drift.words)
     if validation.few:
@@ -250,6 +248,16 @@ def print_results(calibration: "Calibration") -> None:
         without = taken_out(calibration)
         but = f" but {count_of(without, 'outlier')}" if without else ""
         say(f"The calibration in the file is fitted to all {len(calibration.rows.data)} rows{but}.")
+
+
+def _judged_in_words(calibration: "Calibration") -> str:
+    """How many were judged: rows, or poses where those are fewer, or distances, of which a pair has one."""
+    validation, held = calibration.validation, calibration.held
+    if calibration.selection.distances and held is not None:
+        return count_of(len(held.errors[calibration.model_name].position), "held-out distance")
+    if validation.n_holdout_poses < validation.n_holdout:
+        return validation.poses_judged
+    return count_of(validation.n_holdout, "held-out row")
 
 
 def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:

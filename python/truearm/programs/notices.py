@@ -198,6 +198,6 @@ def _environments_of(done: Rewritten, *, of_joints: bool = True) -> list[Environ
 
 def _is_measured(tool: Frame, calibration: Calibration) -> bool:
     """Whether a tool's point is one that was measured, as the calibration found it on the flange."""
-    points = calibration.model.setup.targets.reshape(-1, 3)
+    points = calibration.measured.points(calibration.model.setup.targets)
     distances = np.linalg.norm(points - tool.true[:3, 3], axis=1)
     return not tool.unknown and bool((distances < MEASURED_M).any())

@@ -244,7 +244,7 @@ class Facts:
         targets = self.calibration.model.setup.targets
         if self.calibration.selection.distances or targets.shape[1] == 0:
             return self.calibration.robot.tool[:3, 3]
-        return np.asarray(targets[0, 0])
+        return np.asarray(self.calibration.measured.points(targets)[0])
 
     @cached_property
     def span(self) -> Floats:

@@ -93,11 +93,11 @@ def _moved_mm(facts: Facts, poses: Floats) -> Floats:
     calibration = facts.calibration
     chain = calibration.arm.chain(calibration.robot.flange)
     values, inputs = calibration.robot.joints_from_readings(poses), facts.inputs(poses)
-    places = []
+    places, target = [], int((calibration.measured.targets[0] > 0).argmax())
     for name in (facts.best, CONSTANT):
         model = calibration.models[name]
         pose = model.setup.frames[0] @ chain.pose(values, model.parameters(inputs))
-        places.append(pose[:, :3, :3] @ model.setup.targets[0, 0] + pose[:, :3, 3])
+        places.append(pose[:, :3, :3] @ model.setup.targets[0, target] + pose[:, :3, 3])
     axes = calibration.models[CONSTANT].setup.frames[0][:3, :3]
     return np.asarray(MM_PER_METRE * (places[0] - places[1]) @ axes)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm import kinds
 from truearm.calibration import Calibration
-from truearm.core_set import Use, select
+from truearm.core_set import select
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
 from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
@@ -161,7 +161,7 @@ def update(
     task = _task(calibration, data, chosen, stages)
     if task.selection.orientation:
         check_turns(data, calibration.robot)
-    unknowns = Unknowns.of(calibration, task, chosen)
+    unknowns = Unknowns.of(calibration, task, chosen, data)
     _check_kept(calibration, task, unknowns, chosen)
     _check_enough(data, task, unknowns)
     _check_groups(data, task)
@@ -256,7 +256,9 @@ def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, 
             way_out="Calibrate with --model variable or constant",
         )
     where = ", ".join(data.files)
-    selection = select(data, options.use or _use(calibration, data))
+    selection = select(data, options.use)
+    if options.use is None and selection.orientation and not calibration.selection.orientation:
+        selection = select(data, "position")
     if selection.orientation and not calibration.selection.orientation:
         raise UsageError(
             "orientations took no part in the calibration",
@@ -269,12 +271,6 @@ def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, 
     if calibration.arm.world_is_known and len(data.groups) > 1:
         raise InputError(f"there are {len(data.groups)} set-ups", where=where, rule="The world is one")
     return Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
-
-
-def _use(calibration: Calibration, data: Measurements) -> Use | None:
-    """Positions where orientations were measured that the calibration did not use; else all that there is."""
-    unknown = not calibration.selection.orientation and data.orientations is not None
-    return "position" if unknown and data.target_count == 1 else None
 
 
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:

@@ -11,6 +11,8 @@ from truearm.calibration import Calibration
 from truearm.core_set import Selection
 from truearm.fitting import FRAME_UNKNOWNS, Task
 from truearm.identified import IdentifiedArm
+from truearm.measured_parts import MeasuredParts
+from truearm.measurements import Measurements
 from truearm.parameters import KIND_COUNT, KINDS, THETA, D
 from truearm.units import to_si
 from truearm.updating.options import UpdateOptions
@@ -43,16 +45,14 @@ class Unknowns:
     known: tuple[int | None, ...]
 
     @classmethod
-    def of(cls, calibration: Calibration, task: Task, options: UpdateOptions) -> "Unknowns":
+    def of(
+        cls, calibration: Calibration, task: Task, options: UpdateOptions, data: Measurements
+    ) -> "Unknowns":
         """Those of an update of a calibration with measurements of a task."""
         arm = task.arm
         directions, names = arm_directions(arm)
-        known = tuple(counterpart(calibration, group) for group in task.groups)
-        comparable = is_part_of(task.selection, calibration.selection)
-        groups = [
-            setup_std(arm, task.selection, options, known=comparable and number is not None)
-            for number in known
-        ]
+        known = _known(calibration, task, data)
+        groups = [setup_std(arm, task.selection, options, known=number is not None) for number in known]
         std = np.concatenate([[arm_std(arm, name, options) for name in names], *groups])
         frame = np.zeros(len(std), dtype=np.bool_)
         width = len(groups[0])
@@ -61,7 +61,7 @@ class Unknowns:
             frame[first : first + (0 if arm.world_is_known else FRAME_UNKNOWNS)] = True
         tool = ~frame
         tool[: len(names)] = False
-        return cls(directions, names, std, frame, tool, known if comparable else (None,) * len(known))
+        return cls(directions, names, std, frame, tool, known)
 
     @property
     def arm(self) -> Mask:
@@ -110,6 +110,20 @@ def counterpart(calibration: Calibration, group: str) -> int | None:
     if group in calibration.groups:
         return calibration.groups.index(group)
     return 0 if len(calibration.groups) == 1 else None
+
+
+def _known(calibration: Calibration, task: Task, data: Measurements) -> tuple[int | None, ...]:
+    """For each set-up of the update its counterpart; None where that lacks what was measured now."""
+    wanted, fitted = task.selection, calibration.selection
+    if not is_part_of(wanted, fitted):
+        return (None,) * len(task.groups)
+    now = MeasuredParts.of(data, wanted, task.groups).held(range(len(wanted.targets)))
+    then = calibration.measured.held([fitted.targets.index(target) for target in wanted.targets])
+    numbers = [counterpart(calibration, group) for group in task.groups]
+    return tuple(
+        None if number is None or (now[k] & ~then[number]).any() else number
+        for k, number in enumerate(numbers)
+    )
 
 
 def offset_columns(arm: IdentifiedArm) -> list[int]:

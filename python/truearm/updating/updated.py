@@ -13,6 +13,7 @@ from truearm.details import ConstantDetails
 from truearm.fitted_rows import TRAINED, FittedRows
 from truearm.held_rows import HeldRows
 from truearm.judging import judge
+from truearm.measured_parts import MeasuredParts
 from truearm.models import NOMINAL, ArmModel
 from truearm.revision import Revision
 from truearm.standard_errors import of_covariance
@@ -52,6 +53,7 @@ def updated(
         calibration,
         groups=tuple(task.groups),
         selection=task.selection,
+        measured=MeasuredParts.of(scene.data, task.selection, task.groups),
         models=models,
         constant=_constant(calibration, scene, found),
         validation=Validation(

@@ -1,0 +1,86 @@
+"""What each set-up measured of what was fitted: what it did not is a guess, and no part of what is known."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.core_set import Selection
+from truearm.errors import InputError
+from truearm.measurements import Measurements
+
+Counts = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredParts:
+    """How many rows of each of G set-ups hold what was fitted.
+
+    Attributes:
+        rows: Rows with a fitted target (G,), or with a distance.
+        targets: Rows with each of the t fitted targets (G, t); of distances (G, 1).
+        orientations: Rows with an orientation (G,); zero where it took no part.
+    """
+
+    rows: Counts
+    targets: Counts
+    orientations: Counts
+
+    @classmethod
+    def of(cls, data: Measurements, selection: Selection, groups: Sequence[str]) -> "MeasuredParts":
+        """Those of the rows that were fitted."""
+        held = held_parts(data, selection)
+        points = np.ones((len(data), 1), dtype=np.bool_) if selection.distances else held[:, :-1]
+        own = [data.group == group for group in groups]
+        return cls(
+            np.array([points[rows].any(axis=1).sum() for rows in own], dtype=np.int64),
+            np.array([points[rows].sum(axis=0) for rows in own], dtype=np.int64),
+            np.array([held[rows, -1].sum() for rows in own], dtype=np.int64),
+        )
+
+    @classmethod
+    def whole(cls, selection: Selection, groups: int) -> "MeasuredParts":
+        """Those of a file that does not say: all set-ups are taken to have measured everything."""
+        targets = np.ones((groups, max(len(selection.targets), 1)), dtype=np.int64)
+        return cls(targets[:, 0], targets, targets[:, 0] * selection.orientation)
+
+    def points(self, targets: Floats) -> Floats:
+        """Of points (G, t, 3) on the flange those that were measured (k, 3)."""
+        return np.asarray(targets[self.targets > 0])
+
+    def held(self, places: Sequence[int]) -> Mask:
+        """Which targets, by their places, and last whether orientations, each set-up measured (G, k + 1)."""
+        return np.column_stack([self.targets[:, list(places)], self.orientations]) > 0
+
+    def pack(self) -> dict[str, Any]:
+        """JSON values."""
+        return {name: getattr(self, name).tolist() for name in ("rows", "targets", "orientations")}
+
+    @classmethod
+    def unpack(cls, content: Mapping[str, Any], selection: Selection, groups: int) -> "MeasuredParts":
+        """Those that `pack` described.
+
+        Raises:
+            InputError: If they are of other set-ups or targets.
+        """
+        expected = cls.whole(selection, groups)
+        for name, counts in content.items():
+            shape = getattr(expected, name).shape
+            if np.shape(counts) != shape:
+                raise InputError(
+                    f"'measured.{name}' has shape {np.shape(counts)}", rule=f"It must be {shape}"
+                )
+        return cls(**{name: np.array(counts, dtype=np.int64) for name, counts in content.items()})
+
+
+def held_parts(data: Measurements, selection: Selection) -> Mask:
+    """Which of the fitted targets each row holds, and whether an orientation that was fitted (n, t + 1)."""
+    points = np.isfinite(data.targets[:, list(selection.targets)]).all(axis=2)
+    turned = np.zeros(len(data), dtype=np.bool_)
+    if selection.orientation and data.orientations is not None:
+        turned = np.asarray(np.isfinite(data.orientations).all(axis=1))
+    return np.column_stack([points, turned])

@@ -1,0 +1,95 @@
+"""Distances: what a file keeps of them, and what they count for beside points."""
+
+import copy
+import re
+
+import numpy as np
+import pytest
+
+import truearm as ta
+from tests.calibration_file_support import read_calibration_file, write_calibration_file
+from truearm.calibration_file import NO_DIGEST
+from truearm.cli import main
+from truearm.points_together import points_together
+from truearm.simulation import VirtualArm
+
+IRB = ta.Robot.load("abb-irb-120")
+PAIRS = 100
+
+
+@pytest.fixture(scope="module")
+def pairs():
+    """A table of distances between two poses each, the second half of the rows the others' partners."""
+    arm = VirtualArm(IRB, seed=3)
+    table = arm.measure_table(arm.poses(2 * PAIRS))
+    points = table[["x", "y", "z"]].to_numpy()
+    apart = np.linalg.norm(points[:PAIRS] - points[PAIRS:], axis=1)
+    names = [f"p{k % PAIRS}" for k in range(2 * PAIRS)]
+    return table[[f"q{k}" for k in range(1, 7)]].assign(distance=np.tile(apart, 2), pair=names)
+
+
+@pytest.fixture(scope="module")
+def from_pairs(pairs):
+    return ta.calibrate(IRB, ta.Measurements.from_dataframe(pairs), model="constant")
+
+
+def rows_of(calibration):
+    """The rows of a calibration that has them."""
+    assert calibration.rows is not None
+    return calibration.rows
+
+
+def test_a_calibration_from_pairs_comes_back(from_pairs, tmp_path):
+    from_pairs.save(tmp_path / "arm.calib")
+    for again in (ta.Calibration.load(tmp_path / "arm.calib"), copy.deepcopy(from_pairs)):
+        assert np.array_equal(rows_of(again).residual, rows_of(from_pairs).residual)
+        assert rows_of(again).residual.shape == (PAIRS, 1)
+        assert np.array_equal(rows_of(again).distance_m, np.zeros(2 * PAIRS))
+        assert again.validation == from_pairs.validation
+        assert again.to_bytes() == from_pairs.to_bytes()
+
+
+def test_a_file_with_a_distance_of_a_point_for_each_pair_is_read(from_pairs, tmp_path):
+    path = tmp_path / "arm.calib"
+    from_pairs.save(path)
+    arrays, content = read_calibration_file(path)
+    content["sha256"] = NO_DIGEST
+    write_calibration_file(path, arrays | {"outcome.distance_m": np.zeros(PAIRS)}, content)
+    assert np.array_equal(rows_of(ta.Calibration.load(path)).distance_m, np.zeros(2 * PAIRS))
+    write_calibration_file(path, arrays | {"outcome.residual": np.zeros((PAIRS + 1, 1))}, content)
+    with pytest.raises(ta.InputError, match=re.escape(f"It must be ({PAIRS}, 1)")):
+        ta.Calibration.load(path)
+
+
+def test_distances_of_pairs_are_counted_once(pairs, tmp_path, capsys):
+    pairs.to_csv(tmp_path / "pairs.csv", index=False)
+    words = ["calibrate", "abb-irb-120", str(tmp_path / "pairs.csv"), "-o", str(tmp_path / "out")]
+    assert main([*words, "--model", "constant"]) == 0
+    told = re.search(r"Distance error, mm, (\d+) held-out distances", capsys.readouterr().out)
+    held = ta.Calibration.load(tmp_path / "out" / "calibration.calib").held
+    assert held is not None
+    assert told is not None
+    assert 2 * int(told[1]) == len(held)
+
+
+def test_distances_beside_points_change_nothing_and_are_told():
+    arm = VirtualArm(IRB, seed=3)
+    table = arm.measure_table(np.repeat(arm.poses(40), 2, axis=0))
+    second = np.arange(80) % 2 == 1
+    for axis in "xyz":
+        table[f"{axis}2"] = np.where(second, table[axis] + 0.1, np.nan)
+        table[axis] = np.where(second, np.nan, table[axis])
+    made = {}
+    for name, more in (
+        ("without", {}),
+        ("empty", {"distance": np.nan}),
+        (
+            "full",
+            {"distance": np.tile(np.linspace(0.8, 1.2, 40), 2), "pair": [f"p{k % 40}" for k in range(80)]},
+        ),
+    ):
+        data = ta.Measurements.from_dataframe(table.assign(**more))
+        made[name] = points_together(data)[0], [notice.kind for notice in data.notices]
+    assert [len(data) for data, _ in made.values()] == [40, 40, 40]
+    assert made["empty"][0].hash() == made["without"][0].hash()
+    assert [told for _, told in made.values()] == [[], [], ["distances_left_out"]]
