@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from truearm._core import MeasurementSet, Setup
 from truearm.defaults import FIRST_TARGET
-from truearm.errors import InputError, UsageError, count_of
+from truearm.errors import UsageError, count_of
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
+from truearm.used_distances import holds_distances
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -185,25 +186,6 @@ def _words(given: NDArray[np.str_] | None, count: int) -> list[str]:
 
 def _numbers(given: Floats | None, count: int) -> list[float]:
     return [np.nan] * count if given is None else [float(number) for number in given]
-
-
-def holds_distances(data: Measurements) -> bool:
-    """Whether distances are what is used of `data`: beside points they are left out.
-
-    Raises:
-        InputError: If only some rows hold distances.
-    """
-    if data.distance_m is None:
-        return False
-    has_point = np.asarray(np.any(np.all(np.isfinite(data.targets), axis=2), axis=1))
-    if has_point.any() and not has_point.all():
-        raise InputError(
-            f"only distances were measured in {data.row_names(~has_point)}, points in others",
-            where=", ".join(data.files),
-            rule="Either all rows hold points, or all hold distances",
-            way_out="Keep them in two files and calibrate from one",
-        )
-    return not bool(has_point.any())
 
 
 def _check_asked(data: Measurements, use: Use | None, judge_target: int) -> None:

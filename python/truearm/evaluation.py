@@ -191,7 +191,12 @@ def _lost_parts(task: Task, calibration: Calibration, data: Measurements, option
         return np.zeros_like(held)
     numbers, chosen = _kept(task, calibration)
     found = calibration.measured.held(chosen)[numbers]
-    return held & ~found[[task.groups.index(name) for name in data.group]]
+    lost: Mask = held & ~found[[task.groups.index(name) for name in data.group]]
+    for group in data.groups if options.keep_tool else ():
+        rows = data.group == group
+        if (lost[rows] == held[rows]).all():
+            never_found(lost[rows], data.select(rows), task.selection)
+    return lost
 
 
 def _found_again(

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.core_set import holds_distances
 from truearm.errors import Notice
 from truearm.measurements import Measurements
+from truearm.used_distances import holds_distances
 from truearm.visits import means, visit_numbers
 
 Mask = NDArray[np.bool_]

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import same_poses
-from truearm.core_set import holds_distances
 from truearm.measurements import Measurements
+from truearm.used_distances import holds_distances
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
