@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from truearm.errors import short_names
+from truearm.errors import list_outliers, short_names
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
@@ -107,6 +107,9 @@ def test_files_of_one_name_are_told_apart():
         "a/n.csv": "n.csv",
     }
     assert short_names(["m.csv", "old/m.csv"]) == {"m.csv": "m.csv", "old/m.csv": "old/m.csv"}
+    alone = [{"file": "a/tue/m.csv", "row": 10, "distance_mm": 19.984}]
+    assert list_outliers(alone, ["a/mon/m.csv", "a/tue/m.csv"]) == "row 10 of tue/m.csv (19.98 mm)"
+    assert list_outliers(alone, ["a/tue/m.csv"]) == "row 10 (19.98 mm)"
 
 
 def test_a_file_knows_from_which_side_its_poses_were_approached(arm, tmp_path):

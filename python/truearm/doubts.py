@@ -107,12 +107,12 @@ class Outliers:
         rows = calibration.rows
         if rows is None:
             return cls("", {})
-        found, several = rows.outliers(), len(rows.data.files) > 1
+        found = rows.outliers()
         held = None if calibration.selection.distances else calibration.held
         means = {} if held is None else held.means_without_mm(found)
         turns = {} if held is None else held.turns_without_mrad(found)
         judged = held.among(found, calibration.model_name) if held is not None and means else []
-        named, among = (list_outliers(each, several=several) for each in (found, judged))
+        named, among = (list_outliers(each, rows.data.files) for each in (found, judged))
         return cls(named, means, among, found, turns)
 
 

@@ -96,16 +96,16 @@ def short_names(files: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def list_outliers(outliers: Sequence[Mapping[str, Any]], *, several: bool) -> str:
+def list_outliers(outliers: Sequence[Mapping[str, Any]], files: Iterable[str]) -> str:
     """Rows with their distances in words, the first five: "row 3 (24.98 mm), row 8 (12.10 mm) and 2 more".
 
     Args:
         outliers: file, row, distance_mm and, with orientation, turn_mrad of each, the worst first.
-        several: Whether the rows are of several files, so that each has to be named.
+        files: All files of the data; where they are several, each row has its own named.
     """
-    names = short_names({outlier["file"] for outlier in outliers})
+    names = short_names(files)
     named = [
-        f"row {outlier['row']}{' of ' + names[outlier['file']] if several else ''}"
+        f"row {outlier['row']}{' of ' + names[outlier['file']] if len(names) > 1 else ''}"
         f" ({how_far(outlier['distance_mm'], outlier.get('turn_mrad'))})"
         for outlier in outliers[:OUTLIERS_NAMED]
     ]

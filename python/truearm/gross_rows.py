@@ -227,4 +227,4 @@ def _entries(data: Measurements, far: dict[int, float]) -> list[Entry]:
 
 
 def _named(entries: Sequence[Entry], data: Measurements) -> str:
-    return list_outliers(entries, several=len(data.files) > 1)
+    return list_outliers(entries, data.files)

@@ -325,9 +325,8 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
     from truearm.doubts import Outliers
 
-    if not outliers:
+    if not outliers or calibration.rows is None:
         return
-    several = calibration.rows is not None and len(calibration.rows.data.files) > 1
     robust = calibration.options.robust != ROBUST
     fate = "given less weight in the fit" if robust else "not taken out of the fit"
     hint = "" if robust else " --robust huber gives them less weight."
@@ -336,7 +335,7 @@ def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") 
             "taken out of the fits",
             " Constants, frame and tool are without them where they bend these.",
         )
-    say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, several=several)}.{hint}")
+    say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, calibration.rows.data.files)}.{hint}")
     without = Outliers.of(calibration)
     units = {"mm": without.means_mm, "mrad": without.means_mrad}
     said = [

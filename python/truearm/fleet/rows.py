@@ -92,18 +92,13 @@ def row_of_made(arm: str, made: ArmMade) -> Row:
         "floor_mm": made.floor_mm,
         "coverage_95": summary["coverage_95"],
         "outliers": len(summary["outliers"]),
-        "outliers_named": list_outliers(summary["outliers"], several=_are_of_several(summary["outliers"])),
+        "outliers_named": list_outliers(summary["outliers"], made.files),
         "determined": summary["identifiability"]["rank"],
         "parameters": summary["identifiability"]["parameters"],
         "drift": made.drift,
         "notices": [in_keys(notice) for notice in summary["notices"]],
         "grave": [in_keys(notice) for notice in made.grave],
     }
-
-
-def _are_of_several(outliers: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether they are rows of several files."""
-    return len({entry["file"] for entry in outliers}) > 1
 
 
 def row_of_failed(arm: str, error: Exception, earlier: Sequence[str] = ()) -> Row:

@@ -50,6 +50,7 @@ class ArmMade:
         floor_mm: Mean position error that noise alone would leave.
         drift: What changed since the last calibration; None where there is none.
         grave: The notices that need attention.
+        files: The files of its measurements.
         report: The page; None where it was not asked for.
     """
 
@@ -59,6 +60,7 @@ class ArmMade:
     floor_mm: float
     drift: dict[str, Any] | None
     grave: list[str]
+    files: list[str]
     report: str | None
 
 
@@ -82,5 +84,6 @@ def calibrate_arm(task: ArmTask) -> ArmMade:
         floor_mm=distance_at_floor_mm(made),
         drift=None if previous is None else drift_of(previous, made, poses),
         grave=grave_notices(made),
+        files=task.data.files,
         report=report(made).html if task.with_report else None,
     )
