@@ -216,3 +216,13 @@ def test_a_space_that_cannot_be_divided_is_told_in_words():
 def test_rows_of_a_division_without_batches_are_not_known(divided):
     with pytest.raises(WorkError, match="does not tell in which order"):
         replace(divided[0], batches=()).identifying_rows()
+
+
+def test_parameters_of_a_division_stand_in_the_order_of_its_ceps():
+    options, arm = DivisionOptions(most_regions=1, tests=1, candidates=20), VirtualArm.paper()
+    given, in_order = (
+        divide_space(WORLD, Workspace(JointSpace(RV_M2), arm.true_position), names, options)
+        for names in (["theta1", "theta2", "d1"], ["theta1", "d1", "theta2"])
+    )
+    assert given.parameters == in_order.parameters == ("theta1", "d1", "theta2")
+    np.testing.assert_array_equal(given.ceps, in_order.ceps)

@@ -107,7 +107,7 @@ class DividedSpace:
     Attributes:
         regions: The tree; its leaves are found in time that grows with its depth.
         names: Names of the coordinates.
-        parameters: Names of the P parameters that the CEPs correct.
+        parameters: Names of the P parameters that the CEPs correct, in the arm's order.
         ceps: CEPs of each node beside the nominal parameters (nodes, P), m and rad; NaN without data.
         kappa: Condition number of M of each node, rows mm, columns per mm and per 1/300 rad.
         error_m: Largest error of each node's test points.
@@ -221,6 +221,7 @@ def divide_space(
     division, measuring = chosen.core(space.low, space.high)
     setup = known_setup(arm.robot.tool[:3, 3])
     columns = named_columns(arm, names)
+    name_of = dict(zip(arm.candidates.columns, arm.candidates.names, strict=True))
     try:
         found = divide(arm.flange_chain, columns, arm.table, setup, workspace, division, measuring)
     except CoreError as error:
@@ -228,7 +229,7 @@ def divide_space(
     return DividedSpace(
         found.regions,
         space.names,
-        names,
+        tuple(name_of[column] for column in columns),
         found.ceps,
         found.kappa,
         found.error,
