@@ -1,5 +1,6 @@
 """Chosen poses are better conditioned than drawn ones, and divisions hold what they promise."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -85,8 +86,53 @@ def test_parameters_and_criteria_that_are_none_are_refused(pool):
     with pytest.raises(UsageError, match=r'no parameter "theta9".*Did you mean "theta'):
         choose(WORLD, pool, 20, ChoiceOptions(names=["theta1", "theta9"]))
     wrong: Any = "condition"
-    with pytest.raises(UsageError, match='criterion: "condition". One of "kappa"'):
+    with pytest.raises(UsageError, match='criterion: "condition" is not known. Either kappa or d'):
         ChoiceOptions(criterion=wrong)
+
+
+WRONG_CHOICES: dict[str, tuple[dict[str, Any], str]] = {
+    "no parameters": ({"names": ()}, "names: .*One parameter or more"),
+    "one parameter twice": ({"names": ("a1", "a1")}, "each once"),
+    "passes below zero": ({"passes": -1}, "passes: -1. Zero or more"),
+    "half a pass": ({"passes": 1.5}, "passes is 1.5. It must be a whole number"),
+    "a limit that no choice meets": ({"limit": -1.0}, "limit: -1. It must be positive"),
+}
+WRONG_DIVISIONS: dict[str, tuple[dict[str, Any], str]] = {
+    "no poses": ({"poses": 0}, "poses: 0. It must be positive"),
+    "no regions": ({"most_regions": 0}, "most_regions: 0. It must be positive"),
+    "no accuracy": ({"accuracy_m": np.nan}, "accuracy_m: nan. Zero or more"),
+    "no limit": ({"limit": 0.0}, "limit: 0. It must be positive"),
+    "another halving": ({"halving": "x"}, "Either longest or best"),
+    "another order": ({"order": "x"}, "Either worst or breadth"),
+    "another criterion": ({"criterion": "x"}, "Either kappa or d"),
+    "a seed below zero": ({"seed": -1}, "seed: -1. Zero or more"),
+    "a seed of 65 bits": ({"seed": 2**64}, "seed: 18446744073709551616. At most"),
+    "fewer candidates than poses": ({"candidates": 19}, "candidates: 19, to choose 20 poses from"),
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "message"),
+    [
+        *((ChoiceOptions, *case) for case in WRONG_CHOICES.values()),
+        *((DivisionOptions, *case) for case in WRONG_DIVISIONS.values()),
+    ],
+    ids=[*WRONG_CHOICES, *WRONG_DIVISIONS],
+)
+def test_options_of_choices_and_divisions_are_checked(kind, given, message):
+    with pytest.raises(UsageError, match=message):
+        kind(**given)
+
+
+def test_a_parameter_may_be_named_by_its_name_alone(pool):
+    one: Any = "theta2"
+    assert choose(WORLD, pool, 3, ChoiceOptions(names=one)).after["kappa"] == pytest.approx(1.0)
+
+
+def test_half_a_pose_is_not_chosen(pool):
+    count: Any = 12.0
+    with pytest.raises(UsageError, match="count is 12.0. It must be a whole number"):
+        choose(WORLD, pool, count)
 
 
 def test_a_pool_that_is_too_small_is_refused(pool):
@@ -152,3 +198,31 @@ def test_unknown_parameter_is_refused():
     workspace = Workspace(JointSpace(RV_M2), VirtualArm.paper().true_position)
     with pytest.raises(InputError, match='no parameter "theta9"'):
         divide_space(WORLD, workspace, ["theta9"])
+
+
+@pytest.mark.parametrize("names", [[], ["theta1", "theta1"]])
+def test_parameters_of_a_division_are_named_once(names):
+    workspace = Workspace(JointSpace(RV_M2), VirtualArm.paper().true_position)
+    with pytest.raises(UsageError, match="parameters: .*each once"):
+        divide_space(WORLD, workspace, names)
+
+
+def test_a_space_that_cannot_be_divided_is_told_in_words():
+    workspace = Workspace(JointSpace(RV_M2), VirtualArm.paper().true_position)
+    with pytest.raises(WorkError, match="condition number of the whole workspace.*higher limit"):
+        divide_space(WORLD, workspace, PAPER_PARAMETERS, DivisionOptions(limit=0.5))
+
+
+def test_rows_of_a_division_without_batches_are_not_known(divided):
+    with pytest.raises(WorkError, match="does not tell in which order"):
+        replace(divided[0], batches=()).identifying_rows()
+
+
+def test_parameters_of_a_division_stand_in_the_order_of_its_ceps():
+    options, arm = DivisionOptions(most_regions=1, tests=1, candidates=20), VirtualArm.paper()
+    given, in_order = (
+        divide_space(WORLD, Workspace(JointSpace(RV_M2), arm.true_position), names, options)
+        for names in (["theta1", "theta2", "d1"], ["theta1", "d1", "theta2"])
+    )
+    assert given.parameters == in_order.parameters == ("theta1", "d1", "theta2")
+    np.testing.assert_array_equal(given.ceps, in_order.ceps)

@@ -1,5 +1,7 @@
 """Spaces lead to poses and back, and rules say which of them can be measured."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -211,3 +213,33 @@ def test_a_space_needs_a_box():
         JointSpace(RV_M2, low=np.array([1.0, 1.0, 1.0]), high=np.array([0.0, 2.0, 2.0]))
     with pytest.raises(UsageError, match="R, theta, phi"):
         SphericalSpace(RV_M2, np.array([0.1, 0.2]), np.array([0.3, 0.4]))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"joints": (1, 1, 2)}, "each once"),
+        ({"joints": ()}, "One joint or more"),
+        ({"joints": (1, 2, 6)}, "It has 1 to 5"),
+        ({"joints": (1, 2, 2.5)}, "a number of joints is 2.5. It must be a whole number"),
+        ({"held": np.zeros(3)}, r"held: \[0.0, 0.0, 0.0\]. A finite reading of each of the 5 joints"),
+        ({"held": [0.0, 0.0, 0.0, 0.0, np.nan]}, "A finite reading"),
+        ({"robot": "rv-m2"}, r"the robot is of type str.*Robot.load"),
+    ],
+)
+def test_joints_of_spaces_are_checked(given, message):
+    corners = {"low": np.full(3, 0.2), "high": np.full(3, 0.4)}
+    for kind in (JointSpace, CartesianSpace):
+        with pytest.raises(UsageError, match=message):
+            kind(**({"robot": RV_M2} | corners | given))
+
+
+def test_three_joints_reach_a_position():
+    with pytest.raises(UsageError, match="Three joints reach a position"):
+        CartesianSpace(RV_M2, np.full(3, 0.2), np.full(3, 0.4), joints=(1, 2))
+
+
+def test_held_readings_may_be_a_list():
+    held: Any = [0.0, 0.0, 0.0, 0.4, 0.5]
+    readings, _ = JointSpace(RV_M2, held=held).readings(np.zeros((2, 3)))
+    np.testing.assert_array_equal(readings[:, 3:], [[0.4, 0.5]] * 2)

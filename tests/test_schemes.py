@@ -1,6 +1,7 @@
 """The paper's schemes as models of a calibration: fitted, judged, kept, refused where they cannot serve."""
 
 import json
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -9,8 +10,10 @@ import pytest
 
 from tests.report_support import words_of
 from truearm import Calibration, Options, Robot, UsageError, WorkError, calibrate, evaluate
+from truearm._core import CoreError, Network
 from truearm.cli import main
 from truearm.compensation import Compensator
+from truearm.scheme_options import SchemeOptions
 from truearm.simulation import Imperfections, VirtualArm
 
 QUICK: dict[str, Any] = {"most_regions": 12, "region_rows": 12, "holdout": 0.3, "cells": (9, 7, 7)}
@@ -132,12 +135,62 @@ def test_a_scheme_of_an_arm_without_determined_parameters_is_refused():
         ({"demanded_mm": -1.0}, "Zero or more"),
         ({"rate": 0.0}, "positive"),
         ({"repeatability_mm": 0.0}, "positive"),
+        ({"model": "fcmac", "cells": (-5, 3, 3)}, r"cells: \[-5, 3, 3\]. Each above active, which is 3"),
+        ({"model": "cmac", "scheme_joints": (1, 2), "active": 7}, r"cells: \[7, 7\]. Each above active"),
+        ({"model": "fcmac", "cells": (2**70, 4, 4)}, r"At most 16777216.*table=20011"),
+        (
+            {"model": "fcmac", "cells": (2**70, 4, 4), "table": 99},
+            r"At most 18446744073709551615. Give fewer",
+        ),
+        ({"model": "fcmac", "table": 2**30}, "table: 1073741824. 1 to 16777216"),
+        ({"model": "fcmac", "active": 9, "cells": (20, 20, 20)}, "active: 9. 1 to 8"),
+        ({"model": "cmac", "scheme_joints": range(1, 7), "cells": [9] * 6, "active": 8}, "262144 .* Lower"),
+        ({"model": "fcmac", "membership": "bspline", "active": 5}, "cubic"),
+        ({"model": "fcmac", "sigma_cells": 0.01}, "sigma_cells: 0.01. At least 0.05"),
+        ({"model": "cmac", "rate": 2.0}, "rate: 2. Below 2"),
         ({"model": "regions", "features": ("t",)}, "varies"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(given, message):
     with pytest.raises(UsageError, match=message):
         Options.of(**given)
+
+
+def test_numbers_that_a_model_does_not_use_may_be_any():
+    Options.of(model="cmac", sigma_cells=0.01, rate=3.0, train_on="measurements")
+    Options.of(model="fcmac", sigma_cells=0.01, membership="bspline")
+    Options.of(model="regions", rate=3.0, cells=(1, 1, 1), train_on="measurements")
+
+
+def test_the_core_knows_the_rules_of_networks():
+    """What these options allow at the most, and no more, the core takes."""
+    for sensor, sigma, fits in (
+        ((0.0, 1.0, 9, 8), 0.05, True),
+        ((0.0, 1.0, 8, 8), 0.05, False),
+        ((0.0, 1.0, 10, 9), 0.05, False),
+        ((0.0, 1.0, 9, 8), 0.0499, False),
+    ):
+        given: Any = {"model": "fcmac", "scheme_joints": (1,), "cells": (sensor[2],), "active": sensor[3]}
+        with nullcontext() if fits else pytest.raises(UsageError):
+            Options.of(**given, sigma_cells=sigma)
+        with nullcontext() if fits else pytest.raises(CoreError):
+            Network([sensor], 1, SchemeOptions(sigma_cells=sigma).network(fuzzy=True))
+
+
+def test_regions_are_not_trained(data):
+    with pytest.raises(UsageError, match="train_on: .* regions are not. .* --model cmac or fcmac"):
+        calibrate(Robot.load("rv-m2"), data, model="regions", train_on="measurements")
+
+
+@pytest.mark.parametrize(
+    ("model", "train_on"), [("regions", "ceps"), ("cmac", "ceps"), ("fcmac", "measurements")]
+)
+def test_joints_that_stood_still_are_named(arm, model, train_on):
+    q = arm.poses(80)
+    q[:, 0] = 0.3
+    words = r"scheme_joints: all rows have joint 1 at 17\.19 deg\. .*--scheme-joints 2,3\."
+    with pytest.raises(UsageError, match=words):
+        calibrate(arm.robot, arm.measure(q), model=model, train_on=train_on)
 
 
 def test_an_arm_has_only_its_joints(data):

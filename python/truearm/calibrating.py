@@ -60,6 +60,8 @@ from truearm.points_together import points_together
 from truearm.robot import Robot
 from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
+from truearm.scheme_options import SchemeOptions
+from truearm.schemes import NETWORKS, REGIONS
 from truearm.shots import shots_notices
 from truearm.splitting import Split, measured_on_both_sides, split_rows
 from truearm.standard_errors import standard_errors
@@ -198,6 +200,7 @@ def _many_are_off(found: Calibration, doubted: Sequence[Notice]) -> bool:
 
 
 def _task(robot: Robot, data: Measurements, options: Options, threads: int | None, stages: Stages) -> Task:
+    _check_train_on(options)
     selection = select(data, options.use, options.judge_target)
     where = ", ".join(data.files)
     if selection.orientation:
@@ -219,6 +222,16 @@ def _task(robot: Robot, data: Measurements, options: Options, threads: int | Non
     _check_features(data, options.features)
     arm = IdentifiedArm(robot, options.frame, options.parallel_within_deg)
     return Task(arm, selection, data.groups, options, threads, stages)
+
+
+def _check_train_on(options: Options) -> None:
+    if options.model == REGIONS and options.scheme.train_on != SchemeOptions.train_on:
+        raise UsageError(
+            f'"{options.scheme.train_on}" with the model {REGIONS}',
+            where="train_on",
+            rule="Networks are trained, regions are not",
+            way_out=f"Leave it out, or --model {' or '.join(NETWORKS)}",
+        )
 
 
 def _check_features(data: Measurements, names: Sequence[str]) -> None:

@@ -296,7 +296,8 @@ def _fit_scheme(
         )
     columns = well_determined(task.problem(measured, determined), constant, determined)
     values = task.arm.robot.joints_from_readings(data.readings)
-    rows = SchemeRows(task.problem(measured, columns), columns, constant, values, task.options.split.seed)
+    joints, seed = task.arm.robot.joints, task.options.split.seed
+    rows = SchemeRows(task.problem(measured, columns), columns, constant, values, joints, seed)
     return fit_scheme(task.options.model, rows, task.options.scheme)
 
 

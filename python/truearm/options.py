@@ -11,7 +11,7 @@ from truearm.errors import UsageError, list_names
 from truearm.identified import Frame
 from truearm.parameters import PARALLEL_WITHIN_DEG
 from truearm.scheme_options import SchemeOptions
-from truearm.schemes import SCHEMES
+from truearm.schemes import FCMAC, NETWORKS, SCHEMES
 from truearm.splitting import SplitRule
 
 ModelName = Literal["variable", "constant", "regions", "cmac", "fcmac"]
@@ -75,6 +75,8 @@ class Options:
         kinds.required(self.scheme, SchemeOptions, "the scheme")
         kinds.settle(self, whole=("judge_target", "degree"), numbers=POSITIVE, flags=("refit",))
         kinds.check_values(self, choices=CHOICES, positive=POSITIVE)
+        if self.model in NETWORKS:
+            self.scheme.check_network(fuzzy=self.model == FCMAC)
         object.__setattr__(self, "features", kinds.words(self.features, "features"))
         if len(set(self.features)) < len(self.features):
             raise UsageError("a feature is named twice", where="features", rule="Each is named once")

@@ -22,6 +22,7 @@ from truearm.errors import UsageError
 from truearm.parameters import are_lengths
 from truearm.scheme_options import SchemeOptions
 from truearm.schemes import FCMAC, REGIONS, NetworkCeps, RegionalCeps, Scheme, training_pairs
+from truearm.stillness import still_joints, still_words
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -76,6 +77,7 @@ class SchemeRows:
         columns: Those parameters.
         constant: The constant fit beside which CEPs are found; its frames and targets are held.
         inputs: Joint values of all joints (n, N).
+        joints: Kind of each joint.
         seed: Of the draw of the rows that judge the division.
     """
 
@@ -83,6 +85,7 @@ class SchemeRows:
     columns: Sequence[int]
     constant: ConstantFit
     inputs: Floats
+    joints: Sequence[str]
     seed: int
 
 
@@ -107,13 +110,9 @@ def fit_scheme(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit
     """Fit the scheme of a name.
 
     Raises:
-        UsageError: If the arm has no such joints.
+        UsageError: If the arm has no such joints, or one of them stood still.
     """
-    joints = rows.inputs.shape[1]
-    if any(not 1 <= joint <= joints for joint in options.scheme_joints):
-        raise UsageError(
-            f"{list(options.scheme_joints)}", where="scheme_joints", rule=f"There are 1 to {joints}"
-        )
+    _check_joints(rows, options.scheme_joints)
     if name != REGIONS and options.train_on == "measurements":
         return _fit_on_measurements(name, rows, options)
     regional, details = _fit_regions(rows, options)
@@ -122,6 +121,23 @@ def fit_scheme(name: str, rows: SchemeRows, options: SchemeOptions) -> SchemeFit
         scheme = RegionalCeps(regional.inputs, regional.columns, regional.regions, filled)
         return SchemeFit(scheme, SchemeDetails(**details))
     return _train_on_ceps(name, rows, options, regional, details)
+
+
+def _check_joints(rows: SchemeRows, chosen: Sequence[int]) -> None:
+    joints = rows.inputs.shape[1]
+    if any(not 1 <= joint <= joints for joint in chosen):
+        raise UsageError(f"{list(chosen)}", where="scheme_joints", rule=f"There are 1 to {joints}")
+    still = still_joints(rows.inputs, rows.joints)
+    those = {joint: at for joint, at in still.items() if joint in chosen}
+    if those:
+        moved = [joint for joint in range(1, joints + 1) if joint not in still]
+        others = [joint for joint in chosen if joint in moved] or moved
+        raise UsageError(
+            f"all rows have {still_words(those, rows.joints)}",
+            where="scheme_joints",
+            rule="The workspace is divided along joints that move",
+            way_out=f"Name those that do: --scheme-joints {','.join(map(str, others))}",
+        )
 
 
 def _features(rows: SchemeRows, options: SchemeOptions) -> tuple[tuple[int, ...], Floats]:

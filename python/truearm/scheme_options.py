@@ -1,5 +1,6 @@
 """How the paper's schemes are fitted: options of `truearm calibrate --model regions|cmac|fcmac`."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -20,6 +21,15 @@ KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
     "normalise": ("printed", "squares"),
 }
 
+MOST_ACTIVE: Final = 8
+MOST_ACTIVE_TOGETHER: Final = 2**14
+MOST_ROWS: Final = 2**24
+MOST_HASHED: Final = 2**64 - 1
+NARROWEST_CELLS: Final = 0.05
+SPLINES: Final = (2, 3, 4)
+RATE_BELOW: Final = 2.0
+"""What networks of the core can be."""
+
 
 @dataclass(frozen=True)
 class SchemeOptions:
@@ -35,10 +45,11 @@ class SchemeOptions:
         train_on: Networks learn by (A5) from "ceps" of regions, or from "measurements", kept smooth.
         membership: Of the FCMAC: "gaussian" as in the paper, or "bspline".
         composition: "min" as in the paper, or "product".
-        sigma_cells: Standard deviation of a Gaussian sensor, in cells.
-        cells: Sensor cells of each joint; 17, 11, 11 with three joints as in the paper, else 7.
-        active: Sensors of each input that are active, c.
-        rate: Learning rate of (A5).
+        sigma_cells: Standard deviation of a Gaussian sensor, in cells; 0.05 at the least.
+        cells: Sensor cells of each joint, more than `active`; 17, 11, 11 with three joints as in the paper,
+            else 7.
+        active: Sensors of each input that are active, c, 8 at the most.
+        rate: Learning rate of (A5), below 2.
         normalise: "printed", or "squares" to meet a pattern with one update at a rate of one.
         tolerance_mm: Training ends when no CEP differs more, angles at 0.3 m.
         epochs: Or after so many runs through the patterns.
@@ -83,6 +94,37 @@ class SchemeOptions:
         count = len(self.scheme_joints)
         return (17, 11, 11) if count == len(MAJOR_JOINTS) else (7,) * count
 
+    def check_network(self, *, fuzzy: bool) -> None:
+        """Check what a network is made of and trained with: an FCMAC if fuzzy, else a CMAC.
+
+        Raises:
+            UsageError: If there is no such network.
+        """
+        self._check_cells()
+        shape, sigma = self.membership if fuzzy else "", self.sigma_cells
+        narrow = f"At least {NARROWEST_CELLS}: narrower cells excite nothing"
+        _check(shape != "gaussian" or sigma >= NARROWEST_CELLS, "sigma_cells", f"{sigma:g}", narrow)
+        splines = "2 (linear), 3 (quadratic) or 4 (cubic) of a B-spline"
+        _check(shape != "bspline" or self.active in SPLINES, "active", f"{self.active}", splines)
+        steps = self.train_on == "ceps"
+        diverges = f"Below {RATE_BELOW:g}, or training diverges"
+        _check(not steps or self.rate < RATE_BELOW, "rate", f"{self.rate:g}", diverges)
+
+    def _check_cells(self) -> None:
+        cells, active, inputs = self.sensor_cells, self.active, len(self.scheme_joints)
+        _check(active <= MOST_ACTIVE, "active", f"{active}", f"1 to {MOST_ACTIVE}")
+        _check(min(cells) > active, "cells", f"{list(cells)}", f"Each above active, which is {active}")
+        together = f"{active} of each of {inputs} inputs make {active**inputs} association cells"
+        at_once = f"At most {MOST_ACTIVE_TOGETHER} are active at once"
+        _check(active**inputs <= MOST_ACTIVE_TOGETHER, "active", together, at_once, "Lower active")
+        most, way_out = MOST_HASHED, "Give fewer"
+        if self.table is None:
+            most, way_out = MOST_ROWS, "Give fewer, or the size of a hash table (table=20011)"
+        count = math.prod(cells)
+        association = f"{list(cells)} make {count} association cells"
+        _check(count <= most, "cells", association, f"At most {most}", way_out)
+        _check((self.table or 1) <= MOST_ROWS, "table", f"{self.table}", f"1 to {MOST_ROWS}")
+
     def network(self, *, fuzzy: bool) -> dict[str, Any]:
         """Options of the core's network: the FCMAC, or the CMAC whose inputs are quantised."""
         return {
@@ -101,3 +143,8 @@ class SchemeOptions:
             "tolerance": self.tolerance_mm / MM_PER_METRE,
             "epochs": self.epochs,
         }
+
+
+def _check(holds: bool, where: str, what: str, rule: str, way_out: str = "") -> None:
+    if not holds:
+        raise UsageError(what, where=where, rule=rule, way_out=way_out)

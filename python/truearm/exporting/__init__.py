@@ -19,6 +19,7 @@ from truearm.exporting.ur_yaml import yaml_text
 from truearm.exporting.urdf_file import urdf_text
 from truearm.files import write_whole
 from truearm.kinds import check_number, required
+from truearm.solving import beyond_notices, feature_values
 
 Format = Literal["urdf", "ur-yaml", "dh-toml", "dh-json", "dh-csv", "field-csv"]
 FORMATS: Final = get_args(Format)
@@ -132,8 +133,10 @@ def _samples(calibration: Calibration, options: Options) -> Exported:
     axes = grid_axes(calibration, options.grid)
     table = grid_table(calibration, axes, features=options.features, with_std=options.with_std)
     note = "Samples of a field are not the field: between them it is not linear"
-    text = grid_text(table, calibration, axes, options.features)
-    return Exported("field-csv", text, (note,), None, len(table))
+    guesses = beyond_notices(calibration, feature_values(calibration, options.features))
+    beyond = [notice.message for notice in guesses]
+    text = grid_text(table, calibration, axes, options.features, notes=beyond)
+    return Exported("field-csv", text, (note, *beyond), None, len(table))
 
 
 def _constants(calibration: Calibration, chosen: Format, options: Options) -> Exported:

@@ -145,18 +145,24 @@ def grid_text(
     calibration: Calibration,
     axes: Sequence[Axis],
     features: Mapping[str, float] | None = None,
+    *,
+    notes: Sequence[str] = (),
 ) -> str:
-    """The table as CSV with comments on what it is, where it was sampled, and what each column is."""
+    """The table as CSV with comments on what it is, where it was sampled, and what each column is.
+
+    `notes` are what else is to be minded of these samples.
+    """
     stated = [f"{name} {value:{SHOWN}}" for name, value in (features or {}).items()]
-    notes = [
+    comments = [
         f"{calibration.robot.name}, calibrated by truearm {calibration.version}: samples of what varies",
         f"Sampled at {'; '.join(_in_words(calibration, axes))}, the last one running fastest",
         *([f"Features: {', '.join(stated)}"] if stated else []),
+        *notes,
         *_columns_in_words(list(table.columns), calibration),
         "Between samples the field is not linear; beyond the readings it was learnt at it is a guess",
         *_waves_in_words(calibration),
     ]
-    return as_comments(notes) + table.to_csv(index=False, float_format=DIGITS, lineterminator="\n")
+    return as_comments(comments) + table.to_csv(index=False, float_format=DIGITS, lineterminator="\n")
 
 
 def _waves_in_words(calibration: Calibration) -> list[str]:

@@ -2,17 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truearm._core import Problem, choose_poses, independent_columns, linearise, setup_jacobian
+from truearm import kinds
+from truearm._core import CoreError, Problem, choose_poses, independent_columns, linearise, setup_jacobian
 from truearm.core_set import known_setup, measured_points
 from truearm.endpoints import at_tool
-from truearm.errors import UsageError, WorkError, list_names
+from truearm.errors import UsageError, WorkError
 from truearm.identified import IdentifiedArm
-from truearm.kinds import required
 from truearm.parameters import THETA, D
 
 Floats = NDArray[np.float64]
@@ -45,8 +46,13 @@ class ChoiceOptions:
     tool: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        if self.criterion not in CRITERIA:
-            raise UsageError(f'"{self.criterion}"', where="criterion", rule=f"One of {list_names(CRITERIA)}")
+        kinds.settle(self, whole=("passes",), numbers=("limit",), flags=("pose",))
+        kinds.check_values(
+            self, choices={"criterion": CRITERIA}, positive=("limit",), not_negative=("passes",)
+        )
+        if self.names is not None:
+            object.__setattr__(self, "names", kinds.words(self.names, "names"))
+            check_some(self.names, "names")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +96,12 @@ def choose(
         given: Poses (k, N) that are measured anyway.
 
     Raises:
-        UsageError: If there is no such parameter.
+        UsageError: If there is no such parameter, or `count` is no whole number.
         WorkError: If the pool is smaller than the choice, or the choice too small to determine the unknowns.
     """
-    required(arm, IdentifiedArm, "the arm")
-    chosen = options or ChoiceOptions()
+    kinds.required(arm, IdentifiedArm, "the arm")
+    kinds.check_number(count, "count", Integral)
+    chosen = kinds.chosen(ChoiceOptions, options, {})
     if len(readings) < count:
         raise WorkError(
             f"{count} poses are to be chosen from {len(readings)}",
@@ -107,20 +114,26 @@ def choose(
     measured = None
     if given is not None and len(given):
         measured = unknowns_jacobian(arm, given, chosen)[0][:, :, kept]
-    core = choose_poses(
-        np.ascontiguousarray(jacobian[:, :, kept]),
-        count,
-        {
-            "columns": [columns[k] for k in kept],
-            "criterion": chosen.criterion,
-            "limit": chosen.limit,
-            "given": None if measured is None else np.ascontiguousarray(measured),
-            "start": None,
-            "passes": chosen.passes,
-        },
-    )
+    how = {
+        "columns": [columns[k] for k in kept],
+        "criterion": chosen.criterion,
+        "limit": chosen.limit,
+        "given": None if measured is None else np.ascontiguousarray(measured),
+        "start": None,
+        "passes": chosen.passes,
+    }
+    try:
+        core = choose_poses(np.ascontiguousarray(jacobian[:, :, kept]), count, how)
+    except CoreError as error:
+        raise WorkError(str(error)) from error
     rows = np.array(core.chosen, dtype=np.int64)
     return Choice(rows, core.before, core.after, core.exchanges, core.well_conditioned)
+
+
+def check_some(names: Sequence[str], option: str) -> None:
+    """Raise UsageError where an option names no parameter, or one twice."""
+    if not names or len(set(names)) < len(names):
+        raise UsageError(f"{list(names)}", where=option, rule="One parameter or more, each once")
 
 
 def _check_enough(count: int, values: int, unknowns: int) -> None:

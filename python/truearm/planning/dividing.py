@@ -9,18 +9,26 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Regions, divide
+from truearm import kinds
+from truearm._core import CoreError, Regions, divide
 from truearm.core_set import known_setup
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError, WorkError
 from truearm.files import read_text, write_whole
 from truearm.identified import IdentifiedArm
-from truearm.planning.choosing import Criterion
+from truearm.planning.choosing import CRITERIA, Criterion, check_some
 from truearm.planning.workspace import Workspace
 
 Floats = NDArray[np.float64]
 
 INTEGER_ARRAYS: Final = ("axis", "child")
 FORMAT: Final = "truearm division 1"
+COUNTS: Final = ("most_regions", "poses", "candidates", "tests")
+KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
+    "halving": ("longest", "best"),
+    "order": ("worst", "breadth"),
+    "criterion": CRITERIA,
+}
+LARGEST_SEED: Final = 2**64 - 1
 
 
 @dataclass(frozen=True)
@@ -32,7 +40,7 @@ class DivisionOptions:
         most_regions: Leaves at the most; the largest errors are divided first with the order "worst".
         limit: A region whose condition number of M stays above is not divided further.
         poses: Measured in each region to identify its CEPs.
-        candidates: From which these are chosen.
+        candidates: From which these are chosen, as many at the least.
         tests: Further poses that judge the region.
         halving: Axis of each halving: the "longest" side in parts of the whole, or the "best" of all.
         order: "breadth" first, or the "worst" region first.
@@ -50,6 +58,21 @@ class DivisionOptions:
     order: Literal["worst", "breadth"] = "breadth"
     criterion: Criterion = "kappa"
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        kinds.settle(self, whole=(*COUNTS, "seed"), numbers=("accuracy_m", "limit"))
+        kinds.check_values(
+            self, choices=KNOWN, positive=(*COUNTS, "limit"), not_negative=("accuracy_m", "seed")
+        )
+        if self.seed > LARGEST_SEED:
+            raise UsageError(f"{self.seed}", where="seed", rule=f"At most {LARGEST_SEED}")
+        if self.candidates < self.poses:
+            raise UsageError(
+                f"{self.candidates}, to choose {self.poses} poses from",
+                where="candidates",
+                rule="The poses of a region are some of its candidates",
+                way_out="Give more candidates, or fewer poses",
+            )
 
     def core(self, low: Floats, high: Floats) -> tuple[dict[str, Any], dict[str, Any]]:
         """The core's options of the division, and of its measuring."""
@@ -84,7 +107,7 @@ class DividedSpace:
     Attributes:
         regions: The tree; its leaves are found in time that grows with its depth.
         names: Names of the coordinates.
-        parameters: Names of the P parameters that the CEPs correct.
+        parameters: Names of the P parameters that the CEPs correct, in the arm's order.
         ceps: CEPs of each node beside the nominal parameters (nodes, P), m and rad; NaN without data.
         kappa: Condition number of M of each node, rows mm, columns per mm and per 1/300 rad.
         error_m: Largest error of each node's test points.
@@ -107,7 +130,16 @@ class DividedSpace:
         return sum(count for _, count, _ in self.batches)
 
     def identifying_rows(self) -> NDArray[np.bool_]:
-        """Which of the measured poses identify a leaf, in the order of measuring."""
+        """Which of the measured poses identify a leaf, in the order of measuring.
+
+        Raises:
+            WorkError: If the batches, and with them the order, are not known.
+        """
+        if not self.batches:
+            raise WorkError(
+                "this division does not tell in which order its regions were measured",
+                rule="Its batches tell that, and there are none",
+            )
         nodes, counts, tests = (np.array(column) for column in zip(*self.batches, strict=True))
         return np.asarray(np.repeat(np.isin(nodes, self.regions.leaves) & ~tests, counts), dtype=np.bool_)
 
@@ -179,17 +211,25 @@ def divide_space(
 
     Raises:
         InputError: If a name is not a parameter of the arm, or measuring gives another shape than asked for.
-        CoreError: If an option is out of its range.
+        UsageError: If no parameter is named, or one twice.
+        WorkError: If the whole space has too few poses that can be measured, or they tell too little.
     """
-    chosen, space = options or DivisionOptions(), workspace.space
+    kinds.required(arm, IdentifiedArm, "the arm")
+    chosen, space = kinds.chosen(DivisionOptions, options, {}), workspace.space
+    names = kinds.words(parameters, "parameters")
+    check_some(names, "parameters")
     division, measuring = chosen.core(space.low, space.high)
     setup = known_setup(arm.robot.tool[:3, 3])
-    columns = named_columns(arm, parameters)
-    found = divide(arm.flange_chain, columns, arm.table, setup, workspace, division, measuring)
+    columns = named_columns(arm, names)
+    name_of = dict(zip(arm.candidates.columns, arm.candidates.names, strict=True))
+    try:
+        found = divide(arm.flange_chain, columns, arm.table, setup, workspace, division, measuring)
+    except CoreError as error:
+        raise WorkError(str(error)) from error
     return DividedSpace(
         found.regions,
         space.names,
-        tuple(parameters),
+        tuple(name_of[column] for column in columns),
         found.ceps,
         found.kappa,
         found.error,

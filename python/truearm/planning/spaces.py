@@ -8,8 +8,9 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truearm.arrays import as_numbers
 from truearm.errors import UsageError
-from truearm.kinds import required
+from truearm.kinds import required, whole_numbers
 from truearm.planning.configurations import Configuration
 from truearm.planning.positioning import PositionInverse
 from truearm.robot import Robot
@@ -69,9 +70,7 @@ class JointSpace:
     held: Floats | None = None
 
     def __post_init__(self) -> None:
-        required(self.robot, Robot, "the robot")
-        if any(not 1 <= joint <= self.robot.joint_count for joint in self.joints):
-            raise UsageError(f"joints {list(self.joints)}", rule=f"It has 1 to {self.robot.joint_count}")
+        _check_joints(self)
         limits = self.robot.limits[self._columns]
         for name, limit in (("low", limits[:, 0]), ("high", limits[:, 1])):
             given = np.asarray(getattr(self, name), dtype=np.float64)
@@ -127,6 +126,9 @@ class CartesianSpace:
     held: Floats | None = None
 
     def __post_init__(self) -> None:
+        _check_joints(self)
+        if len(self.joints) != len(self.names):
+            raise UsageError(f"joints {list(self.joints)}", rule="Three joints reach a position")
         for name in ("low", "high"):
             object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
         _check_box(self)
@@ -192,6 +194,25 @@ class SphericalSpace(CartesianSpace):
         x, y, z = offset.T
         level = np.hypot(x, y)
         return np.column_stack([np.hypot(level, z), np.arctan2(x, y), np.arctan2(z, level)])
+
+
+def _check_joints(space: JointSpace | CartesianSpace) -> None:
+    """Check the robot, its joints that move and the readings of the others, and settle these."""
+    robot = required(space.robot, Robot, "the robot")
+    joints, count = whole_numbers(space.joints, "joints"), robot.joint_count
+    object.__setattr__(space, "joints", joints)
+    if any(not 1 <= joint <= count for joint in joints):
+        raise UsageError(f"joints {list(joints)}", rule=f"It has 1 to {count}")
+    if not joints or len(set(joints)) < len(joints):
+        raise UsageError(f"joints {list(joints)}", rule="One joint or more, each once")
+    if space.held is None:
+        return
+    held = as_numbers(space.held, what="held readings")
+    if held.shape != (count,) or not np.isfinite(held).all():
+        raise UsageError(
+            f"{held.tolist()}", where="held", rule=f"A finite reading of each of the {count} joints"
+        )
+    object.__setattr__(space, "held", held)
 
 
 def _check_box(space: Space) -> None:
