@@ -356,7 +356,37 @@ def test_an_updated_calibration_is_updated_and_rolled_back_again(known, moved, t
     second.calibration.save(tmp_path / "two.calib")
     ta.roll_back(tmp_path / "two.calib", tmp_path / "back.calib")
     assert (tmp_path / "back.calib").read_bytes() == (tmp_path / "one.calib").read_bytes()
-    assert ta.update(found.calibration, data).verdict == "holds"
+    again = ta.update(found.calibration, data)
+    assert again.verdict == "holds"
+    for offset, before in zip(again.offsets[1:4], found.offsets[1:4], strict=True):
+        assert offset.std is not None
+        assert before.std is not None
+        assert offset.std < 1.2 * before.std
+
+
+def test_updates_of_updates_stay_as_certain_as_one():
+    arm = VirtualArm.paper(seed=2)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(25)), model="constant")
+    q, errors, stds = arm.poses(50, seed=4), [], []
+    for seed in range(20, 25):
+        found = ta.update(calibration, arm.measure(arm.poses(20, seed=9), seed=seed))
+        calibration = found.calibration
+        errors.append([offset.std for offset in found.offsets if offset.told])
+        stds.append(std_mm(calibration, q).mean())
+    assert (np.array(errors[-1]) < 1.2 * np.array(errors[0])).all()
+    assert stds[-1] < 1.2 * stds[0]
+    details = calibration.constant
+    np.testing.assert_allclose(
+        details.standard_errors, np.sqrt(np.diag(details.covariance)[: len(details.names)])
+    )
+
+
+def test_files_that_do_not_tell_what_became_of_errors_count_both_parts_in_full(known, moved):
+    arm, calibration = known
+    updated, q = moved[1].calibration, arm.poses(20, seed=5)
+    assert updated.revision is not None
+    silent = replace(updated, revision=replace(updated.revision, carried=None), fitted_spread=None)
+    assert (std_mm(silent, q) > std_mm(calibration, q)).all()
 
 
 def test_bounds_of_the_updated_deviation_are_no_smaller(known, moved):
@@ -364,8 +394,9 @@ def test_bounds_of_the_updated_deviation_are_no_smaller(known, moved):
     updated = moved[1].calibration
     q = arm.poses(100, seed=5)
     assert (1e3 * updated.conservative_std(q)[:, 0] >= std_mm(updated, q) * (1.0 - 1e-9)).all()
-    assert (std_mm(updated, q) > 0.98 * std_mm(known[1], q)).all()
-    assert np.median(std_mm(updated, q)) < 2.0 * np.median(std_mm(known[1], q))
+    ratio = std_mm(updated, q) / std_mm(known[1], q)  # the device may see some poses better than before
+    assert (ratio > 0.9).all()
+    assert 1.0 < np.median(ratio) < 1.5
 
 
 @pytest.mark.parametrize(
