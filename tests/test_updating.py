@@ -81,6 +81,17 @@ def test_one_motor_that_changes_two_coupled_joints_is_told(shift, changed, follo
     assert (words in words_of(report(found.calibration).html)) == (follows is not None)
 
 
+def test_rows_of_an_update_are_known_to_what_it_made(known, moved):
+    arm, _ = known
+    data, found = moved
+    for told in (ta.evaluate(found.calibration, data, keep_frames=True), ta.update(found.calibration, data)):
+        assert [(notice.kind, len(notice.rows)) for notice in told.notices] == [("known_rows", 15)]
+    first = ta.evaluate(found.calibration, arm.measure(arm.poses(60)))
+    assert [len(notice.rows) for notice in first.notices if notice.kind == "known_rows"] == [60]
+    stripped = found.calibration.without_rows()
+    assert ta.evaluate(stripped, data, keep_frames=True).notices == ()
+
+
 def test_what_cannot_be_told_is_said(moved):
     _, found = moved
     assert not found.offsets[0].told

@@ -126,7 +126,7 @@ def evaluate(
     notices = check_against(data, calibration.robot)
     data, together = points_together(data.deduplicated())
     notices += together
-    notices += [*known_rows(calibration.learned_from, data), *rows_beyond_learnt(calibration, data)]
+    notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     selection = select(data, chosen.use, chosen.judge_target)
     if selection.distances:
         raise InputError(

@@ -155,7 +155,7 @@ def update(
     notices = check_against(data, calibration.robot)
     data, together = points_together(data.deduplicated())
     notices += together
-    notices += [*known_rows(calibration.learned_from, data), *rows_beyond_learnt(calibration, data)]
+    notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     data, unused = some_poses(one_row_a_visit(data))
     notices += [*unused, *_silent_rows(calibration, data)]
     task = _task(calibration, data, chosen, stages)
