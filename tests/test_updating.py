@@ -400,6 +400,16 @@ def test_files_that_do_not_tell_what_became_of_errors_count_both_parts_in_full(k
     assert (std_mm(silent, q) > std_mm(calibration, q)).all()
 
 
+def test_offsets_that_were_held_are_not_called_determined(known, moved):
+    before, after = (set(each.constant.names) for each in (known[1], moved[1].calibration))
+    columns = dict(zip(known[1].arm.candidates.columns, known[1].arm.candidates.names, strict=True))
+    directions = moved[1].calibration.revision.directions
+    held = {columns.get(int(np.argmax(np.abs(directions[:, joint])))) for joint in (0, 4)}
+    assert after >= before
+    assert not (after - before) & held
+    assert (moved[1].calibration.constant.standard_errors > 0.0).all()
+
+
 def test_bounds_of_the_updated_deviation_are_no_smaller(known, moved):
     arm, _ = known
     updated = moved[1].calibration

@@ -97,13 +97,14 @@ def _model(calibration: Calibration, scene: Scene, found: Estimate, name: str, c
 def _constant(calibration: Calibration, scene: Scene, errors: Carried) -> ConstantDetails:
     """Details of the constants whose covariance is that of old and new offsets together, and of the set-ups.
 
-    What standard errors hold beside the covariance stays.
+    Offsets that were held are no constants for that. What standard errors hold beside the covariance stays.
     """
     old, asked = calibration.constant, calibration.arm.candidates
     column_of = dict(zip(asked.names, asked.columns, strict=True))
     before = [column_of[name] for name in old.names]
-    directions = scene.unknowns.directions
-    moved = set(np.flatnonzero(np.abs(directions).sum(axis=1)).tolist())
+    directions, free = scene.unknowns.directions, scene.unknowns.free
+    found = directions[:, free[: directions.shape[1]]]
+    moved = set(np.flatnonzero(np.abs(found).sum(axis=1)).tolist())
     columns = [column for column in asked.columns if column in before or column in moved]
     places = [columns.index(column) for column in before]
     known = _carried_over(old.covariance, errors, before, columns, directions)
