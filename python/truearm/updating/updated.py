@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from truearm.calibration import Calibration
 from truearm.details import ConstantDetails
+from truearm.errors import Notice, in_words
 from truearm.fitted_rows import TRAINED, FittedRows
 from truearm.held_rows import HeldRows
 from truearm.judging import judge
@@ -33,6 +34,7 @@ def updated(
     found: Estimate,
     judged: Mapping[str, RowErrors],
     report: Mapping[str, Any],
+    notices: tuple[Notice, ...],
 ) -> Calibration:
     """The calibration with what was found put in.
 
@@ -42,13 +44,15 @@ def updated(
         found: Values of the unknowns.
         judged: Errors of each model at poses that were left out in turn.
         report: What the update said.
+        notices: What it warned of.
     """
     task, unknowns = scene.task, scene.unknowns
     change = (unknowns.directions @ found.state.arm).reshape(-1, 5)
     models = {name: _model(calibration, scene, found, name, change) for name in calibration.models}
     fitted = judge(task, models, scene.data, scene.data)
     file = calibration.to_bytes() if calibration.file is None else calibration.file
-    report = {**report, "former": calibration.validation.to_dict()}
+    former = {**calibration.validation.to_dict(), "notices": in_words(calibration.notices)}
+    report = {**report, "former": former}
     revision = Revision.of(report, unknowns.directions, found.covariance, file)
     errors = carried(scene, found)
     if calibration.variable is not None:
@@ -72,7 +76,7 @@ def updated(
         held=HeldRows.of(scene.data, judged),
         data_hash=scene.data.hash(),
         version=version("truearm"),
-        notices=(),
+        notices=notices,
         seconds={},
         stored_conservative=None,
         fitted_spread=None,
