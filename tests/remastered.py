@@ -4,6 +4,9 @@ import numpy as np
 
 import truearm as ta
 
+SHIFT = np.array([0.0, 0.6, -0.2, 0.9, 0.0])
+TOOL_MM = (0.6, -0.5, 0.6)
+
 
 def remastered_table(arm, readings, shift_deg, *, seed, tool_mm=(0.0, 0.0, 0.0)):
     """What is measured at `readings` (n, N) when each joint stands `shift_deg` (N,) further than it reads."""
@@ -19,3 +22,14 @@ def remastered_table(arm, readings, shift_deg, *, seed, tool_mm=(0.0, 0.0, 0.0))
 def remastered(arm, readings, shift_deg, **more):
     """The same as Measurements."""
     return ta.Measurements.from_dataframe(remastered_table(arm, readings, shift_deg, **more))
+
+
+def std_mm(calibration, q):
+    """Standard deviation of the tool's position, all coordinates together."""
+    return 1e3 * np.linalg.norm(calibration.position_std(q), axis=1)
+
+
+def check_offset(offset, truth, errors=4.0):
+    """The change of an offset is found within some standard errors, which are small."""
+    assert offset.std is not None
+    assert abs(offset.change - truth) < errors * offset.std < 0.2

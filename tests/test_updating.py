@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from tests.remastered import remastered, remastered_table
+from tests.remastered import SHIFT, TOOL_MM, check_offset, remastered, remastered_table, std_mm
 from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
+from truearm.errors import Notice
 from truearm.programs.notices import update_notices
 from truearm.reporting.facts import Facts
 from truearm.reporting.report import report
@@ -16,9 +17,6 @@ from truearm.simulation import Imperfections, VirtualArm
 from truearm.solving import beyond_learnt
 from truearm.updating.some_poses import MOST_POSES, some_poses
 from truearm.updating.squares import SquaresTest
-
-SHIFT = np.array([0.0, 0.6, -0.2, 0.9, 0.0])
-TOOL_MM = (0.6, -0.5, 0.6)
 
 
 @pytest.fixture(scope="module")
@@ -38,17 +36,6 @@ def error_mm(calibration, arm, shift, tool_mm=(0.0, 0.0, 0.0)):
     """Mean error of predictions of the target at fresh poses in the calibration's only set-up."""
     fresh = remastered(arm, arm.poses(200, seed=77), shift, seed=78, tool_mm=tool_mm)
     return ta.evaluate(calibration, fresh, keep_frames=True).errors[calibration.model_name].position.mean
-
-
-def std_mm(calibration, q):
-    """Standard deviation of the tool's position, all coordinates together."""
-    return 1e3 * np.linalg.norm(calibration.position_std(q), axis=1)
-
-
-def check_offset(offset, truth, errors=4.0):
-    """The change of an offset is found within some standard errors, which are small."""
-    assert offset.std is not None
-    assert abs(offset.change - truth) < errors * offset.std < 0.2
 
 
 def test_what_moved_is_found_and_the_error_comes_back(known, moved):
@@ -167,14 +154,23 @@ def test_a_noisier_device_moves_no_joint_of_an_unchanged_arm(known):
     assert moved <= 1
 
 
+def check_kept_notices(found, before):
+    """What was warned of is in the file and in JSON, beside what was before."""
+    assert found.calibration.notices == found.notices
+    assert found.to_dict()["notices"] == found.calibration.summary["notices"] == list(map(str, found.notices))
+    assert found.calibration.summary["update"]["former"]["notices"] == list(map(str, before.notices))
+
+
 def test_a_gross_error_is_left_out_and_named(known):
-    arm, calibration = known
+    arm, _ = known
+    calibration = replace(known[1], notices=(Notice("limits", "Joint 2 was beyond its limits."),))
     table = remastered_table(arm, arm.poses(15, seed=9), SHIFT, seed=9)
     table.loc[3, "x"] += 0.02
     found = ta.update(calibration, ta.Measurements.from_dataframe(table))
     assert found.outliers == (4,)
     assert found.verdict == "moved"
     assert any("row 4" in str(notice) for notice in found.notices)
+    check_kept_notices(found, calibration)
     assert error_mm(found.calibration, arm, SHIFT) < 0.2
 
 
@@ -262,7 +258,8 @@ def test_every_model_is_judged_at_poses_left_out_in_turn(known, moved):
         assert errors.statistics() == new.validation.holdout[name]
         assert new.validation.holdout[name].position.mean > new.validation.train[name].position.mean
     assert new.validation.holdout["variable"] == found.after
-    assert new.summary["update"]["former"] == calibration.validation.to_dict()
+    former = {**calibration.validation.to_dict(), "notices": list(map(str, calibration.notices))}
+    assert new.summary["update"]["former"] == former
     fresh = remastered(arm, arm.poses(60, seed=77), SHIFT, seed=78, tool_mm=TOOL_MM)
     outside = ta.evaluate(new, fresh, frame_rows=15).errors["nominal"].position.mean
     assert new.validation.holdout["nominal"].position.mean == pytest.approx(outside, rel=0.5)
@@ -344,28 +341,14 @@ def test_features_were_learnt_where_the_first_calibration_was():
     assert Facts(updated).features == {"warmth": 22.5}
 
 
-def test_an_updated_calibration_is_updated_and_rolled_back_again(known, moved, tmp_path):
-    arm, _ = known
-    data, found = moved
-    found.calibration.save(tmp_path / "one.calib")
-    twice = 2.0 * SHIFT
-    more = remastered(arm, arm.poses(15, seed=19), twice, seed=19, tool_mm=TOOL_MM)
-    second = ta.update(ta.Calibration.load(tmp_path / "one.calib"), more)
-    assert second.verdict == "moved"
-    check_offset(second.offsets[3], SHIFT[3], errors=5.0)
-    second.calibration.save(tmp_path / "two.calib")
-    ta.roll_back(tmp_path / "two.calib", tmp_path / "back.calib")
-    assert (tmp_path / "back.calib").read_bytes() == (tmp_path / "one.calib").read_bytes()
-    assert ta.update(found.calibration, data).verdict == "holds"
-
-
 def test_bounds_of_the_updated_deviation_are_no_smaller(known, moved):
     arm, _ = known
     updated = moved[1].calibration
     q = arm.poses(100, seed=5)
     assert (1e3 * updated.conservative_std(q)[:, 0] >= std_mm(updated, q) * (1.0 - 1e-9)).all()
-    assert (std_mm(updated, q) > 0.98 * std_mm(known[1], q)).all()
-    assert np.median(std_mm(updated, q)) < 2.0 * np.median(std_mm(known[1], q))
+    ratio = std_mm(updated, q) / std_mm(known[1], q)  # the device may see some poses better than before
+    assert (ratio > 0.9).all()
+    assert 1.0 < np.median(ratio) < 1.5
 
 
 @pytest.mark.parametrize(

@@ -132,7 +132,7 @@ class Calibration:
     def without_rows(self) -> "Calibration":
         """The same as a file without the measurements holds it, with the bounds of the standard deviation."""
         bounds = self.conservative if self.has_conservative else None
-        revision = None if self.revision is None else replace(self.revision, file=None)
+        revision = None if self.revision is None else self.revision.stripped()
         return replace(
             self,
             rows=None,

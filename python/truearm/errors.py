@@ -72,6 +72,11 @@ class Notice:
         return self.message
 
 
+def in_words(notices: Iterable[Notice]) -> list[str]:
+    """Notices as JSON values."""
+    return [str(notice) for notice in notices]
+
+
 def list_rows(rows: Iterable[int], noun: str = "row") -> str:
     """The rows in words, the first ten by number: "row 3", "rows 1, 2 and 5", "rows 1, ... and 7 more"."""
     numbers = [str(row) for row in rows]

@@ -139,7 +139,7 @@ def evaluate(
     notices = check_against(data, calibration.robot)
     data, together = points_together(data.deduplicated())
     notices += together
-    notices += [*known_rows(calibration.learned_from, data), *rows_beyond_learnt(calibration, data)]
+    notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     selection = _selection(data, chosen)
     if selection.orientation:
         check_turns(data, calibration.robot)

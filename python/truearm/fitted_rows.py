@@ -1,7 +1,8 @@
 """The rows that a calibration was fitted to, and what became of each."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from truearm.fitting import Fits
 from truearm.measurements import Measurements
 from truearm.splitting import Split
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
+
+if TYPE_CHECKING:
+    from truearm.calibration import Calibration
 
 Floats = NDArray[np.float64]
 
@@ -111,9 +115,14 @@ def without_drift(data: Measurements, moved: Floats | None) -> Measurements:
     return data if moved is None else replace(data, targets=data.targets - moved[:, None])
 
 
-def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:
-    """A notice of rows that the calibration was fitted to: what it says of them, it knows from them."""
-    known = np.zeros(len(data), dtype=np.bool_) if fitted is None else fitted.among(data)
+def known_rows(calibration: "Calibration", data: Measurements) -> list[Notice]:
+    """A notice of rows that the calibration was fitted to: what it says of them, it knows from them.
+
+    Rows of its updates count, as far as files keep them.
+    """
+    known = np.zeros(len(data), dtype=np.bool_)
+    for fitted in _all_rows(calibration):
+        known |= fitted.among(data)
     if not known.any():
         return []
     named = "All rows" if known.all() else f"{data.row_names(known)[:1].upper()}{data.row_names(known)[1:]}"
@@ -122,6 +131,16 @@ def known_rows(fitted: FittedRows | None, data: Measurements) -> list[Notice]:
         "do not say."
     )
     return [Notice("known_rows", text, tuple(data.rows[known].tolist()))]
+
+
+def _all_rows(calibration: "Calibration") -> Iterator[FittedRows]:
+    """The rows of a calibration and of those that it was updated from."""
+    before: Calibration | None = calibration
+    while before is not None:
+        if before.rows is not None:
+            yield before.rows
+        is_kept = before.revision is not None and before.revision.file is not None
+        before = before.predecessor if is_kept else None
 
 
 def _marks(data: Measurements) -> list[bytes]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M
+from truearm.errors import in_words
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 from truearm.validation import mean_distance
 
@@ -48,7 +49,7 @@ def summarise(calibration: "Calibration") -> dict[str, Any]:
         "data_sha256": calibration.data_hash,
         "version": calibration.version,
         "seconds": dict(calibration.seconds),
-        "notices": [str(notice) for notice in calibration.notices],
+        "notices": in_words(calibration.notices),
         "update": None if calibration.revision is None else dict(calibration.revision.report),
     }
 

@@ -21,6 +21,7 @@ from truearm.fitting import (
 )
 from truearm.measured_parts import MeasuredParts
 from truearm.models import CONSTANT
+from truearm.revision import Carried
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -31,6 +32,9 @@ Mask = NDArray[np.bool_]
 LENGTHS: Final = (1, 2)
 """Places of d and a among a link's parameters."""
 AXES: Final = 3
+AT_ONCE: Final = 32
+"""Configurations that an updated calibration is asked for together with the rows of its update, or as many as
+those."""
 MOTIONS: Final = FRAME_UNKNOWNS + AXES
 """Of the base, and of the tool's place."""
 
@@ -250,15 +254,23 @@ class VariableSpread:
 class UpdatedSpread:
     """A calibration whose offsets were estimated again: what was uncertain before, and what they are now.
 
+    The offsets take up what of the errors before looked like them, so that an update of an update is no less
+    certain than one.
+
     Attributes:
         before: Of the calibration that was updated.
         offsets: Derivatives (5 L, u) of the arm's parameters by what was estimated of the arm.
         of_all: Covariance (u + S, u + S) of that and of all set-ups' unknowns, after the update.
+        carried: What became of the errors before; None in files that do not tell. Then both parts count in
+            full, though they have something in common, and the set-up is that of the calibration before.
+        place: What of the unknowns of all set-ups is the frame and the target of one.
     """
 
     before: Spread
     offsets: Floats
     of_all: Floats
+    carried: Carried | None
+    place: SetupPlace
 
     @classmethod
     def of(cls, calibration: "Calibration", before: Spread) -> "UpdatedSpread":
@@ -266,17 +278,24 @@ class UpdatedSpread:
         revision = calibration.revision
         if revision is None:
             raise WorkError("this calibration was not updated", rule="Only an updated one has this spread")
-        return cls(before, revision.directions, revision.covariance)
+        place = SetupPlace.of(task_of(calibration), calibration.measured)
+        return cls(before, revision.directions, revision.covariance, revision.carried, place)
 
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
-        """Covariance (n, m, m); both parts counted in full, though they have something in common.
-
-        The set-up is that of the calibration that was updated: with it its parameters were found.
-        """
-        size = self.offsets.shape[1]
-        shifted = jacobian @ self.offsets
-        own = shifted @ self.of_all[:size, :size] @ shifted.transpose(0, 2, 1)
-        return self.before.covariance(inputs, jacobian, moved) + np.asarray(own)
+        """Covariance (n, m, m)."""
+        if self.carried is None:
+            rows = jacobian @ self.offsets
+            size = rows.shape[2]
+            own = rows @ self.of_all[:size, :size] @ rows.transpose(0, 2, 1)
+            return self.before.covariance(inputs, jacobian, moved) + np.asarray(own)
+        setup, count = self.place.among_all(moved), jacobian.shape[1]
+        found = np.empty((len(jacobian), count, count))
+        step = max(AT_ONCE, len(self.carried.inputs))
+        for first in range(0, len(jacobian), step):
+            some = slice(first, first + step)
+            together = self.joint(inputs[some], jacobian[some], None if setup is None else setup[some])
+            found[some] = np.einsum("ikil->ikl", together.reshape(-1, count, len(together) // count, count))
+        return found
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) before any measurement."""
@@ -288,11 +307,39 @@ class UpdatedSpread:
         if setup is not None:
             rows = np.hstack([rows, setup.reshape(len(rows), -1)])
         size = rows.shape[1]
-        return self.before.joint(inputs, jacobian) + np.asarray(rows @ self.of_all[:size, :size] @ rows.T)
+        if self.carried is None:
+            own = rows @ self.of_all[:size, :size] @ rows.T
+            return self.before.joint(inputs, jacobian) + np.asarray(own)
+        then = self._with_rows(self.carried, inputs, jacobian, setup)
+        taken, count = rows @ self.carried.response[:size], len(rows)
+        both = then[:count, count:] @ taken.T
+        own = taken @ then[count:, count:] @ taken.T + rows @ self.carried.own[:size, :size] @ rows.T
+        return np.asarray(then[:count, :count] - both - both.T + own)
+
+    def _with_rows(self, carried: Carried, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n m + R, n m + R) before the update, together with what its R values showed."""
+        tied = (
+            np.zeros((*jacobian.shape[:2], carried.tied.shape[1])) if setup is None else setup @ carried.tied
+        )
+        mine, theirs = (
+            _in_threes(*parts)
+            for parts in ((inputs, jacobian, tied), (carried.inputs, carried.jacobian, carried.setup))
+        )
+        return self.before.joint(*(np.concatenate(pair) for pair in zip(mine, theirs, strict=True)))
 
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """As before."""
         return self.before.noise(jacobian, orientation)
+
+
+def _in_threes(inputs: Floats, jacobian: Floats, setup: Floats) -> tuple[Floats, Floats, Floats]:
+    """Inputs, and rows (n, m, ...) of derivatives, three at a time: m is a multiple of three."""
+    parts = jacobian.shape[1] // AXES
+    return (
+        np.repeat(inputs, parts, axis=0),
+        jacobian.reshape(-1, AXES, jacobian.shape[2]),
+        setup.reshape(-1, AXES, setup.shape[2]),
+    )
 
 
 def noises_of(hyper: Mapping[str, Sequence[float]]) -> tuple[float, float]:

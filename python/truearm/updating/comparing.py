@@ -9,7 +9,7 @@ import numpy as np
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import select
-from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
+from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, in_words, list_names
 from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
 from truearm.lengths import length_mm
@@ -105,7 +105,7 @@ class Update:
         return ("offsets", "tool") if any(motion.p is not None for motion in self.tools) else ("offsets",)
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON values, without the calibration and the notices."""
+        """JSON values, without the calibration."""
         return {
             "verdict": self.verdict,
             "level": self.level,
@@ -121,6 +121,7 @@ class Update:
             "rest": self.rest.to_dict(),
             "before": self.before.to_dict(),
             "after": self.after.to_dict(),
+            "notices": in_words(self.notices),
         }
 
 
@@ -155,7 +156,7 @@ def update(
     notices = check_against(data, calibration.robot)
     data, together = points_together(data.deduplicated())
     notices += together
-    notices += [*known_rows(calibration.learned_from, data), *rows_beyond_learnt(calibration, data)]
+    notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     data, unused = some_poses(one_row_a_visit(data))
     notices += [*unused, *_silent_rows(calibration, data)]
     task = _task(calibration, data, chosen, stages)
@@ -233,7 +234,8 @@ class _Found:
             outliers=tuple(outliers),
             notices=notices,
         )
-        return replace(told, calibration=updated(self.calibration, scene, found, judged, told.to_dict()))
+        new = updated(self.calibration, scene, found, judged, told.to_dict(), notices)
+        return replace(told, calibration=new)
 
 
 def _threshold(level: float) -> float:

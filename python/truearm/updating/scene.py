@@ -11,11 +11,11 @@ from scipy.linalg import block_diag
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
 from truearm.core_set import Selection, core_set, rotations
-from truearm.fitting import FRAME_UNKNOWNS, Task, core_errors, fit_options
+from truearm.fitting import FRAME_UNKNOWNS, Task, core_errors, fit_options, setup_unknowns
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
-from truearm.uncertainty import noises_of
+from truearm.uncertainty import noises_of, task_of
 from truearm.updating.unknowns import OPEN, Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
@@ -130,12 +130,7 @@ class Scene:
         unknowns = self.unknowns
         parameters = self._moved_parameters(state)
         arm, residual = linearise(self.problem, parameters, state.setup)
-        own = setup_jacobian(self.problem, parameters, state.setup)
-        jacobian = np.zeros((*residual.shape, len(unknowns.std)))
-        jacobian[:, :, : len(state.arm)] = arm @ unknowns.directions
-        for k in range(len(self.task.groups)):
-            rows = self.number == k
-            jacobian[rows, :, unknowns.group(k)] = own[rows]
+        jacobian = np.concatenate([arm @ unknowns.directions, self._setup_jacobian(state)], axis=2)
         seen = self.seen
         pose = np.repeat(np.arange(len(residual)), residual.shape[1]).reshape(residual.shape)
         return Linear(residual[seen], jacobian[seen], self.departure(state), pose[seen])
@@ -172,15 +167,16 @@ class Scene:
         and the old set-up may be unknown by metres, each known with the other alone (the height of a SCARA
         and of its tool).
         """
-        jacobian, _ = linearise(self.problem, self._moved_parameters(state), state.setup)
-        whole = self._calibration.spread.joint(self.inputs, jacobian, self._known_setup_jacobian(state))
+        whole = self._calibration.spread.joint(
+            self.inputs, self.arm_jacobian(state), self.tied_jacobian(state)
+        )
         anew, seen = self.linear(state).jacobian[:, self.unknowns.std >= OPEN], self.seen.reshape(-1)
         return _without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
 
     def scatter(self, state: State) -> Floats:
         """Covariance (R, R) of what rows show anew: noise, and what the device says of itself."""
-        jacobian, _ = linearise(self.problem, self._moved_parameters(state), state.setup)
-        noise, seen = self._calibration.spread.noise(jacobian, self.orientation), self.seen.reshape(-1)
+        noise = self._calibration.spread.noise(self.arm_jacobian(state), self.orientation)
+        seen = self.seen.reshape(-1)
         own = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
         whole = block_diag(*(noise + own))
         return np.asarray(whole[np.ix_(seen, seen)])
@@ -242,22 +238,39 @@ class Scene:
             parts.append(rotation_vector_from_matrix(turn))
         return np.concatenate(parts)
 
-    def _known_setup_jacobian(self, state: State) -> Floats | None:
-        """Derivatives (n, m, S) by the calibration's own set-ups, as far as they are not found anew."""
-        if all(number is None for number in self.unknowns.known):
-            return None
-        own = setup_jacobian(self.problem, self._moved_parameters(state), state.setup)
-        places, width = self._places(self._calibration.selection)
-        found = np.zeros((*own.shape[:2], len(self._calibration.groups) * width))
-        for k, number in enumerate(self.unknowns.known):
+    def arm_jacobian(self, state: State) -> Floats:
+        """Derivatives (n, m, 5 L) of what rows show by the chain's parameters."""
+        return linearise(self.problem, self._moved_parameters(state), state.setup)[0]
+
+    def tied_jacobian(self, state: State) -> Floats:
+        """Derivatives (n, m, S') by the calibration's own set-ups, as far as they are not found anew."""
+        return self._setup_jacobian(state) @ self.tied
+
+    @cached_property
+    def tied(self) -> Floats:
+        """One where an unknown of these set-ups is not found anew, but from its place before (S, S')."""
+        unknowns, calibration = self.unknowns, self._calibration
+        first = len(unknowns.arm_names)
+        found = np.zeros((len(unknowns.std) - first, setup_unknowns(task_of(calibration))))
+        width = found.shape[1] // len(calibration.groups)
+        for k, number in enumerate(unknowns.known):
             if number is not None:
-                rows = np.flatnonzero(self.number == k)
-                tied = self.unknowns.std[self.unknowns.group(k)] < OPEN
-                found[np.ix_(rows, np.arange(own.shape[1]), number * width + places)] = own[rows] * tied
+                group = unknowns.group(k)
+                rows, columns = (
+                    np.arange(group.start, group.stop) - first,
+                    self._places(calibration.selection),
+                )
+                found[rows, number * width + columns] = unknowns.std[group] < OPEN
         return found
 
-    def _places(self, selection: Selection) -> tuple[NDArray[np.int64], int]:
-        """Where the unknowns of an update's set-up stand in one of the calibration, and how many that has."""
+    def _setup_jacobian(self, state: State) -> Floats:
+        """Derivatives (n, m, S) by the unknowns of all set-ups."""
+        own = setup_jacobian(self.problem, self._moved_parameters(state), state.setup)
+        chosen = self.number[:, None] == np.arange(len(self.task.groups))
+        return np.asarray((own[:, :, None] * chosen[:, None, :, None]).reshape(*own.shape[:2], -1))
+
+    def _places(self, selection: Selection) -> NDArray[np.int64]:
+        """Where the unknowns of an update's set-up stand in one of the calibration (W,)."""
         first = 0 if self.task.arm.world_is_known else FRAME_UNKNOWNS
         points = [
             first + 3 * selection.targets.index(target) + axis
@@ -265,8 +278,7 @@ class Scene:
             for axis in range(3)
         ]
         behind = first + 3 * len(selection.targets)
-        turns = range(behind, behind + self._turns)
-        return np.array([*range(first), *points, *turns]), behind + (3 if selection.orientation else 0)
+        return np.array([*range(first), *points, *range(behind, behind + self._turns)])
 
 
 def _part(setup: Setup, fitted: Selection, used: Selection) -> Setup:

@@ -7,17 +7,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from truearm.calibration import Calibration
 from truearm.details import ConstantDetails
+from truearm.errors import Notice, in_words
 from truearm.fitted_rows import TRAINED, FittedRows
 from truearm.held_rows import HeldRows
 from truearm.judging import judge
 from truearm.measured_parts import MeasuredParts
 from truearm.models import NOMINAL, ArmModel
-from truearm.revision import Revision
+from truearm.revision import Carried, Revision
 from truearm.standard_errors import of_covariance
 from truearm.uncertainty import UpdatedSpread
+from truearm.updating.carrying import carried
 from truearm.updating.estimating import Estimate
 from truearm.updating.scene import Scene
 from truearm.updating.validating import setup_of
@@ -32,6 +35,7 @@ def updated(
     found: Estimate,
     judged: Mapping[str, RowErrors],
     report: Mapping[str, Any],
+    notices: tuple[Notice, ...],
 ) -> Calibration:
     """The calibration with what was found put in.
 
@@ -41,21 +45,26 @@ def updated(
         found: Values of the unknowns.
         judged: Errors of each model at poses that were left out in turn.
         report: What the update said.
+        notices: What it warned of.
     """
     task, unknowns = scene.task, scene.unknowns
     change = (unknowns.directions @ found.state.arm).reshape(-1, 5)
     models = {name: _model(calibration, scene, found, name, change) for name in calibration.models}
     fitted = judge(task, models, scene.data, scene.data)
     file = calibration.to_bytes() if calibration.file is None else calibration.file
-    report = {**report, "former": calibration.validation.to_dict()}
+    former = {**calibration.validation.to_dict(), "notices": in_words(calibration.notices)}
+    report = {**report, "former": former}
     revision = Revision.of(report, unknowns.directions, found.covariance, file)
+    errors = carried(scene, found)
+    if calibration.variable is not None:
+        revision = replace(revision, carried=errors)
     new = replace(
         calibration,
         groups=tuple(task.groups),
         selection=task.selection,
         measured=MeasuredParts.of(scene.data, task.selection, task.groups),
         models=models,
-        constant=_constant(calibration, scene, found),
+        constant=_constant(calibration, scene, errors),
         validation=Validation(
             n_train=len(scene.data),
             n_train_poses=len(scene.data),
@@ -69,7 +78,7 @@ def updated(
         held=HeldRows.of(scene.data, judged),
         data_hash=scene.data.hash(),
         version=version("truearm"),
-        notices=(),
+        notices=notices,
         seconds={},
         stored_conservative=None,
         fitted_spread=None,
@@ -91,31 +100,40 @@ def _model(calibration: Calibration, scene: Scene, found: Estimate, name: str, c
     return replace(model, setup=setup_of(model, scene, scene.data))
 
 
-def _constant(calibration: Calibration, scene: Scene, found: Estimate) -> ConstantDetails:
-    """Details of the constants whose covariance holds that of the new offsets, and of the new set-ups."""
-    old, arm = calibration.constant, calibration.arm
-    before = [
-        c for c, name in zip(arm.candidates.columns, arm.candidates.names, strict=True) if name in old.names
-    ]
-    directions, count = scene.unknowns.directions, len(scene.unknowns.arm_names)
-    moved = np.flatnonzero(np.abs(directions).sum(axis=1))
-    asked = dict(zip(arm.candidates.columns, arm.candidates.names, strict=True))
-    columns = sorted(set(before) | {int(c) for c in moved if int(c) in asked})
-    whole = np.zeros((len(columns) + len(found.covariance) - count,) * 2)
-    places = [columns.index(c) for c in before]
-    whole[np.ix_(places, places)] = old.covariance[: len(before), : len(before)]
-    carry = np.zeros((len(whole), len(found.covariance)))
-    carry[: len(columns), :count] = directions[columns]
-    carry[len(columns) :, count:] = np.eye(len(found.covariance) - count)
-    carried = carry @ found.covariance @ carry.T
-    errors = np.zeros(len(columns))
-    errors[places] = old.standard_errors
+def _constant(calibration: Calibration, scene: Scene, errors: Carried) -> ConstantDetails:
+    """Details of the constants whose covariance is that of old and new offsets together, and of the set-ups.
+
+    Offsets that were held are no constants for that. What standard errors hold beside the covariance stays.
+    """
+    old, asked = calibration.constant, calibration.arm.candidates
+    column_of = dict(zip(asked.names, asked.columns, strict=True))
+    before = [column_of[name] for name in old.names]
+    directions, free = scene.unknowns.directions, scene.unknowns.free
+    found = directions[:, free[: directions.shape[1]]]
+    moved = set(np.flatnonzero(np.abs(found).sum(axis=1)).tolist())
+    columns = [column for column in asked.columns if column in before or column in moved]
+    places = [columns.index(column) for column in before]
+    known = _carried_over(old.covariance, errors, before, columns, directions)
+    beyond = np.zeros(len(columns))
+    beyond[places] = np.square(old.standard_errors) - np.diagonal(old.covariance)[: len(before)]
     return replace(
         old,
-        names=tuple(asked[c] for c in columns),
-        covariance=whole + carried,
-        standard_errors=np.hypot(errors, of_covariance(carried, len(columns))),
+        names=tuple(asked.names[asked.columns.index(column)] for column in columns),
+        covariance=known,
+        standard_errors=np.hypot(np.sqrt(np.maximum(beyond, 0.0)), of_covariance(known, len(columns))),
     )
+
+
+def _carried_over(
+    covariance: Floats, errors: Carried, before: list[int], columns: list[int], directions: Floats
+) -> Floats:
+    """Covariance (c + S, c + S) of constants in c columns and of the new set-ups, from (b + S', b + S')."""
+    rows = errors.response.shape[1]
+    shown = np.concatenate([errors.jacobian[:, :, before], errors.setup], axis=2).reshape(rows, -1)
+    found = block_diag(directions[columns], np.eye(len(errors.tied)))
+    kept = np.equal.outer(columns, before).astype(np.float64)
+    stays = block_diag(kept, errors.tied) - found @ errors.response @ shown
+    return np.asarray(stays @ covariance @ stays.T + found @ errors.own @ found.T)
 
 
 def _rows(scene: Scene, found: Estimate) -> FittedRows:
