@@ -3,6 +3,7 @@
 import numpy as np
 
 import truearm as ta
+from truearm.simulation import VirtualArm
 
 SHIFT = np.array([0.0, 0.6, -0.2, 0.9, 0.0])
 TOOL_MM = (0.6, -0.5, 0.6)
@@ -22,6 +23,18 @@ def remastered_table(arm, readings, shift_deg, *, seed, tool_mm=(0.0, 0.0, 0.0))
 def remastered(arm, readings, shift_deg, **more):
     """The same as Measurements."""
     return ta.Measurements.from_dataframe(remastered_table(arm, readings, shift_deg, **more))
+
+
+def paper_arm():
+    """The paper's arm and a calibration of it."""
+    arm = VirtualArm.paper(seed=2)
+    return arm, ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
+
+
+def updated(arm, calibration):
+    """What 15 poses of the arm measured after SHIFT, and the update by these."""
+    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9, tool_mm=TOOL_MM)
+    return data, ta.update(calibration, data)
 
 
 def std_mm(calibration, q):

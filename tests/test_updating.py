@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from tests.remastered import SHIFT, TOOL_MM, check_offset, remastered, remastered_table, std_mm
+from tests.remastered import (
+    SHIFT,
+    TOOL_MM,
+    check_offset,
+    paper_arm,
+    remastered,
+    remastered_table,
+    std_mm,
+    updated,
+)
 from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
 from truearm.errors import Notice
@@ -21,15 +30,12 @@ from truearm.updating.squares import SquaresTest
 
 @pytest.fixture(scope="module")
 def known():
-    arm = VirtualArm.paper(seed=2)
-    return arm, ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
+    return paper_arm()
 
 
 @pytest.fixture(scope="module")
 def moved(known):
-    arm, calibration = known
-    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9, tool_mm=TOOL_MM)
-    return data, ta.update(calibration, data)
+    return updated(*known)
 
 
 def error_mm(calibration, arm, shift, tool_mm=(0.0, 0.0, 0.0)):

@@ -6,21 +6,18 @@ import numpy as np
 import pytest
 
 import truearm as ta
-from tests.remastered import SHIFT, TOOL_MM, check_offset, remastered, std_mm
+from tests.remastered import SHIFT, TOOL_MM, check_offset, paper_arm, remastered, std_mm, updated
 from truearm.simulation import VirtualArm
 
 
 @pytest.fixture(scope="module")
 def known():
-    arm = VirtualArm.paper(seed=2)
-    return arm, ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
+    return paper_arm()
 
 
 @pytest.fixture(scope="module")
 def moved(known):
-    arm, calibration = known
-    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9, tool_mm=TOOL_MM)
-    return data, ta.update(calibration, data)
+    return updated(*known)
 
 
 def test_updates_of_updates_stay_as_certain_as_one():
