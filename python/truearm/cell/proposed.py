@@ -22,7 +22,6 @@ from truearm.cell.reaching import within_reach
 from truearm.defaults import THERE_AND_BACK
 from truearm.endpoints import at_target
 from truearm.errors import UsageError
-from truearm.measurements import Measurements
 from truearm.planning.accessibility import Mask, Places, Rule, accessible, lowest
 from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
 from truearm.robot import Robot
@@ -194,21 +193,17 @@ def _tools(calibration: Calibration, group: str | None, cell: Cell | None) -> li
     """
     if cell is not None:
         return [cell.flange_from_target]
-    known, rows, selection = calibration.groups, calibration.learned_from, calibration.selection
+    known, selection = calibration.groups, calibration.selection
     group = known[-1] if group is None else group
     if group not in known:
         return [calibration.robot.tool]
+    held = calibration.measured.targets[known.index(group)]
     ends = [
         at_target(calibration, None, group, target + 1).flange_from_end
-        for target in selection.targets
-        if rows is None or _holds(rows.data, group, target)
+        for target, count in zip(selection.targets, held, strict=False)
+        if count
     ]
     return [end for end in ends if np.isfinite(end).all()] or [calibration.robot.tool]
-
-
-def _holds(data: Measurements, group: str, target: int) -> bool:
-    """Whether any row of a set-up holds a target, from 0: where none does, its place is a guess."""
-    return bool(np.isfinite(data.targets[data.group == group, target]).all(axis=1).any())
 
 
 def _ordered(
