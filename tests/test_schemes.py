@@ -157,9 +157,12 @@ def test_options_that_make_no_sense_are_refused(given, message):
 
 
 def test_numbers_that_a_model_does_not_use_may_be_any():
-    Options.of(model="cmac", sigma_cells=0.01, rate=3.0, train_on="measurements")
-    Options.of(model="fcmac", sigma_cells=0.01, membership="bspline")
-    Options.of(model="regions", rate=3.0, cells=(1, 1, 1), train_on="measurements")
+    for given in (
+        {"model": "cmac", "sigma_cells": 0.01, "rate": 3.0, "train_on": "measurements"},
+        {"model": "fcmac", "sigma_cells": 0.01, "membership": "bspline"},
+        {"model": "regions", "rate": 3.0, "cells": [1, 1, 1], "train_on": "measurements"},
+    ):
+        assert Options.of(**given).to_dict().items() >= given.items()
 
 
 def test_the_core_knows_the_rules_of_networks():

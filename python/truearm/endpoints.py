@@ -106,7 +106,7 @@ def at_target(
         return Endpoint(at_tool(calibration.robot, tool), world_from_base)
     known = [k + 1 for k in selection.targets] or [1]
     held = calibration.measured.targets[number]
-    wanted = known[int((held > 0).argmax())] if target is None else target
+    wanted = known[calibration.measured.first(number)] if target is None else target
     if wanted not in known:
         raise UsageError(f"there is no target {wanted}", rule=f"Targets {known} were fitted")
     if not held[known.index(wanted)]:

@@ -48,6 +48,10 @@ class MeasuredParts:
         targets = np.ones((groups, max(len(selection.targets), 1)), dtype=np.int64)
         return cls(targets[:, 0], targets, targets[:, 0] * selection.orientation)
 
+    def first(self, group: int) -> int:
+        """Place of the first target that a set-up measured; 0 where it measured none."""
+        return int((self.targets[group] > 0).argmax())
+
     def points(self, targets: Floats) -> Floats:
         """Of points (G, t, 3) on the flange those that were measured (k, 3)."""
         return np.asarray(targets[self.targets > 0])

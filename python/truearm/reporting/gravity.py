@@ -93,7 +93,7 @@ def _moved_mm(facts: Facts, poses: Floats) -> Floats:
     calibration = facts.calibration
     chain = calibration.arm.chain(calibration.robot.flange)
     values, inputs = calibration.robot.joints_from_readings(poses), facts.inputs(poses)
-    places, target = [], int((calibration.measured.targets[0] > 0).argmax())
+    places, target = [], calibration.measured.first(0)
     for name in (facts.best, CONSTANT):
         model = calibration.models[name]
         pose = model.setup.frames[0] @ chain.pose(values, model.parameters(inputs))
