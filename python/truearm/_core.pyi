@@ -485,6 +485,18 @@ class Posterior:
     ) -> NDArray[np.float64]:
         """Covariance (n m, n m) of the rows of all configurations together; arguments as for `covariance`."""
 
+    def cross_covariance(
+        self,
+        first: int,
+        inputs: NDArray[np.float64],
+        jacobian: NDArray[np.float64],
+        setup: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.float64]:
+        """Covariance (k m, (n - k) m) of the rows of the `first` k configurations with those of the others.
+
+        Inputs, Jacobian and set-up are of all n, as for `covariance`.
+        """
+
     def repeatability(self, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
         """Covariance (n, m, m) of what joints miss anew at every pose, carried to jacobian (n, m, P)."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
@@ -32,9 +33,8 @@ Mask = NDArray[np.bool_]
 LENGTHS: Final = (1, 2)
 """Places of d and a among a link's parameters."""
 AXES: Final = 3
-AT_ONCE: Final = 32
-"""Configurations that an updated calibration is asked for together with the rows of its update, or as many as
-those."""
+AT_ONCE: Final = 512
+"""Configurations that an updated calibration is asked for together with the rows of its update."""
 MOTIONS: Final = FRAME_UNKNOWNS + AXES
 """Of the base, and of the tool's place."""
 
@@ -49,6 +49,9 @@ class Spread(Protocol):
         what the device of the set-up with most rows sees: what frame and target can take over counts no more.
         """
 
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m) of the same, each of its own, with set-ups as in `joint`."""
+
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) of the same before any measurement."""
 
@@ -58,6 +61,9 @@ class Spread(Protocol):
         With `setup` (n, m, S), derivatives by the unknowns of all set-ups that were fitted, their part is
         added. m is a multiple of three.
         """
+
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint` of the `first` k inputs with the others."""
 
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """Covariance (n, m, m) of what a measurement shows anew; `orientation` (m,) tells rows in rad."""
@@ -153,16 +159,21 @@ class ConstantSpread:
 
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m), the same rule everywhere; with `moved` what the constants leave is added."""
-        rows, setup = jacobian[:, :, self.columns], self.place.among_all(moved)
-        if setup is None:
-            return self._carried(rows)
-        left = np.repeat(np.square(self.noises), AXES)[: jacobian.shape[1]]
-        return self._carried(np.concatenate([rows, setup], axis=2)) + np.diag(left)
+        found = self.each(inputs, jacobian, self.place.among_all(moved))
+        if moved is None:
+            return found
+        return found + np.diag(np.repeat(np.square(self.noises), AXES)[: jacobian.shape[1]])
 
-    def _carried(self, rows: Floats) -> Floats:
-        """Covariance (n, m, m) of rows (n, m, u) times the first u of all unknowns."""
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m), from that of constants and set-up."""
+        rows = self._unknown_to(jacobian, setup)
         size = rows.shape[2]
         return np.asarray(rows @ self.of_all[:size, :size] @ rows.transpose(0, 2, 1))
+
+    def _unknown_to(self, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Derivatives (n, m, u) by the first u of all unknowns: without set-up those of the arm."""
+        rows = jacobian[:, :, self.columns]
+        return rows if setup is None else np.concatenate([rows, setup], axis=2)
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) that the prior of the constants gives."""
@@ -170,11 +181,17 @@ class ConstantSpread:
 
     def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
         """Covariance (n m, n m), from that of constants and set-up."""
-        rows = jacobian[:, :, self.columns].reshape(-1, len(self.columns))
-        if setup is not None:
-            rows = np.hstack([rows, setup.reshape(len(rows), -1)])
-        size = rows.shape[1]
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        rows = rows.reshape(-1, size)
         return np.asarray(rows @ self.of_all[:size, :size] @ rows.T)
+
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint`."""
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
+        return np.asarray(left @ self.of_all[:size, :size] @ right.T)
 
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """What no constant explains, alike everywhere."""
@@ -224,8 +241,11 @@ class VariableSpread:
 
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m) at inputs (n, I)."""
+        return self.each(inputs, jacobian, self.place.among_all(moved))
+
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m) at inputs (n, I), exact."""
         chosen = np.ascontiguousarray(jacobian[:, :, self.columns])
-        setup = self.place.among_all(moved)
         return self.posterior.covariance(np.ascontiguousarray(inputs), chosen, setup) * self.inflation**2
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
@@ -235,13 +255,14 @@ class VariableSpread:
 
     def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
         """Covariance (n m, n m), exact."""
-        parts = jacobian.shape[1] // AXES
-        chosen = jacobian[:, :, self.columns].reshape(-1, AXES, len(self.columns))
-        own = None if setup is None else np.ascontiguousarray(setup.reshape(len(chosen), AXES, -1))
-        found = self.posterior.joint_covariance(
-            np.repeat(inputs, parts, axis=0), np.ascontiguousarray(chosen), own
-        )
+        found = self.posterior.joint_covariance(*_in_threes(inputs, jacobian[:, :, self.columns], setup))
         return np.asarray(found * self.inflation**2)
+
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint`."""
+        asked = _in_threes(inputs, jacobian[:, :, self.columns], setup)
+        parts = jacobian.shape[1] // AXES
+        return np.asarray(self.posterior.cross_covariance(first * parts, *asked) * self.inflation**2)
 
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """Noise of the instrument, and what joints miss anew."""
@@ -284,18 +305,33 @@ class UpdatedSpread:
     def covariance(self, inputs: Floats, jacobian: Floats, moved: Floats | None = None) -> Floats:
         """Covariance (n, m, m)."""
         if self.carried is None:
-            rows = jacobian @ self.offsets
-            size = rows.shape[2]
-            own = rows @ self.of_all[:size, :size] @ rows.transpose(0, 2, 1)
-            return self.before.covariance(inputs, jacobian, moved) + np.asarray(own)
-        setup, count = self.place.among_all(moved), jacobian.shape[1]
-        found = np.empty((len(jacobian), count, count))
-        step = max(AT_ONCE, len(self.carried.inputs))
-        for first in range(0, len(jacobian), step):
-            some = slice(first, first + step)
-            together = self.joint(inputs[some], jacobian[some], None if setup is None else setup[some])
-            found[some] = np.einsum("ikil->ikl", together.reshape(-1, count, len(together) // count, count))
+            return self.before.covariance(inputs, jacobian, moved) + self._own_each(jacobian @ self.offsets)
+        return self.each(inputs, jacobian, self.place.among_all(moved))
+
+    def each(self, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Covariance (n, m, m), each of its own."""
+        if self.carried is None:
+            return self.before.each(inputs, jacobian, None) + self._own_each(
+                self._unknown_to(jacobian, setup)
+            )
+        found = np.empty((len(jacobian), *jacobian.shape[1:2] * 2))
+        for first in range(0, len(jacobian), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            own = None if setup is None else setup[some]
+            found[some] = self._carried_each(self.carried, inputs[some], jacobian[some], own)
         return found
+
+    def _carried_each(
+        self, carried: Carried, inputs: Floats, jacobian: Floats, setup: Floats | None
+    ) -> Floats:
+        """Covariance (n, m, m) of no more than can be asked for at once."""
+        rows, tied = self._unknown_to(jacobian, setup), _tied(carried, jacobian, setup)
+        taken = rows @ carried.response[: rows.shape[2]]
+        parts = jacobian.shape[1] // AXES
+        with_shown = self.before.cross(len(inputs) * parts, *_with_shown(carried, inputs, jacobian, tied))
+        both = taken @ with_shown.reshape(taken.shape).transpose(0, 2, 1)
+        found = self.before.each(inputs, jacobian, tied) - both - both.transpose(0, 2, 1)
+        return found + taken @ self._shown @ taken.transpose(0, 2, 1) + self._own_each(rows)
 
     def prior(self, inputs: Floats, jacobian: Floats) -> Floats:
         """Variances (n, m) before any measurement."""
@@ -303,43 +339,94 @@ class UpdatedSpread:
 
     def joint(self, inputs: Floats, jacobian: Floats, setup: Floats | None = None) -> Floats:
         """Covariance (n m, n m)."""
-        rows = (jacobian @ self.offsets).reshape(-1, self.offsets.shape[1])
-        if setup is not None:
-            rows = np.hstack([rows, setup.reshape(len(rows), -1)])
-        size = rows.shape[1]
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        rows = rows.reshape(-1, size)
+        own = rows @ self._anew[:size, :size] @ rows.T
         if self.carried is None:
-            own = rows @ self.of_all[:size, :size] @ rows.T
             return self.before.joint(inputs, jacobian) + np.asarray(own)
-        then = self._with_rows(self.carried, inputs, jacobian, setup)
+        tied = _tied(self.carried, jacobian, setup)
+        then = self.before.joint(*_with_shown(self.carried, inputs, jacobian, tied))
         taken, count = rows @ self.carried.response[:size], len(rows)
         both = then[:count, count:] @ taken.T
-        own = taken @ then[count:, count:] @ taken.T + rows @ self.carried.own[:size, :size] @ rows.T
-        return np.asarray(then[:count, :count] - both - both.T + own)
+        return np.asarray(then[:count, :count] - both - both.T + taken @ then[count:, count:] @ taken.T + own)
 
-    def _with_rows(self, carried: Carried, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
-        """Covariance (n m + R, n m + R) before the update, together with what its R values showed."""
-        tied = (
-            np.zeros((*jacobian.shape[:2], carried.tied.shape[1])) if setup is None else setup @ carried.tied
-        )
-        mine, theirs = (
-            _in_threes(*parts)
-            for parts in ((inputs, jacobian, tied), (carried.inputs, carried.jacobian, carried.setup))
-        )
-        return self.before.joint(*(np.concatenate(pair) for pair in zip(mine, theirs, strict=True)))
+    def cross(self, first: int, inputs: Floats, jacobian: Floats, setup: Floats | None) -> Floats:
+        """The block (k m, (n - k) m) of `joint`."""
+        rows = self._unknown_to(jacobian, setup)
+        size = rows.shape[2]
+        left, right = (part.reshape(-1, size) for part in (rows[:first], rows[first:]))
+        own = left @ self._anew[:size, :size] @ right.T
+        if self.carried is None:
+            return self.before.cross(first, inputs, jacobian, None) + np.asarray(own)
+        response, parts = self.carried.response[:size], jacobian.shape[1] // AXES
+        tied = _tied(self.carried, jacobian, setup)
+        mine = self.before.cross(first * parts, *_with_shown(self.carried, inputs, jacobian, tied))
+        others = _with_shown(self.carried, inputs[first:], jacobian[first:], tied[first:])
+        theirs = self.before.cross((len(inputs) - first) * parts, *others)
+        between, shown = mine[:, : len(right)], mine[:, len(right) :]
+        taken, taken_there = left @ response, right @ response
+        found = between - shown @ taken_there.T - taken @ theirs.T + taken @ self._shown @ taken_there.T
+        return np.asarray(found + own)
+
+    def _unknown_to(self, jacobian: Floats, setup: Floats | None) -> Floats:
+        """Derivatives (n, m, u) by the first u of all unknowns: without set-up those of the arm."""
+        rows = jacobian @ self.offsets
+        return rows if setup is None else np.concatenate([rows, setup], axis=2)
+
+    def _own_each(self, rows: Floats) -> Floats:
+        """Covariance (n, m, m) of rows (n, m, u) by the first u unknowns that the update adds of its own."""
+        size = rows.shape[2]
+        return np.asarray(rows @ self._anew[:size, :size] @ rows.transpose(0, 2, 1))
+
+    @property
+    def _anew(self) -> Floats:
+        """Covariance (u + S, u + S) of what was estimated, beside what of the errors before it took up."""
+        return self.of_all if self.carried is None else self.carried.own
+
+    @cached_property
+    def _shown(self) -> Floats:
+        """Covariance (R, R) before the update of what its rows showed."""
+        if self.carried is None:
+            raise WorkError("this update carries nothing", rule="Only what it made of errors before is shown")
+        carried = self.carried
+        return self.before.joint(*_in_threes(carried.inputs, carried.jacobian, carried.setup))
 
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
         """As before."""
         return self.before.noise(jacobian, orientation)
 
 
-def _in_threes(inputs: Floats, jacobian: Floats, setup: Floats) -> tuple[Floats, Floats, Floats]:
+def _tied(carried: Carried, jacobian: Floats, setup: Floats | None) -> Floats:
+    """Derivatives (n, m, S') by the set-ups of the calibration before, of those (n, m, S) by the new ones."""
+    return np.zeros((*jacobian.shape[:2], carried.tied.shape[1])) if setup is None else setup @ carried.tied
+
+
+def _with_shown(
+    carried: Carried, inputs: Floats, jacobian: Floats, tied: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Inputs and rows, three at a time, and behind them those of the update."""
+    mine, shown = (inputs, jacobian, tied), (carried.inputs, carried.jacobian, carried.setup)
+    at = np.concatenate([_repeated(*part[:2]) for part in (mine, shown)])
+    of_arm, of_setup = (np.concatenate([_threes(mine[k]), _threes(shown[k])]) for k in (1, 2))
+    return at, of_arm, of_setup
+
+
+def _in_threes(
+    inputs: Floats, jacobian: Floats, setup: Floats | None
+) -> tuple[Floats, Floats, Floats | None]:
     """Inputs, and rows (n, m, ...) of derivatives, three at a time: m is a multiple of three."""
-    parts = jacobian.shape[1] // AXES
-    return (
-        np.repeat(inputs, parts, axis=0),
-        jacobian.reshape(-1, AXES, jacobian.shape[2]),
-        setup.reshape(-1, AXES, setup.shape[2]),
-    )
+    return _repeated(inputs, jacobian), _threes(jacobian), None if setup is None else _threes(setup)
+
+
+def _repeated(inputs: Floats, jacobian: Floats) -> Floats:
+    """Inputs (n, I), once for every three rows (n, m, ...)."""
+    return np.repeat(inputs, jacobian.shape[1] // AXES, axis=0)
+
+
+def _threes(rows: Floats) -> Floats:
+    """Rows (n, m, k) three at a time, (n m / 3, 3, k)."""
+    return np.ascontiguousarray(rows.reshape(-1, AXES, rows.shape[2]))
 
 
 def noises_of(hyper: Mapping[str, Sequence[float]]) -> tuple[float, float]:

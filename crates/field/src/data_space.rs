@@ -225,22 +225,24 @@ impl DataSpace {
         }
     }
 
-    /// Covariance (n m, n m) of all rows of a query with one another.
-    pub fn joint(&self, query: &Query) -> Mat<f64> {
-        let training = &self.model.training;
+    /// Covariance (k m, l m) of the rows of some configurations of a query with those of some others, or of the same.
+    pub fn joint(&self, query: &Query, left: Range<usize>, right: Range<usize>) -> Mat<f64> {
         let (learned, lost) = self.reduced(query, 0..query.poses());
         let excited: Vec<Excited> =
             (0..query.poses()).map(|pose| self.model.cells.excite(query.values_of(pose))).collect();
-        let mut joint = product(learned.transpose(), learned.as_ref()) * faer::Scale(-1.0);
-        joint += product(lost.transpose(), lost.as_ref());
+        let mut joint = product(query.part(&learned, &left).transpose(), query.part(&learned, &right))
+            * faer::Scale(-1.0);
+        joint += product(query.part(&lost, &left).transpose(), query.part(&lost, &right));
+        let symmetric = left == right;
         let prior = |a: usize| -> Vec<f64> {
-            let covariances = self.model.covariances(&excited[a], &excited[..=a]);
-            let covariances = covariances.chunks_exact(training.columns.len());
-            covariances.enumerate().flat_map(|(b, covariances)| query.cross((a, b), covariances)).collect()
+            let others = right.start..if symmetric { a + 1 } else { right.end };
+            let covariances = self.model.covariances(&excited[a], &excited[others.clone()]);
+            let each = others.zip(covariances.chunks_exact(self.model.training.columns.len()));
+            each.flat_map(|(b, covariances)| query.cross((a, b), covariances)).collect()
         };
-        let priors: Vec<Vec<f64>> = (0..query.poses()).into_par_iter().map(prior).collect();
+        let priors: Vec<Vec<f64>> = left.into_par_iter().map(prior).collect();
         for (a, blocks) in priors.iter().enumerate() {
-            add_blocks(&mut joint, query.rows, a, blocks);
+            add_blocks(&mut joint, query.rows, a, blocks, symmetric);
         }
         joint
     }
@@ -308,13 +310,13 @@ impl DataSpace {
 }
 
 /// Adds the blocks (m, m) of a configuration with those up to it to a symmetric matrix, on both sides of its diagonal.
-fn add_blocks(joint: &mut Mat<f64>, rows: usize, pose: usize, blocks: &[f64]) {
+fn add_blocks(joint: &mut Mat<f64>, rows: usize, pose: usize, blocks: &[f64], symmetric: bool) {
     for (other, block) in blocks.chunks_exact(rows * rows).enumerate() {
         for i in 0..rows {
             for j in 0..rows {
                 let (a, b) = (pose * rows + i, other * rows + j);
                 joint[(a, b)] += block[i * rows + j];
-                if other != pose {
+                if symmetric && other != pose {
                     joint[(b, a)] += block[i * rows + j];
                 }
             }

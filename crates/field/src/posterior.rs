@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use faer::Mat;
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, column, to_vec};
@@ -88,6 +88,11 @@ impl Query<'_> {
         let columns = self.widths.1;
         let pairs = left.chunks_exact(columns).flat_map(|x| right.chunks_exact(columns).map(move |y| (x, y)));
         pairs.map(|(x, y)| weighted(x, y, covariances)).collect()
+    }
+
+    /// The columns of some configurations' rows, among those (u, n m) of all.
+    pub fn part<'m>(&self, whole: &'m Mat<f64>, poses: &Range<usize>) -> MatRef<'m, f64> {
+        whole.as_ref().subcols(poses.start * self.rows, poses.len() * self.rows)
     }
 
     /// Whether all arrays have the lengths that they need.
@@ -248,10 +253,8 @@ impl Posterior {
         rows: usize,
     ) -> Result<Vec<f64>, FieldError> {
         let query = self.query(values, jacobian, setup, rows)?;
-        let mut joint = match self {
-            Self::Data(space) => space.joint(&query),
-            Self::Weight(space) => space.joint(&query),
-        };
+        let all = 0..query.poses();
+        let mut joint = self.joint(&query, all.clone(), all);
         for pose in 0..query.poses() {
             let beyond = self.model().beyond(query.values_of(pose));
             for k in 0..rows * rows {
@@ -259,9 +262,41 @@ impl Posterior {
                 joint[(pose * rows + i, pose * rows + j)] += query.prior(pose, (i, j), &beyond);
             }
         }
+        Ok(self.row_major(&joint))
+    }
+
+    /// Covariance (k m, (n - k) m) of the rows of the first k configurations with those of the others, row-major.
+    ///
+    /// # Errors
+    /// [`FieldError::Length`] where there are fewer configurations, [`FieldError::Option`] where there are no rows.
+    pub fn cross_covariance(
+        &self,
+        first: usize,
+        values: &[f64],
+        jacobian: &[f64],
+        setup: Option<&[f64]>,
+        rows: usize,
+    ) -> Result<Vec<f64>, FieldError> {
+        let query = self.query(values, jacobian, setup, rows)?;
+        let all = query.poses();
+        if first > all {
+            return Err(FieldError::Length { what: "values", found: all, expected: first });
+        }
+        Ok(self.row_major(&self.joint(&query, 0..first, first..all)))
+    }
+
+    fn joint(&self, query: &Query, left: Range<usize>, right: Range<usize>) -> Mat<f64> {
+        match self {
+            Self::Data(space) => space.joint(query, left, right),
+            Self::Weight(space) => space.joint(query, left, right),
+        }
+    }
+
+    /// Entries of a covariance, row by row, as wide as extrapolation has it.
+    fn row_major(&self, covariance: &Mat<f64>) -> Vec<f64> {
         let scale = self.model().hyper.extrapolation.powi(2);
-        let size = joint.nrows();
-        Ok((0..size * size).map(|k| scale * joint[(k / size, k % size)]).collect())
+        let width = covariance.ncols();
+        (0..covariance.nrows() * width).map(|k| scale * covariance[(k / width, k % width)]).collect()
     }
 
     /// Covariance (P, P) of the columns' constants alone, whatever varies beside them, row-major.

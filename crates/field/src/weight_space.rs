@@ -5,6 +5,8 @@
 //! the pose's own noise covariance. With A the whitened rows, `(I + A^T A) v = A^T r`; set-up unknowns stand beside
 //! with the precision of their priors.
 
+use std::ops::Range;
+
 use faer::{Mat, MatRef};
 use truearm_estimate::Cancel;
 use truearm_estimate::dense::{Cholesky, column, parallelism, product, times, to_vec};
@@ -233,10 +235,10 @@ impl WeightSpace {
         out
     }
 
-    /// Covariance (n m, n m) of all rows of a query with one another.
-    pub fn joint(&self, query: &Query) -> Mat<f64> {
+    /// Covariance (k m, l m) of the rows of some configurations of a query with those of some others, or of the same.
+    pub fn joint(&self, query: &Query, left: Range<usize>, right: Range<usize>) -> Mat<f64> {
         let reduced = self.reduced(query, 0..query.poses());
-        product(reduced.transpose(), reduced.as_ref())
+        product(query.part(&reduced, &left).transpose(), query.part(&reduced, &right))
     }
 
     /// Covariance (P, P) of the columns' constants alone, whatever varies beside them.
@@ -251,7 +253,7 @@ impl WeightSpace {
     }
 
     /// Rows of some configurations by unknowns of unit variance, (u, k).
-    fn reduced(&self, query: &Query, poses: std::ops::Range<usize>) -> Mat<f64> {
+    fn reduced(&self, query: &Query, poses: Range<usize>) -> Mat<f64> {
         let mut reduced = self.rows().of(query, poses);
         self.factor.solve_lower(reduced.as_mut());
         reduced

@@ -445,6 +445,25 @@ impl Posterior {
         Ok(matrix(py, &values, poses * rows))
     }
 
+    /// Covariance (k m, (n - k) m) of the rows of the first k configurations with those of the others; arguments as for `covariance`.
+    #[pyo3(signature = (first, inputs, jacobian, setup=None))]
+    fn cross_covariance<'py>(
+        &self,
+        py: Python<'py>,
+        first: usize,
+        inputs: PyReadonlyArray2<'py, f64>,
+        jacobian: PyReadonlyArray3<'py, f64>,
+        setup: Option<PyReadonlyArray3<'py, f64>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
+        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
+        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
+        let setup: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
+        let found =
+            quick(py, || self.core().cross_covariance(first, &inputs, &jacobian, setup.as_deref(), rows))?;
+        Ok(matrix(py, &found, (poses - first) * rows))
+    }
+
     /// Covariance (n, m, m) of what joints do not repeat, carried to rows of Jacobians (n, m, P).
     fn repeatability<'py>(
         &self,

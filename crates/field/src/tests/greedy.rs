@@ -111,6 +111,12 @@ fn the_joint_covariance_holds_that_of_each() {
                 let turned: Vec<f64> =
                     (0..size * size).map(|e| joint[(e % size) * size + e / size]).collect();
                 close(&joint, &turned, 1e-9, "symmetric");
+                let first = 1;
+                let cross = posterior.cross_covariance(first, &all, &many, given, rows).unwrap();
+                let block: Vec<f64> = (0..first * rows)
+                    .flat_map(|i| joint[i * size + first * rows..(i + 1) * size].to_vec())
+                    .collect();
+                close(&cross, &block, 1e-9, "block beside the diagonal");
             }
         }
     }
