@@ -68,8 +68,9 @@ def test_zeros_that_err_more_than_lengths_have_wider_priors():
 def test_files_of_one_factor_for_all_constants_and_without_ripples_are_read(rippling):
     details = rippling.variable
     assert details is not None
-    shared = details.hyper | {"constant": [0.4] * 3, "own_cycles": [0.0]}
-    older = {name: value for name, value in shared.items() if name != "own_cycles"} | {"constant": [0.4]}
+    shared = details.hyper | {"constant": [0.4] * 3, "own_cycles": [0.0], "unevenness": [1.0] * 6}
+    since = "own_cycles", "unevenness"
+    older = {name: value for name, value in shared.items() if name not in since} | {"constant": [0.4]}
     q = np.random.default_rng(0).uniform(-1.5, 1.5, (20, 6))
     new, old = (
         dataclasses.replace(rippling, variable=dataclasses.replace(details, hyper=hyper)).position_std(q)

@@ -22,6 +22,8 @@ def unexplained(task: Task, fit: FieldFit, data: Measurements) -> float:
     chain = task.arm.chain(task.arm.robot.flange @ end)
     jacobian = chain.joint_jacobian(task.arm.robot.joints_from_readings(data.readings))
     levers = np.where(np.array(task.arm.robot.joints) == "prismatic", ANGLE_ARM_M, 1.0)
-    missed = fit.hyper["repeatability"][0] * jacobian * levers
+    # Files from before joints had factors of their own hold none.
+    uneven = np.array(fit.hyper["unevenness"] or 1.0)
+    missed = fit.hyper["repeatability"][0] * uneven * jacobian * levers
     variance = np.square(missed).sum(axis=(1, 2)).mean() / 3.0
     return float(np.sqrt(fit.hyper["noise_position"][0] ** 2 + variance))

@@ -113,6 +113,12 @@ impl Training {
         self.in_use().iter().all(|drive| drive.reading != input)
     }
 
+    /// The joint whose drive an input is of: readings are numbered as joints are.
+    pub fn joint_of(&self, input: usize) -> usize {
+        let drive = input.checked_sub(self.input_count()).map(|k| self.in_use()[k].reading);
+        drive.unwrap_or(input)
+    }
+
     /// Inputs (n, I), with the readings that are inputs here.
     pub fn with_own_inputs<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
         match &self.drives {

@@ -362,9 +362,15 @@ impl PoseGradient<'_> {
         for (class, (factor, share)) in hyper.constant.iter().zip(shares.constants()).enumerate() {
             gradient[AT_CONSTANT + class] = factor.powi(2) * share.iter().sum::<f64>();
         }
-        let has_curve = &self.evidence.by_column.has_curve;
-        let anew: f64 = shares.own().zip(has_curve).filter(|(_, has)| **has).map(|(share, _)| share[0]).sum();
-        gradient[AT_REPEATABILITY] = hyper.repeatability.powi(2) * anew;
+        let by_column = &self.evidence.by_column;
+        let own = shares.own().zip(by_column.has_curve.iter().zip(&by_column.joint));
+        for (share, (_, &joint)) in own.filter(|(_, (has_curve, _))| **has_curve) {
+            let anew = hyper.repeatability_of(joint).powi(2) * share[0];
+            gradient[AT_REPEATABILITY] += anew;
+            if joint < hyper.unevenness.len() {
+                gradient[hyper.at_unevenness() + joint] += anew;
+            }
+        }
         gradient[noise] = shares.noise[0];
         gradient[noise + 1] = shares.noise[1];
         self.contract_single(shares, &mut gradient);

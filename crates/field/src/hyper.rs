@@ -1,7 +1,8 @@
 //! Hyper-parameters of the field, their starts, bounds and priors.
 //!
 //! Amplitudes and lengths are shared by the joints: one more per joint costs at thirty poses and gains nothing
-//! measurable at four hundred (docs/decisions/0003). Each has a wide log-normal prior centred on its start.
+//! measurable at four hundred (docs/decisions/0003). What they do not repeat is each one's own, about a level that they share
+//! (docs/decisions/0040). Each has a wide log-normal prior centred on its start.
 
 use crate::kernel::{Input, InputKind};
 use crate::sag::UPRIGHT;
@@ -50,8 +51,10 @@ pub struct Hyper {
     pub smooth_length: f64,
     /// The same over slides and features, in parts of their range over pi: what rails do has nothing to do with turns.
     pub smooth_line_length: f64,
-    /// What every joint misses anew at every pose, rad (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
+    /// What joints miss anew at every pose, rad (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
     pub repeatability: f64,
+    /// Factor of each joint on it, (N,).
+    pub unevenness: Vec<f64>,
     /// Amplitude of `sag` weights, rad for each metre of lever (prismatic: times [`truearm_estimate::ANGLE_ARM`] m).
     pub sag: f64,
     /// The direction, in the base frame, against which `sag` takes links to weigh.
@@ -107,6 +110,8 @@ const SMOOTH_LINE_LENGTH: Range = range(1.5, 0.05, 20.0, 1.0);
 /// Where a search for rails that bend often begins.
 const BENDS: f64 = 0.3;
 const REPEATABILITY: Range = range(0.03 * MILLI, 0.002 * MILLI, MILLI, 1.0);
+/// One joint beside the others: play, wear or a coarse encoder in one of them is common.
+const UNEVENNESS: Range = range(1.0, 0.02, 50.0, 0.5);
 const SAG: Range = range(MILLI, 0.003 * MILLI, 100.0 * MILLI, 1.5);
 const MAJOR: [Range; 3] = [amplitude(0.1), amplitude(0.1), amplitude(0.05)];
 const WRIST: [Range; 3] = [amplitude(0.05), amplitude(0.05), amplitude(0.025)];
@@ -115,7 +120,7 @@ const NOISE_LOW: f64 = 0.001 * MILLI;
 /// Orientations that are noted in another way than stated are no nearer than a radian, and must not spoil the positions.
 const NOISE_HIGH: f64 = 1000.0 * MILLI;
 
-/// Positions of the hyper-parameters in the vector of logarithms; products follow, then noise.
+/// Positions of the hyper-parameters in the vector of logarithms; products follow, then the joints' unevenness and noise.
 pub const AT_CONSTANT: usize = 0;
 pub const AT_OWN: usize = 3;
 pub const AT_OWN_LENGTH: usize = 4;
@@ -175,6 +180,7 @@ impl Hyper {
             smooth_length: SMOOTH_LENGTH.start,
             smooth_line_length: SMOOTH_LINE_LENGTH.start,
             repeatability: REPEATABILITY.start,
+            unevenness: vec![UNEVENNESS.start; joint_count],
             sag: SAG.start,
             up: UPRIGHT,
             by_readings: false,
@@ -226,6 +232,7 @@ impl Hyper {
             values.extend(product.amplitudes);
             values.extend(&product.lengths);
         }
+        values.extend(&self.unevenness);
         values.extend(self.noise);
         values.into_iter().map(f64::ln).collect()
     }
@@ -242,6 +249,7 @@ impl Hyper {
             lengths.for_each(|(k, length)| *length = at(first + 3 + k));
             first += product.len();
         }
+        let noise = first + self.unevenness.len();
         Self {
             constant: three(AT_CONSTANT),
             own: at(AT_OWN),
@@ -253,9 +261,20 @@ impl Hyper {
             repeatability: at(AT_REPEATABILITY),
             sag: at(AT_SAG),
             products,
-            noise: [at(first), at(first + 1)],
+            unevenness: (first..noise).map(at).collect(),
+            noise: [at(noise), at(noise + 1)],
             ..self.clone()
         }
+    }
+
+    /// What a joint misses anew at every pose, rad.
+    pub fn repeatability_of(&self, joint: usize) -> f64 {
+        self.repeatability * self.unevenness.get(joint).copied().unwrap_or(UNEVENNESS.start)
+    }
+
+    /// Position of the joints' unevenness among the logarithms.
+    pub fn at_unevenness(&self) -> usize {
+        AT_PRODUCTS + self.products.iter().map(Product::len).sum::<usize>()
     }
 
     /// Length scale of the `smooth` block over an input.
@@ -315,6 +334,7 @@ impl Hyper {
             ranges.extend(Product::amplitude_ranges(&product.name));
             ranges.extend(vec![PRODUCT_LENGTH; product.lengths.len()]);
         }
+        ranges.extend(vec![UNEVENNESS; self.unevenness.len()]);
         ranges.extend(self.noise.map(|start| range(start, NOISE_LOW, NOISE_HIGH, f64::INFINITY)));
         ranges
     }

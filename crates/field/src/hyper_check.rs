@@ -68,7 +68,8 @@ impl Hyper {
     fn check_numbers(&self) -> Result<(), FieldError> {
         let refuse = |what| Err(FieldError::Hyper { what });
         let products = self.products.iter().flat_map(|product| &product.amplitudes);
-        let amplitudes = products.chain(&self.smooth).chain([&self.own, &self.repeatability, &self.sag]);
+        let amplitudes = products.chain(&self.smooth).chain(&self.unevenness);
+        let amplitudes = amplitudes.chain([&self.own, &self.repeatability, &self.sag]);
         if !amplitudes.into_iter().all(|amplitude| *amplitude >= 0.0 && amplitude.is_finite()) {
             return refuse("an amplitude is negative or no number");
         }

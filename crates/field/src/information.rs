@@ -221,9 +221,13 @@ impl Slopes<'_> {
             let class = self.class(p);
             share(AT_CONSTANT + class, p, 2.0 * hyper.constant[class].powi(2) * variance, &all)
         });
-        let anew = self.by_column.curved().map(|(_, p, lever)| {
-            let factor = 2.0 * (hyper.repeatability * lever).powi(2);
-            share(AT_REPEATABILITY, p, factor, pulls.col_as_slice(p))
+        let anew = self.by_column.curved().flat_map(|(input, p, lever)| {
+            let joint = self.by_column.joint[input];
+            let factor = 2.0 * (hyper.repeatability_of(joint) * lever).powi(2);
+            let (_, shared) = share(AT_REPEATABILITY, p, factor, pulls.col_as_slice(p));
+            let own =
+                (joint < hyper.unevenness.len()).then(|| (hyper.at_unevenness() + joint, shared.clone()));
+            own.into_iter().chain([(AT_REPEATABILITY, shared)])
         });
         let first = hyper.to_logs().len() - hyper.noise.len();
         let noise = (0..hyper.noise.len()).map(|kind| {

@@ -64,6 +64,8 @@ pub struct ByColumn {
     pub own: Vec<Option<(usize, f64)>>,
     /// Whether what the joint's drive leaves, curves and what it does not repeat, goes with this input.
     pub has_curve: Vec<bool>,
+    /// The joint whose drive an input is of; joints count before features.
+    pub joint: Vec<usize>,
     /// Column and prior variance of each constant.
     pub constant: Vec<(usize, f64)>,
     /// Columns that are summed together.
@@ -138,6 +140,7 @@ impl ByColumn {
             driven: [of_class(Class::Theta), of_class(Class::Angle), of_class(Class::Length)],
             own,
             has_curve: (0..training.inputs.len()).map(|input| training.has_curve(input)).collect(),
+            joint: (0..training.inputs.len()).map(|input| training.joint_of(input)).collect(),
             constant: constant.map(|(p, column)| (p, column.constant.powi(2))).collect(),
             groups,
         }
@@ -254,7 +257,7 @@ impl RowFactors {
             by_pose.clear();
             by_pose.extend(kernels.iter().zip(loads).map(|(kernel, load)| variance * kernel + sag * load));
             if by_column.has_curve[joint] {
-                by_pose[0] += (hyper.repeatability * lever).powi(2);
+                by_pose[0] += (hyper.repeatability_of(by_column.joint[joint]) * lever).powi(2);
             }
             let waves = hyper.waves.iter().zip(&table.waves).filter(|(wave, _)| wave.joint == joint);
             for (wave, kernels) in waves {

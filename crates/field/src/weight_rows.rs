@@ -201,9 +201,9 @@ impl Model {
     pub fn noise_covariance(&self, jacobian: &[f64], rows: std::ops::Range<usize>) -> Mat<f64> {
         let columns = self.training.columns.len();
         let mut noise = Mat::zeros(rows.len(), rows.len());
-        for (_, p, lever) in self.by_column.curved() {
-            let entry =
-                |i: usize| jacobian[(rows.start + i) * columns + p] * lever * self.hyper.repeatability;
+        for (input, p, lever) in self.by_column.curved() {
+            let missed = lever * self.hyper.repeatability_of(self.by_column.joint[input]);
+            let entry = |i: usize| jacobian[(rows.start + i) * columns + p] * missed;
             for i in 0..rows.len() {
                 (0..=i).for_each(|j| noise[(i, j)] += entry(i) * entry(j));
             }

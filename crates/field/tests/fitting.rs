@@ -4,7 +4,7 @@
 mod common;
 
 use common::{
-    Arm, Fitted, Measure, Truth, deviations, fit, fit_from, fitted, options, problem, root_mean_square,
+    Arm, Fitted, Measure, Random, Truth, deviations, fit, fit_from, fitted, options, problem, root_mean_square,
     six_axes, subset,
 };
 use truearm_estimate::{ConstantFit, EstimateError, MeasurementSet, Point, Problem, Setup};
@@ -45,6 +45,22 @@ fn what_varies_is_found_and_intervals_hold() {
     assert!((0.90..=0.99).contains(&share), "{share} of the components lie within their 95 % intervals");
     assert!((0.5..1.7).contains(&(fit.field.hyper.noise[0] / NOISE)), "{:?}", fit.field.hyper);
     assert!(fit.field.judgement.outliers.is_empty(), "{:?}", fit.field.judgement.outliers);
+}
+
+#[test]
+fn a_joint_that_scatters_more_than_the_others_is_told_and_spoils_nothing() {
+    const SCATTER: f64 = 2e-4;
+    let arm = six_axes(Truth::BENDING);
+    let mut set = Measure::poses(100).of(&arm);
+    let mut random = Random::new(3);
+    set.joints.iter_mut().step_by(set.joint_count).for_each(|q| *q += SCATTER * random.normal());
+    let fit = fit(&arm, &set).unwrap();
+    let missed: Vec<f64> = (0..6).map(|joint| fit.field.hyper.repeatability_of(joint)).collect();
+    assert!((0.7..1.3).contains(&(missed[0] / SCATTER)), "{missed:?}");
+    assert!(missed[1..].iter().all(|other| *other < 0.5 * missed[0]), "{missed:?}");
+    let (constant, field) = deviations(&arm, &fit, &held_out(200).of(&arm));
+    let (constant, field) = (root_mean_square(&constant), root_mean_square(&field));
+    assert!(field < 0.7 * constant, "the field leaves {field}, the constants {constant}");
 }
 
 #[test]

@@ -10,6 +10,9 @@ use crate::door::CoreError;
 /// Key of what curves of coupled joints go with; kept where it is not zero.
 const BY_READINGS: &str = "by_readings";
 
+/// Key of the joints' factors on what they do not repeat; files from before there were any have none.
+const UNEVENNESS: &str = "unevenness";
+
 /// From values by name.
 pub fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
     let get = |name: &str| {
@@ -51,6 +54,7 @@ pub fn hyper_from(values: &HashMap<String, Vec<f64>>) -> PyResult<Hyper> {
             .get("smooth_line_length")
             .map_or_else(|| one("smooth_length"), |_| one("smooth_line_length"))?,
         repeatability: one("repeatability")?,
+        unevenness: values.get(UNEVENNESS).cloned().unwrap_or_default(),
         products: present.map(|name| product(name)).collect::<PyResult<_>>()?,
         waves: values.get("waves").map_or_else(|| Ok(Vec::new()), |stored| waves_from(stored))?,
         noise: [one("noise_position")?, one("noise_orientation")?],
@@ -95,6 +99,7 @@ pub fn hyper_into(hyper: &Hyper) -> BTreeMap<String, Vec<f64>> {
         ("smooth_length".to_owned(), vec![hyper.smooth_length]),
         ("smooth_line_length".to_owned(), vec![hyper.smooth_line_length]),
         ("repeatability".to_owned(), vec![hyper.repeatability]),
+        (UNEVENNESS.to_owned(), hyper.unevenness.clone()),
         ("noise_position".to_owned(), vec![hyper.noise[0]]),
         ("noise_orientation".to_owned(), vec![hyper.noise[1]]),
         ("own_widening".to_owned(), vec![hyper.own_widening]),

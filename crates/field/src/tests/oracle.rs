@@ -227,7 +227,9 @@ impl<'a, K: Kernels> Oracle<'a, K> {
     pub fn anew(&self, a: &[f64], b: &[f64]) -> f64 {
         let of = |(p, column): (usize, &crate::Column)| {
             let drive = column.own.filter(|&k| self.training.has_curve(k));
-            drive.map_or(0.0, |k| a[p] * b[p] * (self.hyper.repeatability * self.lever(k)).powi(2))
+            let missed =
+                |k: usize| self.hyper.repeatability * self.hyper.unevenness[self.training.joint_of(k)];
+            drive.map_or(0.0, |k| a[p] * b[p] * (missed(k) * self.lever(k)).powi(2))
         };
         self.training.columns.iter().enumerate().map(of).sum()
     }
