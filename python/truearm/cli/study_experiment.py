@@ -68,9 +68,9 @@ def command(
             )
     except KeyboardInterrupt:
         end_at_once()
-    files = save_panels({"figure10": drawn}, output)
     write_whole(output / JSON_NAME, json.dumps(result, indent=1, allow_nan=False) + "\n")
     write_whole(output / PAGE_NAME, page(result))
+    files = save_panels({"figure10": drawn}, output)
     if as_json:
         print_json(result)
         return
