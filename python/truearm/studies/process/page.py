@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from truearm.studies.markdown import table
 from truearm.studies.panels import TITLES
+from truearm.studies.process.judging import AGREES, arms_that_agree
 from truearm.studies.process.setting import ANGLE_DEG, LENGTH_MM, SHARE
 
 Result = Mapping[str, Any]
@@ -28,7 +29,7 @@ READINGS: Final = (
     ),
     (
         "Division",
-        "The longest side is halved, breadth first, until there are 85 regions, whatever was measured: all "
+        "The longest side is halved, breadth first, until there are as many regions as above, whatever was measured: all "
         "poses are known beforehand and are measured in the paper's order in one session.",
     ),
     (
@@ -60,7 +61,7 @@ def page(result: Result) -> str:
         table(
             ("place", "the paper", "here", "agrees"),
             [
-                (s["place"], s["paper"], s["ours"], "yes" if s["agrees"] else "no")
+                (s["place"], s["paper"], s["ours"], AGREES[s["agrees"]])
                 for s in result["statements"]
             ],
         ),
@@ -100,7 +101,7 @@ def _several(over: Result | None) -> list[str]:
         "because its path errs as that of Figure 10(a); the others come as they come.",
         table(
             ("place", "the paper", f"agrees on, of {count}"),
-            [(s["place"], s["paper"], str(s["agrees"])) for s in over["statements"]],
+            [(s["place"], s["paper"], arms_that_agree(s)) for s in over["statements"]],
         ),
         "Medians over the arms, and the 95 % quantile in brackets, mm.",
         table(
