@@ -29,8 +29,8 @@ READINGS: Final = (
     ),
     (
         "Division",
-        "The longest side is halved, breadth first, until there are as many regions as above, whatever was measured: all "
-        "poses are known beforehand and are measured in the paper's order in one session.",
+        "The longest side is halved, breadth first, until there are as many regions as above, whatever was "
+        "measured: all poses are known beforehand and are measured in the paper's order in one session.",
     ),
     (
         "Measuring",
@@ -60,10 +60,7 @@ def page(result: Result) -> str:
         "## What the paper states, and what comes out",
         table(
             ("place", "the paper", "here", "agrees"),
-            [
-                (s["place"], s["paper"], s["ours"], AGREES[s["agrees"]])
-                for s in result["statements"]
-            ],
+            [(s["place"], s["paper"], s["ours"], AGREES[s["agrees"]]) for s in result["statements"]],
         ),
         "## Figure 10: the path",
         table(HEAD, [_on_path(name, part["path"]) for name, part in result["figure10"].items()]),
