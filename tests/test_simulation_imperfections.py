@@ -217,7 +217,7 @@ def test_a_size_below_zero_in_a_file_is_told_with_its_key():
     ("call", "message"),
     [
         (lambda arm: VirtualArm(arm.robot, seed=-1), "the seed is -1. Zero or more"),
-        (lambda arm: VirtualArm(arm.robot, seed=0.5), "the seed is 0.5"),
+        (lambda arm: VirtualArm(arm.robot, seed=0.5), "the seed is 0.5"),  # type: ignore[arg-type]
         (lambda arm: arm.poses(-1), "the number of poses is -1"),
         (lambda arm: arm.poses(2.5), "the number of poses is 2.5"),
         (lambda arm: arm.poses(2, seed=-1), "the seed is -1"),
