@@ -33,13 +33,14 @@ ABOUT: Final = (
 
 def page(summary: Summary) -> str:
     """The text of accuracy.md."""
-    missing = summary["asked"] - summary["there"] - summary["failed"]
+    asked, failed = summary["asked"], summary["failed"]
+    missing = asked - summary["there"] - failed
     parts = [
         "# Comparison of methods",
         f"Made by `truearm study accuracy`, version {summary['version']}. {ABOUT}",
         _versions(summary),
-        f"{missing} of {summary['asked']} results are not there yet." if missing else "",
-        f"{summary['failed']} could not be found: the last table says why." if summary["failed"] else "",
+        f"{missing} of {asked} results are not there yet." if missing else "",
+        f"{failed} of {asked} results could not be found: the last table says why." if failed else "",
         *sections(summary),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -132,7 +133,7 @@ def _means_table(groups: Mapping[str, Mapping[str, Any]], sizes: Sequence[str]) 
         rows.append((TITLES[name], *means, *_details(groups[detailed]["methods"].get(name, {}))))
     told = [f"{size}: {_count(groups[size])}" for size in there]
     head = ("method", *there, "worst", "95 %", "99 %", "max", "covered")
-    held = [f"{size}: {groups[size]['n_holdout']}" for size in there]
+    held = [f"{size}: {groups[size]['n_holdout']}" for size in there if groups[size]["n_holdout"]]
     words = (
         f"Runs: {'; '.join(told)}. Held-out rows: {'; '.join(held)}. "
         f"The last five columns are of {detailed} poses."
