@@ -34,6 +34,12 @@ measured that is [taken out](../explanations/drift.md) of the rows, the held-out
 the errors with it left in; the last one what `truearm calibrate --no-refit` takes, its report included. The
 mean to reach is the goal that the project set itself.
 
+Of UR10 B rows of a pose that was visited more than once may stand on both sides of a random split, as
+`truearm calibrate` says: with 400 training poses and seed 7, 44 of 449 held-out rows are of poses that also
+trained. By `truearm calibrate ur10 ur10_ipa_B.csv --train-size 400 --seed 7 --no-refit` of today the variable
+model errs by 0.094 mm in the mean over all of them, by 0.061 mm over these 44 and by 0.098 mm over the
+others.
+
 The data, q1 ... q6 in rad and x y z in m, from their authors' repositories:
 
 """

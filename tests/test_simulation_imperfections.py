@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from truearm.errors import InputError
+from truearm.errors import InputError, UsageError
 from truearm.robot import Robot
 from truearm.simulation import (
     Conditions,
@@ -186,9 +186,44 @@ def test_what_does_not_fit_the_arm_is_refused():
         two_links(joint_errors=(JointError(7),))
     with pytest.raises(InputError, match="3 compliances"):
         two_links(deflection=Deflection((1.0, 1.0, 1.0)))
-    with pytest.raises(InputError, match=r"noise_mm is -0.1\. Zero or more"):
-        two_links(noise_mm=-0.1)
     with pytest.raises(InputError, match="payload"):
         two_links().true_position([0, 0], conditions=Conditions(payload_kg=1.0))
     with pytest.raises(InputError, match="temperature"):
         two_links().true_position([0, 0], conditions=Conditions(temperature_c=30.0))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"non_geometric": "joints"}, '"joints" is not known. Either cartesian or joint'),
+        ({"signs": "positve"}, '"positve" is not known'),
+        ({"length_mm": -0.4}, "length_mm: -0.4. Zero or more"),
+        ({"angle_deg": float("inf")}, "angle_deg: inf"),
+        ({"noise_mm": "much"}, "noise_mm is 'much'"),
+    ],
+)
+def test_imperfections_are_sizes_and_words_that_are_known(wrong, message):
+    with pytest.raises(UsageError, match=message):
+        Imperfections(**wrong)
+
+
+def test_a_size_below_zero_in_a_file_is_told_with_its_key():
+    with pytest.raises(InputError, match="cell, length_mm: -1. Zero or more") as refused:
+        VirtualArm.from_toml('robot = "rv-m2"\n[imperfections]\nlength_mm = -1.0', where="cell")
+    assert not isinstance(refused.value, UsageError)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda arm: VirtualArm(arm.robot, seed=-1), "the seed is -1. Zero or more"),
+        (lambda arm: VirtualArm(arm.robot, seed=0.5), "the seed is 0.5"),  # type: ignore[arg-type]
+        (lambda arm: arm.poses(-1), "the number of poses is -1"),
+        (lambda arm: arm.poses(2.5), "the number of poses is 2.5"),
+        (lambda arm: arm.poses(2, seed=-1), "the seed is -1"),
+        (lambda arm: arm.measure(arm.poses(2), seed=-1), "the seed is -1"),
+    ],
+)
+def test_counts_and_seeds_are_whole_numbers_from_zero_on(call, message):
+    with pytest.raises(UsageError, match=message):
+        call(two_links())

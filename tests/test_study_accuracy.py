@@ -7,14 +7,13 @@ import pytest
 
 from truearm.cli import main
 from truearm.errors import InputError, UsageError
-from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.simulation import VirtualArm
 from truearm.studies.accuracy import judging, libraries, running
 from truearm.studies.accuracy.cells import Asked, list_cells, parse_sizes, study_seeds
 from truearm.studies.accuracy.page import page
 from truearm.studies.accuracy.results import Kept
-from truearm.studies.accuracy.sets import parse_sets
+from truearm.studies.accuracy.sets import parse_sets, read_set
 from truearm.studies.accuracy.splits import KINDS, Cut, cuts, divide
 from truearm.workers import Done
 
@@ -102,6 +101,10 @@ def test_what_an_interruption_leaves_is_told(file, tmp_path, monkeypatch, capsys
     assert f"Results so far are in {tmp_path / 'out'}" in " ".join(capsys.readouterr().err.split())
 
 
+def _words(text):
+    return " ".join(text.split())
+
+
 def _but_times(record):
     return json.dumps({key: record[key] for key in record if key not in ("fit_s", "predict_us")})
 
@@ -110,7 +113,9 @@ def test_a_method_that_cannot_be_fitted_says_why_and_stops_no_other(file, tmp_pa
     out = tmp_path / "out"
     given = ["--methods", "nominal,constant", "--sizes", "5,30", "--seeds", "1", "--splits", "random"]
     assert study(file, out, *given) == 0
-    assert "2 of them could not be fitted" in capsys.readouterr().out
+    assert "2 of 4 results are there, 2 of them found now. 2 more could not be fitted" in _words(
+        capsys.readouterr().out
+    )
     text = (out / "accuracy.md").read_text()
     assert "Could not be fitted" in text
     assert "15 measured values in 5 training rows" in text
@@ -152,7 +157,7 @@ def test_a_method_that_breaks_is_told_and_tried_again(file, tmp_path, monkeypatc
 
 def test_every_split_leaves_out_what_it_says(file, table):
     one = parse_sets([f"ur10={file}"], None)[0]
-    found = cuts(Measurements.read_csv(file), KINDS, ("place",), 0)
+    found = cuts(read_set(one), KINDS, ("place",), 0)
     assert [cut.kind for cut in found] == ["tails"] * 6 + ["clusters", "groups", "target", "random"]
     for cut in found:
         split = divide(one, cut, 0)
@@ -166,15 +171,16 @@ def test_every_split_leaves_out_what_it_says(file, table):
 
 
 def test_tails_change_sides_from_seed_to_seed(file):
-    data = Measurements.read_csv(file)
-    sides = [[cut.detail.split(":")[1] for cut in cuts(data, ("tails",), (), turn)] for turn in (0, 1)]
+    read = read_set(parse_sets([f"ur10={file}"], None)[0])
+    sides = [[cut.detail.split(":")[1] for cut in cuts(read, ("tails",), (), turn)] for turn in (0, 1)]
     assert sides[0] == ["low", "high"] * 3
     assert sides[1] == ["high", "low"] * 3
 
 
 def test_columns_that_hardly_any_rows_share_make_no_groups(file):
-    assert cuts(Measurements.read_csv(file), ("groups",), ("x2",), 0) == []
-    assert cuts(Measurements.read_csv(file), ("groups",), ("absent",), 0) == []
+    read = read_set(parse_sets([f"ur10={file}"], None)[0])
+    assert cuts(read, ("groups",), ("x2",), 0) == []
+    assert cuts(read, ("groups",), ("absent",), 0) == []
 
 
 def test_sizes_beyond_the_training_rows_are_left_out_and_the_middle_comes_first(file):
@@ -246,10 +252,13 @@ def test_the_page_says_who_is_first_and_what_is_missing():
         "curves": _found(0.1),
         "ours": _found(0.102),
     }
-    plain = {"best_without_curves": "constant", "ratio_without_curves": 0.51}
-    lead = {"best": "curves", "ratio": 1.02, "level": True, **plain}
+    plain = {"best_without_curves": "constant", "ratio_without_curves": 0.51, "runs_without_curves": 1}
+    first = {"best": "curves", "ours_mm": 0.102, "best_mm": 0.1, "runs": 1}
+    lead = {**first, "ratio": 1.02, "level": True, **plain}
     text = _page_of(methods, lead)
     assert "1 of 4 results are not there yet" in text
+    assert "Versions that found the results: 1 (2), 2 (1)" in text
+    assert "Held-out rows: 100: 40" in text
     assert "| arm | random rows held out | **0.102** (1.02 curves) |" in text
     assert "| arm | random rows held out | 0.51 constant |" in text
     assert "| constant D-H, theta curves | **0.100** |" in text
@@ -265,12 +274,15 @@ def test_the_page_has_a_column_for_each_block():
 
 def _page_of(methods, lead):
     """The page of one set and split, of whose four results one is missing."""
-    group = {"set": "arm", "split": "random", "size": "100", "runs": 1, "seeds": 1, "n_train": 100}
+    sizes = {"size": "100", "runs": 1, "seeds": 1, "n_train": 100, "n_holdout": 40}
+    group = {"set": "arm", "split": "random", **sizes}
     return page(
         {
-            "version": "1",
+            "version": "2",
+            "versions": {"1": 2, "2": 1},
             "asked": 4,
             "there": 3,
+            "failed": 0,
             "sizes": ["100"],
             "sets": {"arm": {"robot": "ur10", "rows": 200}},
             "groups": [{**group, "methods": methods, "lead": lead}],
@@ -281,4 +293,12 @@ def _page_of(methods, lead):
 
 def _found(mean):
     errors = dict.fromkeys(("p95_mm", "p99_mm", "max_mm", "worst_mean_mm"), 2.0 * mean)
-    return {"mean_mm": mean, "failed": 0, "coverage_95": None, "fit_s": 1.0, "predict_us": 2.0, **errors}
+    return {
+        "mean_mm": mean,
+        "failed": 0,
+        "runs": 1,
+        "coverage_95": None,
+        "fit_s": 1.0,
+        "predict_us": 2.0,
+        **errors,
+    }

@@ -13,7 +13,7 @@ from truearm.cell.session import Session
 from truearm.cli import main
 from truearm.errors import InputError, WorkError
 from truearm.fitting import no_stages
-from truearm.studies.process import several
+from truearm.studies.process import judging, several
 from truearm.studies.process.planning import plan_experiment
 from truearm.studies.process.setting import Setting, path, space
 from truearm.workers.done import answer
@@ -132,3 +132,28 @@ def test_workers_that_contradict_each_other_are_refused_before_anything_is_measu
     assert main(["study", "experiment", "-o", str(tmp_path), *SMALL, *place]) == 2
     assert "both a scheduler and a number of workers" in capsys.readouterr().err
     assert not (tmp_path / "session.db").exists()
+
+
+def test_fewer_poses_than_a_region_needs_are_refused_before_any_work(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["study", "experiment", "-o", str(out), "--regions", "2", "--poses", "5"]) == 2
+    assert "15 parameters of a region" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()
+
+
+def test_what_the_paper_says_of_its_size_is_not_said_of_another(small):
+    directory, result = small
+    agrees = {each["paper"]: each["agrees"] for each in result["statements"]}
+    sized = [agrees[said] for said in agrees if "85 regions" in said or "couple of hours" in said]
+    assert sized == [None, None]
+    assert "of 3 regions, as measured" in (directory / "experiment.md").read_text()
+    claimed = {each["claim"] for each in result["claims"]}
+    assert "hours of measuring" not in claimed
+
+
+def test_hours_are_judged_of_an_experiment_as_large_as_the_papers():
+    session = {"regions": 85.0, "poses": 20.0, "hours": 3.5, "measurements": 2520.0, "hours_in_all": 5.0}
+    (hours,) = (each for each in judging.STATEMENTS if "couple of hours" in each.paper)
+    assert hours.check({"session": session})[1] is False
+    assert hours.check({"session": {**session, "hours": 2.4}})[1] is True
+    assert hours.check({"session": {**session, "regions": 4.0, "hours": 0.1}})[1] is None

@@ -8,7 +8,7 @@ import pytest
 
 from truearm.cli import main
 from truearm.errors import UsageError
-from truearm.studies import paper, setting
+from truearm.studies import paper, paper_results, setting
 from truearm.studies.claims import CLAIMS, judged
 from truearm.studies.metrics import over_seeds, quantiles
 from truearm.studies.panels import save_panels
@@ -144,3 +144,23 @@ def test_unknown_figures_and_no_seeds_are_refused(tmp_path, capsys):
     assert main(["study", "paper", "-o", str(tmp_path / "x"), "--figure", "9"]) == 2
     assert "no figure" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
+
+
+def test_results_are_there_where_a_picture_cannot_be_written(study, tmp_path, monkeypatch):
+    def no_room(*_):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(paper_results, "conduct_study", lambda *_, **__: study)
+    monkeypatch.setattr(paper_results, "save_pictures", no_room)
+    assert main(["study", "paper", "-o", str(tmp_path / "out")]) == 1
+    assert json.loads((tmp_path / "out" / "paper.json").read_text()) == study.result
+    assert (tmp_path / "out" / "paper.md").exists()
+
+
+def test_a_directory_that_cannot_be_made_is_told_before_any_work(tmp_path, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("nothing is to be simulated")
+
+    monkeypatch.setattr(paper_results, "conduct_study", never)
+    (tmp_path / "out").symlink_to(tmp_path / "nowhere")
+    assert main(["study", "paper", "-o", str(tmp_path / "out")]) == 1

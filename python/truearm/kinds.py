@@ -140,6 +140,18 @@ def words(value: object, name: str) -> tuple[str, ...]:
     return tuple(str(part) for part in found)
 
 
+def count(value: object, name: str) -> int:
+    """The argument or option `name`, which is a whole number from zero on.
+
+    Raises:
+        UsageError: If it is anything else.
+    """
+    found = _whole(value, name)
+    if found < 0:
+        raise UsageError(f"{name} is {found}", rule="Zero or more")
+    return found
+
+
 def _whole(value: object, name: str) -> int:
     check_number(value, name, Integral)
     return int(value)  # type: ignore[call-overload, no-any-return]

@@ -55,7 +55,11 @@ def command(
         bool, typer.Option("--so-far", help="Run nothing; tell what an interrupted study has brought.")
     ] = False,
     again: Annotated[
-        str | None, typer.Option(metavar="NAME,NAME", help="Methods whose results are found again.")
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Methods whose results are forgotten and found anew, as after a change of version.",
+        ),
     ] = None,
     scheduler: Scheduler = None,
     workers: Workers = None,
@@ -67,12 +71,14 @@ def command(
 
     All methods get the same training rows and are judged on the same held-out rows: first whole parts that
     are left out (tails of each joint, clusters of joint space, groups equal in some columns, another target
-    on the tool), then random rows. Settings of a method are looked for by cross-validation on its training
-    rows. Needs scikit-learn and lightgbm: pip install ".[study]".
+    on the tool), then random rows. Shots of one visit to a pose are one row, and rows of a pose are held out
+    together. Settings of a method are looked for by cross-validation on its training rows. Needs scikit-learn
+    and lightgbm: pip install ".[study]".
 
     Writes DIR/accuracy.json, DIR/accuracy.md and learning curves as PNG and SVG. Every result is kept in
-    DIR/results.jsonl as soon as it is there; the same command goes on where it was interrupted. The workers
-    of a scheduler read the files themselves, so they must see them under the same names.
+    DIR/results.jsonl as soon as it is there, with the version that found it; the same command goes on where
+    it was interrupted, and keeps results of earlier versions. The workers of a scheduler read the files
+    themselves, so they must see them under the same names.
 
     Examples:
       truearm study accuracy ur10=measurements.csv -o accuracy
@@ -111,6 +117,19 @@ def command(
             f"{outcome.asked - len(outcome.records)} results are missing, the first of {name}: {error}",
             way_out="The same command tries them again; --methods leaves methods out",
         )
+    _check_fitted(outcome)
+
+
+def _check_fitted(outcome: "Outcome") -> None:
+    """Raise WorkError where no method could be fitted to any rows of a set."""
+    for name in dict.fromkeys(record["set"] for record in outcome.records):
+        found = [record for record in outcome.records if record["set"] == name]
+        if all("failed" in record for record in found):
+            raise WorkError(
+                f'nothing could be fitted to the set "{name}"',
+                rule=f"The first of {len(found)} failures is of {found[0]['method']}: {found[0]['failed']}",
+                way_out="Ask for other --sizes, or see what `truearm calibrate` says of the measurements",
+            )
 
 
 def _study(
@@ -184,20 +203,16 @@ def _print(summary: Mapping[str, Any], outcome: "Outcome", files: Sequence[Path]
     for group in summary["groups"]:
         lead = group["lead"]
         if lead is not None:
-            ours = f"{group['methods']['ours']['mean_mm']:.3f}"
-            best = f"{group['methods'][lead['best']]['mean_mm']:.3f}"
-            rows.append(
-                (group["set"], group["split"], group["size"], str(group["runs"]), ours, lead["best"], best)
-            )
+            means = (f"{lead['ours_mm']:.3f}", lead["best"], f"{lead['best_mm']:.3f}")
+            rows.append((group["set"], group["split"], group["size"], str(lead["runs"]), *means))
     if rows:
         head = ("set", "split", "poses", "runs", "ours, mm", "best other", "mm")
         print_table(head, rows, title="Mean held-out error, median over runs", left=(0, 1, 5))
     if not summary["groups"]:
         tell("No question has all its methods yet.")
-    say(f"{len(outcome.records)} of {outcome.asked} results are there, {outcome.run} of them found now.")
-    failed = sum("failed" in record for record in outcome.records)
-    if failed:
-        say(f"{failed} of them could not be fitted: {files[0]} says why.")
+    say(f"{summary['there']} of {outcome.asked} results are there, {outcome.run} of them found now.")
+    if summary["failed"]:
+        say(f"{summary['failed']} more could not be fitted: {files[0]} says why.")
     for path in files:
         say(f"Written: {path}")
     suggest("truearm calibrate ROBOT MEASUREMENTS -o DIR", when="Calibrate an arm with ours:")

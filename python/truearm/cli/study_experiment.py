@@ -23,7 +23,7 @@ PAGE_NAME: Final = "experiment.md"
 def command(
     output: OutputDirectory,
     regions: Annotated[int, typer.Option(min=2, help="Into how many the space is divided.")] = PAPER_REGIONS,
-    poses: Annotated[int, typer.Option(min=5, help="Measured in each region to identify it.")] = PAPER_POSES,
+    poses: Annotated[int, typer.Option(help="Measured in each region to identify it.")] = PAPER_POSES,
     speed: Annotated[
         float, typer.Option(min=1.0, metavar="X", help="How fast the virtual clock runs.")
     ] = EXPERIMENT_SPEED,
@@ -51,13 +51,14 @@ def command(
       truearm study experiment -o arms --seeds 10 --scheduler tcp://10.0.0.5:8786
     """
     from truearm.studies.panels import save_panels
+    from truearm.studies.process.judging import AGREES, arms_that_agree
     from truearm.studies.process.page import page
     from truearm.studies.process.setting import Setting
     from truearm.studies.process.several import conduct_arms
 
+    first = Setting(regions=regions, poses=poses, speed=speed)
     check_directory(output)
     make_directory(output)
-    first = Setting(regions=regions, poses=poses, speed=speed)
     settings = [replace(first, seed=first.seed + number) for number in range(seeds)]
     kept = f"What was measured is in {output}; the same command goes on with it"
     kept += " once the cluster's workers are through with the arms under way." if scheduler else "."
@@ -68,16 +69,16 @@ def command(
             )
     except KeyboardInterrupt:
         end_at_once()
-    files = save_panels({"figure10": drawn}, output)
     write_whole(output / JSON_NAME, json.dumps(result, indent=1, allow_nan=False) + "\n")
     write_whole(output / PAGE_NAME, page(result))
+    files = save_panels({"figure10": drawn}, output)
     if as_json:
         print_json(result)
         return
-    rows = [(each["place"], each["ours"], "yes" if each["agrees"] else "no") for each in result["statements"]]
+    rows = [(each["place"], each["ours"], AGREES[each["agrees"]]) for each in result["statements"]]
     print_table(("the paper", "what comes out here", "agrees"), rows, left=(0, 1, 2))
     if "over_arms" in result:
-        held = [(each["paper"], str(each["agrees"])) for each in result["over_arms"]["statements"]]
+        held = [(each["paper"], arms_that_agree(each)) for each in result["over_arms"]["statements"]]
         print_table(("the paper", f"agrees on, of {seeds} arms"), held, left=(0,))
     for path in (output / PAGE_NAME, output / JSON_NAME, *files):
         say(f"Written: {path}")

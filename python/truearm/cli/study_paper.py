@@ -51,12 +51,12 @@ def command(
     check_directory(output)
     from truearm.studies.paper_results import conduct_study, save_pictures
 
+    make_directory(output)
     with ends_promptly():
         study = conduct_study(range(seeds), chosen, told_stages(), scheduler=scheduler, workers=workers)
-    make_directory(output)
-    files = save_pictures(study, output)
     write_whole(output / JSON_NAME, json.dumps(study.result, indent=1, allow_nan=False) + "\n")
     write_whole(output / PAGE_NAME, study.page)
+    files = save_pictures(study, output)
     if as_json:
         print_json(study.result)
         return

@@ -21,7 +21,7 @@ from typing import Any, Final
 import tomli_w
 from pydantic import TypeAdapter, ValidationError
 
-from truearm.errors import InputError, did_you_mean
+from truearm.errors import InputError, UsageError, did_you_mean
 from truearm.robot import Robot
 from truearm.simulation.imperfections import Imperfections
 
@@ -57,6 +57,8 @@ def arguments(content: Mapping[str, Any], *, where: str) -> dict[str, Any]:
             "parameters": TypeAdapter(list[str] | None).validate_python(content.get("parameters")),
             "imperfections": TypeAdapter(Imperfections).validate_python(content.get("imperfections", {})),
         }
+    except UsageError as error:
+        raise InputError(error.what, where=f"{where}, {error.where}", rule=error.rule) from None
     except ValidationError as error:
         detail = error.errors(include_url=False)[0]
         place = ", ".join(str(part + 1) if isinstance(part, int) else part for part in detail["loc"])

@@ -2,18 +2,30 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Final, Literal
+from typing import ClassVar, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import ConfigDict
 
-from truearm.errors import InputError
+from truearm import kinds
 
 Point = tuple[float, float, float]
+NonGeometric = Literal["cartesian", "joint"]
+Signs = Literal["random", "positive"]
 
 STANDARD_GRAVITY: Final = 9.80665
 STRICT: Final = ConfigDict(extra="forbid", allow_inf_nan=False)
+CHOICES: Final = {"non_geometric": get_args(NonGeometric), "signs": get_args(Signs)}
+SIZES: Final = (
+    "length_mm",
+    "angle_deg",
+    "share",
+    "noise_mm",
+    "noise_mrad",
+    "repeatability_mm",
+    "repeatability_deg",
+)
 
 
 @dataclass(frozen=True)
@@ -140,10 +152,10 @@ class Imperfections:
     length_mm: float = 0.4
     angle_deg: float = 0.05
     share: float = 0.09
-    non_geometric: Literal["cartesian", "joint"] = "cartesian"
+    non_geometric: NonGeometric = "cartesian"
     noise_mm: float = 0.04
     noise_mrad: float = 0.1
-    signs: Literal["random", "positive"] = "random"
+    signs: Signs = "random"
     stated: Mapping[str, float] = field(default_factory=dict)
     repeatability_mm: float = 0.0
     repeatability_deg: float = 0.0
@@ -151,11 +163,9 @@ class Imperfections:
     deflection: Deflection | None = None
     thermal: Thermal | None = None
 
-    def check_sizes(self) -> None:
-        """Raise InputError where a standard deviation or a share is below zero or no number."""
-        for name in ("share", "noise_mm", "noise_mrad", "repeatability_mm", "repeatability_deg"):
-            if not 0.0 <= (size := getattr(self, name)) < float("inf"):
-                raise InputError(f"{name} is {size:g}", where="imperfections", rule="Zero or more")
+    def __post_init__(self) -> None:
+        kinds.settle(self, numbers=SIZES)
+        kinds.check_values(self, choices=CHOICES, not_negative=SIZES)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from truearm._core import Chain
 from truearm.arrays import as_rows
 from truearm.errors import InputError, UsageError
 from truearm.files import parsed
-from truearm.kinds import required, whole_numbers
+from truearm.kinds import count, required, whole_numbers
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.simulation import arm_file
@@ -84,14 +84,13 @@ class VirtualArm:
                 of all links by default.
 
         Raises:
-            InputError: If a name is not a parameter of this robot, a joint or link is not of it, or a
-                standard deviation is below zero.
+            InputError: If a name is not a parameter of this robot, or a joint or link is not of it.
+            UsageError: If the seed is no whole number from zero on.
         """
         self.robot = required(robot, Robot, "the robot")
-        self.seed = seed
+        self.seed = count(seed, "the seed")
         given = Imperfections() if imperfections is None else imperfections
         self.imperfections = required(given, Imperfections, "the imperfections")
-        self.imperfections.check_sizes()
         check_joints(robot, self.imperfections.joint_errors, self.imperfections.deflection)
         rng = np.random.default_rng([seed, 0])
         self.names = tuple(default_parameters(robot) if parameters is None else parameters)
@@ -153,8 +152,9 @@ class VirtualArm:
             held: Joints, counted from 1, that stay at reading zero.
 
         Raises:
-            UsageError: If the arm has no such joint.
+            UsageError: If the arm has no such joint, or `n` or the seed is no whole number from zero on.
         """
+        number, draw = count(n, "the number of poses"), count(seed, "the seed")
         joints = whole_numbers(held, "held")
         for joint in joints:
             if not 1 <= joint <= self.robot.joint_count:
@@ -162,7 +162,7 @@ class VirtualArm:
                     f"there is no joint {joint} to hold", rule=f"Joints are 1 to {self.robot.joint_count}"
                 )
         low, high = joint_ranges(self.robot)
-        readings = np.random.default_rng([self.seed, 1, seed]).uniform(low, high, (n, len(low)))
+        readings = np.random.default_rng([self.seed, 1, draw]).uniform(low, high, (number, len(low)))
         readings[:, [joint - 1 for joint in joints]] = 0.0
         return readings
 
@@ -228,13 +228,17 @@ class VirtualArm:
         """The same as a table with columns q1 ... qN in rad and m, x y z in m, and qw qx qy qz if asked.
 
         Where the conditions say so, payload_kg and temperature_c are further columns.
+
+        Raises:
+            UsageError: If the seed is no whole number from zero on.
         """
         rows, _ = as_rows(q, self.robot.joint_count, what="joint readings")
         met = Conditions(approach=approach_in_sequence(rows)) if conditions is None else conditions
-        rng = np.random.default_rng([self.seed, 2, seed])
+        draw = count(seed, "the seed")
+        rng = np.random.default_rng([self.seed, 2, draw])
         flange_from_target = np.eye(4)
         flange_from_target[:3, 3] = self.target_in_flange
-        visit = np.random.default_rng([self.seed, 3, seed])
+        visit = np.random.default_rng([self.seed, 3, draw])
         poses = self.world_from_base @ self._pose(rows, self.robot.flange @ flange_from_target, met, visit)
         noise = rng.normal(scale=to_si(self.imperfections.noise_mm, "mm"), size=(len(rows), 3))
         columns: dict[str, Any] = {f"q{j + 1}": rows[:, j] for j in range(rows.shape[1])}

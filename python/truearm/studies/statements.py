@@ -27,13 +27,14 @@ class Statement:
         place: Section or figure.
         paper: What it says, in our words.
         figures: Results that the check needs, with blanks between; empty for none.
-        check: From the results: what comes out here, and whether it agrees.
+        check: From the results: what comes out here, and whether it agrees; None where they are of another
+            size than what the paper speaks of.
     """
 
     place: str
     paper: str
     figures: str
-    check: Callable[[Result], tuple[str, bool]]
+    check: Callable[[Result], tuple[str, bool | None]]
 
 
 def checked(result: Result) -> list[dict[str, Any]]:

@@ -1,9 +1,11 @@
 """One method on one cell: fitted, judged on held-out rows, timed."""
 
+import hashlib
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from truearm.studies.accuracy.libraries import one_thread
 from truearm.studies.accuracy.methods import BY_NAME, Effort
 from truearm.studies.accuracy.poses import Prepared, prepare
 from truearm.studies.accuracy.sets import read_set
+from truearm.studies.accuracy.splits import rows_of
 from truearm.validation import Statistics
 
 Record = dict[str, Any]
@@ -52,16 +55,25 @@ class Job:
             "seed": cell.seed,
             "quick": self.quick,
             "method": name,
+            "rows": _rows_print(cell),
         }
+
+
+@lru_cache(maxsize=4096)
+def _rows_print(cell: Cell) -> str:
+    """Short hash of the rows that train and that are held out."""
+    split = rows_of(cell.data_set, cell.cut, cell.seed, cell.poses)
+    return hashlib.sha256(split.train.tobytes() + b"|" + split.holdout.tobytes()).hexdigest()[:12]
 
 
 def run_job(job: Job) -> list[Record]:
     """The results of a job; a method that cannot be fitted to the rows says why in its result."""
     try:
         with one_thread():
-            return _run(job)
+            found = _run(job)
     except (TruearmError, np.linalg.LinAlgError) as error:
-        return [{**job.head(name), "failed": str(error)} for name in job.results]
+        found = [{**job.head(name), "failed": str(error)} for name in job.results]
+    return [{**record, "version": version("truearm")} for record in found]
 
 
 def _run(job: Job) -> list[Record]:

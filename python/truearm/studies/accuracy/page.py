@@ -25,17 +25,22 @@ CUMULATED: Final = (
 """Heads of the columns of what blocks add, by the methods that have them."""
 ABOUT: Final = (
     "Mean held-out position error in mm, the median over runs: one run is a seed and, for tails, one joint's "
-    "tail. Each table has its number of runs and seeds. In bold the lowest mean and those within 3 % of it."
+    "tail. Each table has its number of runs and seeds, and the least number of held-out rows of a run. In "
+    "bold the lowest mean and those within 3 % of it; a method that could not be fitted to all runs has how "
+    "many in brackets, and takes no part in that."
 )
 
 
 def page(summary: Summary) -> str:
     """The text of accuracy.md."""
-    missing = summary["asked"] - summary["there"]
+    asked, failed = summary["asked"], summary["failed"]
+    missing = asked - summary["there"] - failed
     parts = [
         "# Comparison of methods",
         f"Made by `truearm study accuracy`, version {summary['version']}. {ABOUT}",
-        f"{missing} of {summary['asked']} results are not there yet." if missing else "",
+        _versions(summary),
+        f"{missing} of {asked} results are not there yet." if missing else "",
+        f"{failed} of {asked} results could not be found: the last table says why." if failed else "",
         *sections(summary),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -54,10 +59,20 @@ def sections(summary: Summary) -> list[str]:
     ]
 
 
+def _versions(summary: Summary) -> str:
+    """A sentence on the versions that results are of, where they are of another than the page."""
+    found = summary["versions"]
+    if set(found) <= {summary["version"]}:
+        return ""
+    each = ", ".join(f"{name} ({count})" for name, count in sorted(found.items()))
+    return f"Versions that found the results: {each}; `--again` finds those of a method anew."
+
+
 def _standing(summary: Summary) -> str:
     words = (
         "Ours, and its ratio to the best other method, which is named: below one ours is better. "
-        "In bold where it is first or within 3 %."
+        "In bold where it is first or within 3 %. They are compared over the runs that both could be fitted "
+        "to, which are told where they are not all."
     )
     return f"{words}\n\n{_lead_table(summary, _lead_cell)}"
 
@@ -77,14 +92,20 @@ def _lead_table(summary: Summary, cell: Callable[[Mapping[str, Any]], str]) -> s
 
 
 def _lead_cell(group: Mapping[str, Any]) -> str:
-    lead, number = group["lead"], f"{group['methods'][OURS]['mean_mm']:.3f}"
-    ratio = f"{lead['ratio']:.2f} {lead['best']}"
+    lead, number = group["lead"], f"{group['lead']['ours_mm']:.3f}"
+    ratio = f"{lead['ratio']:.2f} {lead['best']}{_of_runs(lead['runs'], group['runs'], ', ')}"
     return f"**{number}** ({ratio})" if lead["level"] else f"{number} ({ratio})"
 
 
 def _plain_cell(group: Mapping[str, Any]) -> str:
     ratio, best = group["lead"]["ratio_without_curves"], group["lead"]["best_without_curves"]
+    best += _of_runs(group["lead"]["runs_without_curves"], group["runs"], ", ")
     return f"**{ratio:.2f}** {best}" if ratio < HALF else f"{ratio:.2f} {best}"
+
+
+def _of_runs(runs: int, of: int, before: str = "") -> str:
+    """How many runs a number is of, in words; nothing where it is of all."""
+    return "" if runs == of else f"{before}{runs} of {of}"
 
 
 def _means(summary: Summary) -> Iterable[str]:
@@ -103,16 +124,20 @@ def _means_table(groups: Mapping[str, Mapping[str, Any]], sizes: Sequence[str]) 
     there = [size for size in sizes if size in groups]
     detailed = next(size for size in DETAILED + tuple(there) if size in groups)
     shown = [name for name in TITLES if FAMILIES[name] != "block"]
-    lowest = {size: min(_mean(groups[size]["methods"].get(name, {})) for name in shown) for size in there}
+    lowest = {size: min(_whole_mean(groups[size], name) for name in shown) for size in there}
     rows = []
     for name in shown:
         if not any(name in groups[size]["methods"] for size in there):
             continue
-        means = [_mean_cell(groups[size]["methods"].get(name, {}), lowest[size]) for size in there]
+        means = [_mean_cell(groups[size], name, lowest[size]) for size in there]
         rows.append((TITLES[name], *means, *_details(groups[detailed]["methods"].get(name, {}))))
     told = [f"{size}: {_count(groups[size])}" for size in there]
     head = ("method", *there, "worst", "95 %", "99 %", "max", "covered")
-    words = f"Runs: {'; '.join(told)}. The last five columns are of {detailed} poses."
+    held = [f"{size}: {groups[size]['n_holdout']}" for size in there if groups[size]["n_holdout"]]
+    words = (
+        f"Runs: {'; '.join(told)}. Held-out rows: {'; '.join(held)}. "
+        f"The last five columns are of {detailed} poses."
+    )
     return f"{words}\n\n{table(head, rows)}"
 
 
@@ -125,15 +150,21 @@ def _number(value: float | None, digits: int = 3) -> str:
     return "" if value is None else f"{value:.{digits}f}"
 
 
-def _mean(found: Mapping[str, Any]) -> float:
-    return float(found.get("mean_mm", float("inf")))
+def _whole_mean(group: Mapping[str, Any], name: str) -> float:
+    """A method's mean where it could be fitted to all runs; infinite otherwise."""
+    found = group["methods"].get(name, {})
+    return float(found["mean_mm"]) if found.get("runs") == group["runs"] else float("inf")
 
 
-def _mean_cell(found: Mapping[str, Any], lowest: float) -> str:
+def _mean_cell(group: Mapping[str, Any], name: str, lowest: float | None = None) -> str:
+    """A mean with how many runs it is of, where these are not all; in bold up to 3 % above the lowest."""
+    found = group["methods"].get(name, {})
     if "mean_mm" not in found:
         return ""
-    number = f"{found['mean_mm']:.3f}"
-    return f"**{number}**" if found["mean_mm"] <= LEVEL * lowest else number
+    number, some = f"{found['mean_mm']:.3f}", _of_runs(found["runs"], group["runs"])
+    if some:
+        return f"{number} ({some})"
+    return f"**{number}**" if lowest is not None and found["mean_mm"] <= LEVEL * lowest else number
 
 
 def _details(found: Mapping[str, Any]) -> tuple[str, ...]:
@@ -150,7 +181,7 @@ def _blocks(summary: Summary) -> Iterable[str]:
         size = next(size for size in DETAILED + tuple(groups) if size in groups)
         found = groups[size]["methods"]
         if not PARTS.keys().isdisjoint(found):
-            means = [_number(found.get(name, {}).get("mean_mm")) for name in CUMULATED]
+            means = [_mean_cell(groups[size], name) for name in CUMULATED]
             rows.append((name, SPLITS[split], size, str(groups[size]["runs"]), *means))
     if rows:
         yield "## What each block adds"

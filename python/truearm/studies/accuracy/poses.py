@@ -17,7 +17,7 @@ from truearm.options import Options
 from truearm.parameters import KIND_COUNT, D
 from truearm.studies.accuracy.cells import Cell
 from truearm.studies.accuracy.sets import read_set
-from truearm.studies.accuracy.splits import divide
+from truearm.studies.accuracy.splits import rows_of
 
 Floats = NDArray[np.float64]
 
@@ -79,8 +79,8 @@ class Prepared:
     Attributes:
         cell: The question.
         task: How constants are fitted; positions of target 1 alone.
-        train: Training rows.
-        held: Held-out rows.
+        train: Training rows, which hold target 1.
+        held: Held-out rows, which hold the target that is judged.
         fits: Frame and tool alone, and constants, of the training rows.
     """
 
@@ -145,22 +145,16 @@ def prepare(cell: Cell) -> Prepared:
     """Divide the rows of a cell, and fit constants to its training rows.
 
     Raises:
-        WorkError: If the rows are too few or too alike.
+        InputError: If the rows cannot be divided.
+        WorkError: If they are too few or too alike.
     """
     read = read_set(cell.data_set)
-    split = divide(cell.data_set, cell.cut, cell.seed)
-    train = _measured(read.data.select(split.train), 0)
-    train = train.select(np.arange(min(cell.poses, len(train))))
-    held = _measured(read.data.select(split.holdout), cell.cut.target)
-    held = held.select(np.isin(held.group, train.groups))
+    split = rows_of(cell.data_set, cell.cut, cell.seed, cell.poses)
+    train, held = read.data.select(split.train), read.data.select(split.holdout)
     options = Options(model="constant", use="position")
     arm = IdentifiedArm(read.robot, options.frame, options.parallel_within_deg)
     task = Task(arm, Selection((0,)), train.groups, options, THREADS)
     return Prepared(cell, task, train, held, fit_rows(task, train))
-
-
-def _measured(data: Measurements, target: int) -> Measurements:
-    return data.select(np.isfinite(data.targets[:, target]).all(axis=1))
 
 
 def _heights(arm: IdentifiedArm, joints: Floats, constants: Floats) -> Floats:

@@ -16,8 +16,8 @@ KNOWN_BY: Final = ("set", "data", "split", "detail", "size", "seed", "quick", "m
 
 
 def key_of(record: Mapping[str, Any]) -> Key:
-    """What a result is known by."""
-    return tuple(str(record[name]) for name in KNOWN_BY)
+    """What a result is known by; one that does not say which rows it is of is none that is asked for."""
+    return (*(str(record[name]) for name in KNOWN_BY), str(record.get("rows", "")))
 
 
 class Kept:

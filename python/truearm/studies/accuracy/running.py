@@ -53,9 +53,10 @@ class Outcome:
     """What there is of a study.
 
     Attributes:
-        records: All results that are there of those asked for, in the order of the questions.
+        records: All results that are there of those asked for, in the order of the questions; those of
+            methods that could not be fitted say why.
         asked: Number of results asked for.
-        run: How many of them were found now.
+        run: How many were found now, without those that could not be fitted.
         errors: What went wrong where a result is missing, by method.
     """
 
@@ -90,7 +91,7 @@ def conduct(study: Study, directory: Path, where: Where, told: Progress) -> Outc
             if done.error is None:
                 results = done.result()
                 kept.add(results)
-                run += len(results)
+                run += sum("failed" not in result for result in results)
             else:
                 errors[missing[done.index].method] = done.trace or str(done.error)
             told("comparing methods", count, len(jobs))

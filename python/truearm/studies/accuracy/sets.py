@@ -7,11 +7,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truearm.errors import InputError, Notice, UsageError
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
 from truearm.robot import Robot
+from truearm.visits import one_row_a_visit, pose_numbers
 
 
 @dataclass(frozen=True)
@@ -39,13 +43,15 @@ class Read:
 
     Attributes:
         robot: The arm.
-        data: What was measured, without repeated rows.
-        print_: Short hash of both, by which results are known again.
+        data: What was measured, without repeated rows; shots of one visit to a pose are one row.
+        pose: First row of each row's pose (n,), whatever its set-up.
+        print_: Short hash of arm and data, by which results are known again.
         notices: What the user should know.
     """
 
     robot: Robot
     data: Measurements
+    pose: NDArray[np.int64]
     print_: str
     notices: tuple[Notice, ...]
 
@@ -99,7 +105,22 @@ def read_set(data_set: DataSet) -> Read:
             "distances were measured, not points", where=data_set.file, rule="Methods are judged at points"
         )
     notices = check_against(data, robot)
-    data, _ = points_together(data.deduplicated())
+    data, together = points_together(data.deduplicated())
+    visits = one_row_a_visit(data)
+    notices += together + _shots(data, visits)
+    data = visits
     described = json.dumps(robot.to_dict(), sort_keys=True) + data.hash()
     short = hashlib.sha256(described.encode()).hexdigest()[:12]
-    return Read(robot, data, short, tuple(notices))
+    pose = pose_numbers(data.readings, np.full(len(data), ""))
+    return Read(robot, data, pose, short, tuple(notices))
+
+
+def _shots(rows: Measurements, visits: Measurements) -> list[Notice]:
+    """A notice where rows were taken together because they are shots of one visit to a pose."""
+    if len(rows) == len(visits):
+        return []
+    text = (
+        f"{len(rows)} rows are {len(visits)} visits to poses: rows after one another that were read at the "
+        "same pose are one row for every method, their mean. Most methods would take them for as many poses."
+    )
+    return [Notice("one_row_a_visit", text)]

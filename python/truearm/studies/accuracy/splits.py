@@ -1,4 +1,8 @@
-"""Which rows are held out: tails of joints, clusters, groups, another target, and random rows."""
+"""Which rows are held out: tails of joints, clusters, groups, another target, and random rows.
+
+Rows of one pose are on one side, whatever is held out: a row of a pose that trained would say how the arm
+repeats. Rows without the target that is fitted, or judged, take no part.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,11 +14,13 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
 from truearm.defaults import HOLDOUT
-from truearm.errors import UsageError, did_you_mean, list_names
+from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.measurements import Measurements
 from truearm.splitting import HoldoutRange, Split, SplitRule, split_rows
-from truearm.studies.accuracy.sets import DataSet, read_set
+from truearm.stillness import still_joints
+from truearm.studies.accuracy.sets import DataSet, Read, read_set
 
+Rows = NDArray[np.int64]
 Kind = Literal["tails", "clusters", "groups", "target", "random"]
 
 KINDS: Final[tuple[Kind, ...]] = ("tails", "clusters", "groups", "target", "random")
@@ -28,6 +34,8 @@ TITLES: Final = {
 CLUSTERS: Final = 10
 CLUSTER_COLUMN: Final = "cluster of the study"
 MOST_SHARED: Final = 0.5
+FEWEST_JUDGED: Final = 5
+"""Held-out rows at the least; a mean over fewer of them is chance."""
 MOST_JUDGED: Final = 1000
 """Held-out rows at the most; a mean over more of them changes by less than it does with the seed."""
 
@@ -43,6 +51,9 @@ class Cut:
 
     kind: Kind
     detail: str = ""
+
+    def __str__(self) -> str:
+        return " ".join(word for word in (TITLES[self.kind], self.detail) if word)
 
     @property
     def target(self) -> int:
@@ -69,23 +80,25 @@ def check_kinds(given: Sequence[str], *, split_by: bool) -> tuple[Kind, ...]:
     return tuple(kind for kind in KINDS if kind in wanted)
 
 
-def cuts(data: Measurements, kinds: Sequence[Kind], split_by: Sequence[str], turn: int) -> list[Cut]:
-    """The ways to hold out rows that `data` allows.
+def cuts(read: Read, kinds: Sequence[Kind], split_by: Sequence[str], turn: int) -> list[Cut]:
+    """The ways to hold out rows that a set allows.
 
-    Of each joint one tail, the lower and the upper ones in turn from joint to joint and from seed to seed;
-    groups where the columns are there and most rows share their values with others; targets where several
-    were measured.
+    Of each joint that moved one tail, the lower and the upper ones in turn from joint to joint and from seed
+    to seed; groups where the columns are there and most rows share their values with others; targets where
+    several were measured.
 
     Args:
-        data: What was measured.
+        read: The set.
         kinds: Kinds asked for.
         split_by: Columns of groups.
         turn: Number of the seed, from 0.
     """
-    found: list[Cut] = []
+    data, found = read.data, list[Cut]()
+    still = still_joints(data.readings, read.robot.joints)
+    moved = [joint for joint in range(1, data.joint_count + 1) if joint not in still]
     for kind in kinds:
         if kind == "tails":
-            found += [Cut(kind, str(_tail(joint, turn))) for joint in range(1, data.joint_count + 1)]
+            found += [Cut(kind, str(_tail(joint, turn))) for joint in moved]
         elif kind == "groups":
             found += [Cut(kind, ",".join(split_by))] if _has_groups(data, split_by) else []
         elif kind == "target":
@@ -99,10 +112,47 @@ def cuts(data: Measurements, kinds: Sequence[Kind], split_by: Sequence[str], tur
 def divide(data_set: DataSet, cut: Cut, seed: int) -> Split:
     """Training rows, of which the first are taken, and held-out rows, MOST_JUDGED at the most.
 
+    Training rows hold target 1, held-out ones the target that is judged.
+
     Raises:
         InputError: If a column is empty or the rows cannot be divided.
     """
-    data = read_set(data_set).data
+    read = read_set(data_set)
+    measured: NDArray[np.bool_] = np.asarray(np.isfinite(read.data.targets).all(axis=2))
+    fitted, judged = measured[:, 0], measured[:, cut.target]
+    rows = np.flatnonzero(fitted | judged)
+    split = _divided(read.data.select(rows), cut, seed)
+    train, holdout = _poses_together(read.pose, rows[split.train], rows[split.holdout])
+    train, holdout = train[fitted[train]], holdout[judged[holdout]]
+    count = min(len(holdout), MOST_JUDGED)
+    spread = np.arange(count) * len(holdout) // max(count, 1)
+    return Split(train, holdout[spread])
+
+
+def rows_of(data_set: DataSet, cut: Cut, seed: int, poses: int) -> Split:
+    """The first of the training rows, and the held-out rows that can be judged after these.
+
+    Where a set-up stands, and where the judged target is on its tool, is found from its training rows:
+    held-out rows of a set-up that has none of them take no part.
+
+    Raises:
+        InputError: If the rows cannot be divided, or fewer than FEWEST_JUDGED can be judged.
+    """
+    split, data = divide(data_set, cut, seed), read_set(data_set).data
+    train = split.train[:poses]
+    finding = train[np.isfinite(data.targets[train, cut.target]).all(axis=1)]
+    holdout = split.holdout[np.isin(data.group[split.holdout], data.group[finding])]
+    if len(holdout) < FEWEST_JUDGED:
+        raise InputError(
+            f"fewer than {FEWEST_JUDGED} held-out rows of set-ups that train can be judged",
+            where=data_set.file,
+        )
+    return Split(train, holdout)
+
+
+def _divided(data: Measurements, cut: Cut, seed: int) -> Split:
+    """Rows divided by what the cut says; which set-ups train is asked later, of the rows that are taken."""
+    data = replace(data, group=np.full_like(data.group, ""))
     if cut.kind == "tails":
         rule = SplitRule(seed=seed, holdout_range=HoldoutRange.parse(cut.detail))
     elif cut.kind == "groups":
@@ -112,10 +162,16 @@ def divide(data_set: DataSet, cut: Cut, seed: int) -> Split:
         rule = SplitRule(seed=seed, split_by=(CLUSTER_COLUMN,))
     else:
         rule = SplitRule(seed=seed, by_purpose=False)
-    split = split_rows(data, rule)
-    count = min(len(split.holdout), MOST_JUDGED)
-    spread = np.arange(count) * len(split.holdout) // count
-    return Split(split.train, split.holdout[spread])
+    return split_rows(data, rule)
+
+
+def _poses_together(pose: Rows, train: Rows, holdout: Rows) -> tuple[Rows, Rows]:
+    """Both sides with all rows of a pose on that of its first row; those that change it come last."""
+    order = np.concatenate([train, holdout])
+    held, there = np.isin(np.arange(len(pose)), holdout), np.sort(order)
+    _, first, number = np.unique(pose[there], return_index=True, return_inverse=True)
+    held[there] = held[there[first]][number.reshape(-1)]
+    return order[~held[order]], order[held[order]]
 
 
 def _tail(joint: int, turn: int) -> HoldoutRange:

@@ -150,6 +150,7 @@ def measured(setting: Setting, plan: Planned, path_of_session: Path) -> Measured
     )
     facts = {
         "regions": float(len(leaves)),
+        "poses": float(setting.poses),
         "condition_median": float(np.nanmedian(plan.kappa[leaves])),
         "measurements": float(used.sum()),
         "test_points": float(tests.sum()),

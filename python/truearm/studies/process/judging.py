@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
+from truearm.defaults import PAPER_POSES, PAPER_REGIONS
 from truearm.studies.claims import Claim, look_up
 from truearm.studies.statements import Statement
 
@@ -34,10 +35,18 @@ CLAIMS: Final = (
         lambda result: _path("fcmac", "cep_jump")(result) / _path("regional", "cep_jump")(result),
         0.5,
     ),
-    Claim("hours of measuring", "session", lambda result: look_up(result, "session", "hours"), 3.0),
     Claim("ours: largest error, variable model, mm", "figure10", _path("variable", "max_mm"), 0.5),
     Claim("ours: mean error, variable / conventional", "figure10", _ratio("variable", "mean_mm"), 0.5),
 )
+HOURS: Final = Claim("hours of measuring", "session", lambda result: look_up(result, "session", "hours"), 3.0)
+"""Of an experiment as large as the paper's."""
+AGREES: Final[Mapping[bool | None, str]] = {True: "yes", False: "no", None: "of another size"}
+
+
+def _as_large(result: Result) -> bool:
+    """Whether the experiment has as many regions, and poses in each, as the paper's."""
+    session = result["session"]
+    return (session["regions"], session["poses"]) == (PAPER_REGIONS, PAPER_POSES)
 
 
 def _sizes(result: Result, *schemes: str) -> str:
@@ -83,20 +92,23 @@ def _several(result: Result) -> tuple[str, bool]:
     ]
 
 
-def _demanded(result: Result) -> tuple[str, bool]:
+def _demanded(result: Result) -> tuple[str, bool | None]:
     share = result["figure10"]["regional"]["tests"]["regions_within"]
     needed = result["session"]["regions_that_suffice"]
-    words = f"met in {share:.0%} of the regions, as measured; by itself the division stops at {needed:.0f}"
-    return words, share >= 1.0
+    words = (
+        f"met in {share:.0%} of {result['session']['regions']:.0f} regions, as measured; by itself the "
+        f"division stops at {needed:.0f}"
+    )
+    return words, share >= 1.0 if _as_large(result) else None
 
 
-def _time(result: Result) -> tuple[str, bool]:
+def _time(result: Result) -> tuple[str, bool | None]:
     session = result["session"]
     words = (
         f"{session['hours']:.1f} h for {session['measurements']:.0f} poses at five seconds, "
         f"{session['hours_in_all']:.1f} h with the test points"
     )
-    return words, session["hours"] < 3.0
+    return words, session["hours"] < 3.0 if _as_large(result) else None
 
 
 STATEMENTS: Final = (
@@ -117,23 +129,26 @@ def judged(result: Result) -> dict[str, Any]:
     for statement in STATEMENTS:
         ours, agrees = statement.check(result)
         said = {"place": statement.place, "paper": statement.paper}
-        statements.append({**said, "ours": ours, "agrees": bool(agrees)})
+        statements.append({**said, "ours": ours, "agrees": None if agrees is None else bool(agrees)})
     return {"claims": _claims([result]), "statements": statements}
 
 
 def judged_over_arms(results: Sequence[Result]) -> dict[str, Any]:
-    """Claims over several arms, and with how many of them each statement agrees."""
-    statements = [
-        {
-            "place": statement.place,
-            "paper": statement.paper,
-            "agrees": sum(bool(statement.check(result)[1]) for result in results),
-        }
-        for statement in STATEMENTS
-    ]
+    """Claims over several arms, and with how many of them each statement agrees, None as with one of them."""
+    statements = []
+    for statement in STATEMENTS:
+        each = [statement.check(result)[1] for result in results]
+        agrees = None if None in each else sum(bool(one) for one in each)
+        statements.append({"place": statement.place, "paper": statement.paper, "agrees": agrees})
     return {"claims": _claims(results), "statements": statements}
 
 
+def arms_that_agree(statement: Mapping[str, Any]) -> str:
+    """On how many arms a statement of `judged_over_arms` holds, in words."""
+    return AGREES[None] if statement["agrees"] is None else str(statement["agrees"])
+
+
 def _claims(results: Sequence[Result]) -> list[dict[str, Any]]:
-    claims = [claim.judge(results) for claim in CLAIMS]
+    asked = (*CLAIMS, HOURS) if _as_large(results[0]) else CLAIMS
+    claims = [claim.judge(results) for claim in asked]
     return [claim for claim in claims if claim is not None]

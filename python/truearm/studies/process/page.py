@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from truearm.studies.markdown import table
 from truearm.studies.panels import TITLES
+from truearm.studies.process.judging import AGREES, arms_that_agree
 from truearm.studies.process.setting import ANGLE_DEG, LENGTH_MM, SHARE
 
 Result = Mapping[str, Any]
@@ -28,8 +29,8 @@ READINGS: Final = (
     ),
     (
         "Division",
-        "The longest side is halved, breadth first, until there are 85 regions, whatever was measured: all "
-        "poses are known beforehand and are measured in the paper's order in one session.",
+        "The longest side is halved, breadth first, until there are as many regions as above, whatever was "
+        "measured: all poses are known beforehand and are measured in the paper's order in one session.",
     ),
     (
         "Measuring",
@@ -59,10 +60,7 @@ def page(result: Result) -> str:
         "## What the paper states, and what comes out",
         table(
             ("place", "the paper", "here", "agrees"),
-            [
-                (s["place"], s["paper"], s["ours"], "yes" if s["agrees"] else "no")
-                for s in result["statements"]
-            ],
+            [(s["place"], s["paper"], s["ours"], AGREES[s["agrees"]]) for s in result["statements"]],
         ),
         "## Figure 10: the path",
         table(HEAD, [_on_path(name, part["path"]) for name, part in result["figure10"].items()]),
@@ -100,7 +98,7 @@ def _several(over: Result | None) -> list[str]:
         "because its path errs as that of Figure 10(a); the others come as they come.",
         table(
             ("place", "the paper", f"agrees on, of {count}"),
-            [(s["place"], s["paper"], str(s["agrees"])) for s in over["statements"]],
+            [(s["place"], s["paper"], arms_that_agree(s)) for s in over["statements"]],
         ),
         "Medians over the arms, and the 95 % quantile in brackets, mm.",
         table(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.cell.examples import example
 from truearm.defaults import EXPERIMENT_SPEED, PAPER_POSES, PAPER_REGIONS
+from truearm.errors import UsageError
 from truearm.files import parsed
 from truearm.planning.configurations import Configuration
 from truearm.planning.spaces import CartesianSpace
@@ -39,6 +40,9 @@ themselves are half as large as those of geometry."""
 WORLD_MM: Final = (440.0, -300.0, -75.0)
 EXPECTED_MM: Final = 6.0
 CHECK_EVERY: Final = 200
+COORDINATES: Final = 3
+FEWEST_POSES: Final = len(PAPER_PARAMETERS) // COORDINATES + 1
+"""Poses whose coordinates are more than the parameters of a region."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,15 @@ class Setting:
     poses: int = PAPER_POSES
     tests: int = TEST_POINTS
     speed: float = EXPERIMENT_SPEED
+
+    def __post_init__(self) -> None:
+        if self.poses < FEWEST_POSES:
+            raise UsageError(
+                f"{self.poses} poses in each region",
+                where="--poses",
+                rule=f"The {len(PAPER_PARAMETERS)} parameters of a region are found from more coordinates "
+                f"than that, {COORDINATES} of each pose: {FEWEST_POSES} poses at the least",
+            )
 
 
 def cell_text(setting: Setting) -> str:

@@ -81,7 +81,7 @@ def fit_grid(poses: Poses, residuals: Floats, effort: Effort) -> Correction:
         return np.asarray(shares[setting[0]][judge] @ errors(setting, fit))
 
     settings = effort.some(list(product(grids, RIDGES)))
-    best = best_setting(settings, predict, residuals, effort.seed)
+    best = best_setting(settings, predict, poses, residuals, effort.seed)
     (kind, count), ridge = best
     told = {"space": kind, "nodes": count, "ridge": ridge}
     return Grid(grids[kind, count], errors(best, np.arange(len(poses))), told)

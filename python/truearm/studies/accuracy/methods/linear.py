@@ -84,7 +84,7 @@ def _scores(
     family: Sequence[Ridge], poses: Poses, residuals: Floats, noise: float, effort: Effort
 ) -> list[tuple[float, Ridge]]:
     """Mean cross-validated error of each setting; normal equations of the folds are shared by all."""
-    divided = folds(len(poses), effort.seed)
+    divided = folds(poses, effort.seed)
     columns = with_constants(family[0].columns, poses)
     parts = [_sums(columns[judge], residuals[judge]) for _, judge in divided]
     gram, right = (np.sum([part[k] for part in parts], axis=0) for k in (0, 1))

@@ -64,7 +64,7 @@ def fit_radial(poses: Poses, residuals: Floats, effort: Effort) -> Correction:
         return np.asarray(functions(setting, fit)(inputs[setting[0]][judge]))
 
     settings = effort.some(list(product(SPACES, SHAPES, SMOOTHING)))
-    best = best_setting(settings, predict, residuals, effort.seed)
+    best = best_setting(settings, predict, poses, residuals, effort.seed)
     kind, (shape, width), smoothing = best
     told = {"space": kind, "kernel": shape, "epsilon": width, "smoothing": smoothing}
     return Radial(spaces[kind], functions(best, np.arange(len(poses))), told)

@@ -61,7 +61,7 @@ def fit_regressor(
         found = fitted(setting, fit).predict(inputs[setting[0]][judge])
         return np.asarray(found).reshape(len(judge), 3) * scale
 
-    best = best_setting(settings, predict, residuals, effort.seed)
+    best = best_setting(settings, predict, poses, residuals, effort.seed)
     kind, chosen = best
     whole = fitted(best, np.arange(len(poses)))
     return Regressor(spaces[kind], whole, scale, {"space": kind, **chosen})

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.studies.accuracy.fitted import Correction
 from truearm.studies.accuracy.poses import Poses
+from truearm.visits import pose_numbers
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -42,11 +43,17 @@ Learn = Callable[[Poses, Floats, Effort], Correction]
 """From poses and residuals of the constant model there (n, 3), m: what is to be added to it."""
 
 
-def folds(count: int, seed: int) -> list[tuple[Rows, Rows]]:
-    """Rows to fit to and rows to judge, for each fold."""
+def folds(poses: Poses, seed: int) -> list[tuple[Rows, Rows]]:
+    """Rows to fit to and rows to judge, for each fold; rows of one pose are in the same fold.
+
+    A setting that follows what the arm does not repeat would predict further rows of a pose best.
+    """
+    first = pose_numbers(poses.joints, np.full(len(poses), ""))
+    number = np.unique(first, return_inverse=True)[1].reshape(-1)
+    count = len(np.unique(first))
     order = np.random.default_rng([seed, count]).permutation(count)
-    parts = np.array_split(order, min(FOLDS, count))
-    return [(np.setdiff1d(order, part), np.sort(part)) for part in parts]
+    judged = [np.isin(number, part) for part in np.array_split(order, min(FOLDS, count))]
+    return [(np.flatnonzero(~rows), np.flatnonzero(rows)) for rows in judged]
 
 
 def search_rows(count: int) -> Rows:
@@ -57,6 +64,7 @@ def search_rows(count: int) -> Rows:
 def best_setting(
     settings: Sequence[Setting],
     predict: Callable[[Setting, Rows, Rows], Floats],
+    poses: Poses,
     residuals: Floats,
     seed: int,
 ) -> Setting:
@@ -65,10 +73,11 @@ def best_setting(
     Args:
         settings: What to try.
         predict: From a setting, rows to fit to and rows to predict (k,): predictions (k, 3).
+        poses: Training poses, n of them.
         residuals: What is to be predicted (n, 3).
         seed: Of the folds.
     """
-    divided = folds(len(search_rows(len(residuals))), seed)
+    divided = folds(poses.select(search_rows(len(poses))), seed)
 
     def score(setting: Setting) -> float:
         return sum(
