@@ -388,12 +388,13 @@ def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:
     if final.variable is None or searched.variable is None:
         return None
-    ranges = feature_ranges(feature_values(final.data, task.options.features))
+    values = feature_values(final.data, task.options.features)
     return VariableDetails(
         hyper=final.variable.hyper,
         evidence=searched.variable.evidence,
         evaluations=searched.variable.evaluations,
         inflation=final.variable.inflation,
         unexplained_m=unexplained(task, final.variable, final.data),
-        feature_ranges=tuple(ranges),
+        feature_ranges=tuple(feature_ranges(values)),
+        feature_lowest=tuple(values.min(axis=0).tolist()),
     )

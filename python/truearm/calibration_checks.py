@@ -54,6 +54,7 @@ class _Variable(_Part):
     inflation: float
     unexplained_m: float
     feature_ranges: list[float]
+    feature_lowest: list[float] | None = None
 
 
 class _Notice(_Part):
