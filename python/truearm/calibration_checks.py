@@ -27,6 +27,7 @@ class _Measured(_Part):
     rows: list[Count]
     targets: list[list[Count]]
     orientations: list[Count]
+    worth: list[list[float]] | None = None
 
 
 class _Identifiability(_Part):

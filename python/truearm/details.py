@@ -79,6 +79,11 @@ class VariableDetails:
     feature_lowest: tuple[float, ...] | None = None
 
 
+def left_m(constant: ConstantDetails, variable: VariableDetails | None) -> float:
+    """Standard deviation of a position's coordinate that the model that predicts leaves, m."""
+    return constant.noise_m if variable is None else variable.unexplained_m
+
+
 ANOTHER_PLACE: Final = "another_place"
 FARTHEST_SLIP_MM: Final = 20.0
 """What gives way when it is touched moves by less; what moves farther stands elsewhere and is turned, too."""
