@@ -187,7 +187,7 @@ def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Out
     return [
         *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
         *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
-        *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
+        *stated_too_large(data, judged, best, points),
         *constant_is_better(judged, best, points, outliers),
     ]
 
