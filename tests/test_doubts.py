@@ -320,6 +320,18 @@ def test_a_sigma_that_is_too_large_is_told(column, stated, told):
     assert not (told and "noise floor is reached" in words)
 
 
+@pytest.mark.parametrize("honest", [False, True])
+def test_a_sigma_that_is_too_large_in_a_part_of_the_rows_is_told(honest):
+    """Their median is right."""
+    arm, coarse = VirtualArm(ta.Robot.load("ur10"), seed=3), np.arange(60) % 5 < 2
+    table = arm.measure_table(arm.poses(60)).assign(sigma_mm=np.where(coarse, 1.0, 0.05))
+    if honest:
+        table.loc[coarse, ["x", "y", "z"]] += np.random.default_rng(0).normal(0.0, 1e-3, (coarse.sum(), 3))
+    calibration = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+    said = notice_of(calibration, "stated_too_large")
+    assert ("state a sigma of 1 mm, which alone would leave a mean error of 1.6 mm" in said) == (not honest)
+
+
 def test_single_rows_that_nobody_trusts_say_nothing_of_the_others():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
     table = arm.measure_table(arm.poses(60)).assign(sigma_mm=0.05)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.calibration_file import NO_DIGEST, calibration_bytes, parse_calibration
 from truearm.cli import main
 from truearm.exporting import Options, export
 from truearm.reporting.report import report
@@ -65,6 +66,28 @@ def test_an_evaluation_and_its_report_tell_it(arm, known):
 def test_an_update_tells_it(arm, known):
     assert told(ta.update(known, measured(arm, 20, 6, 6.0)).notices) == []
     assert told(ta.update(known, measured(arm, 20, 6, 500.0)).notices) == [FAR]
+
+
+def test_files_without_measurements_and_their_updates_tell_it(arm, known, tmp_path):
+    updated = ta.update(known, measured(arm, 20, 6, 6.0)).calibration
+    for name, calibration in {"a": known, "b": updated}.items():
+        assert beyond_learnt(calibration.without_rows(), [500.0]) == [FAR.split(":", maxsplit=1)[0]]
+        calibration.save(tmp_path / name, with_rows=False)
+        stripped = ta.Calibration.load(tmp_path / name)
+        assert beyond_learnt(stripped, [500.0]) == [FAR.split(":", maxsplit=1)[0]]
+        assert beyond_learnt(stripped, [8.1]) == []
+
+
+def test_files_that_do_not_say_where_features_lay_tell_it_by_their_rows(known, tmp_path):
+    """As those of earlier versions, until they are written again."""
+    arrays, content = parse_calibration(known.to_bytes(), "new.calib")
+    del content["variable"]["feature_lowest"]
+    again = ta.Calibration.from_bytes(
+        calibration_bytes(arrays, {**content, "sha256": NO_DIGEST}), where="older.calib"
+    )
+    assert beyond_learnt(again, [500.0]) == [FAR.split(":", maxsplit=1)[0]]
+    stripped = ta.Calibration.from_bytes(again.to_bytes(with_rows=False), where="stripped.calib")
+    assert beyond_learnt(stripped, [500.0]) == [FAR.split(":", maxsplit=1)[0]]
 
 
 def test_an_update_that_is_refused_tells_it(arm, known):

@@ -108,6 +108,25 @@ def test_a_target_of_another_set_up_makes_no_standard_deviation_large(arm, table
         assert known.position_std(q).max() < 1e-4
 
 
+@pytest.mark.parametrize(("sigma_mm", "rows"), [(5.0, 1), (5.0, 40), (0.02, 1)])
+def test_a_target_of_few_or_coarse_rows_harms_no_standard_deviation(arm, table, sigma_mm, rows):
+    """What the device saw of the tool is the place of the targets that it saw best."""
+    q, few = arm.poses(20, seed=4), np.arange(ROWS) < rows
+    coarse = table.drop(columns=QUATERNION).assign(sigma_mm=np.where(few, sigma_mm, 0.02))
+    coarse.loc[~few, SECOND] = np.nan
+    found, plain = constants(coarse), constants(coarse.drop(columns=SECOND))
+    for std in ("position_std", "conservative_std"):
+        ratio = np.median(getattr(found, std)(q)) / np.median(getattr(plain, std)(q))
+        assert ratio < 1.01
+    again = ta.Calibration.from_bytes(found.to_bytes(with_rows=False), where="without rows")
+    assert again.position_std(q).tolist() == found.position_std(q).tolist()
+
+
+def test_targets_of_as_many_rows_count_the_same(table):
+    found = constants(table.drop(columns=QUATERNION))
+    assert found.measured.shares(0).tolist() == [0.5, 0.5]
+
+
 def test_a_file_without_its_rows_tells_the_same(arm, by_set_up, turned_in_a):
     q = arm.poses(5, seed=4)
     for whole in (by_set_up, turned_in_a):

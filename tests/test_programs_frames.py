@@ -185,6 +185,12 @@ def test_tools_that_no_measurement_of_a_target_places_are_told(tmp_path, positio
         assert found.message.endswith("truearm frame CALIB touches.csv --tool tG")
         assert "\n" not in found.message
     assert notices_of(path, positions_alone, entry + "identified = {residual_mm = 0.03}\n") == []
+    bare = numbers(SEEN["pB"], tool=np.eye(4), placed=np.eye(4))
+    two = module(f"MoveJ {numbers(SEEN['pA'])},{GO}\nMoveJ {bare},v1,fine,tool0;")
+    path.write_bytes(two.encode("latin-1"))
+    (found,) = notices_of(path, positions_alone)
+    assert 'tools "tG" and "tool0" are measured' in found.message
+    assert "Teach each again" in found.message
     arm = VirtualArm(ABB, seed=3)
     poses = arm.measure(arm.poses(60, seed=1), orientation=True)
     (found,) = notices_of(path, ta.calibrate(ABB, poses, ta.Options.of(model="constant")))

@@ -25,13 +25,11 @@ from truearm.programs.languages import LANGUAGES, language_of
 from truearm.programs.layouts import EulerPose, Joints, QuaternionPose, RotationVectorPose, within_half_turn
 from truearm.programs.lexing import Token
 from truearm.programs.marks import MARK, mark_text
-from truearm.programs.notices import payload_notices
 from truearm.programs.report import report_of, unified_diff
 from truearm.programs.rewriting import Choices, rewrite
 from truearm.programs.solving import LEAST_GAIN, are_singular
 from truearm.programs.source import Source
 from truearm.robot import Robot
-from truearm.robot_data import Payload
 
 TWO = f"MoveJ pA,{GO}\nMoveJ pB,{GO}"
 
@@ -180,16 +178,6 @@ def test_a_base_that_is_turned_is_refused_by_the_angle():
     base[:2, :2] = [[-1.0, 0.0], [0.0, -1.0]]
     with pytest.raises(InputError, match=r"180\.0 deg away"):
         refuse_another_arm(Controller(but(ABB, base=base, base_row=None), "factory", "ros.urdf"), ABB)
-
-
-def test_payloads_are_compared():
-    loaded = Robot(
-        **{**{name: getattr(ABB, name) for name in ABB.__dataclass_fields__}, "payload": Payload(0.5)}
-    )
-    program = program_of(TWO)
-    rewritten(program, models(ABB))
-    assert "1.5 kg" in payload_notices(program, loaded)[0].message
-    assert payload_notices(program, ABB) == []
 
 
 class Wavy(Shift):

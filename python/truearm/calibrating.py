@@ -12,7 +12,7 @@ from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.conventions import fits_otherwise
 from truearm.core_set import select
-from truearm.details import ConstantDetails, VariableDetails
+from truearm.details import ConstantDetails, VariableDetails, left_m
 from truearm.distance_zero import zero_notices
 from truearm.doubts import (
     FAR_FROM_NOMINAL,
@@ -51,7 +51,7 @@ from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge, where_found
 from truearm.lengths import length_mm
-from truearm.measured_parts import MeasuredParts
+from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE
 from truearm.options import Options
@@ -123,16 +123,16 @@ def calibrate(
     if astray:
         final, order = trained, split.train
     searched = trained if _keeps_hyper(trained) else final
-    variable = _variable_details(task, final, searched)
+    constant, variable, measured = _details(task, final, searched)
     found = Calibration(
         robot=robot,
         options=chosen,
         groups=tuple(task.groups),
         selection=task.selection,
-        measured=_measured(task, final),
+        measured=measured,
         models=final.models(task.arm),
         identifiability=final.identifiability,
-        constant=_constant_details(task, final),
+        constant=constant,
         variable=variable,
         validation=validation,
         held=held,
@@ -147,7 +147,7 @@ def calibrate(
             *_over_time(task, given, drift, validation),
         ),
         seconds=trained.seconds,
-        fitted_spread=_fitted_spread(task, final, variable),
+        fitted_spread=_fitted_spread(task, final, variable, measured),
     )
     return replace(found, notices=(*found.notices, *_doubts(task, found, given, stages)))
 
@@ -187,7 +187,7 @@ def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Out
     return [
         *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
         *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
-        *stated_too_large(data.sigma_m, judged, best, distances=found.selection.distances),
+        *stated_too_large(data, judged, best, points),
         *constant_is_better(judged, best, points, outliers),
     ]
 
@@ -306,18 +306,22 @@ def _open_setup(task: Task, found: Identifiability, data: Measurements) -> list[
     return [Notice(OPEN_SETUP, text)]
 
 
-def _fitted_spread(task: Task, fits: Fits, details: VariableDetails | None) -> VariableSpread | None:
+def _fitted_spread(
+    task: Task, fits: Fits, details: VariableDetails | None, measured: MeasuredParts
+) -> VariableSpread | None:
     """The posterior of the field's fit, which a large set would take long to find again."""
     if fits.variable is None or details is None:
         return None
     columns = list(task.arm.candidates.columns)
-    noises, place = noises_of(details.hyper), SetupPlace.of(task, _measured(task, fits))
+    noises, place = noises_of(details.hyper), SetupPlace.of(task, measured)
     return VariableSpread(columns, fits.variable.posterior, details.inflation, noises, place)
 
 
-def _measured(task: Task, fits: Fits) -> MeasuredParts:
-    """What the rows of each set-up hold of what was fitted."""
-    return MeasuredParts.of(fits.data, task.selection, task.groups)
+def _measured(task: Task, fits: Fits, left: float) -> MeasuredParts:
+    """What the rows of each set-up hold of what was fitted, of which the model leaves so much, m."""
+    fit, sigma = fits.variable or fits.constant, fits.data.sigma_m
+    own = np.zeros(len(fits.data)) if sigma is None else np.nan_to_num(sigma)
+    return MeasuredParts.of(fits.data, task.selection, task.groups, sureness(own, left, fit.weights))
 
 
 def _fit_both(
@@ -378,6 +382,14 @@ def _astray(task: Task, fits: tuple[Fits, Fits], held: Measurements, judged: Hel
     return [Notice(REFIT_ASTRAY, text)]
 
 
+def _details(
+    task: Task, final: Fits, searched: Fits
+) -> tuple[ConstantDetails, VariableDetails | None, MeasuredParts]:
+    """More about both models, and what of what was fitted the set-ups measured."""
+    constant, variable = _constant_details(task, final), _variable_details(task, final, searched)
+    return constant, variable, _measured(task, final, left_m(constant, variable))
+
+
 def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
     names = fits.identifiability.determined
     return ConstantDetails.of(
@@ -388,12 +400,13 @@ def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:
     if final.variable is None or searched.variable is None:
         return None
-    ranges = feature_ranges(feature_values(final.data, task.options.features))
+    values = feature_values(final.data, task.options.features)
     return VariableDetails(
         hyper=final.variable.hyper,
         evidence=searched.variable.evidence,
         evaluations=searched.variable.evaluations,
         inflation=final.variable.inflation,
         unexplained_m=unexplained(task, final.variable, final.data),
-        feature_ranges=tuple(ranges),
+        feature_ranges=tuple(feature_ranges(values)),
+        feature_lowest=tuple(values.min(axis=0).tolist()),
     )

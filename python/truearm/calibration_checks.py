@@ -27,6 +27,7 @@ class _Measured(_Part):
     rows: list[Count]
     targets: list[list[Count]]
     orientations: list[Count]
+    worth: list[list[float]] | None = None
 
 
 class _Identifiability(_Part):
@@ -54,6 +55,7 @@ class _Variable(_Part):
     inflation: float
     unexplained_m: float
     feature_ranges: list[float]
+    feature_lowest: list[float] | None = None
 
 
 class _Notice(_Part):

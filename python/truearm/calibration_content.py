@@ -20,6 +20,7 @@ from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
+from truearm.learnt_features import learnt_spans
 from truearm.measured_parts import MeasuredParts
 from truearm.models import ArmModel
 from truearm.options import Options
@@ -56,7 +57,7 @@ def pack(calibration: "Calibration", *, with_rows: bool) -> tuple[Arrays, dict[s
         "measured": calibration.measured.pack(),
         "identifiability": calibration.identifiability.to_dict(),
         "constant": _constant(calibration.constant),
-        "variable": _variable(calibration.variable),
+        "variable": _variable(calibration),
         "scheme": None if calibration.scheme is None else calibration.scheme.to_dict(),
         "models": {name: _model(name, model, arrays) for name, model in calibration.models.items()},
         "validation": calibration.validation.to_dict(),
@@ -200,12 +201,14 @@ def _read_constant(content: Mapping[str, Any], arrays: Arrays) -> ConstantDetail
     )
 
 
-def _variable(details: VariableDetails | None) -> dict[str, Any] | None:
+def _variable(calibration: "Calibration") -> dict[str, Any] | None:
+    details = calibration.variable
     if details is None:
         return None
     return {
         "hyper": {name: details.hyper[name] for name in sorted(details.hyper)},
         "feature_ranges": list(details.feature_ranges),
+        "feature_lowest": [low for low, _ in learnt_spans(calibration)],
         **{key: getattr(details, key) for key in VARIABLE_KEYS},
     }
 
@@ -216,8 +219,21 @@ def _read_variable(content: Mapping[str, Any] | None) -> VariableDetails | None:
     return VariableDetails(
         hyper=content["hyper"],
         feature_ranges=tuple(content["feature_ranges"]),
+        feature_lowest=_read_lowest(content),
         **{key: content[key] for key in VARIABLE_KEYS},
     )
+
+
+def _read_lowest(content: Mapping[str, Any]) -> tuple[float, ...] | None:
+    """The lowest value of each feature; None where the file does not say."""
+    lowest, ranges = content.get("feature_lowest"), content["feature_ranges"]
+    if not lowest:
+        return None
+    if len(lowest) != len(ranges):
+        raise InputError(
+            f"'variable.feature_lowest' has {len(lowest)} values", rule=f"There are {len(ranges)} features"
+        )
+    return tuple(lowest)
 
 
 def _model(name: str, model: ArmModel, arrays: Arrays) -> dict[str, Any]:

@@ -150,9 +150,8 @@ class Compensator:
         return f"<Compensator of {name} by the {model} model, {self.task}>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        features = dict(zip(self.feature_names, self._features, strict=True))
-        kept = (self.calibration, self.programming, self.task, self._moving, self.limits, features)
-        return _compensator, kept
+        shared = (self.calibration, self.programming, self.task, self._moving, self.limits)
+        return _compensator, (*shared, self.named_features)
 
     def joints(
         self, q: ArrayLike, *, tool: ArrayLike | None = None, author: Robot | None = None
@@ -228,6 +227,11 @@ class Compensator:
     def features(self) -> list[float]:
         """Values of the features that the calibration depends on, in its order."""
         return self._features
+
+    @property
+    def named_features(self) -> dict[str, float]:
+        """The same by name."""
+        return dict(zip(self.feature_names, self._features, strict=True))
 
     def corrector(self, tool: ArrayLike | None = None) -> Corrector:
         """The core's corrector for a tool, flange_from_tool (4, 4) or a point (3,)."""

@@ -67,6 +67,7 @@ class VariableDetails:
         unexplained_m: Standard deviation of a position's coordinate that is left: noise, and what the joints
             miss anew at every pose, where they were measured.
         feature_ranges: How far the values of each feature reached.
+        feature_lowest: From where on; None in files of earlier versions.
     """
 
     hyper: dict[str, list[float]]
@@ -75,6 +76,12 @@ class VariableDetails:
     inflation: float
     unexplained_m: float
     feature_ranges: tuple[float, ...]
+    feature_lowest: tuple[float, ...] | None = None
+
+
+def left_m(constant: ConstantDetails, variable: VariableDetails | None) -> float:
+    """Standard deviation of a position's coordinate that the model that predicts leaves, m."""
+    return constant.noise_m if variable is None else variable.unexplained_m
 
 
 ANOTHER_PLACE: Final = "another_place"

@@ -55,6 +55,11 @@ SAME: Final = 0.97
 """Mean errors whose ratio is between it and one are as good as the same."""
 UNLIKELY: Final = 0.5
 """Noise leaves no mean error of so small a part of its own."""
+FEWEST_OF_LEVEL: Final = 5
+"""Rows of a level of sigma that do not all come out at so small a part of their noise by chance: of five it
+is one level in a thousand."""
+ALIKE: Final = 2.0
+"""Sigmas whose ratio is below it are of one level."""
 SURE: Final = 2.0
 """Standard errors of the mean difference over poses beyond which one model does better than another."""
 STATED_TOO_LARGE: Final = "stated_too_large"
@@ -140,13 +145,22 @@ def doubts(
 
 
 def stated_too_large(
-    sigma_m: Floats | None, validation: Validation, best: str, *, distances: bool
+    data: Measurements, validation: Validation, best: str, held: HeldRows | None
 ) -> list[Notice]:
-    """A warning where held-out rows are far nearer than the noise that rows (n,) state lets them be."""
-    stated = 0.0 if sigma_m is None else float(np.median(np.nan_to_num(sigma_m))) * MM_PER_METRE
-    left, noise = validation.holdout[best].position.mean, mean_distance(stated, distances=distances)
-    if left > UNLIKELY * noise:
+    """A warning where held-out rows are far nearer than the noise that rows state lets them be.
+
+    Args:
+        data: All rows.
+        validation: Errors of the models.
+        best: The model that is used.
+        held: The held-out rows, of which each level of sigma is judged; None where distances were judged.
+    """
+    if data.sigma_m is None:
         return []
+    stated = float(np.median(np.nan_to_num(data.sigma_m))) * MM_PER_METRE
+    left, noise = validation.holdout[best].position.mean, mean_distance(stated, distances=held is None)
+    if left > UNLIKELY * noise:
+        return [] if held is None else _level_too_large(held.sigmas_mm(data), held, best)
     text = (
         f"The column of sigma typically says {length_mm(stated, 3)}, which alone would leave a mean error "
         f"of {length_mm(noise, 3)}; on {validation.judged} rows it is {length_mm(left, 3)}. So sigma is too "
@@ -154,6 +168,36 @@ def stated_too_large(
         "leave the column out."
     )
     return [Notice(STATED_TOO_LARGE, text)]
+
+
+def _level_too_large(sigmas_mm: Floats, held: HeldRows, best: str) -> list[Notice]:
+    """The same of the largest sigma that enough held-out rows state (n,), if it is so."""
+    errors = MM_PER_METRE * held.errors[best].distance_m
+    for level in reversed(_levels(np.where(np.isfinite(errors), sigmas_mm, 0.0))):
+        left, noise = float(errors[level].mean()), mean_distance(sigmas_mm[level].mean(), distances=False)
+        if len(level) < FEWEST_OF_LEVEL or left > UNLIKELY * noise:
+            continue
+        ends = (length_mm(end, 3) for end in (sigmas_mm[level].min(), sigmas_mm[level].max()))
+        text = (
+            f"{count_of(len(level), 'held-out row')} of {len(held)} state a sigma of "
+            f"{' to '.join(dict.fromkeys(ends))}, which alone would leave a mean error of "
+            f"{length_mm(noise, 3)}; theirs is {length_mm(left, 3)}. So sigma is too large there: errors of "
+            "the arm are taken for noise, and standard deviations may be too small. Correct it (sigma is in "
+            "m, sigma_mm in mm), or leave the column out."
+        )
+        return [Notice(STATED_TOO_LARGE, text)]
+    return []
+
+
+def _levels(sigmas: Floats) -> list[NDArray[np.int64]]:
+    """Rows by what they state (n,), ascending: places of those that are alike within ALIKE, zeros apart."""
+    order = [int(k) for k in np.argsort(sigmas, kind="stable") if sigmas[k] > 0.0]
+    levels: list[list[int]] = []
+    for k in order:
+        if not levels or sigmas[k] > ALIKE * sigmas[levels[-1][0]]:
+            levels.append([])
+        levels[-1].append(k)
+    return [np.array(level, dtype=np.int64) for level in levels]
 
 
 def constants_do_better(mean_mm: float, constant_mm: float) -> bool:

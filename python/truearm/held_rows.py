@@ -54,6 +54,15 @@ class HeldRows:
         own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
         return np.array([row not in named for row in own], dtype=bool)
 
+    def sigmas_mm(self, data: Measurements) -> Floats:
+        """What each of these rows states as its sigma (n,) in the measurements it is of, mm; else zero."""
+        if data.sigma_m is None:
+            return np.zeros(len(self))
+        names = zip(data.sources.tolist(), data.rows.tolist(), strict=True)
+        stated = dict(zip(names, (MM_PER_METRE * np.nan_to_num(data.sigma_m)).tolist(), strict=True))
+        own = zip(self.sources.tolist(), self.rows.tolist(), strict=True)
+        return np.array([stated.get(row, 0.0) for row in own])
+
     def among(self, outliers: Sequence[Mapping[str, Any]], model: str) -> list[Mapping[str, Any]]:
         """Those of the outliers, given with file and row, that are among these rows.
 

@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.arrays import as_numbers, check_finite
-from truearm.errors import InputError, UsageError, list_names
+from truearm.errors import InputError, UsageError, list_names, typed
 
 Floats = NDArray[np.float64]
 Features = Mapping[str, ArrayLike] | pd.DataFrame
@@ -16,6 +16,8 @@ Features = Mapping[str, ArrayLike] | pd.DataFrame
 
 PAYLOAD: Final = "payload"
 """Features whose names begin so are weights that the arm carries."""
+PAYLOAD_KG: Final = "payload_kg"
+"""The one of them whose unit is known."""
 
 
 def is_payload(feature: str) -> bool:
@@ -61,7 +63,17 @@ def feature_columns(given: Features | None, names: Sequence[str], count: int) ->
                 f'the feature "{name}" has shape {np.shape(known[name])}',
                 rule=f"One number, or {count}: one for each pose",
             )
+        _check_known(name, values)
         columns[:, k] = values
-    if columns.size:
-        check_finite(columns, what="features")
     return columns
+
+
+def _check_known(name: str, values: Floats) -> None:
+    """Raise InputError where one of a feature's values (n,) is not finite."""
+    if values.size == 1 and not np.isfinite(values[0]):
+        raise InputError(
+            f'the feature "{name}" is {values[0]:g}',
+            rule="All values must be finite",
+            way_out=f"Give a number: --feature {typed(name)}=NUMBER, or in Python features={{...}}",
+        )
+    check_finite(values, what=f'values of the feature "{name}"')

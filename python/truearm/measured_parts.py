@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ Counts = NDArray[np.int64]
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+LEAST_LEFT_M: Final = 1e-9
+"""No row is known better than this."""
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredParts:
@@ -24,15 +27,20 @@ class MeasuredParts:
         rows: Rows with a fitted target (G,), or with a distance.
         targets: Rows with each of the t fitted targets (G, t); of distances (G, 1).
         orientations: Rows with an orientation (G,); zero where it took no part.
+        worth: Weights of the rows with each target added up, in rows as sure as the surest one (G, t).
     """
 
     rows: Counts
     targets: Counts
     orientations: Counts
+    worth: Floats
 
     @classmethod
-    def of(cls, data: Measurements, selection: Selection, groups: Sequence[str]) -> "MeasuredParts":
-        """Those of the rows that were fitted."""
+    def of(
+        cls, data: Measurements, selection: Selection, groups: Sequence[str], sureness: Floats | None = None
+    ) -> "MeasuredParts":
+        """Those of the rows that were fitted; without `sureness` (n,) all of them are as sure."""
+        sure = np.ones(len(data)) if sureness is None else sureness
         held = held_parts(data, selection)
         points = np.ones((len(data), 1), dtype=np.bool_) if selection.distances else held[:, :-1]
         own = [data.group == group for group in groups]
@@ -40,13 +48,15 @@ class MeasuredParts:
             np.array([points[rows].any(axis=1).sum() for rows in own], dtype=np.int64),
             np.array([points[rows].sum(axis=0) for rows in own], dtype=np.int64),
             np.array([held[rows, -1].sum() for rows in own], dtype=np.int64),
+            np.array([sure[rows] @ points[rows] for rows in own]),
         )
 
     @classmethod
     def whole(cls, selection: Selection, groups: int) -> "MeasuredParts":
         """Those of a file that does not say: all set-ups are taken to have measured everything."""
         targets = np.ones((groups, max(len(selection.targets), 1)), dtype=np.int64)
-        return cls(targets[:, 0], targets, targets[:, 0] * selection.orientation)
+        turned = targets[:, 0] * selection.orientation
+        return cls(targets[:, 0], targets, turned, targets.astype(np.float64))
 
     def first(self, group: int) -> int:
         """Place of the first target that a set-up measured; 0 where it measured none."""
@@ -60,25 +70,44 @@ class MeasuredParts:
         """Which targets, by their places, and last whether orientations, each set-up measured (G, k + 1)."""
         return np.column_stack([self.targets[:, list(places)], self.orientations]) > 0
 
+    def shares(self, group: int) -> Floats:
+        """Parts (t,) of one for which the middle of a set-up's targets is known best; zeros without rows."""
+        worth = self.worth[group]
+        return np.asarray(worth / worth.sum()) if worth.any() else worth
+
     def pack(self) -> dict[str, Any]:
         """JSON values."""
-        return {name: getattr(self, name).tolist() for name in ("rows", "targets", "orientations")}
+        return {name: getattr(self, name).tolist() for name in ("rows", "targets", "orientations", "worth")}
 
     @classmethod
     def unpack(cls, content: Mapping[str, Any], selection: Selection, groups: int) -> "MeasuredParts":
-        """Those that `pack` described.
+        """Those that `pack` described; where it does not say what rows are worth all count the same.
 
         Raises:
             InputError: If they are of other set-ups or targets.
         """
         expected = cls.whole(selection, groups)
+        content = {"worth": content["targets"], **content}
         for name, counts in content.items():
             shape = getattr(expected, name).shape
             if np.shape(counts) != shape:
                 raise InputError(
                     f"'measured.{name}' has shape {np.shape(counts)}", rule=f"It must be {shape}"
                 )
-        return cls(**{name: np.array(counts, dtype=np.int64) for name, counts in content.items()})
+        kept = {name: np.array(content[name], dtype=np.int64) for name in ("rows", "targets", "orientations")}
+        return cls(**kept, worth=np.array(content["worth"], dtype=np.float64))
+
+
+def sureness(own_m: Floats, left_m: float, weight: Floats) -> Floats:
+    """Weights of rows (n,) in parts of that of the surest one.
+
+    Args:
+        own_m: The sigma that each row states (n,), m; zero where it states none.
+        left_m: What the model leaves of a coordinate beside it, m.
+        weight: Weights of outliers (n,).
+    """
+    deviation = np.hypot(max(left_m, LEAST_LEFT_M), own_m)
+    return np.asarray(weight * (deviation.min() / deviation) ** 2)
 
 
 def held_parts(data: Measurements, selection: Selection) -> Mask:

@@ -11,6 +11,7 @@ from truearm.arrays import as_rows, as_transforms
 from truearm.endpoints import at_tool
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_rows
 from truearm.inputs import feature_columns
+from truearm.learnt_features import learnt_spans
 from truearm.limits import TASKS, Limits, Task
 from truearm.measurements import Measurements
 from truearm.robot import Robot
@@ -103,13 +104,12 @@ def beyond_learnt(calibration: "Calibration", values: ArrayLike) -> list[str]:
         calibration: What learned.
         values: Features (F,) in its order, or those of each row (n, F).
     """
-    names, rows = feature_names(calibration), calibration.learned_from
-    if rows is None or not names:
+    names, spans = feature_names(calibration), learnt_spans(calibration)
+    if not names or not spans:
         return []
     found = []
-    for name, given in zip(names, np.atleast_2d(np.asarray(values, dtype=np.float64)).T, strict=True):
-        learnt = rows.data.features[name]
-        low, high = float(learnt.min()), float(learnt.max())
+    columns = np.atleast_2d(np.asarray(values, dtype=np.float64)).T
+    for name, given, (low, high) in zip(names, columns, spans, strict=True):
         margin = MARGIN * (high - low)
         sides = (given[given < low - margin], given[given > high + margin])
         values_beyond = " and ".join(_span(side) for side in sides if len(side))

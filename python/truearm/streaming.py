@@ -95,7 +95,7 @@ class CorrectionStream:
         Raises:
             UsageError: If an option is not positive.
         """
-        self._features = dict(zip(compensator.feature_names, compensator.features, strict=True))
+        self._features = compensator.named_features
         self._joints = compensator.programming.joint_count
         try:
             self._core = Stream(compensator.corrector(tool), (options or StreamOptions()).core())

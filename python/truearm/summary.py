@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import ANGLE_ARM_M
+from truearm.details import left_m
 from truearm.errors import in_words
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
 from truearm.validation import mean_distance
@@ -70,8 +71,7 @@ def noise_mm(calibration: "Calibration") -> float:
     """
     if calibration.scheme is not None:
         return _held_out_mm(calibration)
-    details = calibration.variable
-    return MM_PER_METRE * (calibration.constant.noise_m if details is None else details.unexplained_m)
+    return MM_PER_METRE * left_m(calibration.constant, calibration.variable)
 
 
 def _held_out_mm(calibration: "Calibration") -> float:

@@ -75,9 +75,9 @@ class SetupPlace:
 
     Attributes:
         motion: Motion (12, S) of the base (translation, rotation vector), of the tool (translation in the
-            flange's frame, that of the middle of the targets that were measured) and of the measured
-            orientation (rotation vector in the target's frame) with them; zero where nothing was fitted. It
-            is that of the set-up with most rows.
+            flange's frame, that of the middle of the targets, each as much as its rows are sure) and of the
+            measured orientation (rotation vector in the target's frame) with them; zero where nothing was
+            fitted. It is that of the set-up with most rows.
         turning: The same of the set-up with most orientations, for how a target is turned.
     """
 
@@ -108,10 +108,9 @@ def _motion(task: Task, measured: MeasuredParts, group: int) -> Floats:
     start, end = group * width, (group + 1) * width
     motion = np.zeros((MOTIONS + AXES, count))
     motion[:frame, start : start + frame] = np.eye(frame)
-    held = np.flatnonzero(measured.targets[group, : len(task.selection.targets)])
-    for k in held:
+    for k, share in enumerate(measured.shares(group)[: len(task.selection.targets)]):
         target = start + frame + AXES * k
-        motion[FRAME_UNKNOWNS:MOTIONS, target : target + AXES] = np.eye(AXES) / len(held)
+        motion[FRAME_UNKNOWNS:MOTIONS, target : target + AXES] = share * np.eye(AXES)
     if measured.orientations[group]:
         motion[MOTIONS:, end - AXES : end] = np.eye(AXES)
     return motion

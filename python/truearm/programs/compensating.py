@@ -87,7 +87,7 @@ def compensate_program(
         _facts(compensator, declared, chosen),
         [
             *frames_notices(program, known),
-            *payload_notices(program, calibration.robot),
+            *payload_notices(program, calibration.robot, compensator.named_features),
             *update_notices(calibration),
             *still_notices(done, calibration),
             *tool_notices(done, calibration),

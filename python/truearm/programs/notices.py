@@ -7,6 +7,7 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.errors import Notice, list_names, typed
+from truearm.inputs import PAYLOAD_KG, is_payload
 from truearm.programs.environment import Environment, Frame
 from truearm.programs.frames import Frames, Kind
 from truearm.programs.layouts import of_joints as layout_of_joints
@@ -23,23 +24,42 @@ POSE: Final = 6
 IN_WORDS: Final[dict[Kind, str]] = {"tool": "tool", "object": "work object"}
 
 
-def payload_notices(program: Program, robot: Robot) -> list[Notice]:
-    """What differs between the payload that was calibrated with and those that the program states."""
+def payload_notices(program: Program, robot: Robot, features: Mapping[str, float]) -> list[Notice]:
+    """What differs between the payloads that a program states and the one that its corrections are for.
+
+    Args:
+        program: The program.
+        robot: The calibrated arm; its payload counts where no feature of the calibration is one.
+        features: Values of the calibration's features, by name, that the program is corrected for.
+    """
     stated = sorted({e.payload_kg for e in program.environments if e.payload_kg is not None})
-    if robot.payload is None or not stated:
+    weights = {name: value for name, value in features.items() if is_payload(name)}
+    if weights:
+        others = _unlike(stated, weights.get(PAYLOAD_KG))
+        given = ", ".join(f"{name} = {value:g}" for name, value in weights.items())
+        option = typed(f"{PAYLOAD_KG if PAYLOAD_KG in weights else next(iter(weights))}=NUMBER")
+        why, way_out = f"corrections are for {given}", f". Rewrite it once for each: --feature {option}"
+    elif robot.payload is not None:
+        others = _unlike(stated, robot.payload.mass_kg)
+        why, way_out = f"the calibration was made with {robot.payload.mass_kg:g} kg", ""
+    else:
         return []
-    calibrated = robot.payload.mass_kg
-    others = [mass for mass in stated if abs(mass - calibrated) > SAME_PAYLOAD_KG]
-    if not others:
-        return []
-    masses = ", ".join(f"{mass:g} kg" for mass in others)
-    return [
-        Notice(
-            "payload",
-            f"the program states a payload of {masses}, the calibration was made with {calibrated:g} kg: "
-            "what the arm yields under the difference is not corrected",
-        )
-    ]
+    masses = " and ".join(f"{mass:g} kg" for mass in others)
+    text = (
+        f"the program states a payload of {masses}, {why}: what the arm yields under the difference is not "
+        f"corrected{way_out}"
+    )
+    return [Notice("payload", text)] if others else []
+
+
+def _unlike(stated: Sequence[float], corrected_for: float | None) -> list[float]:
+    """Masses (ascending, kg) that are another than the one that is corrected for.
+
+    Of one in an unknown unit only so much is known that it is not several at once.
+    """
+    if corrected_for is None:
+        return list(stated) if len(stated) > 1 and stated[-1] - stated[0] > SAME_PAYLOAD_KG else []
+    return [mass for mass in stated if abs(mass - corrected_for) > SAME_PAYLOAD_KG]
 
 
 def frames_notices(program: Program, frames: Frames) -> list[Notice]:
@@ -121,14 +141,15 @@ def tool_notices(done: Rewritten, calibration: Calibration) -> list[Notice]:
     names = list(dict.fromkeys(tool.name for tool in doubtful if tool.name))
     if not doubtful:
         return []
-    tools = f"tool{'s' if len(names) > 1 else ''} {list_names(names)}" if names else "the program's tool"
-    name = typed(names[0]) if names else "NAME"
+    several, name = len(names) > 1, typed(names[0]) if names else "NAME"
+    tools = f"tool{'s' if several else ''} {list_names(names)}" if names else "the program's tool"
     return [
         Notice(
             "tool",
             f"the calibration knows {known} alone, which do not tell where the flange is, and from there "
-            f"{tools} is measured: all targets may be off by more than std_mm says. "
-            f"Teach it again through the calibration: truearm frame CALIB touches.csv --tool {name}",
+            f"{tools} {'are' if several else 'is'} measured: all targets may be off by more than std_mm "
+            f"says. Teach {'each' if several else 'it'} again through the calibration: "
+            f"truearm frame CALIB touches.csv --tool {name}",
         )
     ]
 

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from truearm.calibration import Calibration
-from truearm.details import ConstantDetails
+from truearm.details import ConstantDetails, left_m
 from truearm.errors import Notice, in_words
 from truearm.fitted_rows import TRAINED, FittedRows
 from truearm.held_rows import HeldRows
 from truearm.judging import judge
-from truearm.measured_parts import MeasuredParts
+from truearm.measured_parts import MeasuredParts, sureness
 from truearm.models import NOMINAL, ArmModel
 from truearm.revision import Carried, Revision
 from truearm.standard_errors import of_covariance
 from truearm.uncertainty import UpdatedSpread
 from truearm.updating.carrying import carried
 from truearm.updating.estimating import Estimate
-from truearm.updating.scene import Scene
+from truearm.updating.scene import Scene, sigmas_m
 from truearm.updating.validating import setup_of
 from truearm.validation import RowErrors, Validation
 
@@ -62,7 +62,7 @@ def updated(
         calibration,
         groups=tuple(task.groups),
         selection=task.selection,
-        measured=MeasuredParts.of(scene.data, task.selection, task.groups),
+        measured=_measured(calibration, scene),
         models=models,
         constant=_constant(calibration, scene, errors),
         validation=Validation(
@@ -134,6 +134,14 @@ def _carried_over(
     kept = np.equal.outer(columns, before).astype(np.float64)
     stays = block_diag(kept, errors.tied) - found @ errors.response @ shown
     return np.asarray(stays @ covariance @ stays.T + found @ errors.own @ found.T)
+
+
+def _measured(calibration: Calibration, scene: Scene) -> MeasuredParts:
+    """What the rows of each set-up hold, of which the calibration leaves as much as before."""
+    task, own = scene.task, sigmas_m(calibration, scene.data)
+    left = left_m(calibration.constant, calibration.variable)
+    sure = sureness(own, left, np.ones(len(own)))
+    return MeasuredParts.of(scene.data, task.selection, task.groups, sure)
 
 
 def _rows(scene: Scene, found: Estimate) -> FittedRows:
