@@ -25,7 +25,7 @@ from truearm.programs.languages import LANGUAGES, language_of
 from truearm.programs.layouts import EulerPose, Joints, QuaternionPose, RotationVectorPose, within_half_turn
 from truearm.programs.lexing import Token
 from truearm.programs.marks import MARK, mark_text
-from truearm.programs.notices import payload_notices
+from truearm.programs.notices import language_notices, payload_notices
 from truearm.programs.report import report_of, unified_diff
 from truearm.programs.rewriting import Choices, rewrite
 from truearm.programs.solving import LEAST_GAIN, are_singular
@@ -137,6 +137,29 @@ def test_controllers_that_may_differ_must_be_declared():
             declared_controller("nominal", language_of(Path("p"), language), Robot.load(name)).kind
             == "nominal"
         )
+
+
+def test_of_universal_robots_only_a_simulated_arm_is_said_to_be_nominal():
+    for name, language in (("ur10e", "KRL"), ("rv-m2", "URScript")):
+        with pytest.raises(UsageError, match=r"calibration\.conf out of.*Only a simulated arm is nominal"):
+            declared_controller(None, language_of(Path("p"), language), Robot.load(name))
+    with pytest.raises(UsageError, match="--controller nominal if it has none"):
+        declared_controller(None, language_of(Path("p"), "KRL"), KUKA)
+
+
+@pytest.mark.parametrize("name", ["abb_irb120", "ur10_robot", "FANUC-R2000", "KUKA_KR6"])
+def test_names_that_urdfs_give_tell_makers_too(name):
+    assert may_differ(but(ABB, name=name))
+
+
+def test_a_language_of_another_maker_is_told():
+    rapid, krl, csv = (language_of(Path(name)) for name in ("p.mod", "p.src", "p.csv"))
+    (notice,) = language_notices(rapid, Robot.load("fanuc-lr-mate-200id"))
+    assert notice.kind == "language"
+    assert "RAPID is the language of ABB's controllers, and the calibration is of FANUC LR" in notice.message
+    assert language_notices(rapid, Robot.load("staubli-tx2-90l"))
+    for language, name in ((rapid, "abb-irb-120"), (krl, "kuka-iiwa-7"), (csv, "ur5"), (krl, "rv-m2")):
+        assert not language_notices(language, Robot.load(name))
 
 
 def test_other_controllers_need_not():

@@ -7,10 +7,11 @@ import numpy as np
 
 from truearm.calibration import Calibration
 from truearm.errors import Notice, list_names, typed
+from truearm.programs.declaring import maker_of
 from truearm.programs.environment import Environment, Frame
 from truearm.programs.frames import Frames, Kind
 from truearm.programs.layouts import of_joints as layout_of_joints
-from truearm.programs.program import Program
+from truearm.programs.program import Language, Program
 from truearm.programs.rewriting import Rewritten
 from truearm.robot import Robot
 from truearm.stillness import carried_joints, moved_joints, still_words
@@ -40,6 +41,19 @@ def payload_notices(program: Program, robot: Robot) -> list[Notice]:
             "what the arm yields under the difference is not corrected",
         )
     ]
+
+
+def language_notices(language: Language, robot: Robot) -> list[Notice]:
+    """A warning where a program is in the language of another maker's controllers than the arm's."""
+    maker = maker_of(robot)
+    if maker in ("", language.maker.lower()) or not language.maker:
+        return []
+    text = (
+        f"{language.name} is the language of {language.maker}'s controllers, and the calibration is of "
+        f"{robot.name}: targets are corrected as if that arm ran the program. Take the calibration of the "
+        "arm that runs it"
+    )
+    return [Notice("language", text)]
 
 
 def frames_notices(program: Program, frames: Frames) -> list[Notice]:

@@ -327,7 +327,7 @@ class _State:
         self.corrected[which[refused]] = self.nominal[which[refused]]
 
     def _take_refusals(self, which: Integers, refusals: Sequence[Refusal]) -> None:
-        """Refused targets; those at singularities that no small change meets are listed, as poses there are."""
+        """Refused targets; those at singularities that no small change meets are listed, as poses are."""
         targets = which[[refusal.number - 1 for refusal in refusals]]
         singular = are_singular(self.models.programming, self.nominal[targets])
         for target, refusal, stretched in zip(targets.tolist(), refusals, singular.tolist(), strict=True):
