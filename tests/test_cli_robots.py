@@ -212,6 +212,7 @@ def test_import_writes_what_it_says(tmp_path, capsys):
         "left_out": [],
         "rows_left_out": [],
         "remarks": [],
+        "notices": [],
     }
 
 
@@ -348,3 +349,21 @@ def test_numbers_of_tables_are_whole_on_a_terminal_of_any_width(width, monkeypat
     console.print_table(["model", "mean", "RMS", "95 %", "99 %", "max"], [["nominal", *numbers]])
     printed = capsys.readouterr().out
     assert all(number in printed.split() for number in ["nominal", *numbers])
+
+
+@pytest.mark.parametrize("width", [30, 40, 60])
+def test_the_table_of_an_arm_keeps_all_digits(width, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main(["robots", "ur10"]) == 0
+    printed = capsys.readouterr().out
+    assert {"163.941", "-572.3", "-360"} <= set(printed.split())
+    assert "\N{HORIZONTAL ELLIPSIS}" not in printed
+    if width == 60:
+        assert printed.count("-360 to 360") == 6
+
+
+def test_limits_have_four_decimals(tmp_path, capsys):
+    arm = Robot.from_table("Mine", [[0, 0, 0.3, 0]], limits=[[-2.8973, 2.8973]])
+    (tmp_path / "mine.toml").write_text(arm.to_toml())
+    assert main(["robots", str(tmp_path / "mine.toml")]) == 0
+    assert "-166.0031 to 166.0031" in capsys.readouterr().out

@@ -10,6 +10,7 @@ import importlib.util
 import json
 import os
 import re
+import sqlite3
 import subprocess
 import sys
 import tomllib
@@ -23,6 +24,7 @@ from truearm import doubts, validation
 from truearm.cell.cell_file import CellFile
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.schema import checked
+from truearm.cell.session_schema import SCHEMA
 from truearm.cli import COMMANDS
 from truearm.fleet import Fleet
 from truearm.programs.frames import FramesFile
@@ -185,6 +187,20 @@ def test_schemas_are_current():
     maker = load_script("make_schemas")
     found = {path.name: path.read_text() for path in maker.FOLDER.glob("*.json")}
     assert found == {name: maker.text_of(schema) for name, schema in maker.schemas().items()}, "make docs"
+
+
+def test_every_column_of_a_session_is_explained():
+    text = (ROOT / "docs" / "reference" / "session-file.md").read_text()
+    explained = dict(re.findall(r"^\| `(\w+)` \|(.*)$", text, re.MULTILINE))
+    database = sqlite3.connect(":memory:")
+    database.executescript(SCHEMA)
+    for table, words in explained.items():
+        columns = [column[1] for column in database.execute(f"PRAGMA table_info({table})")]
+        named = set(re.findall(r"\w+", words))
+        for first, last in re.findall(r"`(\w+)` to `(\w+)`", words):
+            named |= set(columns[columns.index(first) : columns.index(last) + 1])
+        assert [column for column in columns if column not in named] == [], table
+    database.close()
 
 
 def test_every_command_is_in_the_reference():

@@ -315,3 +315,8 @@ def test_limits_beyond_half_a_turn_are_searched(low, high):
     q = np.random.default_rng(5).uniform(limits[0, 0], limits[0, 1], (60, 6))
     found = [is_among(own, solver.solutions(pose)) for own, pose in zip(q, poses_of(robot, q), strict=True)]
     assert np.mean(found) > 0.9
+
+
+def test_what_is_no_pose_is_said_in_a_sentence():
+    with pytest.raises(InputError, match=r"^the poses have shape \(3, 3\)"):
+        Inverse(Robot.load("ur10")).solutions(np.eye(3))

@@ -185,6 +185,8 @@ def test_row_selection() -> None:
     assert by_mask.features["temperature_C"].tolist() == [0, 2, 4, 6]
     assert len(data.select(np.zeros(8, dtype=bool))) == len(data.select([])) == 0
     assert data.select([-1, 0]).rows.tolist() == [8, 1]
+    assert data.select(slice(0, 4)).rows.tolist() == data[:4].rows.tolist() == [1, 2, 3, 4]
+    assert data[::-3].rows.tolist() == [8, 5, 2]
 
 
 @pytest.mark.parametrize(
@@ -194,7 +196,7 @@ def test_row_selection() -> None:
         ([-9], "there is no row -9"),
         ([True, False], r"bool of shape \(2,\) says no rows. Rows are said by a boolean mask of 8"),
         ([0.0, 1.0], "float64 of shape"),
-        (slice(0, 3), "object of shape"),
+        (slice("a"), "says no rows: slice indices must be integers"),
         (3, r"int64 of shape \(\)"),
     ],
 )

@@ -41,7 +41,8 @@ def test_what_is_not_explained_is_beyond_a_stated_sigma_and_the_floor_holds_both
     assert (
         f"does not explain{', beyond the stated sigma' * stated}: {noise:.3f} mm per coordinate." in printed
     )
-    assert f"It makes a mean error of {floor:.3f} mm: noise and, with constants alone, what varies" in printed
+    it = "With that sigma it" if stated else "It"
+    assert f"coordinate. {it} makes a mean error of {floor:.3f} mm: noise and, with constants" in printed
     assert "noise alone" not in printed
     text = words_of(report(ta.Calibration.load("out/calibration.calib")).html)
     related = f"mm per coordinate beyond what rows state as their sigma, {whole:.3f} mm with it; alone"

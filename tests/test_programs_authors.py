@@ -91,3 +91,9 @@ def test_a_declared_model_is_held_against_the_arm_that_was_calibrated(irb, tmp_p
     compensator = ta.Compensator(irb, programming=other, limits=WIDE)
     with pytest.raises(ta.InputError, match="away from that of ABB IRB 120, which was calibrated"):
         ta.compensate_program(tmp_path / "a.mod", compensator, controller=Controller.nominal(other))
+
+
+def test_a_program_in_the_language_of_another_maker_is_told(irb, tmp_path):
+    (tmp_path / "a.src").write_text("DEF a()\nPTP {A1 10,A2 10,A3 20,A4 15,A5 40,A6 30}\nEND\n")
+    done = ta.compensate_program(tmp_path / "a.src", ta.Compensator(irb), controller="nominal")
+    assert "KRL is the language of KUKA's controllers" in str(done.notices[0])

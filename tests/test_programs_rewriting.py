@@ -7,17 +7,10 @@ import numpy as np
 import pytest
 
 from tests.programs_rig import ABB, KUKA, Shift, again, models, obeyed, read, rewritten
-from tests.test_controller import CONF
 from tests.test_programs_rapid import GO, NOTHING, SEEN, module, numbers, points
 from truearm.controller import Controller
 from truearm.errors import InputError, UsageError, WorkError
 from truearm.programs.configuration import NearestTurns, with_turns
-from truearm.programs.declaring import (
-    declared_controller,
-    may_differ,
-    refuse_another_arm,
-    refuse_contradiction,
-)
 from truearm.programs.densify import Spacing
 from truearm.programs.folding import constant
 from truearm.programs.frames import Frames
@@ -119,65 +112,6 @@ def test_a_controller_with_factory_kinematics_gets_what_it_computes_with():
     assert np.abs(said - done.corrected)[done.changed].max() < 3e-5
     nominal = obeyed(again(done, ABB), ABB, done.corrected)
     assert np.abs(nominal - done.corrected)[done.changed].max() > 1e-4
-
-
-def test_controllers_that_may_differ_must_be_declared():
-    for name, language in (
-        ("kuka-kr-6-r900", "KRL"),
-        ("abb-irb-120", "RAPID"),
-        ("ur10e", "KRL"),
-        ("fanuc-lr-mate-200id", "FANUC TP"),
-    ):
-        with pytest.raises(UsageError, match="not declared.*--controller"):
-            declared_controller(None, language_of(Path("p"), language), Robot.load(name))
-        assert may_differ(Robot.load(name))
-        assert (
-            declared_controller("nominal", language_of(Path("p"), language), Robot.load(name)).kind
-            == "nominal"
-        )
-
-
-def test_other_controllers_need_not():
-    arm = Robot.load("rv-m2")
-    assert not may_differ(arm)
-    assert declared_controller(None, language_of(Path("p"), "MELFA BASIC"), arm).kind == "nominal"
-
-
-def test_a_nominal_controller_contradicts_points_of_an_accurate_one():
-    text = "DEF a()\n$TOOL=$NULLFRAME\n$BASE=$NULLFRAME\nPTP {X 500,Y 0,Z 500,A 0,B 90,C 0,S 10,T 2}\nEND\n"
-    program = read("a.src", text, KUKA)
-    with pytest.raises(WorkError, match="absolutely accurate"):
-        refuse_contradiction(program, Controller.nominal(KUKA), force=False)
-    refuse_contradiction(program, Controller.nominal(KUKA), force=True)
-    refuse_contradiction(program, Controller(KUKA, "factory", "f"), force=False)
-
-
-@pytest.mark.parametrize(
-    ("arm", "other"),
-    [("ur10", "ur5"), ("abb-irb-120", "abb-irb-1200"), ("ur3", "ur3e"), ("kuka-iiwa-7", "kuka-iiwa-14")],
-)
-def test_the_model_of_another_arm_is_refused(arm, other):
-    robot, wrong = Robot.load(arm), Robot.load(other)
-    refuse_another_arm(Controller(robot, "factory", "own.toml"), robot)
-    with pytest.raises(InputError, match=r"other\.toml: .* its flange is up to \d+ mm .* 20 mm and 3 deg"):
-        refuse_another_arm(Controller(wrong, "factory", "other.toml"), robot)
-
-
-def test_the_factory_kinematics_of_the_arm_are_no_other_arm(tmp_path):
-    """Its parameters differ by metres, and poses of its flange by millimetres."""
-    path, robot = tmp_path / "calibration.conf", Robot.load("ur10")
-    path.write_text(CONF)
-    refuse_another_arm(Controller.load(path, robot=robot), robot)
-    path.write_text(CONF.replace("81.328", "81.228"))
-    with pytest.raises(InputError, match="away from that of UR10, which was calibrated"):
-        refuse_another_arm(Controller.load(path, robot=robot), robot)
-
-
-def test_a_base_that_is_turned_is_refused_by_the_angle():
-    base = np.eye(4)
-    base[:2, :2] = [[-1.0, 0.0], [0.0, -1.0]]
-    with pytest.raises(InputError, match=r"180\.0 deg away"):
-        refuse_another_arm(Controller(but(ABB, base=base, base_row=None), "factory", "ros.urdf"), ABB)
 
 
 class Wavy(Shift):

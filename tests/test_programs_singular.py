@@ -1,9 +1,12 @@
 """Joint targets at singularities, as home positions with a stretched wrist are: listed, and no refusals."""
 
+import numpy as np
 import pytest
 
+import truearm as ta
 from tests.programs_rig import ABB, KUKA, models, read, rewritten
 from truearm.errors import WorkError
+from truearm.simulation import VirtualArm
 
 AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 HOME = f"MoveAbsJ [[0,0,0,0,0,0],{AXES}],v100,fine,tool0;"
@@ -16,8 +19,9 @@ def program_of(*moves):
     return read("home.mod", f"MODULE Home\nPROC main()\n{lines}\nENDPROC\nENDMODULE\n", ABB)
 
 
-def test_a_home_with_a_stretched_wrist_is_listed_and_the_others_are_changed():
-    done = rewritten(program_of(HOME, BENT, HOME), models(ABB, refuse=(0, 2), code=NOT_REACHED))
+@pytest.mark.parametrize("code", [NOT_REACHED, TOO_FAR])
+def test_a_home_with_a_stretched_wrist_is_listed_and_the_others_are_changed(code):
+    done = rewritten(program_of(HOME, BENT, HOME), models(ABB, refuse=(0, 2), code=code))
     assert done.changed.tolist() == [False, True, False]
     assert [one.line for one in done.listed] == [3, 5]
     assert all("singularity" in one.reason for one in done.listed)
@@ -42,7 +46,23 @@ def test_straight_motion_from_it_is_warned_of():
     assert [notice.kind for notice in done.notices] == ["steps"]
 
 
-@pytest.mark.parametrize(("moves", "code"), [((HOME, BENT), TOO_FAR), ((BENT, HOME), NOT_REACHED)])
-def test_other_refusals_stay_what_they_are(moves, code):
+@pytest.mark.parametrize("code", [NOT_REACHED, TOO_FAR])
+def test_refusals_away_from_singularities_stay_what_they_are(code):
     with pytest.raises(WorkError, match="1 of 2 targets cannot be corrected"):
-        rewritten(program_of(*moves), models(ABB, refuse=(0,), code=code))
+        rewritten(program_of(BENT, HOME), models(ABB, refuse=(0,), code=code))
+
+
+def test_a_home_that_a_turned_wrist_would_meet_is_listed(tmp_path):
+    arm = VirtualArm(ABB, seed=1)
+    measured = arm.measure(arm.poses(80, seed=1), orientation=True)
+    compensator = ta.Compensator(ta.calibrate(ABB, measured, model="constant", refit=False))
+    tool = np.eye(4)
+    tool[2, 3] = 0.15
+    assert [one.code for one in compensator.joints(np.zeros(6), tool=tool).refusals] == [TOO_FAR]
+    path = tmp_path / "home.mod"
+    gripper = "PERS tooldata tGrip:=[TRUE,[[0,0,150],[1,0,0,0]],[1.5,[0,0,50],[1,0,0,0],0,0,0]];"
+    moves = "\n".join(move.replace("tool0", "tGrip") for move in (HOME, BENT))
+    path.write_text(f"MODULE Home\n{gripper}\nPROC main()\n{moves}\nENDPROC\nENDMODULE\n")
+    done = ta.compensate_program(path, compensator, controller="nominal")
+    assert done.changed.tolist() == [False, True]
+    assert "singularity" in done.listed[0].reason

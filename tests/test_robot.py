@@ -238,3 +238,39 @@ def test_library_names_forgive_case_and_separators(name: str) -> None:
 def test_unknown_names_bring_the_nearest() -> None:
     with pytest.raises(InputError, match=r'no robot "ur12" .*Did you mean .*"ur10".*truearm robots'):
         Robot.load("ur12")
+
+
+def test_a_table_alone_makes_a_robot() -> None:
+    known = Robot.load("abb-irb-120")
+    plain = replace(known, source="", base_row=None, base=np.eye(4), flange=np.eye(4), tool=np.eye(4))
+    plain = replace(plain, coupling=np.eye(6))
+    assert Robot.from_table(known.name, known.table[:, :4], limits=known.limits) == plain
+    assert np.isinf(Robot.from_table("Mine", known.table).limits).all()
+    turned = Robot.from_table("Mine", known.table, coupling=np.diag([1, 1, 1, 1, 1, -1]))
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    np.testing.assert_allclose(turned.joints_from_readings(q), q * [1, 1, 1, 1, 1, -1])
+    slide = Robot.from_table("Mine", [[0, 0.1, 0, 0]], joints=["prismatic"], convention="modified")
+    np.testing.assert_allclose(slide.position([0.2]), [0, 0, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"table": np.zeros((6, 3))}, r"table: shape \(6, 3\).*theta, d, a, alpha for each link, \(N, 4\)"),
+        ({"table": np.zeros(4)}, r"table: shape \(4,\)"),
+        ({"table": [["a"] * 4]}, "values of table are not real numbers"),
+        ({"joints": ["revolute"]}, "joints: 1 joint. The table has 2, one a row"),
+        ({"table": [[90.0, 0, 0, 0], [0, 0, 0, 90.0]]}, "rad"),
+        ({"limits": [[-1, 1]]}, r"limits: shape \(1, 2\)"),
+    ],
+)
+def test_what_is_no_table_of_an_arm_is_refused(given: dict[str, Any], message: str) -> None:
+    table = given.pop("table", [[0, 0.1, 0, 0], [0, 0, 0.3, 0]])
+    with pytest.raises(InputError, match=message):
+        Robot.from_table("Mine", table, **given)
+
+
+def test_where_numbers_come_from_may_be_left_out_of_a_dictionary() -> None:
+    content = Robot.load("ur5").to_dict()
+    del content["source"]
+    assert Robot.from_dict(content) == replace(Robot.load("ur5"), source="")

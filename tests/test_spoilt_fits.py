@@ -12,7 +12,7 @@ from truearm.fitting import fit_rows
 from truearm.held_rows import HeldRows
 from truearm.models import CONSTANT, NOMINAL, VARIABLE
 from truearm.simulation import VirtualArm
-from truearm.validation import RowErrors
+from truearm.validation import FEW_HELD, RowErrors
 
 FRESH = 99
 
@@ -79,19 +79,24 @@ def test_many_outliers_among_few_rows_are_named(name, seed):
 def test_constants_are_compared_without_outliers():
     arm = VirtualArm(ta.Robot.load("ur10"), seed=3)
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)))
-    validation, held = calibration.validation, calibration.held
+    validation, held = replace(calibration.validation, n_holdout_poses=FEW_HELD), calibration.held
+    few = calibration.validation
     assert held is not None
     errors = {**held.errors, CONSTANT: held.errors[VARIABLE], VARIABLE: held.errors[CONSTANT]}
     swapped = replace(held, errors=errors)
     bent = {NOMINAL: 2.0, CONSTANT: 0.1, VARIABLE: 0.2}
     entry = {"file": str(held.sources[0]), "row": int(held.rows[0]), "distance_mm": 9.0}
 
-    def said(outliers, rows=swapped):
-        return "".join(map(str, constant_is_better(validation, VARIABLE, rows, outliers)))
+    def said(outliers, rows=swapped, judged=validation):
+        return "".join(map(str, constant_is_better(judged, VARIABLE, rows, outliers)))
 
     told = said(Outliers("row 1", bent, entries=[entry]))
     assert "0.1 mm against 0.2 mm. Give --model constant --robust cauchy, or" in told
     assert "Give --model constant, or" in said(Outliers("row 1", bent))
+    unsure = said(Outliers("row 1", bent), judged=few)
+    assert "18 held-out poses, outliers left out" in unsure
+    assert "So few do not tell" in unsure
+    assert "--model" not in unsure
     assert said(Outliers("row 1", bent | {CONSTANT: 0.3})) == ""
     assert said(Outliers("", {})) == ""
     assert said(Outliers("row 1", bent), held) == ""

@@ -191,18 +191,23 @@ def rotation_fault(matrices: NDArray[np.float64], within: float = RIGID_WITHIN) 
     return None
 
 
-def as_row_numbers(index: ArrayLike, count: int) -> NDArray[np.int64]:
-    """Row numbers from 0 of a boolean mask (count,) or of row numbers (m,), negative ones from the end.
+def as_row_numbers(index: ArrayLike | slice, count: int) -> NDArray[np.int64]:
+    """Row numbers from 0 of a boolean mask (count,), a slice or row numbers (m,), negative ones from the end.
 
     Raises:
-        InputError: If it is neither, or a number is beyond the rows.
+        InputError: If it is none of these, or a number is beyond the rows.
     """
+    if isinstance(index, slice):
+        try:
+            return np.arange(count)[index]
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{index} says no rows: {error}") from None
     given = np.asarray(index)
     whole = given.dtype.kind in "iub" or given.size == 0
     if given.ndim != 1 or not whole or (given.dtype.kind == "b" and len(given) != count):
         raise InputError(
             f"{given.dtype} of shape {given.shape} says no rows",
-            rule=f"Rows are said by a boolean mask of {count}, or by row numbers from 0 to {count - 1}",
+            rule=f"Rows are said by a boolean mask of {count}, a slice, or row numbers from 0 to {count - 1}",
         )
     if given.dtype.kind == "b":
         return np.flatnonzero(given)

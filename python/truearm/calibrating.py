@@ -29,6 +29,7 @@ from truearm.doubts import (
     stood_still,
 )
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
+from truearm.endpoints import at_tool
 from truearm.errors import InputError, Notice, UsageError, count_of
 from truearm.exchanged import exchanged_notices
 from truearm.fitted_rows import FittedRows, sides
@@ -58,6 +59,7 @@ from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
 from truearm.robot import Robot
+from truearm.rounded_readings import rounded_notices
 from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
 from truearm.scheme_options import SchemeOptions
@@ -65,7 +67,7 @@ from truearm.schemes import NETWORKS, REGIONS
 from truearm.shots import shots_notices
 from truearm.splitting import Split, measured_on_both_sides, split_rows
 from truearm.standard_errors import standard_errors
-from truearm.summary import distance_at_floor_mm
+from truearm.summary import distance_at_floor_mm, whole_noise_mm
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.unexplained import unexplained
@@ -189,7 +191,17 @@ def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Out
         *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data, judged, best, points),
         *constant_is_better(judged, best, points, outliers),
+        *_rounded(found, data),
     ]
+
+
+def _rounded(found: Calibration, data: Measurements) -> list[Notice]:
+    """Whether readings have so few decimals that what is taken for noise is theirs."""
+    points = found.measured.points(found.model.setup.targets)
+    if found.selection.distances or not len(points):
+        return []
+    at_point = replace(found.robot, tool=at_tool(found.robot, points[0]))
+    return rounded_notices(at_point, data.readings, whole_noise_mm(found))
 
 
 def _many_are_off(found: Calibration, doubted: Sequence[Notice]) -> bool:

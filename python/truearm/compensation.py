@@ -53,7 +53,7 @@ class Refusal:
 
 @dataclass(frozen=True, eq=False)
 class Compensated:
-    """Corrected waypoints.
+    """Corrected waypoints of a path, n rows; a waypoint that was given alone is a path of one, n = 1.
 
     Attributes:
         q: Corrected readings (n, N), rad and m; NaN where the waypoint is refused.
@@ -159,7 +159,8 @@ class Compensator:
         """Correct the joint targets of a path.
 
         Args:
-            q: Readings (n, N) of the program, or (N,) for one.
+            q: Readings (n, N) of the program, or (N,) for one, which is a path of one: the result has rows
+                (1, N).
             tool: flange_from_tool (4, 4), or a point (3,); the programming model's own by default.
             author: The arm that with `tool` on its flange is, for readings `q`, where the author meant the
                 tool; the programming model by default. An author who took the tool, or the place of a work
@@ -178,7 +179,7 @@ class Compensator:
         """Correct the Cartesian targets of a path: the programming model's readings for them, corrected.
 
         Args:
-            base_from_tool: Targets (n, 4, 4), or (4, 4) for one.
+            base_from_tool: Targets (n, 4, 4), or (4, 4) for one, which is a path of one as in `joints`.
             seed: Readings (n, N), near which the solution of each target is looked for; or (N,), near which
                 that of the first is, and of each other one near the one before. Branch and turn are kept.
             tool: As for `joints`.

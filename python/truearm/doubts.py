@@ -22,7 +22,7 @@ from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
 from truearm.stillness import still_warning
 from truearm.units import MM_PER_METRE, to_si
-from truearm.validation import Validation, mean_distance
+from truearm.validation import FEW_HELD, Validation, mean_distance
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -69,6 +69,7 @@ SINGLE_ROWS: Final = "single_rows"
 ORIENTATION_MISFIT: Final = "orientation_misfit"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 CONSTANT_BETTER: Final = "constant_better"
+TOO_FEW_TO_TELL: Final = "too_few_to_tell"
 ROWS_SHIFTED: Final = "rows_shifted"
 FAR_FROM_NOMINAL: Final = "far_from_nominal"
 FITS_OTHERWISE: Final = "fits_otherwise"
@@ -215,7 +216,11 @@ def judged_means_mm(validation: Validation, outliers: Outliers | None) -> dict[s
 def constant_is_better(
     validation: Validation, best: str, held: HeldRows | None, outliers: Outliers | None = None
 ) -> list[Notice]:
-    """A notice where what varies was learnt and the constants alone are surely nearer, outliers left out."""
+    """A notice where what varies was learnt and the constants alone are surely nearer, outliers left out.
+
+    Few rows do not tell: a calibration that is fitted to all of them afterwards has learnt from so many more
+    that it is often the nearer one then.
+    """
     means = judged_means_mm(validation, outliers)
     if best in {NOMINAL, CONSTANT} or held is None or not helps(means[NOMINAL], means[best]):
         return []
@@ -224,9 +229,15 @@ def constant_is_better(
         return []
     apart = ", outliers left out" if outliers is not None and outliers.means_mm else ""
     robust = " --robust cauchy" if best == VARIABLE and outliers is not None and outliers.entries else ""
+    against = f"a mean error of {length_mm(means[CONSTANT], 3)} against {length_mm(means[best], 3)}"
+    if validation.n_holdout_poses < FEW_HELD:
+        text = (
+            f"Constant parameters were nearer on {validation.poses_judged}{apart}: {against}. So few do not "
+            "tell which are nearer to the arm: measure more poses."
+        )
+        return [Notice(TOO_FEW_TO_TELL, text)]
     text = (
-        f"Constant parameters do better on {validation.judged} rows{apart}: a mean error of "
-        f"{length_mm(means[CONSTANT], 3)} against {length_mm(means[best], 3)}. Give --model "
+        f"Constant parameters do better on {validation.judged} rows{apart}: {against}. Give --model "
         f"constant{robust}, or measure more poses."
     )
     return [Notice(CONSTANT_BETTER, text)]

@@ -19,13 +19,13 @@ from truearm.columns import (
     MissingColumnError,
     StatedUnits,
 )
-from truearm.errors import InputError, UsageError, did_you_mean, list_names, list_rows, typed
+from truearm.errors import InputError, Notice, UsageError, did_you_mean, list_names, list_rows, typed
 from truearm.measured_fields import read_fields
 from truearm.measurements import Measurements
 from truearm.raw_tables import Marks, RawTable, join_tables, read_raw
 from truearm.reading import table_from_frame
 from truearm.rotation_columns import RotationColumns
-from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si, unit_in_header
+from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +34,7 @@ WHICH: Final = "target"
 """Which of several points on the tool was measured in a row, from 1, where x, y, z are of one each."""
 POINT: Final = ("x", "y", "z")
 MOST_TARGETS: Final = 100
+AGREE: Final = "The name of a column, a unit below it and the one that is stated for it must agree"
 WHICH_IS_WHICH: Final = "Say which is which: --map q1=COLUMN:deg --map x=COLUMN:mm, and so on"
 
 
@@ -87,13 +88,15 @@ class Imported(NamedTuple):
             measured. The column of a joint that is given as a length says so: q3_m.
         unused: Their columns that nothing was taken from.
         left_out: In words, rows that nothing was taken from.
-        remarks: In words, lines that are remarks, and columns that count the rows.
+        remarks: In words, lines that are remarks or units, and columns that count the rows.
+        notices: What the user should know.
     """
 
     frame: pd.DataFrame
     unused: list[str]
     left_out: list[str]
     remarks: list[str]
+    notices: list[Notice]
 
 
 def import_table(path: Path, plan: ImportPlan) -> Imported:
@@ -129,9 +132,16 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
     _check(frame, table)
     alone = [f"{rows}, as they are not in the other table" for rows in table.alone]
-    return Imported(
-        frame.reset_index(drop=True), _unused(table, named, plan), [*alone, *empty], table.remarks
-    )
+    left_out, unused = [*alone, *empty], _unused(table, named, plan)
+    return Imported(frame.reset_index(drop=True), unused, left_out, table.remarks, _unsaid(table))
+
+
+def _unsaid(table: RawTable) -> list[Notice]:
+    """That no cell says what was stated of cells where nothing was measured."""
+    return [
+        Notice("missing", f"no cell of {table.where} says what --missing {typed(word)} says")
+        for word in table.unsaid
+    ]
 
 
 def _check(frame: pd.DataFrame, table: RawTable) -> None:
@@ -269,7 +279,7 @@ def _unit(table: RawTable, ours: str, theirs: str, plan: ImportPlan) -> str:
 
 def _check_header(table: RawTable, ours: str, theirs: str, stated: str) -> None:
     """Raise UsageError if the column's own name says another unit than the option for all of them."""
-    said = unit_in_header(table.parts[theirs].name)
+    said = table.parts[theirs].said_unit
     if said in ("", stated):
         return
     option = "--joint-unit" if JOINT.fullmatch(ours) else "--length-unit"
@@ -277,7 +287,7 @@ def _check_header(table: RawTable, ours: str, theirs: str, stated: str) -> None:
     raise UsageError(
         f'column "{theirs}" says {said}, {option} says {stated}',
         where=table.where,
-        rule="The name of a column and the unit that is stated for it must agree",
+        rule=AGREE,
         way_out=f"Give the right {option}, or state the unit of this column alone behind it: --map "
         f"{typed(f'{ours}={theirs}:{stated}')} if its name is wrong{correct}",
     )
@@ -307,12 +317,12 @@ def _orientation(table: RawTable, rotation: RotationColumns) -> dict[str, Floats
         UsageError: If there is no such column, or its own name says another unit than the option.
     """
     for name in map(table.existing, rotation.columns):
-        said = unit_in_header(table.parts[name].name)
+        said = table.parts[name].said_unit
         if rotation.unit and said not in ("", rotation.unit):
             raise UsageError(
                 f'column "{name}" says {said}, --rotation says {rotation.unit}',
                 where=table.where,
-                rule="The name of a column and the unit that is stated for it must agree",
+                rule=AGREE,
                 way_out="Give the unit in which the angles are; a wrong name has to be mended in the file",
             )
     values = np.column_stack([table.numbers(table.existing(name)) for name in rotation.columns])

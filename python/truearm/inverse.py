@@ -62,7 +62,7 @@ class Inverse:
             InputError: If the pose is not a rigid transform, or they are several.
             CoreError: If a pose of the arm's has more than 100,000 readings that differ by whole turns.
         """
-        poses, single = as_transforms(base_from_flange, what="the pose")
+        poses, single = as_transforms(base_from_flange, what="the poses")
         if not single:
             raise InputError(
                 f"the pose has shape {poses.shape}",

@@ -310,11 +310,17 @@ class Measurements:
         found = [required(part, Measurements, "the measurements") for part in parts]
         return found[0] if len(found) == 1 else _concatenate(found)
 
-    def select(self, index: ArrayLike) -> "Measurements":
-        """The rows of a boolean mask (n,) or of row indices (m,), counted from 0, negative ones from the end.
+    def __getitem__(self, index: ArrayLike | slice) -> "Measurements":
+        """As `select`."""
+        return self.select(index)
+
+    def select(self, index: ArrayLike | slice) -> "Measurements":
+        """The rows of a boolean mask (n,), a slice, or row indices (m,) from 0, negative ones from the end.
+
+        `data[index]` is the same.
 
         Raises:
-            InputError: If it is neither, or a row is none of these measurements.
+            InputError: If it is none of these, or a row is none of these measurements.
         """
         chosen = as_row_numbers(index, len(self))
         changes = {name: getattr(self, name)[chosen] for name in PER_ROW if getattr(self, name) is not None}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
 from truearm.files import decode_text, read_bytes
+from truearm.missing_cells import without_missing
 from truearm.reading import (
     DELIMITERS,
     Table,
@@ -24,6 +25,8 @@ from truearm.reading import (
     quoted_delimiter,
     split_table,
 )
+from truearm.unit_row import without_unit_row
+from truearm.units import unit_in_header
 from truearm.workbooks import DELIMITER, is_workbook, sheet_text
 
 Floats = NDArray[np.float64]
@@ -53,7 +56,8 @@ class Marks:
         decimal: Decimal mark, "." or ","; None takes points.
         skip_lines: Lines before the header.
         comments: What lines begin with that are remarks.
-        missing: What cells say, besides nothing, where nothing was measured; case does not count.
+        missing: What cells say, besides nothing, where nothing was measured: a number, however these write
+            it, or a text, of which case does not count.
         encoding: Encoding of the text.
         names: Names of the columns of a table without a header, "-" for those to leave out; () with one.
         sheet: Name of the sheet of a workbook; None takes the only one. Workbooks have no delimiter, and no
@@ -99,12 +103,19 @@ class Part(NamedTuple):
         name: The column's name in it.
         rows: Which of its rows (n,), from 0.
         marks: How the file is written.
+        unit: Its unit in a row of units below the names, as in units.HEADER_UNITS; "" without.
     """
 
     table: Table
     name: str
     rows: Integers
     marks: Marks
+    unit: str = ""
+
+    @property
+    def said_unit(self) -> str:
+        """The unit that the file says of it, below its name or in it; "" where it says none."""
+        return self.unit or unit_in_header(self.name)
 
     def texts(self) -> Texts:
         """Its cells (n,)."""
@@ -135,7 +146,9 @@ class RawTable:
         parts: Each column.
         row_count: Number of rows.
         alone: In words, which rows of two files are in one of them only.
-        remarks: In words, how many lines were left out as remarks, and a column that counts the rows.
+        remarks: In words, how many lines were left out as remarks, a row of units, and a column that counts
+            the rows.
+        unsaid: What cells say where nothing was measured, as it was stated, and none says.
     """
 
     where: str
@@ -143,6 +156,7 @@ class RawTable:
     row_count: int
     alone: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    unsaid: tuple[str, ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -206,13 +220,18 @@ def read_raw(path: Path, marks: Marks) -> RawTable:
     whole = split_table(text, delimiter, where=where, uneven=uneven, nameless=nameless)
     if delimiter == marks.decimal:
         _check_quoted(whole, delimiter)
-    table = _without(whole, marks.missing)
+    measured, units = (whole, {}) if marks.names else without_unit_row(whole)
+    table, unsaid = without_missing(measured, marks.missing, marks.decimal or DECIMAL_MARKS[0])
     rows = np.arange(table.row_count)
-    parts = {name: Part(table, name, rows, marks) for name in table.names if name not in marks.unnamed}
+    parts = {
+        name: Part(table, name, rows, marks, units.get(name, ""))
+        for name in table.names
+        if name not in marks.unnamed
+    }
     left_out = len(below) - len(kept)
     remarks = [f"{count_of(left_out, 'line')} of {where}, as remarks"] if left_out else []
-    remarks += whole.remarks
-    return RawTable(where, parts, table.row_count, remarks=remarks)
+    remarks += [f"the row of units below the header of {where}"] if units else []
+    return RawTable(where, parts, table.row_count, remarks=[*remarks, *whole.remarks], unsaid=unsaid)
 
 
 def _check_quoted(table: Table, mark: str) -> None:
@@ -297,18 +316,6 @@ def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
     return delimiter.join(f'"{name}"' for name in names) + "\n"
 
 
-def _without(table: Table, missing: Sequence[str]) -> Table:
-    """The table with empty cells where they say that nothing was measured."""
-    if not missing:
-        return table
-    words = {word.casefold() for word in missing}
-    columns = {}
-    for name in table.names:
-        cells = table.texts(name)
-        columns[name] = np.where([cell.casefold() in words for cell in cells.tolist()], "", cells)
-    return Table(table.where, columns, table.row_count)
-
-
 def _check_order(first: RawTable, second: RawTable) -> None:
     """Raise InputError if rows cannot belong together one by one."""
     if first.row_count != second.row_count:
@@ -379,7 +386,8 @@ def _side_by_side(
             raise UsageError(f'"{here}" is a column of both tables', where=first.where, way_out="Rename one")
         parts[here] = part._replace(rows=part.rows[rows[1]])
     where = f"{first.where} with {second.where}, rows as joined"
-    return RawTable(where, parts, len(rows[0]), alone, [*first.remarks, *second.remarks])
+    unsaid = tuple(word for word in first.unsaid if word in second.unsaid)
+    return RawTable(where, parts, len(rows[0]), alone, [*first.remarks, *second.remarks], unsaid)
 
 
 def _alone(table: RawTable, name: str, rows: Sequence[int]) -> list[str]:

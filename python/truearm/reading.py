@@ -4,7 +4,7 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from truearm.errors import InputError, list_rows, typed
 from truearm.files import UTF_16, ZIP, decode_text, name_in_text, read_bytes
+from truearm.units import HEADER_UNITS, bare_unit
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -31,9 +32,7 @@ NAMELESS: Final = (
 SHOWN_NAMES: Final = 4
 LOOKED_AT: Final = 4096
 """Bytes of a file in another encoding, an even number, from which its marks are told."""
-UNIT_WORDS: Final = frozenset(
-    ("", "-", "1", "rad", "deg", "°", "m", "mm", "in", "um", "µm", "c", "°c", "degc", "k", "kg", "s", "ms")
-)
+UNIT_WORDS: Final = frozenset(("", "-", "1", "c", "°c", "degc", "k", "kg", "s", "ms", *HEADER_UNITS))
 """What stands below the names of columns where a row says their units."""
 SAID: Final = "q1_deg and x_mm"
 COMMENTS: Final = ("#", "//")
@@ -107,7 +106,7 @@ class Table:
         for row, cell in enumerate(cells):
             if not cell or infinite[row]:
                 continue
-            number = _as_number(cell)
+            number = as_number(cell)
             if number is None:
                 raise self._no_number(name, row, cell)
             values[row] = number
@@ -143,12 +142,18 @@ class Table:
         """What is said where a row repeats the header or holds the units of the columns; else empty."""
         if cell.casefold() == name.strip().casefold():
             return "The row repeats the header: remove it"
-        own = [self.texts(each)[row].strip("[]()").casefold() for each in self.names]
-        if cell.strip("[]()").casefold() in UNIT_WORDS and all(each in UNIT_WORDS for each in own):
+        if holds_units(str(self.texts(each)[row]) for each in self.names):
             return (
-                f"The row holds the units of the columns: remove it, and state them in their names, as {SAID}"
+                "The row holds the units of the columns: remove it, and state them in their names, as "
+                f"{SAID}, or bring the file in by truearm import, which leaves it out"
             )
         return ""
+
+
+def holds_units(cells: Iterable[str]) -> bool:
+    """Whether all cells of a row are units or empty, and at least one is a unit of lengths or angles."""
+    said = {bare_unit(cell) for cell in cells}
+    return said <= UNIT_WORDS and not said.isdisjoint(HEADER_UNITS)
 
 
 def table_from_frame(frame: pd.DataFrame, *, where: str, row_numbers: Integers | None = None) -> Table:
@@ -318,7 +323,7 @@ def _check_header(header: Sequence[str], where: str) -> None:
             rule="The first line must name the columns",
             way_out=f"Delete it, or bring the file in with: truearm import FILE {option} ...",
         )
-    if any(header) and all(_as_number(name) is not None for name in header if name):
+    if any(header) and all(as_number(name) is not None for name in header if name):
         raise InputError(
             "the first line holds numbers only",
             where=where,
@@ -360,7 +365,7 @@ def _in_words(number: float) -> str:
     return str(int(number)) if number == int(number) else repr(number)
 
 
-def _as_number(text: str) -> float | None:
+def as_number(text: str) -> float | None:
     """The number that a cell holds; Python's 1_000 is none in a table."""
     try:
         return None if "_" in text else float(text)

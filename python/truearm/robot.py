@@ -1,6 +1,6 @@
 """The robot: its files, and the kinematics of its nominal table."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -15,8 +15,9 @@ from truearm.errors import InputError
 from truearm.files import is_file, read_text
 from truearm.library import library_text
 from truearm.robot_checks import check_sizes
-from truearm.robot_data import Floats, RobotData
+from truearm.robot_data import Convention, Floats, Joint, RobotData
 from truearm.robot_file import parse_robot_file
+from truearm.robot_table import table_fields
 from truearm.urdf import UrdfChain, read_urdf, urdf_chain
 
 URDF_ENDINGS: Final = (".urdf", ".xml")
@@ -24,10 +25,33 @@ TABLE_ENDINGS: Final = (".csv", ".tsv", ".txt", ".xlsx")
 
 
 class Robot(RobotData):
-    """A serial arm as its maker means it to be: the fields of RobotData, and their kinematics.
+    """A serial arm as its maker means it to be, and its kinematics. SI units; all arrays are read-only.
 
-    Parameters are in the order links, base to flange, and within a link theta, d, a, alpha, beta. `q` is
-    always joint readings, what the controller shows, in rad and m.
+    `load`, `from_table`, `from_toml` and `from_urdf` make one, and `dataclasses.replace(robot, tool=...)`
+    makes one with another field. `q` is always joint readings, what the controller shows, in rad and m.
+
+    Parameters are in the order links, base to flange, and within a link theta, d, a, alpha, beta.
+    A joint reading becomes a Denavit-Hartenberg joint value by q_dh = coupling . reading; it is added
+    to theta of a revolute joint's row, to d of a prismatic joint's row.
+
+    base_from_tool = base . A1 ... AN . flange . tool, where A is
+    Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) in the standard convention and
+    Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d) in the modified one.
+
+    Attributes:
+        name: What people call it.
+        source: Where its numbers come from.
+        convention: "standard" or "modified".
+        joints: "revolute" or "prismatic" for each of the N joints.
+        table: Nominal parameters (N, 5).
+        base: Fixed transform (4, 4) before the first link.
+        flange: Fixed transform (4, 4) after the last link.
+        tool: Fixed transform (4, 4) from flange to tool.
+        base_row: Denavit-Hartenberg row (5,) that `base` was given as, or None.
+        coupling: Joint values from readings (N, N), directions included.
+        limits: Lowest and highest reading (N, 2); infinite where there is none.
+        payload: What the arm carried, `mass_kg` and `centre_of_gravity_mm`, if stated.
+        urdf_names: Names of its links and joints, if it was read from a URDF.
     """
 
     @classmethod
@@ -85,6 +109,39 @@ class Robot(RobotData):
             check_sizes(robot)
         except InputError as error:
             raise error.at(where) from None
+        return robot
+
+    @classmethod
+    def from_table(
+        cls,
+        name: str,
+        table: ArrayLike,
+        *,
+        joints: Sequence[Joint] | None = None,
+        convention: Convention = "standard",
+        limits: ArrayLike | None = None,
+        coupling: ArrayLike | None = None,
+    ) -> "Robot":
+        """A robot from its Denavit-Hartenberg table; base, flange and tool are where the table has them.
+
+        Args:
+            name: What people call it.
+            table: theta, d, a and alpha of each link, (N, 4) in rad and m, base to flange; (N, 5) with beta.
+                theta, or d of a prismatic joint, is what is added to the joint's value.
+            joints: "revolute" or "prismatic" for each joint; all are revolute by default.
+            convention: "standard", or "modified" where alpha and a of a row are of the link before its joint.
+            limits: Lowest and highest reading (N, 2), infinite where there is none; none by default.
+            coupling: Joint values from readings (N, N): the identity by default, with -1 on the diagonal
+                where a reading counts the other way.
+
+        Raises:
+            InputError: If an array has another shape, a word is not known, or angles or lengths can only be
+                in another unit.
+        """
+        robot = cls(
+            **table_fields(table, joints, limits, coupling), name=name, source="", convention=convention
+        )
+        check_sizes(robot)
         return robot
 
     @classmethod
@@ -207,7 +264,7 @@ class Robot(RobotData):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Robot":
-        """The robot that `to_dict` described.
+        """The robot that `to_dict` described; `source` may be missing.
 
         Raises:
             InputError: If a key is missing or a value has another shape.

@@ -29,31 +29,7 @@ class Payload:
 
 @dataclass(frozen=True, eq=False)
 class RobotData:
-    """A serial arm as its maker means it to be. SI units; all arrays are read-only.
-
-    Parameters are in the order links, base to flange, and within a link theta, d, a, alpha, beta.
-    A joint reading becomes a Denavit-Hartenberg joint value by q_dh = coupling . reading; it is added
-    to theta of a revolute joint's row, to d of a prismatic joint's row.
-
-    base_from_tool = base . A1 ... AN . flange . tool, where A is
-    Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) in the standard convention and
-    Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d) in the modified one.
-
-    Attributes:
-        name: What people call it.
-        source: Where its numbers come from.
-        convention: "standard" or "modified".
-        joints: "revolute" or "prismatic" for each of the N joints.
-        table: Nominal parameters (N, 5).
-        base: Fixed transform (4, 4) before the first link.
-        flange: Fixed transform (4, 4) after the last link.
-        tool: Fixed transform (4, 4) from flange to tool.
-        base_row: Denavit-Hartenberg row (5,) that `base` was given as, or None.
-        coupling: Joint values from readings (N, N), directions included.
-        limits: Lowest and highest reading (N, 2); infinite where there is none.
-        payload: What the arm carried, if stated.
-        urdf_names: Names of its links and joints, if it was read from a URDF.
-    """
+    """The fields of a Robot, which describes them, checked on the way in."""
 
     name: str
     source: str

@@ -44,11 +44,11 @@ def fields_of(content: Mapping[str, Any]) -> dict[str, Any]:
         InputError: If a key is missing, an array holds something else than numbers, or a transform is not
             rigid.
     """
-    keys = (*TEXTS, *ARRAYS, "joints", "base_row", "limits", "payload")
+    keys = (*(key for key in TEXTS if key != "source"), *ARRAYS, "joints", "base_row", "limits", "payload")
     missing = [key for key in keys if key not in content]
     if missing:
         raise InputError(f'key "{missing[0]}" is missing', where="robot")
-    fields: dict[str, Any] = {key: content[key] for key in TEXTS}
+    fields: dict[str, Any] = {key: content.get(key, "") for key in TEXTS}
     fields |= {key: as_numbers(content[key], what=f"values of {key}") for key in ("table", "coupling")}
     fields |= {key: as_transforms([content[key]], what=f"values of {key}")[0][0] for key in TRANSFORMS}
     fields["joints"] = tuple(content["joints"])

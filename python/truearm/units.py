@@ -59,6 +59,11 @@ def to_si(value: Number, unit: str) -> Number:
     raise KeyError(unit)
 
 
+def bare_unit(text: str) -> str:
+    """A text in small letters, without brackets around it, as words of units are compared."""
+    return text.strip(" []()").casefold()
+
+
 def unit_in_header(name: str) -> str:
     """The unit that a column's name says in brackets or at its end, as in "J1 [deg]" and "x_mm"; "" if none.
 

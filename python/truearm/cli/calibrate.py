@@ -272,10 +272,11 @@ def _print_noise(calibration: "Calibration", summary: dict[str, Any]) -> None:
     left = f"{summary['noise_floor_mm']:.3f} mm"
     name = calibration.model_name
     also = "with constants alone" if name == CONSTANT else f"with the model {name}"
+    it = "With that sigma it" if beyond else "It"
     alone = (
         f"Mean error that noise alone would leave: {left}."
         if leaves_noise(name)
-        else f"It makes a mean error of {left}: noise and, {also}, what varies with the joints."
+        else f"{it} makes a mean error of {left}: noise and, {also}, what varies with the joints."
     )
     say_wrapped(
         f"Standard deviation of what the model does not explain{beyond}: {summary['noise_mm']:.3f} mm per "

@@ -84,16 +84,36 @@ def print_table(
     from rich.table import Table
     from rich.text import Text
 
+    lines = [list(columns), *map(list, rows)]
     table = Table(box=SIMPLE_HEAD, title=title or None, title_justify="left", pad_edge=False)
     for position, heading in enumerate(columns):
         table.add_column(Text(heading), justify="left" if position in left else "right")
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+    for line in lines[1:]:
+        table.add_row(*(Text(cell) for cell in line))
     console = _console()
     if _narrowest(table) > console.width:
         table.padding = 0
+    cells_of = list(zip(*lines, strict=True))
+    least = [max((len(word) for cell in cells for word in cell.split()), default=0) for cells in cells_of]
+    room = console.width - (_narrowest(table) - sum(least))
+    for column, width in zip(table.columns, _widths(cells_of, least, room), strict=True):
+        column.width = width
     console.width = max(console.width, _narrowest(table))
     console.print(table)
+
+
+def _widths(cells_of: Sequence[Sequence[str]], least: Sequence[int], room: int) -> list[int]:
+    """Widths of columns of cells, headings first: `least`, and what room is left for cells, then headings."""
+    widths = list(least)
+    for first in (1, 0):
+        wanted = [
+            max(map(len, cells[first:]), default=0) - width
+            for cells, width in zip(cells_of, widths, strict=True)
+        ]
+        more = [max(each, 0) for each in wanted]
+        left = min(max(room - sum(widths), 0), sum(more))
+        widths = [width + each * left // max(sum(more), 1) for width, each in zip(widths, more, strict=True)]
+    return widths
 
 
 def _narrowest(table: "Table") -> int:

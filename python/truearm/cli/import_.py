@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from truearm.cli import import_options as option
 from truearm.cli.arguments import AsJson
-from truearm.cli.console import print_json, say_wrapped, suggest
-from truearm.errors import UsageError, count_of, typed
+from truearm.cli.console import print_json, say_wrapped, suggest, warn
+from truearm.errors import UsageError, count_of, in_words, typed
 from truearm.files import check_output, write_whole
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS
 
@@ -111,11 +111,20 @@ def _names(text: str | None) -> tuple[str, ...]:
 
 
 def _tell(imported: "Imported", output: Path, *, as_json: bool) -> None:
-    frame, unused, left_out, remarks = imported
+    frame, unused, left_out, remarks, notices = imported
+    warn(notices)
     if as_json:
         names = [str(name) for name in frame.columns]
         said = {"output": str(output), "rows": len(frame), "columns": names}
-        print_json({**said, "left_out": unused, "rows_left_out": left_out, "remarks": remarks})
+        print_json(
+            {
+                **said,
+                "left_out": unused,
+                "rows_left_out": left_out,
+                "remarks": remarks,
+                "notices": in_words(notices),
+            }
+        )
         return
     say_wrapped(f"{output}: {count_of(len(frame), 'row')}, {', '.join(frame.columns)}.")
     if unused:

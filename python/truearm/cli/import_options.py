@@ -20,7 +20,7 @@ Rotation: TypeAlias = Annotated[
     typer.Option(
         metavar="KIND=COLUMNS",
         help="euler:XYZ:deg=RX,RY,RZ (capitals moving, small letters fixed axes), "
-        "vector:rad=RX,RY,RZ or quaternion:xyzw=A,B,C,D.",
+        "vector:rad=RX,RY,RZ, quaternion:xyzw=A,B,C,D or matrix=R11,R12,...,R33 row by row.",
     ),
 ]
 JointUnit: TypeAlias = Annotated[str | None, typer.Option(metavar="deg|rad", help="Unit of the joints.")]
@@ -68,6 +68,8 @@ Comments: TypeAlias = Annotated[
 ]
 Missing: TypeAlias = Annotated[
     list[str] | None,
-    typer.Option(metavar="TEXT", help="What cells say where nothing was measured; repeat."),
+    typer.Option(
+        metavar="TEXT", help="What cells say where nothing was measured, a number however written; repeat."
+    ),
 ]
 Encoding: TypeAlias = Annotated[str, typer.Option(help="Encoding of the text.")]

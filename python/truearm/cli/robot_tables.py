@@ -9,7 +9,7 @@ from truearm.robot_checks import robot_notices
 from truearm.units import MM_PER_METRE
 
 LETTER = {"revolute": "R", "prismatic": "P"}
-DIGITS_IN_TABLE = 4
+DECIMALS = 4
 
 
 def show_robot(robot: Robot, *, as_json: bool) -> None:
@@ -39,7 +39,7 @@ def _print_links(robot: Robot) -> None:
     for index, (theta, d, a, alpha, beta) in enumerate(robot.table):
         angles, lengths = np.degrees([theta, alpha, beta]), MM_PER_METRE * np.array([d, a])
         values = [angles[0], *lengths, *(angles[1:] if with_beta else angles[1:2])]
-        cells = [_number(value, DIGITS_IN_TABLE) for value in values]
+        cells = [_number(value) for value in values]
         rows.append([f"{index + 1} {LETTER[robot.joints[index]]}", *cells, _limits(robot, index)])
     print_table(columns, rows)
 
@@ -69,13 +69,13 @@ def _print_coupling(robot: Robot) -> None:
 
 def _print_verdict(robot: Robot, notices: list[Notice]) -> None:
     x, y, z = MM_PER_METRE * robot.position(np.clip(0.0, robot.limits[:, 0], robot.limits[:, 1]))
-    place = ", ".join(_number(value, DIGITS_IN_TABLE) for value in (x, y, z))
+    place = ", ".join(_number(value) for value in (x, y, z))
     say(f"Tool at zero readings, or at the nearest limit: {place} mm")
     warn(notices)
     say("The file is in order." if not notices else "The file can be used; see the warnings.")
 
 
-def _number(value: float, digits: int = 6) -> str:
-    """Up to so many decimals, no trailing zeros, no minus zero."""
-    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
+def _number(value: float) -> str:
+    """Up to DECIMALS decimals, no trailing zeros, no minus zero."""
+    text = f"{value:.{DECIMALS}f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text

@@ -16,6 +16,7 @@ from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
 from truearm.programs.notices import (
     frames_notices,
+    language_notices,
     object_notices,
     payload_notices,
     still_notices,
@@ -86,6 +87,7 @@ def compensate_program(
     return done.with_facts(
         _facts(compensator, declared, chosen),
         [
+            *language_notices(written_in, calibration.robot),
             *frames_notices(program, known),
             *payload_notices(program, calibration.robot, compensator.named_features),
             *update_notices(calibration),

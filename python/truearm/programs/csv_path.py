@@ -52,6 +52,7 @@ class CsvPath(BlendsShortened):
 
     name = "CSV path"
     endings = (".csv",)
+    maker = ""
     controller_differs = ""
 
     def companions(self, path: Path) -> tuple[Path, ...]:

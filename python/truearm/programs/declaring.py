@@ -18,9 +18,23 @@ Floats = NDArray[np.float64]
 UNIVERSAL: Final = (
     "Controllers of Universal Robots compute with the factory kinematics of the very arm (calibration.conf)"
 )
-UR_MODEL: Final = re.compile(r"\bur-?\d{1,2}e?\b")
-MAKERS: Final = re.compile(r"\b(abb|fanuc|kuka)\b")
+IN_GENERAL: Final = (
+    "Give --controller FILE with the arm's own kinematics, or --controller nominal if it has none"
+)
+OF_UNIVERSAL: Final = (
+    "Give --controller FILE: calibration.conf out of the folder .urcontrol of the arm's controller, or the "
+    "kinematics YAML that its ROS driver's ur_calibration reads from it. Only a simulated arm is nominal: "
+    "--controller nominal"
+)
+UR_MODEL: Final = re.compile(r"(?<![a-z0-9])ur-?\d{1,2}e?(?![a-z0-9])")
+UNIVERSAL_ROBOTS: Final = "universal robots"
+WITH_OPTION: Final = ("abb", "fanuc", "kuka")
 """Makers whose controllers can hold the kinematics of the very arm, an option."""
+OTHERS: Final = (
+    "adept", "comau", "denso", "epson", "franka", "kawasaki", "mitsubishi", "motoman", "nachi", "omron",
+    "staubli", "stäubli", "unimation", "yaskawa",
+)  # fmt: skip
+MAKERS: Final = re.compile(rf"(?<![a-z])({'|'.join(WITH_OPTION + OTHERS)})(?![a-z])")
 LARGEST_MM: Final = 20.0
 LARGEST_DEG: Final = 3.0
 """What a controller's own model of an arm may differ by from the nominal one, at the flange.
@@ -40,13 +54,13 @@ def declared_controller(declaration: str | None, language: Language, robot: Robo
     """
     if declaration is not None:
         return Controller.declared(declaration, robot)
-    differs = UNIVERSAL if _is_universal(robot) else language.controller_differs
+    is_universal = UNIVERSAL_ROBOTS in (maker_of(robot), language.maker.lower())
+    differs = UNIVERSAL if is_universal else language.controller_differs
     if differs:
         raise UsageError(
             f"which model the controller of {robot.name} computes with was not declared",
             rule=differs,
-            way_out="Give --controller FILE with the arm's own kinematics, or --controller nominal "
-            "if it has none",
+            way_out=OF_UNIVERSAL if is_universal else IN_GENERAL,
         )
     return Controller.nominal(robot)
 
@@ -92,7 +106,16 @@ def _apart(one: Robot, other: Robot) -> tuple[float, float]:
 
 def may_differ(robot: Robot) -> bool:
     """Whether controllers of arms of this name may compute with another model than the nominal one."""
-    return _is_universal(robot) or MAKERS.search(robot.name.lower()) is not None
+    return maker_of(robot) in (UNIVERSAL_ROBOTS, *WITH_OPTION)
+
+
+def maker_of(robot: Robot) -> str:
+    """The maker of an arm by its name, in small letters; empty where that names none."""
+    name = robot.name.lower()
+    if UNIVERSAL_ROBOTS in name or UR_MODEL.search(name) is not None:
+        return UNIVERSAL_ROBOTS
+    found = MAKERS.search(name)
+    return "" if found is None else found[0]
 
 
 def refuse_contradiction(program: Program, controller: Controller, *, force: bool) -> None:
@@ -108,8 +131,3 @@ def refuse_contradiction(program: Program, controller: Controller, *, force: boo
             rule="A controller that corrects by itself would correct twice",
             way_out="Switch that off, or give its model with --controller FILE; --force goes on",
         )
-
-
-def _is_universal(robot: Robot) -> bool:
-    name = robot.name.lower()
-    return "universal robots" in name or UR_MODEL.search(name) is not None

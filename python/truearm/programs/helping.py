@@ -8,8 +8,9 @@ UNSURE: Final = 8
 FRAMES_UNSURE: Final = 0
 """Code of refusals where it is certain enough, but not together with tool and work object."""
 NOT_REACHED: Final = (2, 3)
+TOO_FAR: Final = 5
 ALLOWING: Final = {
-    5: "--largest-joint-deg",
+    TOO_FAR: "--largest-joint-deg",
     6: "--largest-mm",
     7: "--largest-deg",
     UNSURE: "--largest-std-mm",

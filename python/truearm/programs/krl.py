@@ -22,6 +22,7 @@ class KRL(BlendsShortened):
 
     name = "KRL"
     endings = ENDINGS
+    maker = "KUKA"
     controller_differs = (
         "KUKA arms with an accuracy option (absolutely accurate robot) compute with a model of their own"
     )

@@ -33,6 +33,7 @@ class MelfaBasic(BlendsShortened):
 
     name = "MELFA BASIC"
     endings = (".prg", ".mb4", ".mb5")
+    maker = "Mitsubishi"
     controller_differs = ""
 
     def companions(self, path: Path) -> tuple[Path, ...]:

@@ -8,10 +8,11 @@ import numpy as np
 from truearm.calibration import Calibration
 from truearm.errors import Notice, list_names, typed
 from truearm.inputs import PAYLOAD_KG, is_payload
+from truearm.programs.declaring import maker_of
 from truearm.programs.environment import Environment, Frame
 from truearm.programs.frames import Frames, Kind
 from truearm.programs.layouts import of_joints as layout_of_joints
-from truearm.programs.program import Program
+from truearm.programs.program import Language, Program
 from truearm.programs.rewriting import Rewritten
 from truearm.robot import Robot
 from truearm.stillness import carried_joints, moved_joints, still_words
@@ -60,6 +61,19 @@ def _unlike(stated: Sequence[float], corrected_for: float | None) -> list[float]
     if corrected_for is None:
         return list(stated) if len(stated) > 1 and stated[-1] - stated[0] > SAME_PAYLOAD_KG else []
     return [mass for mass in stated if abs(mass - corrected_for) > SAME_PAYLOAD_KG]
+
+
+def language_notices(language: Language, robot: Robot) -> list[Notice]:
+    """A warning where a program is in the language of another maker's controllers than the arm's."""
+    maker = maker_of(robot)
+    if maker in ("", language.maker.lower()) or not language.maker:
+        return []
+    text = (
+        f"{language.name} is the language of {language.maker}'s controllers, and the calibration is of "
+        f"{robot.name}: targets are corrected as if that arm ran the program. Take the calibration of the "
+        "arm that runs it"
+    )
+    return [Notice("language", text)]
 
 
 def frames_notices(program: Program, frames: Frames) -> list[Notice]:

@@ -172,6 +172,11 @@ class Language(Protocol):
         ...
 
     @property
+    def maker(self) -> str:
+        """Whose controllers run it, as names of robots say it; empty where it is nobody's."""
+        ...
+
+    @property
     def controller_differs(self) -> str:
         """Why its controllers may compute with another model than the nominal one, in words that end a
         sentence; empty where they do not. A controller must be declared then.

@@ -29,6 +29,7 @@ class RAPID(BlendsShortened):
 
     name = "RAPID"
     endings = (".mod", ".modx", ".sys", ".sysx")
+    maker = "ABB"
     controller_differs = (
         "ABB arms with Absolute Accuracy compute with a model of their own, and a program does not say so"
     )

@@ -19,7 +19,14 @@ from truearm.programs.editing import Words, edited
 from truearm.programs.encoding import Encoder, encode_targets
 from truearm.programs.environment import Frame, Transform, author_of
 from truearm.programs.frames import Frames
-from truearm.programs.helping import FRAMES_UNSURE, KEEP_NOMINAL, NOT_REACHED, measured_there, what_helps
+from truearm.programs.helping import (
+    FRAMES_UNSURE,
+    KEEP_NOMINAL,
+    NOT_REACHED,
+    TOO_FAR,
+    measured_there,
+    what_helps,
+)
 from truearm.programs.left_open import left_open_mm
 from truearm.programs.listing import describe, listed_target
 from truearm.programs.marks import refuse_marked
@@ -37,6 +44,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+NO_SMALL_CHANGE: Final = (*NOT_REACHED, TOO_FAR)
 STRETCHED: Final = "it lies at a singularity, where no small change of the joints makes the correction"
 TARGET_COLUMNS: Final = (
     "nominal", "corrected", "changed", "correction_mm", "correction_mrad", "std_mm", "residual_mm",
@@ -319,11 +327,11 @@ class _State:
         self.corrected[which[refused]] = self.nominal[which[refused]]
 
     def _take_refusals(self, which: Integers, refusals: Sequence[Refusal]) -> None:
-        """Refused targets; those that no reading near them can meet are listed, as poses there are."""
+        """Refused targets; those at singularities that no small change meets are listed, as poses are."""
         targets = which[[refusal.number - 1 for refusal in refusals]]
         singular = are_singular(self.models.programming, self.nominal[targets])
         for target, refusal, stretched in zip(targets.tolist(), refusals, singular.tolist(), strict=True):
-            if stretched and refusal.code in NOT_REACHED:
+            if stretched and refusal.code in NO_SMALL_CHANGE:
                 self.reasons[target] = STRETCHED
                 self.known[target] = False
             else:

@@ -28,6 +28,7 @@ class FanucTp(BlendsShortened):
 
     name = "FANUC TP"
     endings = (".ls",)
+    maker = "FANUC"
     controller_differs = (
         "FANUC arms that were calibrated at the factory (a signature) compute with a model of their own"
     )

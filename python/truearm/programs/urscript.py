@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from truearm.errors import InputError
+from truearm.programs.declaring import UNIVERSAL
 from truearm.programs.frames import Frames
 from truearm.programs.layouts import Joints, RotationVectorPose
 from truearm.programs.program import LinearStep, Program, StepTexts
@@ -24,9 +25,8 @@ class UrScript:
 
     name = "URScript"
     endings = (".script", ".urscript")
-    controller_differs = (
-        "the controllers of Universal Robots compute with the factory kinematics of the very arm"
-    )
+    maker = "Universal Robots"
+    controller_differs = UNIVERSAL
 
     def companions(self, path: Path) -> tuple[Path, ...]:
         """None: a program is one file."""

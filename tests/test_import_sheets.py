@@ -1,0 +1,68 @@
+"""Sheets as instruments write them: units below the names, and numbers that say that nothing was measured."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.import_support import COLUMNS, PLAIN, plan, write
+from truearm.cli import main
+from truearm.errors import InputError, UsageError
+from truearm.importing import import_table
+
+HEAD, FIRST, *REST = PLAIN.splitlines(keepends=True)
+MAPS = [word for ours, theirs in COLUMNS.items() for word in ("--map", f"{ours}={theirs}")]
+UNITS = ["--joint-unit", "deg", "--length-unit", "mm"]
+
+
+def below(row: str, rest: str = "".join([FIRST, *REST])) -> str:
+    return f"{HEAD}{row}\n{rest}"
+
+
+@pytest.mark.parametrize("row", ["deg,deg,mm,mm,mm", "[deg],[deg],[mm],[mm],", "°,°,mm,-,(mm)"])
+def test_a_row_of_units_below_the_names_is_left_out_and_told(row: str, tmp_path: Path) -> None:
+    plain = import_table(write(tmp_path, PLAIN), plan()).frame
+    found = import_table(write(tmp_path, below(row)), plan())
+    assert found.frame.equals(plain)
+    assert [words.split(" of ")[:2] for words in found.remarks] == [["the row", "units below the header"]]
+
+
+def test_units_below_the_names_have_to_agree_with_those_stated(tmp_path: Path) -> None:
+    path = write(tmp_path, below("deg,deg,m,m,m"))
+    with pytest.raises(UsageError, match='column "px" says m, --length-unit says mm.*a unit below it'):
+        import_table(path, plan())
+    assert import_table(path, plan(length_unit="m")).frame["x"].tolist() == [1000.0, 1500.0]
+
+
+@pytest.mark.parametrize("row", ["deg,deg,mm,mm,7", "1,-,1,-,1", "Grad,Grad,mm,mm,mm"])
+def test_a_row_that_holds_anything_else_stays(row: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="in row 1. It must hold numbers"):
+        import_table(write(tmp_path, below(row)), plan())
+
+
+def test_such_a_row_is_left_out_by_what_it_begins_with(tmp_path: Path) -> None:
+    found = import_table(write(tmp_path, below("Grad,Grad,mm,mm,mm")), plan(comments=("Grad,",)))
+    assert len(found.frame) == 2
+
+
+@pytest.mark.parametrize("cell", ["-9999", "-9999.0", "-9.999e3", "-9999.000"])
+def test_a_number_says_that_nothing_was_measured_however_it_is_written(cell: str, tmp_path: Path) -> None:
+    found = import_table(write(tmp_path, f"{PLAIN}1,2,{cell},{cell},{cell}\n"), plan(missing=("-9999",)))
+    assert len(found.frame) == 2
+    assert not found.notices
+
+
+def test_a_number_with_a_decimal_comma_does_too(tmp_path: Path) -> None:
+    text = PLAIN.replace(",", ";") + "1;2;-9999,0;-9999,0;-9999,0\n"
+    found = import_table(write(tmp_path, text), plan(missing=("-9999",), delimiter=";", decimal=","))
+    assert len(found.frame) == 2
+
+
+def test_what_no_cell_says_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(tmp_path, PLAIN + "1,2,n/a,n/a,n/a\n")
+    words = ["import", str(path), "-o", str(tmp_path / "m.csv"), *MAPS, *UNITS, "--json"]
+    assert main([*words, "--missing", "N/A", "--missing", "-999"]) == 0
+    out, err = capsys.readouterr()
+    (notice,) = json.loads(out)["notices"]
+    assert notice.endswith("says what --missing -999 says")
+    assert "--missing -999" in err
