@@ -100,11 +100,12 @@ def test_a_change_of_the_tool_is_noticed_from_what_is_told_on():
 
 @pytest.mark.parametrize("freedom", [1, 4, 9])
 def test_a_change_of_so_many_standard_errors_is_noticed_in_95_of_100_cases(freedom):
-    drawn = np.random.default_rng(0).normal(size=(40_000, freedom))
-    limit = np.quantile(np.square(drawn).sum(axis=1), 0.99)
-    drawn[:, 0] += standard_errors(freedom, 0.01)
-    assert abs((np.square(drawn).sum(axis=1) > limit).mean() - 0.95) < 0.01
-    assert standard_errors(freedom, 0.96) == 0.0
+    random, known = np.random.default_rng(0), 20
+    drawn, scale = random.normal(size=(40_000, freedom)), random.chisquare(known, 40_000) / known
+    limit = np.quantile(np.square(drawn).sum(axis=1) / scale, 0.99)
+    drawn[:, 0] += standard_errors(freedom, 0.01, known)
+    assert abs((np.square(drawn).sum(axis=1) / scale > limit).mean() - 0.95) < 0.01
+    assert standard_errors(freedom, 0.96, known) == 0.0
 
 
 def test_what_is_noticed_hardly_depends_on_how_far_things_may_have_moved(known):

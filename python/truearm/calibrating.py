@@ -50,6 +50,7 @@ from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge, where_found
+from truearm.known_scale import KnownScale
 from truearm.lengths import length_mm
 from truearm.measured_parts import MeasuredParts
 from truearm.measurements import Measurements
@@ -379,10 +380,9 @@ def _astray(task: Task, fits: tuple[Fits, Fits], held: Measurements, judged: Hel
 
 
 def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
-    names = fits.identifiability.determined
-    return ConstantDetails.of(
-        names, fits.constant, standard_errors(task.arm, names, fits.constant, fits.variable)
-    )
+    names, fit = fits.identifiability.determined, fits.constant
+    scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m)
+    return ConstantDetails.of(names, fit, standard_errors(task.arm, names, fit, fits.variable), scale)
 
 
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:

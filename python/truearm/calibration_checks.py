@@ -38,6 +38,11 @@ class _Identifiability(_Part):
     condition: float
 
 
+class _Scale(_Part):
+    freedom: Count
+    sigma_m: float | None
+
+
 class _Constant(_Part):
     names: list[str]
     noise_m: float
@@ -45,6 +50,7 @@ class _Constant(_Part):
     prior_scale: float
     iterations: Count
     reason: str
+    scale: _Scale | None = None
 
 
 class _Variable(_Part):

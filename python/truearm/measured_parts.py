@@ -48,6 +48,11 @@ class MeasuredParts:
         targets = np.ones((groups, max(len(selection.targets), 1)), dtype=np.int64)
         return cls(targets[:, 0], targets, targets[:, 0] * selection.orientation)
 
+    @property
+    def values(self) -> int:
+        """How many numbers were measured of what was fitted."""
+        return 3 * int(self.targets.sum() + self.orientations.sum())
+
     def first(self, group: int) -> int:
         """Place of the first target that a set-up measured; 0 where it measured none."""
         return int((self.targets[group] > 0).argmax())

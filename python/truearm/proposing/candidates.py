@@ -13,6 +13,7 @@ from truearm.calibration import Calibration
 from truearm.core_set import measured_points
 from truearm.errors import UsageError, WorkError, list_names
 from truearm.kinds import required
+from truearm.updating.scale import usual_sigma_m
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -73,9 +74,10 @@ class Candidates:
 
     @cached_property
     def noise(self) -> Floats:
-        """Covariance (c, m, m) of what a measurement shows anew."""
+        """Covariance (c, m, m) of what a measurement shows anew, by a device as good as that of before."""
         found = self.calibration.spread.noise(self.jacobian, self.orientation)
-        return np.ascontiguousarray(found)
+        own = usual_sigma_m(self.calibration) ** 2 * np.diag(~self.orientation)
+        return np.ascontiguousarray(found + own)
 
     @property
     def set_up(self) -> str:

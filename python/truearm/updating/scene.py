@@ -16,6 +16,7 @@ from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
 from truearm.uncertainty import noises_of, task_of
+from truearm.updating.scale import sigmas_m
 from truearm.updating.unknowns import OPEN, Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
@@ -48,21 +49,6 @@ class Linear:
     jacobian: Floats
     departure: Floats
     pose: NDArray[np.int64]
-
-
-def usual_sigma_m(calibration: Calibration) -> float:
-    """What half of the calibration's rows state as their sigma, or less, m; zero where none does."""
-    learned = calibration.learned_from
-    stated = None if learned is None else learned.data.sigma_m
-    if stated is None or not np.isfinite(stated).any():
-        return 0.0
-    return float(np.nanmedian(stated))
-
-
-def sigmas_m(calibration: Calibration, data: Measurements) -> Floats:
-    """Sigma of each row (n,), m; where it states none that which was usual when the arm was calibrated."""
-    stated = np.full(len(data), np.nan) if data.sigma_m is None else data.sigma_m
-    return np.where(np.isfinite(stated), stated, usual_sigma_m(calibration))
 
 
 class Scene:
