@@ -126,6 +126,26 @@ def test_a_model_of_constants_proposes_as_well(known):
     assert len(acceptance_poses(candidates, 4).rows) == 4
 
 
+def test_poses_show_what_their_set_up_shows(known):
+    """Another set-up's orientations, and targets, are none of its own."""
+    arm, _ = known
+    turned = arm.measure_table(arm.poses(40), orientation=True).assign(group="A")
+    plain = arm.measure_table(arm.poses(40, seed=3), seed=3).assign(group="B")
+    tables = [ta.Measurements.from_dataframe(table, name=table.group[0]) for table in (turned, plain)]
+    both = ta.calibrate(arm.robot, tables, model="constant")
+    in_a, in_b = (Candidates(both, arm.poses(60, seed=2), group=group) for group in "AB")
+    assert (in_a.shown, in_b.shown) == ("1 target with orientation", "1 target without orientation")
+    assert (in_a.noise.shape[1], in_b.noise.shape[1]) == (6, 3)
+    found = acceptance_poses(in_b, 12)
+    after = next_poses(in_b, arm.poses(20, seed=3), 3)
+    assert (np.diff(after.expected_mm) < 0.0).all()
+    measured = arm.measure_table(in_b.readings[found.rows], seed=4).assign(group="B")
+    update = ta.update(both, ta.Measurements.from_dataframe(measured))
+    told = {f"joint{offset.joint}": offset.std for offset in update.offsets if offset.told}
+    assert set(found.noticed) == {*told, "tool"}
+    assert all(4.0 < found.noticed[name] / std < 8.0 for name, std in told.items() if std is not None)
+
+
 def test_features_are_held_in_the_middle(known):
     arm, _ = known
     table = arm.measure_table(arm.poses(60))

@@ -24,10 +24,9 @@ class KnownScale:
     @classmethod
     def of(cls, residual: Floats, rank: int, stated: Floats | None) -> "KnownScale":
         """That of residuals, zero where not measured, with `rank` unknowns and stated sigmas (n,), m."""
-        has_any = stated is not None and bool(np.isfinite(stated).any())
-        return cls.of_values(
-            int(np.count_nonzero(residual)), rank, float(np.nanmedian(stated)) if has_any else 0.0
-        )
+        told = np.empty(0) if stated is None else stated[np.isfinite(stated)]
+        usual = float(np.median(told)) if len(told) else 0.0
+        return cls.of_values(int(np.count_nonzero(residual)), rank, usual)
 
     @classmethod
     def of_values(cls, values: int, rank: int, sigma_m: float | None) -> "KnownScale":

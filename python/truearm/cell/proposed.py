@@ -66,6 +66,7 @@ class Proposed:
         points: The first of these targets in the base frame (n, 3), m.
         seconds: Time of the motions of the joints in each order by name.
         found: What was chosen, and what is expected of it.
+        shown: What each pose is taken to be measured with, in words.
         lowest_m: The lowest place of the arm and its tool, in the base frame.
     """
 
@@ -73,6 +74,7 @@ class Proposed:
     points: Floats
     seconds: dict[str, float]
     found: NextPoses | Acceptance
+    shown: str
     lowest_m: float
 
     def to_dict(self) -> dict[str, Any]:
@@ -81,6 +83,7 @@ class Proposed:
             "count": len(self.poses),
             "motion_s": self.seconds,
             "lowest_mm": MM_PER_METRE * self.lowest_m,
+            "measured": self.shown,
         }
         if isinstance(self.found, NextPoses):
             expected = self.found.expected_mm
@@ -228,5 +231,6 @@ def _ordered(
         targets_of(arm, poses.readings, tools[0]),
         seconds,
         found,
+        candidates.shown,
         min(lowest(arm, readings, tool=tool) for tool in tools),
     )

@@ -92,7 +92,7 @@ def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, li
     turning = np.flatnonzero((largest > 1e-6) & (np.array(arm.robot.joints) == "revolute"))
     bent = offsets[:, :, turning] * (torque / np.where(largest > 0.0, largest, 1.0))[:, None, turning]
     std = np.array([arm_std(arm, name, options) for name in names])
-    setup = candidates.setup * setup_std(arm, calibration.selection, options, known=True)
+    setup = candidates.setup * setup_std(arm, candidates.selection, options, known=True)
     whole = np.concatenate([offsets * std, setup, PAYLOAD_RAD * bent], axis=2)
     frame = [] if arm.world_is_known else ["frame"] * 6
     tool = ["tool"] * (setup.shape[2] - len(frame))
@@ -142,5 +142,5 @@ def standard_errors(freedom: int, level: float, known: int) -> float:
         return float("inf")
     if level >= NOTICED:
         return 0.0
-    limit = fdtri(freedom, known, 1.0 - level)
+    limit = float(fdtri(freedom, known, 1.0 - level))
     return float(np.sqrt(ncfdtrinc(freedom, known, 1.0 - NOTICED, limit)))
