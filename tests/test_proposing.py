@@ -1,12 +1,14 @@
 """Poses that a calibration proposes: those that teach it most, and those that check it best."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import truearm as ta
 from tests.remastered import remastered
 from truearm._core import CoreError, choose_informative
-from truearm.proposing import Candidates, acceptance_poses, next_poses
+from truearm.proposing import Candidates, acceptance_poses, expected_by_update, next_poses
 from truearm.proposing.acceptance import standard_errors
 from truearm.simulation import VirtualArm
 from truearm.updating import UpdateOptions
@@ -57,6 +59,18 @@ def test_the_expected_error_is_that_of_one_gaussian_update(proposed):
     left = joint[size:, size:] - cross @ np.linalg.solve(own, cross.T)
     wanted = 1e3 * np.sqrt(np.trace(left) / len(workspace))
     np.testing.assert_allclose(found.expected_mm[1], wanted, rtol=1e-9)
+
+
+def test_what_is_expected_of_an_update_comes_true(known):
+    arm, _ = known
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(40), orientation=True), model="constant")
+    candidates, workspace = Candidates(calibration, arm.poses(10, seed=2)), arm.poses(20, seed=3)
+    before, after = expected_by_update(candidates, workspace)
+    assert before == pytest.approx(next_poses(candidates, workspace, 1).expected_mm[0])
+    found = ta.update(calibration, arm.measure(candidates.readings, orientation=True, seed=4))
+    then = replace(candidates, readings=workspace, calibration=found.calibration)
+    assert after == pytest.approx(expected_by_update(then, workspace)[0], rel=0.02)
+    assert len(expected_by_update(replace(candidates, readings=candidates.readings[:2]), workspace)) == 1
 
 
 def test_proposed_poses_teach_more_than_as_many_random_ones(known, proposed):

@@ -50,7 +50,7 @@ from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge, where_found
-from truearm.known_scale import KnownScale
+from truearm.known_scale import KnownScale, common_share
 from truearm.lengths import length_mm
 from truearm.measured_parts import MeasuredParts
 from truearm.measurements import Measurements
@@ -381,7 +381,8 @@ def _astray(task: Task, fits: tuple[Fits, Fits], held: Measurements, judged: Hel
 
 def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
     names, fit = fits.identifiability.determined, fits.constant
-    scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m)
+    common = common_share(fit.residuals, fit.weights, len(task.selection.targets), fit.noise[0])
+    scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m, common)
     return ConstantDetails.of(names, fit, standard_errors(task.arm, names, fit, fits.variable), scale)
 
 

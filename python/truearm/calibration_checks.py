@@ -41,6 +41,7 @@ class _Identifiability(_Part):
 class _Scale(_Part):
     freedom: Count
     sigma_m: float | None
+    common: float = 0.0
 
 
 class _Constant(_Part):

@@ -20,7 +20,7 @@ from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
-from truearm.known_scale import KnownScale
+from truearm.known_scale import KnownScale, common_share
 from truearm.measured_parts import MeasuredParts
 from truearm.models import ArmModel
 from truearm.options import Options
@@ -120,7 +120,8 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     identifiability = Identifiability.from_dict(content["identifiability"])
     details = _read_constant(constant, arrays)
     if details.scale is None and not content.get("update"):
-        details = replace(details, scale=_scale_of(rows, measured, identifiability.total_rank))
+        scale = _scale_of(rows, measured, identifiability.total_rank, details.noise_m)
+        details = replace(details, scale=scale)
     return {
         "robot": robot,
         "options": options,
@@ -196,11 +197,12 @@ def _constant(details: ConstantDetails) -> dict[str, Any]:
     return {"names": list(details.names), **plain, "scale": scale}
 
 
-def _scale_of(rows: FittedRows | None, measured: MeasuredParts, rank: int) -> KnownScale:
+def _scale_of(rows: FittedRows | None, measured: MeasuredParts, rank: int, noise_m: float) -> KnownScale:
     """What files of earlier versions do not say, from their rows, or from how much was measured."""
-    if rows is not None:
-        return KnownScale.of(rows.residual, rank, rows.data.sigma_m)
-    return KnownScale.of_values(measured.values, rank, None)
+    if rows is None:
+        return KnownScale(max(measured.values - rank, 1), None)
+    common = common_share(rows.residual, rows.weight, measured.targets.shape[1], noise_m)
+    return KnownScale.of(rows.residual, rank, rows.data.sigma_m, common)
 
 
 def _read_constant(content: Mapping[str, Any], arrays: Arrays) -> ConstantDetails:

@@ -23,7 +23,14 @@ from truearm.defaults import THERE_AND_BACK
 from truearm.endpoints import at_target
 from truearm.errors import UsageError
 from truearm.planning.accessibility import Mask, Places, Rule, accessible, lowest
-from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
+from truearm.proposing import (
+    Acceptance,
+    Candidates,
+    NextPoses,
+    acceptance_poses,
+    expected_by_update,
+    next_poses,
+)
 from truearm.robot import Robot
 from truearm.stillness import still_joints
 from truearm.units import MM_PER_METRE
@@ -46,6 +53,7 @@ class ProposalOptions:
         seed: Seed of the candidates, and of the workspace.
         order: "there-and-back", "short" or "paper".
         group: Set-up in which they will be measured; the calibration's last one by default.
+        by_update: Whether the calibration will be updated from the next poses, not made anew from all.
         rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these, with
             each target that the calibration found in the set-up, or the cell's.
     """
@@ -54,6 +62,7 @@ class ProposalOptions:
     seed: int = 0
     order: str = THERE_AND_BACK
     group: str | None = None
+    by_update: bool = False
     rules: tuple[Rule, ...] = ()
 
 
@@ -115,6 +124,9 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
         _held(calibration),
     )
     found = next_poses(candidates, workspace, options.count)
+    if options.by_update:
+        chosen = replace(candidates, readings=candidates.readings[found.rows])
+        found = replace(found, expected_mm=expected_by_update(chosen, workspace))
     proposed = _ordered(candidates, found, found.rows, "train", options, cell)
     return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))
 

@@ -16,6 +16,8 @@ RENAMED: Final = {"most_regions": "regions"}
 """Options of a calibration that the command calls otherwise."""
 SAID_OTHERWISE: Final = frozenset({"by_purpose", "refit"})
 """Options that the command has another option for."""
+FIELD: Final = "field"
+"""Verdict of an update that the calibration no longer fits."""
 SOME_FILE: Final = "OLD.csv"
 NEW_FILE: Final = "MEASUREMENTS.csv"
 FEWEST_ANEW: Final = 60
@@ -35,10 +37,14 @@ class Again:
     Attributes:
         command: The command.
         notes: What it leaves out, in sentences.
+        older_rows: Whether the rows that constants and field were learned from belong with the others.
+        holds: Whether the calibration fitted the arm when it was last updated.
     """
 
     command: str
     notes: tuple[str, ...] = ()
+    older_rows: bool = True
+    holds: bool = True
 
 
 def calibrate_again(calibration: "Calibration", robot: str | None, more: str) -> Again:
@@ -53,10 +59,12 @@ def calibrate_again(calibration: "Calibration", robot: str | None, more: str) ->
     """
     from truearm.cli.naming import name_of
 
-    files, notes = _files(calibration)
+    files, apart = _files(calibration)
     words = [robot or name_of(calibration.robot), *files, more]
-    notes += _not_kept(calibration.options)
-    return Again(_command(words, calibration.options), tuple(notes))
+    notes = (*apart, *_not_kept(calibration.options))
+    revision = calibration.revision
+    holds = revision is None or revision.report["verdict"] != FIELD
+    return Again(_command(words, calibration.options), notes, older_rows=not apart, holds=holds)
 
 
 def plan_anew(calibration: "Calibration") -> str:
@@ -112,7 +120,7 @@ def _files(calibration: "Calibration") -> tuple[list[str], list[str]]:
 
 def _why_apart(report: Mapping[str, Any], older: "Measurements", later: list["Measurements"]) -> str:
     """Why rows before an update cannot be calibrated from with later ones; "" where they can."""
-    if report["verdict"] == "field":
+    if report["verdict"] == FIELD:
         return NO_LONGER
     moved = [str(offset["joint"]) for offset in report["offsets"] if offset["moved"]]
     if moved:

@@ -58,12 +58,12 @@ class Candidates:
 
     def values(self, readings: Floats) -> Floats:
         """Inputs (n, I) of the field at readings (n, N)."""
-        return self.calibration.field_inputs(readings, self._feature_values)
+        return self.calibration.field_inputs(readings, self.feature_values)
 
     @cached_property
     def points(self) -> Floats:
         """The tool's points (c, 3) in the base frame, m."""
-        return self.calibration.position(self.readings, features=self._feature_values)
+        return self.calibration.position(self.readings, features=self.feature_values)
 
     @cached_property
     def jacobian(self) -> Floats:
@@ -129,7 +129,8 @@ class Candidates:
         return len(groups) - 1 if self.group is None else groups.index(self.group)
 
     @cached_property
-    def _feature_values(self) -> Mapping[str, float]:
+    def feature_values(self) -> Mapping[str, float]:
+        """The number of each feature that the field varies with."""
         names = self.calibration.options.features
         given = self.features or {}
         learned = self.calibration.learned_from
