@@ -158,7 +158,8 @@ def test_rows_that_do_not_belong_to_older_ones_update_and_are_too_few_to_calibra
     said = " ".join(told.split())
     assert "learned anew from as many poses as before" in said
     assert "Older rows count" not in said
-    assert ("truearm update new.calib MEASUREMENTS.csv -o NEW.calib" in told) == (verdict == "moved")
+    assert ("truearm update OLD.calib new.csv MEASUREMENTS.csv -o NEW.calib" in told) == (verdict == "moved")
+    assert ("truearm update --roll-back new.calib -o OLD.calib" in told) == (verdict == "moved")
     assert ("when these are measured too" in said) == (verdict == "moved")
     assert proposed(told, "plan")[2:] == ["rv-m2", "-n", "60", "-o", "poses.csv"]
 

@@ -65,12 +65,15 @@ def test_what_is_expected_of_an_update_comes_true(known):
     arm, _ = known
     calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(40), orientation=True), model="constant")
     candidates, workspace = Candidates(calibration, arm.poses(10, seed=2)), arm.poses(20, seed=3)
-    before, after = expected_by_update(candidates, workspace)
+    before, after = expected_by_update(candidates, workspace, calibration)
     assert before == pytest.approx(next_poses(candidates, workspace, 1).expected_mm[0])
     found = ta.update(calibration, arm.measure(candidates.readings, orientation=True, seed=4))
     then = replace(candidates, readings=workspace, calibration=found.calibration)
-    assert after == pytest.approx(expected_by_update(then, workspace)[0], rel=0.02)
-    assert len(expected_by_update(replace(candidates, readings=candidates.readings[:2]), workspace)) == 1
+    assert after == pytest.approx(expected_by_update(then, workspace, calibration)[0], rel=0.02)
+    few = replace(candidates, readings=candidates.readings[:2])
+    assert len(expected_by_update(few, workspace, calibration)) == 1
+    rows = arm.measure(arm.poses(10, seed=5), orientation=True, seed=5)
+    assert len(expected_by_update(few, workspace, calibration, [rows])) == 2
 
 
 def test_proposed_poses_teach_more_than_as_many_random_ones(known, proposed):

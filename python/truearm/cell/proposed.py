@@ -22,6 +22,7 @@ from truearm.cell.reaching import within_reach
 from truearm.defaults import THERE_AND_BACK
 from truearm.endpoints import at_target
 from truearm.errors import UsageError
+from truearm.measurements import Measurements
 from truearm.planning.accessibility import Mask, Places, Rule, accessible, lowest
 from truearm.proposing import (
     Acceptance,
@@ -53,17 +54,19 @@ class ProposalOptions:
         seed: Seed of the candidates, and of the workspace.
         order: "there-and-back", "short" or "paper".
         group: Set-up in which they will be measured; the calibration's last one by default.
-        by_update: Whether the calibration will be updated from the next poses, not made anew from all.
         rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these, with
             each target that the calibration found in the set-up, or the cell's.
+        update_of: The calibration that will be updated from the next poses; None where one is made from all.
+        update_rows: What was measured since that one, which takes part.
     """
 
     count: int
     seed: int = 0
     order: str = THERE_AND_BACK
     group: str | None = None
-    by_update: bool = False
     rules: tuple[Rule, ...] = ()
+    update_of: Calibration | None = None
+    update_rows: tuple[Measurements, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +127,10 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
         _held(calibration),
     )
     found = next_poses(candidates, workspace, options.count)
-    if options.by_update:
+    if options.update_of is not None:
         chosen = replace(candidates, readings=candidates.readings[found.rows])
-        found = replace(found, expected_mm=expected_by_update(chosen, workspace))
+        expected = expected_by_update(chosen, workspace, options.update_of, options.update_rows)
+        found = replace(found, expected_mm=expected)
     proposed = _ordered(candidates, found, found.rows, "train", options, cell)
     return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))
 

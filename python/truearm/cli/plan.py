@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 NUMBERS: Final = (20, 40, 60, 100, 200)
 MEASURED: Final = "Measure them; then:"
 ANEW: Final = (
-    "An update finds offsets, frame and tool again. All else can only be learned anew from as many poses as "
-    "before."
+    "An update of the calibration before finds offsets, frame and tool from all rows since. What varies "
+    "can only be learned anew from as many poses as before."
 )
 PICTURES: Final = (".png", ".svg", ".pdf")
 
@@ -210,9 +210,7 @@ def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: 
     choose = propose_next if asked.acceptance is None else propose_acceptance
     number = asked.next_count or asked.acceptance or 0
     again = calibrate_again(calibration, asked.robot, NEW_FILE)
-    options = ProposalOptions(
-        number, asked.seed, asked.order, asked.group, by_update=not again.older_rows, rules=asked.rules
-    )
+    options = ProposalOptions(number, asked.seed, asked.order, asked.group, asked.rules, *again.update)
     with ends_promptly():
         with told_stages()("choosing poses"):
             proposed = choose(calibration, options, cell=cell)
@@ -254,16 +252,16 @@ def _save(plan: "Plan | Proposed", output: Path | None, picture: Path | None) ->
 
 def _suggest_again(again: Again, calibration: "Calibration", file: Path) -> None:
     update = f"truearm update {typed(file)} {NEW_FILE}"
-    if again.older_rows:
+    if not again.apart:
         say_wrapped(f"Older rows count only if the arm has not changed since: {update} tells.")
     for note in again.notes:
         say_wrapped(note)
-    if again.older_rows:
+    if not again.apart:
         suggest(again.command, when="Then calibrate:" if again.notes else "Then calibrate from all:")
         return
     say_wrapped(ANEW)
     if again.holds:
-        suggest(f"{update} -o NEW.calib", when=MEASURED)
+        suggest(*again.updates(file, NEW_FILE), when=MEASURED)
     suggest(plan_anew(calibration), calibrate_anew(calibration).command, when="To calibrate anew:")
 
 

@@ -1,11 +1,14 @@
 """What an update from proposed poses would leave uncertain: its offsets are found again, the field is not."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from truearm.calibration import Calibration
 from truearm.errors import InputError
 from truearm.measurements import Measurements
 from truearm.proposing.candidates import Candidates
@@ -15,27 +18,33 @@ from truearm.updating import update
 
 Floats = NDArray[np.float64]
 
+PREDICTED: Final = "as predicted"
 
-def expected_by_update(candidates: Candidates, workspace: Floats) -> Floats:
-    """Expected standard deviation as in NextPoses, before and after an update from all candidates, mm.
+
+def expected_by_update(
+    candidates: Candidates, workspace: Floats, before: Calibration, rows: Sequence[Measurements] = ()
+) -> Floats:
+    """Expected standard deviation as in NextPoses, now and after an update from all candidates, mm.
 
     Args:
         candidates: What is measured.
         workspace: Readings (t, N) at which the error counts.
+        before: The calibration that is updated.
+        rows: Measurements that it is updated from beside.
 
     Returns:
-        Two numbers; the first alone where the candidates are too few for an update.
+        Two numbers; the first alone where the rows are too few for an update.
 
     Raises:
-        WorkError: If the calibration has no standard deviations.
+        WorkError: If a calibration has no standard deviations.
     """
     where = replace(candidates, readings=workspace, group=candidates.set_up)
-    before = deviation_mm(where)
+    now = deviation_mm(where)
     try:
-        found = update(candidates.calibration, _as_predicted(candidates))
+        found = update(before, [*rows, _as_predicted(candidates)])
     except InputError:
-        return np.array([before])
-    return np.array([before, deviation_mm(replace(where, calibration=found.calibration))])
+        return np.array([now])
+    return np.array([now, deviation_mm(replace(where, calibration=found.calibration))])
 
 
 def _as_predicted(candidates: Candidates) -> Measurements:
@@ -55,4 +64,4 @@ def _as_predicted(candidates: Candidates) -> Measurements:
         poses = calibration.pose(candidates.readings, group=group, features=features)
         table[["qw", "qx", "qy", "qz"]] = quaternion_from_matrix(poses[:, :3, :3])
     table = table.assign(group=group, **features)
-    return Measurements.from_dataframe(table, joints=calibration.robot.joints)
+    return Measurements.from_dataframe(table, name=PREDICTED, joints=calibration.robot.joints)

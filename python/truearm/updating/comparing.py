@@ -19,6 +19,7 @@ from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.turning_sense import check_turns
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
+from truearm.updating.kept_parts import KeptParts
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
 from truearm.updating.scale import known_scale, silent_rows
@@ -218,6 +219,8 @@ class _Found:
             found = replace(found, covariance=found.covariance * max(rest.squares / rest.freedom, 1.0))
             judge = replace(judge, known=min(judge.known, rest.freedom))
         frames, tools = motions(scene, found, judge)
+        kept = KeptParts(self.calibration, scene, {tool.group for tool in tools if tool.moved})
+        notices = (*notices, *kept.notices)
         judged = left_out_errors(self.calibration, scene, found)
         told = Update(
             calibration=self.calibration,
@@ -234,7 +237,7 @@ class _Found:
             outliers=tuple(outliers),
             notices=notices,
         )
-        new = updated(self.calibration, scene, found, judged, told.to_dict(), notices)
+        new = updated(kept, found, judged, told.to_dict(), notices)
         return replace(told, calibration=new)
 
 
