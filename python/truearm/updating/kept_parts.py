@@ -168,7 +168,7 @@ class KeptParts:
         places = places_of(self.calibration.arm, self.scene.task.selection, self.selection)
         one = np.zeros((self._width, len(places)))
         one[places, np.arange(len(places))] = 1.0
-        return np.kron(np.eye(len(self.scene.task.groups)), one)
+        return np.asarray(np.kron(np.eye(len(self.scene.task.groups)), one), dtype=np.float64)
 
     def _with_arm(self, size: int) -> Floats:
         """The same, with the unknowns of the arm in front; `size` is that of all unknowns of the update."""
