@@ -21,4 +21,5 @@ def places_of(arm: IdentifiedArm, used: Selection, fitted: Selection) -> NDArray
     first = 0 if arm.world_is_known else FRAME_UNKNOWNS
     points = [first + 3 * fitted.targets.index(target) + axis for target in used.targets for axis in range(3)]
     behind = first + 3 * len(fitted.targets)
-    return np.array([*range(first), *points, *range(behind, behind + 3 * used.orientation)])
+    turn = range(behind, behind + 3 * used.orientation)
+    return np.array([*range(first), *points, *turn], dtype=np.int64)
