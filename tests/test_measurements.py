@@ -245,6 +245,15 @@ def test_files_of_one_name_are_groups_of_their_own(tmp_path: Path) -> None:
         Measurements.read_files([other, other])
 
 
+def test_set_ups_that_are_numbered_are_the_same_with_and_without_a_point(tmp_path: Path) -> None:
+    header = "q1,x,y,z,group"
+    plain = write(tmp_path, header, ["0,1,2,3,2", "1,1,2,3,10"], "plain.csv")
+    behind_a_gap = write(tmp_path, header, ["2,1,2,3,2.0", "3,1,2,3,10.0"], "behind_a_gap.csv")
+    assert Measurements.read_files([plain, behind_a_gap]).groups == ["2", "10"]
+    named = write(tmp_path, header, ["2,1,2,3,2.0", "3,1,2,3,2.5"], "named.csv")
+    assert Measurements.read_csv(named).groups == ["2.0", "2.5"]
+
+
 def test_files_that_name_the_same_group_share_it(tmp_path: Path) -> None:
     paths = [write(tmp_path, "q1,x,y,z,group", ["0,1,2,3,a"], name) for name in ("one.csv", "two.csv")]
     assert Measurements.read_files(paths).groups == ["a"]

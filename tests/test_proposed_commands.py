@@ -144,6 +144,26 @@ def test_files_before_an_update_are_named_where_their_rows_belong(
     assert said is None or (said in again.notes[0] and 'before "new.csv"' in again.notes[0])
 
 
+@pytest.mark.parametrize("verdict", ["moved", "field"])
+def test_rows_that_do_not_belong_to_older_ones_update_and_are_too_few_to_calibrate_from(
+    verdict, measured, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    known = updated(measured, tmp_path, moved=True)
+    assert known.revision is not None
+    report = {**known.revision.report, "verdict": verdict}
+    replace(known, revision=replace(known.revision, report=report)).save("new.calib")
+    assert main(["plan", "--next", "10", "--from", "new.calib", "-o", "more.csv"]) == 0
+    told = capsys.readouterr().out
+    said = " ".join(told.split())
+    assert "learned anew from as many poses as before" in said
+    assert "Older rows count" not in said
+    assert ("truearm update OLD.calib new.csv MEASUREMENTS.csv -o NEW.calib" in told) == (verdict == "moved")
+    assert ("truearm update --roll-back new.calib -o OLD.calib" in told) == (verdict == "moved")
+    assert ("when these are measured too" in said) == (verdict == "moved")
+    assert proposed(told, "plan")[2:] == ["rv-m2", "-n", "60", "-o", "poses.csv"]
+
+
 def test_a_second_update_adds_its_file_to_those_before(measured, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     once = updated(measured, tmp_path)

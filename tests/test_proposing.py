@@ -1,12 +1,14 @@
 """Poses that a calibration proposes: those that teach it most, and those that check it best."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import truearm as ta
 from tests.remastered import remastered
 from truearm._core import CoreError, choose_informative
-from truearm.proposing import Candidates, acceptance_poses, next_poses
+from truearm.proposing import Candidates, acceptance_poses, expected_by_update, next_poses
 from truearm.proposing.acceptance import standard_errors
 from truearm.simulation import VirtualArm
 from truearm.updating import UpdateOptions
@@ -59,6 +61,21 @@ def test_the_expected_error_is_that_of_one_gaussian_update(proposed):
     np.testing.assert_allclose(found.expected_mm[1], wanted, rtol=1e-9)
 
 
+def test_what_is_expected_of_an_update_comes_true(known):
+    arm, _ = known
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(40), orientation=True), model="constant")
+    candidates, workspace = Candidates(calibration, arm.poses(10, seed=2)), arm.poses(20, seed=3)
+    before, after = expected_by_update(candidates, workspace, calibration)
+    assert before == pytest.approx(next_poses(candidates, workspace, 1).expected_mm[0])
+    found = ta.update(calibration, arm.measure(candidates.readings, orientation=True, seed=4))
+    then = replace(candidates, readings=workspace, calibration=found.calibration)
+    assert after == pytest.approx(expected_by_update(then, workspace, calibration)[0], rel=0.02)
+    few = replace(candidates, readings=candidates.readings[:2])
+    assert len(expected_by_update(few, workspace, calibration)) == 1
+    rows = arm.measure(arm.poses(10, seed=5), orientation=True, seed=5)
+    assert len(expected_by_update(few, workspace, calibration, [rows])) == 2
+
+
 def test_proposed_poses_teach_more_than_as_many_random_ones(known, proposed):
     calibration = known[1]
     candidates, workspace, found = proposed
@@ -100,11 +117,12 @@ def test_a_change_of_the_tool_is_noticed_from_what_is_told_on():
 
 @pytest.mark.parametrize("freedom", [1, 4, 9])
 def test_a_change_of_so_many_standard_errors_is_noticed_in_95_of_100_cases(freedom):
-    drawn = np.random.default_rng(0).normal(size=(40_000, freedom))
-    limit = np.quantile(np.square(drawn).sum(axis=1), 0.99)
-    drawn[:, 0] += standard_errors(freedom, 0.01)
-    assert abs((np.square(drawn).sum(axis=1) > limit).mean() - 0.95) < 0.01
-    assert standard_errors(freedom, 0.96) == 0.0
+    random, known = np.random.default_rng(0), 20
+    drawn, scale = random.normal(size=(40_000, freedom)), random.chisquare(known, 40_000) / known
+    limit = np.quantile(np.square(drawn).sum(axis=1) / scale, 0.99)
+    drawn[:, 0] += standard_errors(freedom, 0.01, known)
+    assert abs((np.square(drawn).sum(axis=1) / scale > limit).mean() - 0.95) < 0.01
+    assert standard_errors(freedom, 0.96, known) == 0.0
 
 
 def test_what_is_noticed_hardly_depends_on_how_far_things_may_have_moved(known):
@@ -123,6 +141,26 @@ def test_a_model_of_constants_proposes_as_well(known):
     found = next_poses(candidates, arm.poses(20, seed=3), 3)
     assert (np.diff(found.expected_mm) < 0.0).all()
     assert len(acceptance_poses(candidates, 4).rows) == 4
+
+
+def test_poses_show_what_their_set_up_shows(known):
+    """Another set-up's orientations, and targets, are none of its own."""
+    arm, _ = known
+    turned = arm.measure_table(arm.poses(40), orientation=True).assign(group="A")
+    plain = arm.measure_table(arm.poses(40, seed=3), seed=3).assign(group="B")
+    tables = [ta.Measurements.from_dataframe(table, name=table.group[0]) for table in (turned, plain)]
+    both = ta.calibrate(arm.robot, tables, model="constant")
+    in_a, in_b = (Candidates(both, arm.poses(60, seed=2), group=group) for group in "AB")
+    assert (in_a.shown, in_b.shown) == ("1 target with orientation", "1 target without orientation")
+    assert (in_a.noise.shape[1], in_b.noise.shape[1]) == (6, 3)
+    found = acceptance_poses(in_b, 12)
+    after = next_poses(in_b, arm.poses(20, seed=3), 3)
+    assert (np.diff(after.expected_mm) < 0.0).all()
+    measured = arm.measure_table(in_b.readings[found.rows], seed=4).assign(group="B")
+    update = ta.update(both, ta.Measurements.from_dataframe(measured))
+    told = {f"joint{offset.joint}": offset.std for offset in update.offsets if offset.told}
+    assert set(found.noticed) == {*told, "tool"}
+    assert all(4.0 < found.noticed[name] / std < 8.0 for name, std in told.items() if std is not None)
 
 
 def test_features_are_held_in_the_middle(known):

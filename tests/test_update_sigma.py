@@ -3,8 +3,13 @@
 import pytest
 
 import truearm as ta
+from tests.remastered import remastered_table
+from truearm import calibration_content
+from truearm.calibration_file import calibration_bytes
+from truearm.proposing import Candidates, acceptance_poses
 from truearm.simulation import VirtualArm
 from truearm.uncertainty import noises_of
+from truearm.updating.scale import known_scale
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +71,51 @@ def test_rows_that_state_none_scatter_as_those_of_the_calibration_did(arm, later
 
 def test_nothing_is_said_where_the_calibration_stated_none(silent, later):
     assert "sigma" not in {notice.kind for notice in ta.update(silent, of(later)).notices}
+
+
+def test_a_stripped_calibration_finds_what_the_whole_one_finds(arm):
+    """How far its rows scattered stays with the file, whatever its updates."""
+    rows = arm.measure_table(arm.poses(60)).assign(sigma_mm=0.02)
+    whole = ta.calibrate(arm.robot, of(rows), model="constant")
+    moved = of(remastered_table(arm, arm.poses(15, seed=8), [0.0, 0.3, 0.0, 0.0, 0.0], seed=8))
+    once = ta.update(whole, moved)
+    for known in (whole, once.calibration):
+        stripped = ta.Calibration.from_bytes(known.to_bytes(with_rows=False), where="stripped")
+        found, expected = ta.update(stripped, moved), ta.update(known, moved)
+        assert found.verdict == expected.verdict
+        assert (found.changed, found.rest) == (expected.changed, expected.rest)
+        assert found.notices[-1].kind == "sigma"
+    assert once.verdict == "moved"
+
+
+def without_a_scale(calibration):
+    """A calibration as files of earlier versions hold it, without rows."""
+    arrays, content = calibration_content.pack(calibration, with_rows=False)
+    content["constant"].pop("scale")
+    return ta.Calibration.from_bytes(calibration_bytes(arrays, content), where="arm.calib")
+
+
+def test_files_of_earlier_versions_know_their_scale_from_what_was_measured(arm, later):
+    whole = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
+    old = without_a_scale(whole)
+    assert known_scale(old).freedom == known_scale(whole).freedom
+    found = ta.update(old, of(later))
+    assert [notice.message for notice in found.notices] == [
+        "15 rows without a sigma, and the calibration's file does not say whether its rows had one: they are "
+        "taken to have none. If they had, say how much in a column sigma_mm."
+    ]
+    updated = without_a_scale(found.calibration)
+    for refused in (lambda: ta.update(updated, of(later)), lambda: acceptance_of(updated, arm)):
+        with pytest.raises(ta.WorkError, match="the calibration before the update is not in this file"):
+            refused()
+
+
+def acceptance_of(calibration, arm):
+    return acceptance_poses(Candidates(calibration, arm.poses(30, seed=5)), 12)
+
+
+def test_poses_promise_no_more_than_the_device_that_was_stated_shows(arm):
+    rows = arm.measure_table(arm.poses(60)).assign(sigma_mm=0.3)
+    stated = ta.calibrate(arm.robot, of(rows), model="constant")
+    noise = Candidates(stated, arm.poses(3)).noise
+    assert noise[0, 0, 0] == pytest.approx(stated.constant.noise_m**2 + 0.3e-3**2, rel=1e-9)

@@ -51,6 +51,7 @@ from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge, where_found
+from truearm.known_scale import KnownScale, common_share
 from truearm.lengths import length_mm
 from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
@@ -403,10 +404,10 @@ def _details(
 
 
 def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
-    names = fits.identifiability.determined
-    return ConstantDetails.of(
-        names, fits.constant, standard_errors(task.arm, names, fits.constant, fits.variable)
-    )
+    names, fit = fits.identifiability.determined, fits.constant
+    common = common_share(fit.residuals, fit.weights, len(task.selection.targets), fit.noise[0])
+    scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m, common)
+    return ConstantDetails.of(names, fit, standard_errors(task.arm, names, fit, fits.variable), scale)
 
 
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:

@@ -39,6 +39,12 @@ class _Identifiability(_Part):
     condition: float
 
 
+class _Scale(_Part):
+    freedom: Count
+    sigma_m: float | None
+    common: float = 0.0
+
+
 class _Constant(_Part):
     names: list[str]
     noise_m: float
@@ -46,6 +52,7 @@ class _Constant(_Part):
     prior_scale: float
     iterations: Count
     reason: str
+    scale: _Scale | None = None
 
 
 class _Variable(_Part):

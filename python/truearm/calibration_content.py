@@ -1,7 +1,7 @@
 """A calibration as arrays and JSON values, and back, bit for bit."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -20,6 +20,7 @@ from truearm.fitted_rows import FittedRows
 from truearm.held_rows import HeldRows
 from truearm.identifiability import Identifiability
 from truearm.identified import IdentifiedArm
+from truearm.known_scale import KnownScale, common_share
 from truearm.learnt_features import learnt_spans
 from truearm.measured_parts import MeasuredParts
 from truearm.models import ArmModel
@@ -116,15 +117,21 @@ def _fields(arrays: Arrays, content: Mapping[str, Any]) -> dict[str, Any]:
     for model in models.values():
         check_set_ups(len(content["groups"]), len(model.setup.frames))
     rows = _read_rows(content, arrays, selection)
+    measured = _read_measured(content, selection, rows)
+    identifiability = Identifiability.from_dict(content["identifiability"])
+    details = _read_constant(constant, arrays)
+    if details.scale is None and not content.get("update"):
+        scale = _scale_of(rows, measured, identifiability.total_rank, details.noise_m)
+        details = replace(details, scale=scale)
     return {
         "robot": robot,
         "options": options,
         "groups": tuple(content["groups"]),
         "selection": selection,
-        "measured": _read_measured(content, selection, rows),
+        "measured": measured,
         "models": models,
-        "identifiability": Identifiability.from_dict(content["identifiability"]),
-        "constant": _read_constant(constant, arrays),
+        "identifiability": identifiability,
+        "constant": details,
         "variable": _read_variable(content["variable"]),
         "scheme": SchemeDetails(**content["scheme"]) if content.get("scheme") else None,
         "validation": Validation.from_dict(content["validation"]),
@@ -186,17 +193,28 @@ def _notice(content: Mapping[str, Any]) -> Notice:
 
 
 def _constant(details: ConstantDetails) -> dict[str, Any]:
-    return {"names": list(details.names), **{key: getattr(details, key) for key in CONSTANT_KEYS}}
+    scale = None if details.scale is None else asdict(details.scale)
+    plain = {key: getattr(details, key) for key in CONSTANT_KEYS}
+    return {"names": list(details.names), **plain, "scale": scale}
+
+
+def _scale_of(rows: FittedRows | None, measured: MeasuredParts, rank: int, noise_m: float) -> KnownScale:
+    """What files of earlier versions do not say, from their rows, or from how much was measured."""
+    if rows is None:
+        return KnownScale(max(measured.values - rank, 1), None)
+    common = common_share(rows.residual, rows.weight, measured.targets.shape[1], noise_m)
+    return KnownScale.of(rows.residual, rank, rows.data.sigma_m, common)
 
 
 def _read_constant(content: Mapping[str, Any], arrays: Arrays) -> ConstantDetails:
     """Details of the constants; files of earlier versions hold no standard errors beside the covariance."""
     names, covariance = tuple(content["names"]), arrays["constant.covariance"]
-    errors = arrays.get("constant.standard_errors")
+    errors, scale = arrays.get("constant.standard_errors"), content.get("scale")
     return ConstantDetails(
         names=names,
         covariance=covariance,
         standard_errors=of_covariance(covariance, len(names)) if errors is None else errors,
+        scale=None if scale is None else KnownScale(**scale),
         **{key: content[key] for key in CONSTANT_KEYS},
     )
 

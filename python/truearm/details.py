@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm._core import ConstantFit
+from truearm.known_scale import KnownScale
 from truearm.lengths import length_mm
 
 Floats = NDArray[np.float64]
@@ -27,6 +28,8 @@ class ConstantDetails:
         prior_scale: Factor on the priors' standard deviations that the evidence chose.
         iterations: Steps of the last minimisation.
         reason: Why it ended.
+        scale: How well the rows tell the scale of standard deviations; None in updated files of earlier
+            versions, where the calibration before tells.
     """
 
     names: tuple[str, ...]
@@ -37,9 +40,12 @@ class ConstantDetails:
     prior_scale: float
     iterations: int
     reason: str
+    scale: KnownScale | None = None
 
     @classmethod
-    def of(cls, names: tuple[str, ...], fit: ConstantFit, standard_errors: Floats) -> "ConstantDetails":
+    def of(
+        cls, names: tuple[str, ...], fit: ConstantFit, standard_errors: Floats, scale: KnownScale
+    ) -> "ConstantDetails":
         """Those of a fit."""
         noise_m, noise_rad = fit.noise
         return cls(
@@ -51,6 +57,7 @@ class ConstantDetails:
             prior_scale=fit.prior_scale,
             iterations=fit.iterations,
             reason=str(fit.reason),
+            scale=scale,
         )
 
 

@@ -196,7 +196,7 @@ def _check_measured(table: Table, targets: Floats, distance: Floats | None) -> N
 def _group(table: Table, layout: Layout, default: str) -> Texts:
     if "group" not in layout.words:
         return np.full(table.row_count, default)
-    groups = table.texts("group")
+    groups = table.names_in("group")
     _refuse(
         table,
         ~_is_given(groups, table.row_count),
@@ -214,8 +214,8 @@ def _ends(
     Distances without either column lead to one fixed point, `own`. `measured` are distances and sigmas.
     """
     distance, sigma = measured
-    anchor = table.texts("anchor") if "anchor" in layout.words else None
-    pair = table.texts("pair") if "pair" in layout.words else None
+    anchor = table.names_in("anchor") if "anchor" in layout.words else None
+    pair = table.names_in("pair") if "pair" in layout.words else None
     if distance is None:
         return {"anchor": anchor, "pair": pair}
     if anchor is None and pair is None:

@@ -1,7 +1,7 @@
 """What each set-up measured of what was fitted: what it did not is a guess, and no part of what is known."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -58,9 +58,20 @@ class MeasuredParts:
         turned = targets[:, 0] * selection.orientation
         return cls(targets[:, 0], targets, turned, targets.astype(np.float64))
 
+    @property
+    def values(self) -> int:
+        """How many numbers were measured of what was fitted."""
+        return 3 * int(self.targets.sum() + self.orientations.sum())
+
     def first(self, group: int) -> int:
         """Place of the first target that a set-up measured; 0 where it measured none."""
         return int((self.targets[group] > 0).argmax())
+
+    def selection(self, group: int, fitted: Selection) -> Selection:
+        """What a set-up measured of what was fitted; the first target where it measured none."""
+        held = [target for target, count in zip(fitted.targets, self.targets[group], strict=True) if count]
+        targets = tuple(held) or fitted.targets[:1]
+        return replace(fitted, targets=targets, orientation=bool(self.orientations[group]))
 
     def points(self, targets: Floats) -> Floats:
         """Of points (G, t, 3) on the flange those that were measured (k, 3)."""

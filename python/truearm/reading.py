@@ -23,6 +23,7 @@ Integers = NDArray[np.int64]
 Texts = NDArray[np.str_]
 
 DELIMITERS: Final = {";": "semicolons", "\t": "tabs", "|": "vertical bars", ",": "commas"}
+WHOLE: Final = re.compile(r"\d+(\.0+)?")
 NOT_FINITE: Final = ("nan", "inf", "-inf", "+inf", "infinity", "-infinity")
 UNEVEN: Final = "Correct or remove them; if the decimal mark is a comma, use truearm import"
 NAMELESS: Final = (
@@ -78,6 +79,14 @@ class Table:
         if column.dtype.kind == "U":
             return np.char.strip(column.astype(np.str_))
         return np.array([_in_words(value) for value in column.tolist()], dtype=np.str_)
+
+    def names_in(self, name: str) -> Texts:
+        """A column of names; whole numbers alone go without the point that programs write behind a gap."""
+        found = self.texts(name)
+        whole = [WHOLE.fullmatch(cell) for cell in found.tolist() if cell]
+        if not all(whole):
+            return found
+        return np.array([cell.partition(".")[0] for cell in found.tolist()], dtype=np.str_)
 
     def numbers(self, name: str) -> Floats:
         """A column as numbers (n,), NaN where the cell is empty.

@@ -128,6 +128,7 @@ class ConstantSpread:
     of_all: Floats
     before: Floats
     noises: tuple[float, float]
+    common: float
     place: SetupPlace
 
     @classmethod
@@ -140,7 +141,8 @@ class ConstantSpread:
         details = calibration.constant
         place = SetupPlace.of(task_of(calibration), calibration.measured)
         noises = details.noise_m, details.noise_rad
-        return cls(columns, details.covariance, before**2, noises, place)
+        common = 0.0 if details.scale is None else details.scale.common
+        return cls(columns, details.covariance, before**2, noises, common, place)
 
     @property
     def with_setup(self) -> Floats:
@@ -193,8 +195,11 @@ class ConstantSpread:
         return np.asarray(left @ self.of_all[:size, :size] @ right.T)
 
     def noise(self, jacobian: Floats, orientation: Mask) -> Floats:
-        """What no constant explains, alike everywhere."""
+        """What no constant explains, alike everywhere; targets of one pose have part of it in common."""
         noise = np.diag(np.where(orientation, self.noises[1], self.noises[0]) ** 2)
+        targets = int((~orientation).sum()) // AXES
+        together = np.kron(np.ones((targets, targets)) - np.eye(targets), np.eye(AXES))
+        noise[: len(together), : len(together)] += self.common * self.noises[0] ** 2 * together
         return np.repeat(noise[None], len(jacobian), axis=0)
 
 

@@ -22,8 +22,16 @@ from truearm.cell.reaching import within_reach
 from truearm.defaults import THERE_AND_BACK
 from truearm.endpoints import at_target
 from truearm.errors import UsageError
+from truearm.measurements import Measurements
 from truearm.planning.accessibility import Mask, Places, Rule, accessible, lowest
-from truearm.proposing import Acceptance, Candidates, NextPoses, acceptance_poses, next_poses
+from truearm.proposing import (
+    Acceptance,
+    Candidates,
+    NextPoses,
+    acceptance_poses,
+    expected_by_update,
+    next_poses,
+)
 from truearm.robot import Robot
 from truearm.stillness import still_joints
 from truearm.units import MM_PER_METRE
@@ -48,6 +56,8 @@ class ProposalOptions:
         group: Set-up in which they will be measured; the calibration's last one by default.
         rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these, with
             each target that the calibration found in the set-up, or the cell's.
+        update_of: The calibration that will be updated from the next poses; None where one is made from all.
+        update_rows: What was measured since that one, which takes part.
     """
 
     count: int
@@ -55,6 +65,8 @@ class ProposalOptions:
     order: str = THERE_AND_BACK
     group: str | None = None
     rules: tuple[Rule, ...] = ()
+    update_of: Calibration | None = None
+    update_rows: tuple[Measurements, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +78,7 @@ class Proposed:
         points: The first of these targets in the base frame (n, 3), m.
         seconds: Time of the motions of the joints in each order by name.
         found: What was chosen, and what is expected of it.
+        shown: What each pose is taken to be measured with, in words.
         lowest_m: The lowest place of the arm and its tool, in the base frame.
     """
 
@@ -73,6 +86,7 @@ class Proposed:
     points: Floats
     seconds: dict[str, float]
     found: NextPoses | Acceptance
+    shown: str
     lowest_m: float
 
     def to_dict(self) -> dict[str, Any]:
@@ -81,6 +95,7 @@ class Proposed:
             "count": len(self.poses),
             "motion_s": self.seconds,
             "lowest_mm": MM_PER_METRE * self.lowest_m,
+            "measured": self.shown,
         }
         if isinstance(self.found, NextPoses):
             expected = self.found.expected_mm
@@ -112,6 +127,10 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
         _held(calibration),
     )
     found = next_poses(candidates, workspace, options.count)
+    if options.update_of is not None:
+        chosen = replace(candidates, readings=candidates.readings[found.rows])
+        expected = expected_by_update(chosen, workspace, options.update_of, options.update_rows)
+        found = replace(found, expected_mm=expected)
     proposed = _ordered(candidates, found, found.rows, "train", options, cell)
     return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))
 
@@ -228,5 +247,6 @@ def _ordered(
         targets_of(arm, poses.readings, tools[0]),
         seconds,
         found,
+        candidates.shown,
         min(lowest(arm, readings, tool=tool) for tool in tools),
     )

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from truearm.errors import list_names, typed
@@ -16,6 +17,8 @@ RENAMED: Final = {"most_regions": "regions"}
 """Options of a calibration that the command calls otherwise."""
 SAID_OTHERWISE: Final = frozenset({"by_purpose", "refit"})
 """Options that the command has another option for."""
+FIELD: Final = "field"
+"""Verdict of an update that the calibration no longer fits."""
 SOME_FILE: Final = "OLD.csv"
 NEW_FILE: Final = "MEASUREMENTS.csv"
 FEWEST_ANEW: Final = 60
@@ -35,10 +38,38 @@ class Again:
     Attributes:
         command: The command.
         notes: What it leaves out, in sentences.
+        calibration: That is made again.
+        files: What it calibrates from, as far as it was measured already.
+        apart: Calibrations before, the last one first, down to the one whose rows do not belong with the
+            files; none where all rows do.
+        holds: Whether the calibration fitted the arm when it was last updated.
     """
 
     command: str
     notes: tuple[str, ...] = ()
+    calibration: "Calibration | None" = None
+    files: tuple[str, ...] = ()
+    apart: "tuple[Calibration, ...]" = ()
+    holds: bool = True
+
+    @property
+    def update(self) -> "tuple[Calibration | None, tuple[Measurements, ...]]":
+        """The calibration to update where rows do not belong together, and what was measured since."""
+        if not self.apart:
+            return None, ()
+        *since, before = self.apart
+        later = [known.rows.data for known in (self.calibration, *since) if known and known.rows]
+        return before, tuple(later[::-1])
+
+    def updates(self, file: Path, more: str) -> list[str]:
+        """Commands that update the calibration before from all that was measured since, and one more file."""
+        commands, known = list[str](), typed(file)
+        for number in range(1, len(self.apart) + 1):
+            former = "OLD.calib" if number == 1 else f"OLD{number}.calib"
+            commands.append(f"truearm update --roll-back {known} -o {former}")
+            known = former
+        files = " ".join(typed(word) for word in (*self.files, more))
+        return [*commands, f"truearm update {known} {files} -o NEW.calib"]
 
 
 def calibrate_again(calibration: "Calibration", robot: str | None, more: str) -> Again:
@@ -53,10 +84,12 @@ def calibrate_again(calibration: "Calibration", robot: str | None, more: str) ->
     """
     from truearm.cli.naming import name_of
 
-    files, notes = _files(calibration)
+    files, left_out, apart = _files(calibration)
     words = [robot or name_of(calibration.robot), *files, more]
-    notes += _not_kept(calibration.options)
-    return Again(_command(words, calibration.options), tuple(notes))
+    notes = (*left_out, *_not_kept(calibration.options))
+    revision = calibration.revision
+    holds = revision is None or revision.report["verdict"] != FIELD
+    return Again(_command(words, calibration.options), notes, calibration, tuple(files), tuple(apart), holds)
 
 
 def plan_anew(calibration: "Calibration") -> str:
@@ -93,26 +126,29 @@ def _not_kept(options: "Options") -> list[str]:
     return [f"The command has no option for {given}: calibrate from Python to keep that."]
 
 
-def _files(calibration: "Calibration") -> tuple[list[str], list[str]]:
-    """Files whose rows belong together, the oldest first, and sentences on those that do not."""
+def _files(calibration: "Calibration") -> "tuple[list[str], list[str], list[Calibration]]":
+    """Files whose rows belong together, the oldest first; sentences on those that do not, and
+    the calibrations before, down to the one that was made from these.
+    """
     if calibration.rows is None:
-        return [SOME_FILE], []
+        return [SOME_FILE], [], []
+    chain: list[Calibration] = []
     files, later = calibration.rows.data.files, [calibration.rows.data]
     while (revision := calibration.revision) is not None:
         before = None if revision.file is None else calibration.predecessor
         if before is None or before.rows is None:
-            return [SOME_FILE, *files], []
-        older = before.rows.data
+            return [SOME_FILE, *files], [], []
+        chain, older = [*chain, before], before.rows.data
         if why := _why_apart(revision.report, older, later):
             first = list_names(calibration.rows.data.files)
-            return files, [f"What was measured before {first} is left out: {why}."]
+            return files, [f"What was measured before {first} is left out: {why}."], chain
         files, later, calibration = list(dict.fromkeys([*older.files, *files])), [older, *later], before
-    return files, []
+    return files, [], []
 
 
 def _why_apart(report: Mapping[str, Any], older: "Measurements", later: list["Measurements"]) -> str:
     """Why rows before an update cannot be calibrated from with later ones; "" where they can."""
-    if report["verdict"] == "field":
+    if report["verdict"] == FIELD:
         return NO_LONGER
     moved = [str(offset["joint"]) for offset in report["offsets"] if offset["moved"]]
     if moved:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from truearm.cli import plan_options as option
-from truearm.cli.again import NEW_FILE, Again, calibrate_again
+from truearm.cli.again import NEW_FILE, Again, calibrate_again, calibrate_anew, plan_anew
 from truearm.cli.arguments import AsJson
 from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
@@ -18,6 +18,7 @@ from truearm.files import check_output, refuse_same
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
+    from truearm.calibration import Calibration
     from truearm.cell.cell_file import Cell
     from truearm.cell.plan import Plan
     from truearm.cell.proposed import Proposed
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 
 NUMBERS: Final = (20, 40, 60, 100, 200)
 MEASURED: Final = "Measure them; then:"
+ANEW: Final = (
+    "An update of the calibration before finds offsets, frame and tool from all rows since. What varies "
+    "can only be learned anew from as many poses as before."
+)
 PICTURES: Final = (".png", ".svg", ".pdf")
 
 
@@ -184,7 +189,6 @@ class _Asked:
 
 def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: bool) -> None:
     from truearm.calibration import Calibration
-    from truearm.cell.cell_file import Cell
     from truearm.cell.proposed import (
         ProposalOptions,
         check_same_arm,
@@ -202,12 +206,11 @@ def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: 
     calibration = Calibration.load(asked.calibration)
     if asked.robot is not None:
         check_same_arm(calibration, Robot.load(asked.robot))
-    cell = None if asked.cell is None else Cell.load(asked.cell)
-    if cell is not None:
-        check_same_arm(calibration, cell.arm)
+    cell = _cell_of(calibration, asked.cell)
     choose = propose_next if asked.acceptance is None else propose_acceptance
     number = asked.next_count or asked.acceptance or 0
-    options = ProposalOptions(number, asked.seed, asked.order, asked.group, asked.rules)
+    again = calibrate_again(calibration, asked.robot, NEW_FILE)
+    options = ProposalOptions(number, asked.seed, asked.order, asked.group, asked.rules, *again.update)
     with ends_promptly():
         with told_stages()("choosing poses"):
             proposed = choose(calibration, options, cell=cell)
@@ -217,13 +220,25 @@ def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: 
         by_joint = {str(joint): at for joint, at in kept.items()}
         print_json({"poses": str(target), "order": asked.order, **proposed.to_dict(), "kept": by_joint})
         return
-    _print_proposed(proposed, target, calibration.robot.joints)
+    _print_proposed(proposed, target, calibration.robot.joints, holds=again.holds)
     _print_still(kept, calibration.robot.joints)
     _print_features(calibration.options.features)
     if asked.acceptance is not None:
         suggest(f"truearm update {typed(asked.calibration)} {NEW_FILE}", when=MEASURED)
     else:
-        _suggest_again(calibrate_again(calibration, asked.robot, NEW_FILE), asked.calibration)
+        _suggest_again(again, calibration, asked.calibration)
+
+
+def _cell_of(calibration: "Calibration", file: Path | None) -> "Cell | None":
+    """The cell of a file, if one is named, which has to be of the calibrated arm."""
+    from truearm.cell.cell_file import Cell
+    from truearm.cell.proposed import check_same_arm
+
+    if file is None:
+        return None
+    cell = Cell.load(file)
+    check_same_arm(calibration, cell.arm)
+    return cell
 
 
 def _save(plan: "Plan | Proposed", output: Path | None, picture: Path | None) -> None:
@@ -235,27 +250,36 @@ def _save(plan: "Plan | Proposed", output: Path | None, picture: Path | None) ->
         draw(plan, picture)
 
 
-def _suggest_again(again: Again, calibration: Path) -> None:
-    say_wrapped(
-        "Older rows count only if the arm has not changed since: "
-        f"truearm update {typed(calibration)} {NEW_FILE} tells."
-    )
+def _suggest_again(again: Again, calibration: "Calibration", file: Path) -> None:
+    update = f"truearm update {typed(file)} {NEW_FILE}"
+    if not again.apart:
+        say_wrapped(f"Older rows count only if the arm has not changed since: {update} tells.")
     for note in again.notes:
         say_wrapped(note)
-    suggest(again.command, when="Then calibrate:" if again.notes else "Then calibrate from all:")
+    if not again.apart:
+        suggest(again.command, when="Then calibrate:" if again.notes else "Then calibrate from all:")
+        return
+    say_wrapped(ANEW)
+    if again.holds:
+        suggest(*again.updates(file, NEW_FILE), when=MEASURED)
+    suggest(plan_anew(calibration), calibrate_anew(calibration).command, when="To calibrate anew:")
 
 
-def _print_proposed(proposed: "Proposed", output: Path, joints: "tuple[str, ...]") -> None:
+def _print_proposed(
+    proposed: "Proposed", output: Path, joints: "tuple[str, ...]", *, holds: bool = True
+) -> None:
     told = proposed.to_dict()
     say(f"{count_of(told['count'], 'pose')}: {output}")
     say_wrapped(_motion(proposed.seconds, joints))
     say_wrapped(_lowest(proposed.lowest_m))
     if "noticed" not in told:
-        before, after = told["expected_before_mm"], told["expected_after_mm"][-1]
-        say_wrapped(
-            f"Expected standard deviation of the target's position over the workspace: {before:.3f} mm now, "
-            f"{after:.3f} mm when these are measured too."
-        )
+        before, after = told["expected_before_mm"], told["expected_after_mm"]
+        then = f", {after[-1]:.3f} mm when these are measured too" if after else ""
+        if holds:
+            say_wrapped(
+                f"Expected standard deviation of the target's position over the workspace: {before:.3f} mm "
+                f"now{then} ({told['measured']})."
+            )
         say_wrapped(
             f'Measure them in the set-up "{proposed.poses.group}", with device and target where they were, '
             'and keep the column "group", which says so.'
@@ -264,7 +288,7 @@ def _print_proposed(proposed: "Proposed", output: Path, joints: "tuple[str, ...]
     if not told["noticed"]:
         say("So few poses tell of no change: 10 to 20 are a good number.")
         return
-    say("Smallest change that is noticed in 95 of 100 cases:")
+    say_wrapped(f"Smallest change that is noticed in 95 of 100 cases ({told['measured']}):")
     rows = [[name, f"{value:.4f}"] for name, value in told["noticed"].items()]
     print_table(("offset of joint in deg (mm), tool in mm (worst direction)", ""), rows)
 

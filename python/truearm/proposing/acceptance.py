@@ -6,15 +6,16 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri, chndtrinc
+from scipy.special import fdtri, ncfdtrinc
 
 from truearm._core import choose_telling
-from truearm.identified import IdentifiedArm
+from truearm.calibration import Calibration
 from truearm.planning.spreading import fill, least_distance
 from truearm.proposing.candidates import Candidates
 from truearm.proposing.next_poses import check_count
 from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 from truearm.updating import UpdateOptions
+from truearm.updating.scale import known_scale
 from truearm.updating.unknowns import arm_directions, arm_std, setup_std
 
 Floats = NDArray[np.float64]
@@ -76,7 +77,7 @@ def acceptance_poses(candidates: Candidates, count: int, options: UpdateOptions 
     is_joint = np.array([name.startswith("joint") for name in names])
     free = ~is_joint | (told < TOLD)
     told[free] = _told(candidates, unchanged, columns[:, :, free], picked)
-    return Acceptance(picked, np.array(values), _noticed(candidates.calibration.arm, chosen, names, told))
+    return Acceptance(picked, np.array(values), _noticed(candidates.calibration, chosen, names, told))
 
 
 def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, list[str]]:
@@ -91,7 +92,7 @@ def _columns(candidates: Candidates, options: UpdateOptions) -> tuple[Floats, li
     turning = np.flatnonzero((largest > 1e-6) & (np.array(arm.robot.joints) == "revolute"))
     bent = offsets[:, :, turning] * (torque / np.where(largest > 0.0, largest, 1.0))[:, None, turning]
     std = np.array([arm_std(arm, name, options) for name in names])
-    setup = candidates.setup * setup_std(arm, calibration.selection, options, known=True)
+    setup = candidates.setup * setup_std(arm, candidates.selection, options, known=True)
     whole = np.concatenate([offsets * std, setup, PAYLOAD_RAD * bent], axis=2)
     frame = [] if arm.world_is_known else ["frame"] * 6
     tool = ["tool"] * (setup.shape[2] - len(frame))
@@ -112,14 +113,15 @@ def _told(candidates: Candidates, unchanged: Floats, columns: Floats, rows: NDAr
 
 
 def _noticed(
-    arm: IdentifiedArm, options: UpdateOptions, names: Sequence[str], std: Floats
+    calibration: Calibration, options: UpdateOptions, names: Sequence[str], std: Floats
 ) -> dict[str, float]:
     """Smallest changes by name that would be noticed, as in Acceptance."""
-    found: dict[str, float] = {}
+    arm, found = calibration.arm, dict[str, float]()
+    known = known_scale(calibration).freedom
     tool = [] if options.new_tool else [k for k, name in enumerate(names) if name == "tool"]
     tested = [*tool, *(k for k, name in enumerate(names) if name.startswith("joint"))]
     # In an update the test of a change shares the level with that of the field.
-    errors = standard_errors(int((std[tested] < TOLD).sum()), options.level / 2.0)
+    errors = standard_errors(int((std[tested] < TOLD).sum()), options.level / 2.0, known)
     for k, name in enumerate(names):
         if name.startswith("joint") and std[k] < TOLD:
             prismatic = arm.robot.joints[int(name.removeprefix("joint")) - 1] == "prismatic"
@@ -130,14 +132,15 @@ def _noticed(
     return found
 
 
-def standard_errors(freedom: int, level: float) -> float:
+def standard_errors(freedom: int, level: float, known: int) -> float:
     """Standard errors of one change that a test of `freedom` changes together notices often enough.
 
-    Such a test says whether a calibration still holds. Its sum of squares is then of the noncentral
-    chi-squared distribution.
+    Such a test says whether a calibration still holds. Its sum of squares, in units of a scale that is known
+    from `known` degrees of freedom, is then of the noncentral F distribution.
     """
     if freedom == 0:
         return float("inf")
     if level >= NOTICED:
         return 0.0
-    return float(np.sqrt(chndtrinc(chdtri(freedom, level), freedom, 1.0 - NOTICED)))
+    limit = float(fdtri(freedom, known, 1.0 - level))
+    return float(np.sqrt(ncfdtrinc(freedom, known, 1.0 - NOTICED, limit)))

@@ -7,12 +7,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm._core import Problem, linearise, setup_jacobian
+from truearm._core import Problem, Setup, linearise, setup_jacobian
 from truearm.arrays import as_rows
 from truearm.calibration import Calibration
-from truearm.core_set import measured_points
-from truearm.errors import UsageError, WorkError, list_names
+from truearm.core_set import Selection, measured_points
+from truearm.errors import UsageError, WorkError, count_of, list_names
+from truearm.fitting import setup_unknowns
 from truearm.kinds import required
+from truearm.uncertainty import task_of
+from truearm.updating.parts import part_of, places_of
+from truearm.updating.scale import usual_sigma_m
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -22,7 +26,7 @@ AXES = 3
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """c poses that can be measured, in a set-up of the calibration.
+    """c poses that can be measured, in a set-up of the calibration with what was measured there.
 
     Attributes:
         calibration: What is known.
@@ -54,28 +58,29 @@ class Candidates:
 
     def values(self, readings: Floats) -> Floats:
         """Inputs (n, I) of the field at readings (n, N)."""
-        return self.calibration.field_inputs(readings, self._feature_values)
+        return self.calibration.field_inputs(readings, self.feature_values)
 
     @cached_property
     def points(self) -> Floats:
         """The tool's points (c, 3) in the base frame, m."""
-        return self.calibration.position(self.readings, features=self._feature_values)
+        return self.calibration.position(self.readings, features=self.feature_values)
 
     @cached_property
     def jacobian(self) -> Floats:
         """Derivatives (c, m, 5 L) of what is measured by the chain's parameters, base frame."""
-        return linearise(self._problem, self._parameters, self.calibration.model.setup)[0]
+        return linearise(self._problem, self._parameters, self._set_ups)[0]
 
     @cached_property
     def setup(self) -> Floats:
         """Derivatives (c, m, W) of it by the unknowns of the set-up."""
-        return setup_jacobian(self._problem, self._parameters, self.calibration.model.setup)
+        return setup_jacobian(self._problem, self._parameters, self._set_ups)
 
     @cached_property
     def noise(self) -> Floats:
-        """Covariance (c, m, m) of what a measurement shows anew."""
+        """Covariance (c, m, m) of what a measurement shows anew, by a device as good as that of before."""
         found = self.calibration.spread.noise(self.jacobian, self.orientation)
-        return np.ascontiguousarray(found)
+        own = usual_sigma_m(self.calibration) ** 2 * np.diag(~self.orientation)
+        return np.ascontiguousarray(found + own)
 
     @property
     def set_up(self) -> str:
@@ -83,11 +88,21 @@ class Candidates:
         return self.calibration.groups[self._number]
 
     @property
+    def selection(self) -> Selection:
+        """What would be measured: what the set-up showed when the arm was calibrated."""
+        return self.calibration.measured.selection(self._number, self.calibration.selection)
+
+    @property
+    def shown(self) -> str:
+        """The same in words."""
+        turned = "with" if self.selection.orientation else "without"
+        return f"{count_of(len(self.selection.targets), 'target')} {turned} orientation"
+
+    @property
     def orientation(self) -> Mask:
         """Which of the m measured values are rotations."""
-        selection = self.calibration.selection
-        turns = AXES if selection.orientation else 0
-        return np.array([False] * (AXES * len(selection.targets)) + [True] * turns)
+        selection = self.selection
+        return np.array([False] * (AXES * len(selection.targets)) + [True] * (AXES * selection.orientation))
 
     def covariance(self, others: "Candidates | None" = None) -> Floats:
         """Covariance of what candidates would show, without noise, and of the first target at `others`.
@@ -114,7 +129,8 @@ class Candidates:
         return len(groups) - 1 if self.group is None else groups.index(self.group)
 
     @cached_property
-    def _feature_values(self) -> Mapping[str, float]:
+    def feature_values(self) -> Mapping[str, float]:
+        """The number of each feature that the field varies with."""
         names = self.calibration.options.features
         given = self.features or {}
         learned = self.calibration.learned_from
@@ -133,7 +149,7 @@ class Candidates:
 
     @cached_property
     def _problem(self) -> Problem:
-        arm, selection, count = self.calibration.arm, self.calibration.selection, len(self)
+        arm, selection, count = self.calibration.arm, self.selection, len(self)
         measured = measured_points(
             arm.robot.joints_from_readings(self.readings),
             np.zeros((count, len(selection.targets), AXES)),
@@ -142,9 +158,16 @@ class Candidates:
         )
         return Problem(arm.flange_chain, measured, list(range(arm.table.size)), arm.world_is_known)
 
+    @property
+    def _set_ups(self) -> Setup:
+        """The calibration's set-ups with what would be measured."""
+        return part_of(self.calibration.model.setup, self.selection, self.calibration.selection)
+
     def _setup_in_all(self) -> Floats:
-        """Derivatives (c, m, S) by the unknowns of all set-ups."""
-        width, groups = self.setup.shape[2], len(self.calibration.groups)
-        found = np.zeros((*self.setup.shape[:2], groups * width))
-        found[:, :, self._number * width : (self._number + 1) * width] = self.setup
+        """Derivatives (c, m, S) by the unknowns of all set-ups that were fitted."""
+        count = setup_unknowns(task_of(self.calibration))
+        width = count // len(self.calibration.groups)
+        found = np.zeros((*self.setup.shape[:2], count))
+        places = places_of(self.calibration.arm, self.selection, self.calibration.selection)
+        found[:, :, self._number * width + places] = self.setup
         return found

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from truearm._core import choose_informative
 from truearm.errors import WorkError
 from truearm.kinds import required
-from truearm.proposing.candidates import Candidates
+from truearm.proposing.candidates import AXES, Candidates
 from truearm.units import MM_PER_METRE
 
 Floats = NDArray[np.float64]
@@ -51,6 +51,13 @@ def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPos
     rows, variance = choose_informative(candidates.covariance(where), core, count)
     expected = MM_PER_METRE * np.sqrt(np.array(variance) / len(workspace))
     return NextPoses(np.array(rows, dtype=np.int64), expected)
+
+
+def deviation_mm(workspace: Candidates) -> float:
+    """Expected standard deviation as in NextPoses at the readings of a workspace, before any of them."""
+    rows, own, inputs = workspace.parts(AXES)
+    variances = np.einsum("nii->n", workspace.calibration.spread.each(inputs, rows, own))
+    return float(MM_PER_METRE * np.sqrt(variances.mean()))
 
 
 def check_count(candidates: Candidates, count: int) -> None:

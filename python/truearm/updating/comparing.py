@@ -12,21 +12,21 @@ from truearm.core_set import select
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, in_words, list_names
 from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
-from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
 from truearm.solving import FEATURE_RANGE, rows_beyond_learnt
 from truearm.turning_sense import check_turns
-from truearm.units import MM_PER_METRE
 from truearm.update_words import way_out_of_keeping
 from truearm.updating.estimating import MOST_PARTS, Estimate, begun, estimate, surprise
+from truearm.updating.kept_parts import KeptParts
 from truearm.updating.moved import Judge, Motion, Offset, motions, offsets, untold
 from truearm.updating.options import UpdateOptions
+from truearm.updating.scale import known_scale, silent_rows
 from truearm.updating.scattering import Scatter
-from truearm.updating.scene import Scene, State, usual_sigma_m
+from truearm.updating.scene import Scene, State
 from truearm.updating.some_poses import some_poses
-from truearm.updating.squares import SquaresTest, change_test, rest_test, scale_freedom
+from truearm.updating.squares import SquaresTest, change_test, rest_test
 from truearm.updating.unknowns import Unknowns
 from truearm.updating.updated import updated
 from truearm.updating.validating import errors_at_left_out, left_out_errors
@@ -149,7 +149,8 @@ def update(
     Raises:
         UsageError: If options contradict each other or the data.
         InputError: If the data cannot be of this arm, or has too few rows.
-        WorkError: If the calibration is stripped or of a scheme, or what it finds is not plausible.
+        WorkError: If the calibration is of a scheme, has a field and is stripped, or does not tell from how
+            many values its scale is known; or if what is found is not plausible.
     """
     chosen = kinds.chosen(UpdateOptions, options, more)
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
@@ -158,7 +159,7 @@ def update(
     notices += together
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     data, unused = some_poses(one_row_a_visit(data))
-    notices += [*unused, *_silent_rows(calibration, data)]
+    notices += [*unused, *silent_rows(calibration, data)]
     task = _task(calibration, data, chosen, stages)
     if task.selection.orientation:
         check_turns(data, calibration.robot)
@@ -210,7 +211,7 @@ class _Found:
         _check_plausible(scene, found, notices)
         anew = unknowns.free & unknowns.nuisance
         still = estimate(scene, scatter, scene.unchanged(start), anew)
-        judge = Judge(level, scale_freedom(self.calibration))
+        judge = Judge(level, known_scale(self.calibration).freedom)
         changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
         verdict = _verdict(changed, rest, level)
         if verdict == "field":
@@ -218,6 +219,8 @@ class _Found:
             found = replace(found, covariance=found.covariance * max(rest.squares / rest.freedom, 1.0))
             judge = replace(judge, known=min(judge.known, rest.freedom))
         frames, tools = motions(scene, found, judge)
+        kept = KeptParts(self.calibration, scene, {tool.group for tool in tools if tool.moved})
+        notices = (*notices, *kept.notices)
         judged = left_out_errors(self.calibration, scene, found)
         told = Update(
             calibration=self.calibration,
@@ -234,7 +237,7 @@ class _Found:
             outliers=tuple(outliers),
             notices=notices,
         )
-        new = updated(self.calibration, scene, found, judged, told.to_dict(), notices)
+        new = updated(kept, found, judged, told.to_dict(), notices)
         return replace(told, calibration=new)
 
 
@@ -349,20 +352,6 @@ def _outlier_notices(data: Measurements, outliers: list[int]) -> list[Notice]:
     which = np.isin(np.arange(len(data)), outliers)
     text = f"No other pose supports what was measured in {data.row_names(which)}: left out."
     return [Notice("outliers", text, tuple(data.rows[which].tolist()))]
-
-
-def _silent_rows(calibration: Calibration, data: Measurements) -> list[Notice]:
-    """What rows that state no sigma are taken to have, where those of the calibration stated one."""
-    usual = usual_sigma_m(calibration)
-    silent = np.full(len(data), True) if data.sigma_m is None else ~np.isfinite(data.sigma_m)
-    if usual == 0.0 or not silent.any():
-        return []
-    text = (
-        f"{count_of(int(silent.sum()), 'row')} without a sigma, which the calibration's rows have: the "
-        f"device is taken to scatter as it did then, by {length_mm(MM_PER_METRE * usual, 2)}. If it does "
-        "not, say how much in a column sigma_mm."
-    )
-    return [Notice("sigma", text)]
 
 
 def _check_plausible(scene: Scene, found: Estimate, notices: Sequence[Notice]) -> None:

@@ -10,12 +10,14 @@ from scipy.linalg import block_diag
 
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
-from truearm.core_set import Selection, core_set, rotations
-from truearm.fitting import FRAME_UNKNOWNS, Task, core_errors, fit_options, setup_unknowns
+from truearm.core_set import core_set, rotations
+from truearm.fitting import Task, core_errors, fit_options, setup_unknowns
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
 from truearm.uncertainty import noises_of, task_of
+from truearm.updating.parts import part_of, places_of
+from truearm.updating.scale import sigmas_m
 from truearm.updating.unknowns import OPEN, Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
@@ -50,21 +52,6 @@ class Linear:
     pose: NDArray[np.int64]
 
 
-def usual_sigma_m(calibration: Calibration) -> float:
-    """What half of the calibration's rows state as their sigma, or less, m; zero where none does."""
-    learned = calibration.learned_from
-    stated = None if learned is None else learned.data.sigma_m
-    if stated is None or not np.isfinite(stated).any():
-        return 0.0
-    return float(np.nanmedian(stated))
-
-
-def sigmas_m(calibration: Calibration, data: Measurements) -> Floats:
-    """Sigma of each row (n,), m; where it states none that which was usual when the arm was calibrated."""
-    stated = np.full(len(data), np.nan) if data.sigma_m is None else data.sigma_m
-    return np.where(np.isfinite(stated), stated, usual_sigma_m(calibration))
-
-
 class Scene:
     """The rows of an update under one model of a calibration.
 
@@ -87,7 +74,9 @@ class Scene:
         model = calibration.model
         self._calibration, self._about = calibration, about
         self.task, self.data, self.unknowns = task, data, unknowns
-        self._known = _part(model.setup, calibration.selection, task.selection)
+        self._known = model.setup
+        if is_part_of(task.selection, calibration.selection):
+            self._known = part_of(model.setup, task.selection, calibration.selection)
         self.inputs = model_inputs(task.arm, data, task.options.features)
         self.parameters = model.parameters(self.inputs)
         self.measured = core_set(task.arm.robot, data, task.selection, task.groups)
@@ -256,10 +245,8 @@ class Scene:
         for k, number in enumerate(unknowns.known):
             if number is not None:
                 group = unknowns.group(k)
-                rows, columns = (
-                    np.arange(group.start, group.stop) - first,
-                    self._places(calibration.selection),
-                )
+                rows = np.arange(group.start, group.stop) - first
+                columns = places_of(self.task.arm, self.task.selection, calibration.selection)
                 found[rows, number * width + columns] = unknowns.std[group] < OPEN
         return found
 
@@ -268,26 +255,6 @@ class Scene:
         own = setup_jacobian(self.problem, self._moved_parameters(state), state.setup)
         chosen = self.number[:, None] == np.arange(len(self.task.groups))
         return np.asarray((own[:, :, None] * chosen[:, None, :, None]).reshape(*own.shape[:2], -1))
-
-    def _places(self, selection: Selection) -> NDArray[np.int64]:
-        """Where the unknowns of an update's set-up stand in one of the calibration (W,)."""
-        first = 0 if self.task.arm.world_is_known else FRAME_UNKNOWNS
-        points = [
-            first + 3 * selection.targets.index(target) + axis
-            for target in self.task.selection.targets
-            for axis in range(3)
-        ]
-        behind = first + 3 * len(selection.targets)
-        return np.array([*range(first), *points, *range(behind, behind + self._turns)])
-
-
-def _part(setup: Setup, fitted: Selection, used: Selection) -> Setup:
-    """A calibration's set-ups with the targets that are used; all of them where one took no part in it."""
-    if not is_part_of(used, fitted):
-        return setup
-    chosen = [fitted.targets.index(target) for target in used.targets]
-    targets = np.ascontiguousarray(setup.targets[:, chosen])
-    return Setup(setup.frames, targets, setup.rotations, setup.anchors)
 
 
 def _without(covariance: Floats, columns: Floats) -> Floats:

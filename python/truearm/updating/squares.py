@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtr
 
-from truearm.calibration import Calibration
 from truearm.updating.estimating import Estimate
 from truearm.updating.unknowns import Unknowns
 
@@ -43,13 +42,6 @@ class SquaresTest:
     def to_dict(self) -> dict[str, Any]:
         """JSON values."""
         return asdict(self)
-
-
-def scale_freedom(calibration: Calibration) -> int:
-    """Degrees of freedom that the scale of a calibration's standard deviations is known from."""
-    learned = calibration.learned_from
-    values = 0 if learned is None else int(np.count_nonzero(learned.residual))
-    return max(values - calibration.identifiability.total_rank, 1)
 
 
 def change_test(unchanged: Estimate, unknowns: Unknowns, known: int) -> SquaresTest:

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from truearm.calibration import Calibration
-from truearm.details import ConstantDetails, left_m
+from truearm.details import ConstantDetails
 from truearm.errors import Notice, in_words
 from truearm.fitted_rows import TRAINED, FittedRows
 from truearm.held_rows import HeldRows
 from truearm.judging import judge
-from truearm.measured_parts import MeasuredParts, sureness
 from truearm.models import NOMINAL, ArmModel
 from truearm.revision import Carried, Revision
 from truearm.standard_errors import of_covariance
 from truearm.uncertainty import UpdatedSpread
 from truearm.updating.carrying import carried
 from truearm.updating.estimating import Estimate
-from truearm.updating.scene import Scene, sigmas_m
+from truearm.updating.kept_parts import KeptParts
+from truearm.updating.scene import Scene
 from truearm.updating.validating import setup_of
 from truearm.validation import RowErrors, Validation
 
@@ -30,8 +30,7 @@ Floats = NDArray[np.float64]
 
 
 def updated(
-    calibration: Calibration,
-    scene: Scene,
+    kept: KeptParts,
     found: Estimate,
     judged: Mapping[str, RowErrors],
     report: Mapping[str, Any],
@@ -40,13 +39,14 @@ def updated(
     """The calibration with what was found put in.
 
     Args:
-        calibration: As it was.
-        scene: The measurements, all of which were used.
+        kept: The calibration as it was, the measurements, all of which were used, and what stays of what was
+            not measured.
         found: Values of the unknowns.
         judged: Errors of each model at poses that were left out in turn.
         report: What the update said.
         notices: What it warned of.
     """
+    calibration, scene = kept.calibration, kept.scene
     task, unknowns = scene.task, scene.unknowns
     change = (unknowns.directions @ found.state.arm).reshape(-1, 5)
     models = {name: _model(calibration, scene, found, name, change) for name in calibration.models}
@@ -54,16 +54,19 @@ def updated(
     file = calibration.to_bytes() if calibration.file is None else calibration.file
     former = {**calibration.validation.to_dict(), "notices": in_words(calibration.notices)}
     report = {**report, "former": former}
-    revision = Revision.of(report, unknowns.directions, found.covariance, file)
-    errors = carried(scene, found)
+    revision = Revision.of(report, unknowns.directions, kept.covariance(found.covariance), file)
+    errors = kept.carried(carried(scene, found))
     if calibration.variable is not None:
         revision = replace(revision, carried=errors)
     new = replace(
         calibration,
         groups=tuple(task.groups),
-        selection=task.selection,
-        measured=_measured(calibration, scene),
-        models=models,
+        selection=kept.selection,
+        measured=kept.measured,
+        models={
+            name: replace(model, setup=kept.setup(model.setup, calibration.models[name].setup))
+            for name, model in models.items()
+        },
         constant=_constant(calibration, scene, errors),
         validation=Validation(
             n_train=len(scene.data),
@@ -74,7 +77,7 @@ def updated(
             train={name: errors.statistics() for name, errors in fitted.items()},
             left_out=True,
         ),
-        rows=_rows(scene, found),
+        rows=_rows(scene, found, kept),
         held=HeldRows.of(scene.data, judged),
         data_hash=scene.data.hash(),
         version=version("truearm"),
@@ -136,23 +139,16 @@ def _carried_over(
     return np.asarray(stays @ covariance @ stays.T + found @ errors.own @ found.T)
 
 
-def _measured(calibration: Calibration, scene: Scene) -> MeasuredParts:
-    """What the rows of each set-up hold, of which the calibration leaves as much as before."""
-    task, own = scene.task, sigmas_m(calibration, scene.data)
-    left = left_m(calibration.constant, calibration.variable)
-    sure = sureness(own, left, np.ones(len(own)))
-    return MeasuredParts.of(scene.data, task.selection, task.groups, sure)
-
-
-def _rows(scene: Scene, found: Estimate) -> FittedRows:
-    residual = np.zeros(scene.seen.shape)
-    residual[scene.seen] = found.linear.residual
+def _rows(scene: Scene, found: Estimate, kept: KeptParts) -> FittedRows:
+    left = np.zeros(scene.seen.shape)
+    left[scene.seen] = found.linear.residual
+    data, residual = kept.rows(scene.data, left)
     return FittedRows(
-        scene.data,
+        data,
         np.full(len(scene.data), TRAINED, dtype=np.int64),
         np.ones(len(scene.data)),
         residual,
         np.zeros(len(scene.data)),
-        np.linalg.norm(residual[:, :3], axis=1),
-        orientation=scene.task.selection.orientation,
+        np.linalg.norm(left[:, :3], axis=1),
+        orientation=kept.selection.orientation,
     )

@@ -1,0 +1,25 @@
+"""What of a calibration's set-ups other measurements show: fewer targets, or no orientation."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm._core import Setup
+from truearm.core_set import Selection
+from truearm.fitting import FRAME_UNKNOWNS
+from truearm.identified import IdentifiedArm
+
+
+def part_of(setup: Setup, used: Selection, fitted: Selection) -> Setup:
+    """Set-ups with those of the fitted targets that are used."""
+    chosen = [fitted.targets.index(target) for target in used.targets]
+    targets = np.ascontiguousarray(setup.targets[:, chosen])
+    return Setup(setup.frames, targets, setup.rotations, setup.anchors)
+
+
+def places_of(arm: IdentifiedArm, used: Selection, fitted: Selection) -> NDArray[np.int64]:
+    """Where the unknowns (W,) of a set-up that are used stand among those that were fitted."""
+    first = 0 if arm.world_is_known else FRAME_UNKNOWNS
+    points = [first + 3 * fitted.targets.index(target) + axis for target in used.targets for axis in range(3)]
+    behind = first + 3 * len(fitted.targets)
+    turn = range(behind, behind + 3 * used.orientation)
+    return np.array([*range(first), *points, *turn], dtype=np.int64)

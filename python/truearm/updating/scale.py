@@ -1,0 +1,67 @@
+"""The scale that an update compares with: that of the rows which constants and field were learned from."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truearm.calibration import Calibration
+from truearm.errors import Notice, WorkError, count_of
+from truearm.known_scale import KnownScale
+from truearm.lengths import length_mm
+from truearm.measurements import Measurements
+from truearm.units import MM_PER_METRE
+
+Floats = NDArray[np.float64]
+
+
+def known_scale(calibration: Calibration) -> KnownScale:
+    """What a calibration, or the one that it was updated from, was told by the rows of its fit.
+
+    Raises:
+        WorkError: If its file does not tell, and holds no calibration before it.
+    """
+    scale = calibration.constant.scale
+    if scale is not None:
+        return scale
+    before = calibration.predecessor
+    if before is None:
+        raise WorkError("this calibration does not tell how well the scale of its errors is known")
+    return known_scale(before)
+
+
+def usual_sigma_m(calibration: Calibration) -> float:
+    """What half of the calibration's rows state as their sigma, or less, m; zero where none is known."""
+    return known_scale(calibration).sigma_m or 0.0
+
+
+def sigmas_m(calibration: Calibration, data: Measurements) -> Floats:
+    """Sigma of each row (n,), m; where it states none that which was usual when the arm was calibrated."""
+    return np.where(_silent(data), usual_sigma_m(calibration), _stated(data))
+
+
+def silent_rows(calibration: Calibration, data: Measurements) -> list[Notice]:
+    """What rows that state no sigma are taken to have, where those of the calibration stated one."""
+    silent, usual = int(_silent(data).sum()), known_scale(calibration).sigma_m
+    if usual == 0.0 or not silent:
+        return []
+    if usual is None:
+        text = (
+            f"{count_of(silent, 'row')} without a sigma, and the calibration's file does not say whether its "
+            "rows had one: they are taken to have none. If they had, say how much in a column sigma_mm."
+        )
+    else:
+        text = (
+            f"{count_of(silent, 'row')} without a sigma, which the calibration's rows have: the "
+            f"device is taken to scatter as it did then, by {length_mm(MM_PER_METRE * usual, 2)}. If it does "
+            "not, say how much in a column sigma_mm."
+        )
+    return [Notice("sigma", text)]
+
+
+def _stated(data: Measurements) -> Floats:
+    """What each row states as its sigma (n,), m; NaN where it states none."""
+    return np.full(len(data), np.nan) if data.sigma_m is None else data.sigma_m
+
+
+def _silent(data: Measurements) -> NDArray[np.bool_]:
+    """Which rows (n,) state no sigma."""
+    return ~np.isfinite(_stated(data))
