@@ -60,8 +60,8 @@ class FoundSetUps:
             return []
         found = rows_in_words(len(self.data), pose_count(self.data))
         text = (
-            f"{found} found {' and '.join(parts)}, which are as uncertain as that: about "
-            f"{100.0 * (1.0 - without_mm / mean_mm):.0f} % of the mean error comes of it, and about "
+            f"No more than {found} found the {' and '.join(parts)}. How far off that may be makes about "
+            f"{100.0 * (1.0 - without_mm / mean_mm):.0f} % of the mean error: about "
             f"{length_mm(without_mm, 2)} would be left without. Measure more poses, or let more of them find "
             "the frame (--frame-rows)."
         )
