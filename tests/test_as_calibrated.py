@@ -7,6 +7,7 @@ import truearm as ta
 from tests.remastered import remastered_table
 from truearm.as_calibrated import NOT_AS_CALIBRATED, can_be_updated
 from truearm.cli import main
+from truearm.frame_share import FRAME_UNCERTAIN
 from truearm.reporting.report import report
 from truearm.simulation import VirtualArm
 
@@ -35,7 +36,7 @@ def later(arm, shift_deg, **more):
         (SHIFT_DEG, {"keep_frames": True}, [NOT_AS_CALIBRATED]),
         (STILL, {}, []),
         (STILL, {"keep_frames": True}, []),
-        (STILL, {"frame_rows": 4}, []),
+        (STILL, {"frame_rows": 4}, [FRAME_UNCERTAIN]),
     ],
 )
 def test_an_arm_that_was_mastered_anew_is_told_from_one_as_it_was(shift_deg, options, expected, known):

@@ -101,8 +101,8 @@ def test_an_altered_and_a_truncated_calibration(folder, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "status", "words"),
     [
-        (["--frame-rows", "2"], 2, "At least 3"),
-        (["--frame-rows", "60"], 1, "some must be left to judge"),
+        (["--frame-rows", "0"], 2, "positive"),
+        (["--frame-rows", "60"], 1, "3 must be left to judge"),
         (["--frame-rows", "9", "--keep-frames"], 2, "none to find"),
         (["--use", "pose"], 2, "no orientation was measured"),
     ],

@@ -31,7 +31,7 @@ def folder(tmp_path, monkeypatch):
         ["calibrate", "rv-m2", "m1.csv", "-o", "out"],
         ["calibrate", "rv-m2", "m30.csv", "-o", "out", "--judge-target", "2"],
         ["evaluate", "arm.calib", "m1.csv"],
-        ["evaluate", "arm.calib", "m30.csv", "--frame-rows", "29"],
+        ["evaluate", "arm.calib", "m30.csv", "--frame-rows", "1"],
         ["update", "arm.calib", "m1.csv"],
         ["import", "m1.csv", "-o", "i.csv", "--joint-unit", "rad", "--length-unit", "m"],
         ["plan", "--next", "1", "--from", "arm.calib", "-o", "p.csv"],

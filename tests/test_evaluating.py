@@ -1,5 +1,7 @@
 """Judging a calibration on measurements of another set-up."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -31,9 +33,10 @@ def test_a_new_set_up_is_found_and_the_rest_judged(known):
     other = moved(arm, tool=(0.05, 0.0, 0.02))
     found = ta.evaluate(calibration, other.measure(other.poses(150, seed=3)))
     assert (found.n_frame, found.n_judged) == (50, 100)
+    assert repr(found).startswith("<Evaluation: frame of 50 rows, 100 rows judged; nominal")
     errors = {name: entry.position.mean for name, entry in found.errors.items()}
     assert errors["variable"] < errors["constant"] < 0.2 * errors["nominal"]
-    assert list(found.to_dict()) == ["n_frame", "n_judged", "errors"]
+    assert list(found.to_dict()) == ["n_frame", "n_frame_poses", "n_judged", "n_judged_poses", "errors"]
 
 
 def test_rows_that_the_calibration_was_fitted_to_are_told(known):
@@ -87,10 +90,10 @@ def test_frame_and_tool_are_found_from_more_values_than_unknowns(known):
     poses = moved(arm).poses(10, seed=3)
     data = moved(arm).measure(poses)
     found = [ta.evaluate(calibration, data, seed=seed) for seed in range(4)]
-    assert {each.n_frame for each in found} == {4}
+    assert {each.n_frame for each in found} == {6}
     assert ta.evaluate(calibration, data, frame_rows=3, keep_tool=True).n_frame == 3
     turned = moved(arm).measure(poses, orientation=True)
-    assert ta.evaluate(calibration, turned).n_frame == 3
+    assert ta.evaluate(calibration, turned).n_frame == 4
     with pytest.raises(ta.InputError, match=r"9 measured values in 3 frame rows .* the 9 .*--frame-rows 4"):
         ta.evaluate(calibration, data, frame_rows=3)
 
@@ -179,9 +182,13 @@ def test_the_world_as_frame_is_kept():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"frame_rows": 2}, "At least 3"),
+        ({"frame_rows": 0}, "positive"),
+        ({"frame_rows": 2}, "6 measured values in 2 frame rows .* and 3 poses. Give --frame-rows 4 or more"),
         ({"frame_rows": 10, "keep_frames": True}, "none to find"),
-        ({"frame_rows": 40}, "some must be left to judge"),
+        (
+            {"frame_rows": 38},
+            "of which 38 rows .* 3 must be left to judge. Give --frame-rows 37 or less",
+        ),
         ({"seed": -1}, "Zero or more"),
         ({"use": "pose"}, "no orientation was measured"),
         ({"judge_target": 2}, "no target 2"),
@@ -193,12 +200,17 @@ def test_options_that_cannot_be(known, options, words):
         ta.evaluate(calibration, arm.measure(arm.poses(40)), **options)
 
 
-def test_an_orientation_that_was_not_fitted_cannot_be_kept(known):
+@pytest.mark.parametrize("kept", [{"keep_tool": True}, {"keep_frames": True}])
+def test_an_orientation_that_was_not_fitted_is_left_out_where_it_would_be_kept(known, kept: dict[str, Any]):
     arm, calibration = known
-    data = arm.measure(arm.poses(40), orientation=True)
-    with pytest.raises(ta.UsageError, match="the orientation of the tool took no part"):
-        ta.evaluate(calibration, data, keep_tool=True)
-    assert ta.evaluate(calibration, data, keep_tool=True, use="position").n_judged > 0
+    data = arm.measure(arm.poses(40, seed=3), orientation=True)
+    found = ta.evaluate(calibration, data, **kept)
+    assert "orientations_left_out" in {notice.kind for notice in found.notices}
+    placed = ta.evaluate(calibration, data, use="position", **kept)
+    assert found.errors == placed.errors
+    with pytest.raises(ta.UsageError, match="orientations took no part in the calibration"):
+        ta.evaluate(calibration, data, use="pose", **kept)
+    assert ta.evaluate(calibration, data).errors["variable"].orientation is not None
 
 
 def test_another_arm_s_measurements_are_refused(known):

@@ -39,7 +39,7 @@ def test_a_target_that_no_training_row_holds_is_not_judged(arm, purposes):
     nest = np.repeat([0, 1], [48, 12])
     table = in_nests(arm, 60, nest).assign(purpose=np.repeat(purposes, [40, 20]))
     found = ta.calibrate(UR10, ta.Measurements.from_dataframe(table), model="constant")
-    assert found.validation.n_planned == 20
+    assert (found.validation.n_planned, found.validation.n_holdout) == (8, 8)
     assert found.held is not None
     assert np.isfinite(found.held.errors["constant"].distance_m).sum() == 8
     assert found.validation.holdout["constant"].position.max < 1.0
@@ -138,3 +138,24 @@ def test_held_out_rows_of_the_judged_target_alone_have_no_intervals(arm):
     assert found.validation.coverage_95 is None
     again = ta.Calibration.from_bytes(found.to_bytes(), where="the same")
     assert again.validation == found.validation
+
+
+def test_rows_that_hold_nothing_judged_do_not_count_as_judged(arm):
+    table = in_nests(arm, 80, np.zeros(80, dtype=int)).assign(group=np.repeat(["a", "b"], 40))
+    table[["x2", "y2", "z2"]] = table[["x", "y", "z"]].to_numpy()
+    table.loc[40:, ["x2", "y2", "z2"]] = np.nan
+    table.loc[:3, ["x2", "y2", "z2"]] = np.nan
+    data = ta.Measurements.from_dataframe(table)
+    known = ta.calibrate(UR10, data, model="constant", judge_target=2, refit=False)
+    assert known.held is not None
+    finite = int(np.isfinite(known.held.errors["constant"].distance_m).sum())
+    judged = known.validation
+    assert 0 < finite == judged.n_holdout == judged.n_holdout_poses < len(known.held)
+    assert "another split would give others" in judged.few
+    for options, empty in (({"keep_frames": True}, 4), ({"frame_rows": 10, "seed": 1}, None)):
+        found = ta.evaluate(known, data, judge_target=2, **options)
+        assert found.rows is not None
+        assert found.n_judged == np.isfinite(found.rows.errors["constant"].distance_m).sum()
+        assert found.n_judged == found.n_judged_poses < len(found.rows)
+        words = "rows of 80 to judge hold nothing that is judged" if empty else "hold nothing that is judged"
+        assert [text for text in notices(found, "not_judged") if words in text]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from truearm import kinds
 from truearm.calibration import Calibration
+from truearm.columns import VALIDATE
 from truearm.conventions import fits_otherwise
 from truearm.core_set import select
 from truearm.details import ConstantDetails, VariableDetails, left_m
@@ -30,6 +31,7 @@ from truearm.doubts import (
 )
 from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.endpoints import at_tool
+from truearm.enough_values import group_unknowns
 from truearm.errors import InputError, Notice, UsageError, count_of
 from truearm.exchanged import exchanged_notices
 from truearm.fitted_rows import FittedRows, sides
@@ -43,7 +45,6 @@ from truearm.fitting import (
     feature_ranges,
     feature_values,
     fit_rows,
-    group_unknowns,
     no_stages,
 )
 from truearm.held_rows import HeldRows
@@ -65,16 +66,15 @@ from truearm.row_lag import CHANGE, fits_shifted
 from truearm.row_order import order_notices
 from truearm.scheme_options import SchemeOptions
 from truearm.schemes import NETWORKS, REGIONS
-from truearm.shots import shots_notices
 from truearm.splitting import Split, measured_on_both_sides, split_rows
-from truearm.standard_errors import standard_errors
+from truearm.standard_errors import counted_covariance, standard_errors
 from truearm.summary import distance_at_floor_mm, whole_noise_mm
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
 from truearm.unexplained import unexplained
 from truearm.units import MM_PER_METRE
 from truearm.validation import Validation
-from truearm.visits import pose_count
+from truearm.visits import pose_count, pose_counts
 
 STUCK: Final = 0.2
 """Ratio of what constants leave below which those of the training rows were no minimum to judge."""
@@ -117,7 +117,7 @@ def calibrate(
     notices += orientations_left_out(given, task.selection, chosen.use)
     split = split_rows(given, chosen.split)
     notices += _of_split(task, given, split)
-    task = replace(task, sizes=() if split.planned else given.sizes)
+    task = replace(task, sizes=() if split.planned else pose_counts(given))
     order = np.random.default_rng(chosen.split.seed).permutation(len(given)) if chosen.refit else split.train
     trained, drift, final = _fit_both(task, given, split.train, order)
     with stages("judging on held-out rows"):
@@ -180,7 +180,7 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     elif any(notice.kind in (NO_HELP, FAR_FROM_NOMINAL) for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
-    return doubted if shifted else [*shots_notices(found), *exchanged_notices(found), *doubted]
+    return doubted if shifted else [*exchanged_notices(found), *doubted]
 
 
 def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Outliers | None) -> list[Notice]:
@@ -268,18 +268,24 @@ def _validate(
     held = where_found(trained.data, drift.taken_out(data).select(split.holdout), task.selection)
     errors = judge(task, models, held, trained.data)
     on_training = judge(task, models, trained.data, trained.data)
+    judged = held if task.selection.distances else held.select(errors[NOMINAL].measured)
     validation = Validation(
         n_train=len(trained.data),
         n_train_poses=pose_count(trained.data),
-        n_holdout=len(held),
-        n_holdout_poses=pose_count(held),
-        n_planned=split.planned,
+        n_holdout=len(judged),
+        n_holdout_poses=pose_count(judged),
+        n_planned=_planned(judged) if split.planned else 0,
         holdout={name: found.statistics() for name, found in errors.items()},
         train={name: found.statistics() for name, found in on_training.items()},
         coverage_95=interval_coverage(task, trained, held),
         drift=drift_details(task, trained, drift, (data, split.holdout, errors)),
     )
     return validation, HeldRows.of(held, errors)
+
+
+def _planned(judged: Measurements) -> int:
+    """How many rows were planned to validate."""
+    return 0 if judged.purpose is None else int(np.sum(judged.purpose == VALIDATE))
 
 
 def _fitted_rows(
@@ -404,10 +410,10 @@ def _details(
 
 
 def _constant_details(task: Task, fits: Fits) -> ConstantDetails:
-    names, fit = fits.identifiability.determined, fits.constant
+    names, fit, covariance = fits.identifiability.determined, fits.constant, counted_covariance(task, fits)
     common = common_share(fit.residuals, fit.weights, len(task.selection.targets), fit.noise[0])
     scale = KnownScale.of(fit.residuals, fits.identifiability.total_rank, fits.data.sigma_m, common)
-    return ConstantDetails.of(names, fit, standard_errors(task.arm, names, fit, fits.variable), scale)
+    return ConstantDetails.of(names, fit, covariance, standard_errors(task, fits, covariance), scale)
 
 
 def _variable_details(task: Task, final: Fits, searched: Fits) -> VariableDetails | None:

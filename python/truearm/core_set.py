@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm._core import MeasurementSet, Setup
 from truearm.defaults import FIRST_TARGET
-from truearm.errors import UsageError, count_of
+from truearm.errors import Notice, UsageError, count_of
 from truearm.measurements import Measurements
 from truearm.robot import Robot
 from truearm.rotations import matrix_from_quaternion
@@ -65,6 +65,31 @@ def select(data: Measurements, use: Use | None, judge_target: int = FIRST_TARGET
     if use is None:
         use = "targets" if others else "pose" if _measures_orientation(data) else "position"
     return Selection((first, *(others if use == "targets" else ())), orientation=use == "pose", judge=judge)
+
+
+def select_fitted(
+    data: Measurements, use: Use | None, fitted: Selection, judge_target: int = FIRST_TARGET
+) -> tuple[Selection, list[Notice]]:
+    """What to use of `data` where a calibration has to know it from its fit.
+
+    Orientations that took no part are left out, unless they are asked for.
+
+    Raises:
+        UsageError: If orientations are asked for that took no part.
+        InputError: If only some rows hold distances.
+    """
+    selection = select(data, use, judge_target)
+    if not selection.orientation or fitted.orientation:
+        return selection, []
+    if use is not None:
+        raise UsageError(
+            "orientations took no part in the calibration",
+            where=", ".join(data.files),
+            rule="It knows neither how the target is turned on the tool nor how far they may scatter",
+            way_out="Leave --use pose out, or calibrate with orientations",
+        )
+    text = "Orientations are left out: they took no part in the calibration, which does not know them."
+    return select(data, "position", judge_target), [Notice("orientations_left_out", text)]
 
 
 def first_measured(data: Measurements, selection: Selection) -> Rows:
@@ -161,6 +186,22 @@ def anchor_names(data: Measurements) -> list[str]:
 def distance_count(data: Measurements) -> int:
     """How many distances were measured; that of a pair counts once."""
     return len(_distances(data))
+
+
+def distances_apart(data: Measurements, poses: Rows) -> tuple[Rows, Rows]:
+    """The row that holds each distance (d,), in the core's order, and a number (d,) that its shots share.
+
+    Args:
+        data: The rows, n of them.
+        poses: Number of each row's pose (n,), not negative.
+    """
+    found = _distances(data)
+    ends = [
+        (poses[row], -1 - other) if to_anchor else tuple(sorted((poses[row], poses[other])))
+        for row, to_anchor, other, _ in found
+    ]
+    _, number = np.unique(np.array(ends, dtype=np.int64).reshape(-1, 2), axis=0, return_inverse=True)
+    return np.array([row for row, *_ in found], dtype=np.int64), number.reshape(-1).astype(np.int64)
 
 
 def _distances(data: Measurements) -> list[tuple[int, bool, int, float]]:

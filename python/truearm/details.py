@@ -21,7 +21,7 @@ class ConstantDetails:
     Attributes:
         names: Names of the constants that were fitted, in the order of the covariance.
         covariance: Of these constants, then of the set-up's unknowns, (u, u), SI, as if what constants leave
-            were noise.
+            were noise, which shots of a pose share as far as they agree.
         standard_errors: Of these constants, (k,), SI, with what they imitate of a fitted field.
         noise_m: Noise of positions (or distances) beside the rows' own sigma, what is not modelled included.
         noise_rad: The same of orientations.
@@ -44,13 +44,18 @@ class ConstantDetails:
 
     @classmethod
     def of(
-        cls, names: tuple[str, ...], fit: ConstantFit, standard_errors: Floats, scale: KnownScale
+        cls,
+        names: tuple[str, ...],
+        fit: ConstantFit,
+        covariance: Floats,
+        standard_errors: Floats,
+        scale: KnownScale,
     ) -> "ConstantDetails":
         """Those of a fit."""
         noise_m, noise_rad = fit.noise
         return cls(
             names=names,
-            covariance=fit.covariance,
+            covariance=covariance,
             standard_errors=standard_errors,
             noise_m=noise_m,
             noise_rad=noise_rad,

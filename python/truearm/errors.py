@@ -123,6 +123,13 @@ def count_of(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def rows_in_words(rows: int, poses: int, which: str = "") -> str:
+    """How many rows: "12 training rows", or "4 training poses (12 rows)" where poses have several shots."""
+    if rows == poses:
+        return count_of(rows, f"{which}row")
+    return f"{count_of(poses, f'{which}pose')} ({count_of(rows, 'row')})"
+
+
 def typed(text: object) -> str:
     """A path or name as shells read it as one word: quoted where it holds blanks or what they act on."""
     word = str(text)

@@ -1,35 +1,41 @@
 """Errors of a calibration on measurements that it has not seen, mostly in a new set-up."""
 
-from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truearm import kinds
-from truearm._core import Setup, fit_constant
+from truearm._core import ANGLE_ARM_M, Setup, fit_constant
 from truearm.as_calibrated import AS_KNOWN, NOT_AS_CALIBRATED, not_as_calibrated
 from truearm.calibration import Calibration
-from truearm.core_set import Selection, Use, core_set, rotations, select
+from truearm.core_set import Selection, Use, core_set, rotations, select, select_fitted
 from truearm.defaults import FIRST_TARGET, SEED
 from truearm.doubts import NO_HELP, no_help
-from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, list_names
+from truearm.errors import InputError, Notice, UsageError, WorkError, list_names, rows_in_words
 from truearm.fitted_rows import known_rows
 from truearm.fitting import (
     Stages,
     Task,
     core_errors,
     fit_options,
-    frame_unknowns,
-    group_unknowns,
-    measured_values,
     no_stages,
 )
+from truearm.frame_rows import divide
+from truearm.frame_share import FoundSetUps
 from truearm.gross_rows import FAR_ROWS, Expected, gross_frame_rows, gross_judged_rows
 from truearm.held_rows import HeldRows
-from truearm.judging import check_judged, judge, model_inputs, never_found, where_found, without_parts
+from truearm.judging import (
+    check_judged,
+    holding_nothing,
+    judge,
+    model_inputs,
+    never_found,
+    where_found,
+    without_parts,
+)
 from truearm.lengths import length_mm
 from truearm.measured_parts import held_parts
 from truearm.measurements import Measurements
@@ -42,13 +48,11 @@ from truearm.summary import distance_at_floor_mm
 from truearm.turning_sense import check_turns
 from truearm.units import MM_PER_METRE
 from truearm.validation import Errors, RowErrors, means_in_words
+from truearm.visits import pose_count, pose_numbers
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-
-MOST_FRAME_ROWS: Final = 400
-FEWEST_FRAME_ROWS: Final = 3
 
 
 @dataclass(frozen=True)
@@ -58,8 +62,9 @@ class EvaluationOptions:
     Attributes:
         seed: Seed of the draw of frame rows.
         use: What of the measurements to use, as in calibrate.
-        frame_rows: Rows of each set-up that find its frame and tool; a third by default, 400 at most, and as
-            many as hold more measured values than frame and tool have unknowns.
+        frame_rows: Rows of each set-up that find frame and tool, with all shots of their poses; by default
+            those of a third of the poses, 400 at most, or of as many as hold twice as many measured values as
+            frame and tool have unknowns, if that leaves a third to judge.
         keep_tool: Whether the tool stays as it was calibrated, so that the rows find the frame alone.
         keep_frames: Whether the set-ups are those of the calibration, so that all rows are judged.
         judge_target: Measured target, from 1, at which errors are judged. Where several were fitted, a row
@@ -75,11 +80,9 @@ class EvaluationOptions:
 
     def __post_init__(self) -> None:
         kinds.settle(self, whole=("seed", "frame_rows", "judge_target"), flags=("keep_tool", "keep_frames"))
-        kinds.check_values(self, not_negative=("seed",))
+        kinds.check_values(self, positive=("frame_rows",), not_negative=("seed",))
         if self.keep_frames and self.frame_rows is not None:
             raise UsageError("frame rows find frames", rule="With --keep-frames there are none to find")
-        if self.frame_rows is not None and self.frame_rows < FEWEST_FRAME_ROWS:
-            raise UsageError(f"{self.frame_rows} frame rows", rule=f"At least {FEWEST_FRAME_ROWS} are needed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,26 +91,41 @@ class Evaluation:
 
     Attributes:
         n_frame: Rows that found frame and tool.
-        n_judged: Rows that were judged.
+        n_frame_poses: How many poses they are of: shots of the same pose count once.
+        n_judged: Rows that were judged and hold what is judged.
+        n_judged_poses: How many poses those are of.
         errors: Errors of "nominal", "constant" and, if there is one, "variable".
         notices: What the user should know.
-        rows: The rows that were judged, each with its errors.
+        rows: The rows that were to be judged, each with its errors, NaN where nothing is judged.
     """
 
     n_frame: int
+    n_frame_poses: int
     n_judged: int
+    n_judged_poses: int
     errors: Mapping[str, Errors]
     notices: tuple[Notice, ...] = ()
     rows: HeldRows | None = None
 
     def __repr__(self) -> str:
-        judged = count_of(self.n_judged, "judged row")
-        return f"<Evaluation: {self.n_frame} frame rows, {judged}; {means_in_words(self.errors)}>"
+        divided = f"frame of {self.rows_of_frame}, {self.rows_judged} judged"
+        return f"<Evaluation: {divided}; {means_in_words(self.errors)}>"
+
+    @property
+    def rows_of_frame(self) -> str:
+        """How many found frame and tool: "50 rows", or "5 poses (50 rows)"."""
+        return rows_in_words(self.n_frame, self.n_frame_poses)
+
+    @property
+    def rows_judged(self) -> str:
+        """How many were judged: "100 rows", or "10 poses (100 rows)"."""
+        return rows_in_words(self.n_judged, self.n_judged_poses)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the notices and the rows."""
         errors = {name: found.to_dict() for name, found in self.errors.items()}
-        return {"n_frame": self.n_frame, "n_judged": self.n_judged, "errors": errors}
+        counts = ("n_frame", "n_frame_poses", "n_judged", "n_judged_poses")
+        return {**{name: getattr(self, name) for name in counts}, "errors": errors}
 
 
 def evaluate(
@@ -138,15 +156,14 @@ def evaluate(
     calibration, data = kinds.required(calibration, Calibration, "the calibration"), Measurements.of(data)
     notices = check_against(data, calibration.robot)
     data, together = points_together(data.deduplicated())
-    notices += together
-    notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
-    selection = _selection(data, chosen)
+    selection, left_out = _selection(calibration, data, chosen)
+    notices += [*together, *known_rows(calibration, data), *rows_beyond_learnt(calibration, data), *left_out]
     if selection.orientation:
         check_turns(data, calibration.robot)
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
     given, lost = data, _lost_parts(task, calibration, data, chosen)
     data = without_parts(lost, data, selection)
-    frame, judged = _divide(task, data, chosen)
+    frame, judged = divide(task, data, chosen)
     found_by = data.select(frame if len(frame) else judged)
     chosen_rows, not_judged = _found_again(found_by, given.select(judged), selection, (chosen, lost[judged]))
     notices += not_judged
@@ -164,24 +181,32 @@ def evaluate(
         errors = judge(task, models, chosen_rows, found_by)
         held, best = HeldRows.of(chosen_rows, errors), calibration.model_name
         rows = chosen_rows, held
-        spoiled, outliers, changed = _gross(task, calibration, models[best], found_by, rows, chosen)
+        spoiled, doubts, changed = _gross(task, calibration, models[best], found_by, rows, chosen)
     of_no_use = spoiled or _of_no_use(errors, best, distance_at_floor_mm(calibration)) or changed
     if of_no_use and not spoiled and (chosen.keep_frames or chosen.keep_tool):
         of_no_use = _moved(calibration, given, chosen, errors[best]) or of_no_use
-    notices = [*notices, *of_no_use, *outliers]
+    notices = [*notices, *of_no_use, *doubts]
     statistics = {name: found.statistics() for name, found in errors.items()}
-    return Evaluation(len(frame), len(judged), statistics, tuple(notices), held)
+    known = chosen_rows.select(errors[best].measured)
+    counts = len(frame), pose_count(data.select(frame)), len(known), pose_count(known)
+    return Evaluation(*counts, statistics, tuple(notices), held)
 
 
-def _selection(data: Measurements, options: EvaluationOptions) -> Selection:
-    selection = select(data, options.use, options.judge_target)
+def _selection(
+    calibration: Calibration, data: Measurements, options: EvaluationOptions
+) -> tuple[Selection, list[Notice]]:
+    """What of the measurements is used: what is kept was fitted, what is found need not have been."""
+    if options.keep_frames or options.keep_tool:
+        selection, left_out = select_fitted(data, options.use, calibration.selection, options.judge_target)
+    else:
+        selection, left_out = select(data, options.use, options.judge_target), []
     if selection.distances:
         raise InputError(
             "distances were measured, not points",
             where=", ".join(data.files),
             rule="A calibration is judged at measured points",
         )
-    return selection
+    return selection, left_out
 
 
 def _lost_parts(task: Task, calibration: Calibration, data: Measurements, options: EvaluationOptions) -> Mask:
@@ -208,62 +233,10 @@ def _found_again(
     """
     options, lost = given
     if (options.keep_frames or options.keep_tool) and not selection.judges_another:
-        return without_parts(lost, judged, selection), never_found(lost, judged, selection)
+        notices = [*never_found(lost, judged, selection), *holding_nothing(judged, selection)]
+        return without_parts(lost, judged, selection), notices
     notices = check_judged(found_by, judged, selection)
     return where_found(found_by, judged, selection), notices
-
-
-def _divide(task: Task, data: Measurements, options: EvaluationOptions) -> tuple[Rows, Rows]:
-    """Rows that find the frames, and rows that are judged; each set-up for itself."""
-    if options.keep_frames:
-        return np.empty(0, dtype=np.int64), np.arange(len(data))
-    frame, judged = [], []
-    for group in data.groups:
-        rows = np.flatnonzero(data.group == group)
-        order = rows[np.random.default_rng(options.seed).permutation(len(rows))]
-        enough, share = _enough(task, data.select(order), options), min(len(rows) // 3, MOST_FRAME_ROWS)
-        count = options.frame_rows or (share if share < FEWEST_FRAME_ROWS else max(share, enough))
-        if not FEWEST_FRAME_ROWS <= count < len(rows):
-            raise InputError(
-                f"{count_of(len(rows), 'row')} of set-up {list_names([group])}, of which {count} would find "
-                "its frame",
-                where=", ".join(data.files),
-                rule=f"At least {FEWEST_FRAME_ROWS} rows find the frame, and some must be left to judge",
-                way_out="Measure more poses or give another --frame-rows",
-            )
-        if count < enough:
-            raise _too_few(task, data.select(order[:count]), enough, options)
-        frame.append(order[:count])
-        judged.append(order[count:])
-    return np.concatenate(frame), np.concatenate(judged)
-
-
-def _enough(task: Task, rows: Measurements, options: EvaluationOptions) -> int:
-    """How many of the rows of a set-up, the first ones, hold more values than they find unknowns."""
-
-    def are_enough(count: int) -> bool:
-        first = rows.select(np.arange(count))
-        return measured_values(task, first) > _found_unknowns(task, first, options)
-
-    counts = range(FEWEST_FRAME_ROWS, len(rows))
-    return FEWEST_FRAME_ROWS + bisect_left(counts, True, key=are_enough)
-
-
-def _found_unknowns(task: Task, rows: Measurements, options: EvaluationOptions) -> int:
-    """Unknowns of the set-up of `rows` that they find."""
-    return frame_unknowns(task) if options.keep_tool else group_unknowns(task, rows)
-
-
-def _too_few(task: Task, rows: Measurements, enough: int, options: EvaluationOptions) -> InputError:
-    """That frame rows of a set-up were stated that are fewer than `enough`."""
-    values, unknowns = measured_values(task, rows), _found_unknowns(task, rows, options)
-    return InputError(
-        f"{values} measured values in {count_of(len(rows), 'frame row')} cannot determine the {unknowns} "
-        f"unknowns of the frame and tool of set-up {list_names(rows.groups)}",
-        where=", ".join(rows.files),
-        rule="There must be more measured values than unknowns",
-        way_out=f"Give --frame-rows {enough} or more",
-    )
 
 
 def _setup(
@@ -330,8 +303,8 @@ def _gross(
     held: tuple[Measurements, HeldRows],
     options: EvaluationOptions,
 ) -> tuple[list[Notice], list[Notice], list[Notice]]:
-    """Notices of rows that spoil frame and tool, of gross ones among those that were judged, and that the arm
-    is not as it was calibrated.
+    """Notices of rows that spoil frame and tool, of gross ones among those that were judged and of what frame
+    and tool add to all, and that the arm is not as it was calibrated.
 
     Where frame and tool are found, a robust fit says where the first of them belong.
     """
@@ -339,15 +312,22 @@ def _gross(
     finds["finds_frame"] = not (options.keep_frames or task.arm.world_is_known)
     of_frame = Expected(task, calibration, model, frame, **finds)
     judged = Expected(task, calibration, model, held[0], **finds)
-    outliers = gross_judged_rows(judged, of_frame, held[1])
-    changed = not_as_calibrated(judged, of_frame, held[1])
+    once = replace(of_frame, data=frame.select(np.unique(pose_numbers(frame.readings, frame.group))))
+    outliers = gross_judged_rows(judged, once, held[1])
+    changed = not_as_calibrated(judged, once, held[1])
     if finds["finds_tool"]:
         measured = core_set(task.arm.robot, frame, task.selection, task.groups)
         with core_errors(frame):
             chosen = fit_options(task.threads, parameters=of_frame.parameters, robust="cauchy")
             setup = fit_constant(task.problem(measured, []), chosen).setup
         of_frame = replace(of_frame, model=replace(model, setup=setup))
-    return gross_frame_rows(of_frame), outliers, changed
+    spoiled = gross_frame_rows(of_frame)
+    if options.keep_frames or spoiled:
+        return spoiled, outliers, changed
+    details = calibration.constant
+    lever_m = details.noise_m / details.noise_rad if details.noise_rad > 0.0 else ANGLE_ARM_M
+    found = FoundSetUps(task, model, frame, options.keep_tool, lever_m)
+    return spoiled, [*outliers, *found.notices(held[0], held[1].errors[calibration.model_name])], changed
 
 
 def _kept(task: Task, calibration: Calibration) -> tuple[list[int], list[int]]:
@@ -369,10 +349,9 @@ def _kept(task: Task, calibration: Calibration) -> tuple[list[int], list[int]]:
         )
     fitted, wanted = calibration.selection.targets, task.selection.targets
     lacking = [target + 1 for target in wanted if target not in fitted]
-    if lacking or (task.selection.orientation and not calibration.selection.orientation):
-        what = f"target {lacking[0]}" if lacking else "the orientation of the tool"
+    if lacking:
         raise UsageError(
-            f"{what} took no part in the calibration",
+            f"target {lacking[0]} took no part in the calibration",
             rule="Only what was fitted can be kept",
             way_out="Give --use position, or let the set-up be found",
         )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.core_set import Selection
 from truearm.errors import Notice, count_of
-from truearm.fitting import Fits
+from truearm.fitting import Fits, constant_variances
 from truearm.measurements import Measurements
 from truearm.splitting import Split
 from truearm.units import MM_PER_METRE, MRAD_PER_RAD
@@ -176,11 +176,6 @@ def _judge_constant(fits: Fits, residual: Floats, selection: Selection) -> Float
     """Score (n,) of each row against the constant model; rows of distances are not judged."""
     if selection.distances:
         return np.zeros(len(fits.data))
-    position, orientation = fits.constant.noise
-    own = np.zeros(len(fits.data)) if fits.data.sigma_m is None else np.nan_to_num(fits.data.sigma_m)
-    variance = np.repeat((position**2 + own**2)[:, None], residual.shape[1], axis=1)
-    if selection.orientation:
-        variance[:, -3:] = orientation**2
-    squares = (residual**2 / variance).sum(axis=1)
+    squares = (residual**2 / constant_variances(fits, selection)).sum(axis=1)
     freedom = np.maximum((residual != 0.0).sum(axis=1), 1)
     return np.asarray(squares / overwhelming(freedom))

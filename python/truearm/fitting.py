@@ -15,33 +15,27 @@ from truearm._core import (
     FieldFit,
     MeasurementSet,
     Problem,
-    Setup,
     fit_constant,
     fit_field,
 )
-from truearm.core_set import Selection, anchor_names, core_set, distance_count
-from truearm.errors import InputError, UsageError, WorkError, count_of, list_names
+from truearm.core_set import Selection, anchor_names, core_set
+from truearm.enough_values import check_enough, check_set_ups, setup_unknowns
+from truearm.errors import InputError, UsageError, WorkError, list_names
 from truearm.identifiability import Identifiability, identify
 from truearm.identified import IdentifiedArm
 from truearm.inputs import is_payload
 from truearm.kinds import settle
-from truearm.measured_parts import held_parts
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
-from truearm.one_turn import one_turn
 from truearm.options import Options
 from truearm.scheme_fitting import SchemeFit, SchemeRows, fit_scheme, well_determined
 from truearm.schemes import SCHEMES
-from truearm.splitting import rows_needed, share_needed
+from truearm.visits import one_row_a_pose
 
 Floats = NDArray[np.float64]
 Hyper = dict[str, list[float]]
 Stages = Callable[[str], AbstractContextManager[Any]]
 
-FRAME_UNKNOWNS: Final = 6
-POSES_PER_ROW: Final = 20
-ANY_TARGET_M: Final = 0.3
-"""How many poses are drawn for each row, and how far from the flange targets lie, to count unknowns."""
 ENOUGH_FOR_HYPER: Final = 400
 """The evidence is maximised on at most so many poses; hyper-parameters from as many serve any number."""
 FAR_FROM_CONSTANTS: Final = 0.1
@@ -96,7 +90,7 @@ class Task:
         options: How to fit.
         threads: Threads at the most; the result does not depend on it.
         stages: Told what is being done.
-        sizes: Rows of each file that a share is held out of; empty where none is.
+        sizes: Poses of each file that a share is held out of; empty where none is.
         starts: Fits of nearly the same rows: the search for constants begins there too, with their noise.
             With more the prior would draw constants away that are far from nominal.
     """
@@ -164,6 +158,17 @@ class Fits:
         return models
 
 
+def constant_variances(fits: Fits, selection: Selection) -> Floats:
+    """Variances (n, m) that the constant fit took for what its rows hold, those of distances (n, 1)."""
+    position, orientation = fits.constant.noise
+    own = np.zeros(len(fits.data)) if fits.data.sigma_m is None else np.nan_to_num(fits.data.sigma_m)
+    width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
+    variance = np.repeat((position**2 + own**2)[:, None], width, axis=1)
+    if selection.orientation:
+        variance[:, -3:] = orientation**2
+    return variance
+
+
 def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) -> Fits:
     """Fit all models to all rows of `data`.
 
@@ -176,8 +181,8 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
         WorkError: If the rows are too few or too alike.
     """
     measured = core_set(task.arm.robot, data, task.selection, task.groups)
-    _check_enough(task, data, setup_unknowns(task))
-    _check_set_ups(task, data)
+    check_enough(task, data, setup_unknowns(task))
+    check_set_ups(task, data)
     began = time.perf_counter()
     constants = _fit_constants(task, measured, data)
     seconds, variable = {CONSTANT: time.perf_counter() - began}, None
@@ -195,7 +200,7 @@ def fit_rows(task: Task, data: Measurements, known: KnownHyper = NOTHING_KNOWN) 
     if task.options.model in SCHEMES:
         began = time.perf_counter()
         with task.stages("dividing the workspace, and learning"), core_errors(data):
-            scheme = _fit_scheme(task, measured, constant, found, data)
+            scheme = _fit_scheme(task, constant, found, one_row_a_pose(data))
         seconds[task.options.model] = time.perf_counter() - began
     return Fits(data, nominal, found, constant, variable, seconds, scheme, task.options.model)
 
@@ -218,7 +223,7 @@ def _fit_constants(task: Task, measured: MeasurementSet, data: Measurements) -> 
         nominal = fit_constant(task.problem(measured, []), options)
     with task.stages("asking what the poses determine"):
         found = identify(task.arm, measured, nominal.setup)
-        _check_enough(task, data, found.total_rank)
+        check_enough(task, data, found.total_rank)
     with task.stages("fitting the constants"), core_errors(data):
         chosen = task.problem(measured, task.columns(found.determined))
         options = fit_options(task.threads, prior=task.options.prior, robust=task.options.robust)
@@ -276,9 +281,8 @@ def _unmasked(
     return found if np.median(found[1].distances) < CLEARER * before else fits
 
 
-def _fit_scheme(
-    task: Task, measured: MeasurementSet, constant: ConstantFit, found: Identifiability, data: Measurements
-) -> SchemeFit:
+def _fit_scheme(task: Task, constant: ConstantFit, found: Identifiability, data: Measurements) -> SchemeFit:
+    """The scheme beside constants; its rows are poses, since shots would vouch for one another."""
     if task.selection.distances:
         raise WorkError(
             "the measurements are distances alone",
@@ -294,6 +298,7 @@ def _fit_scheme(
             rule="The paper's schemes are made of the parameters that the rows determine",
             way_out="Give --model constant (model='constant'), or measure where the arm's parameters tell",
         )
+    measured = core_set(task.arm.robot, data, task.selection, task.groups)
     columns = well_determined(task.problem(measured, determined), constant, determined)
     values = task.arm.robot.joints_from_readings(data.readings)
     joints, seed = task.arm.robot.joints, task.options.split.seed
@@ -389,100 +394,6 @@ def feature_values(data: Measurements, names: Sequence[str]) -> Floats:
 def feature_ranges(values: Floats) -> list[float]:
     """How far each column of `values` (n, F) reaches."""
     return [float(reach) for reach in np.ptp(values, axis=0)] if values.shape[1] else []
-
-
-def _check_enough(task: Task, data: Measurements, rank: int) -> None:
-    """Refuse rows that leave nothing to tell the unknowns from the noise with."""
-    values = measured_values(task, data)
-    if values > rank:
-        return
-    unknowns = max(rank, _full_rank(task, data))
-    needed = unknowns * len(data) // max(values, 1) + 1
-    raise WorkError(
-        f"{values} measured values in {count_of(len(data), 'training row')} cannot determine "
-        f"{unknowns} unknowns",
-        where=", ".join(data.files),
-        rule="There must be more measured values than unknowns",
-        way_out=_way_out_of_few(task, needed),
-    )
-
-
-def _full_rank(task: Task, data: Measurements) -> int:
-    """How many unknowns many poses all over the joints would determine, of each of which as much is measured.
-
-    With distances all unknowns are counted: what they tell depends on where the bars and wires are.
-    """
-    if task.selection.distances:
-        return len(task.arm.candidates.constant) + setup_unknowns(task)
-    robot, rng = task.arm.robot, np.random.default_rng(0)
-    rows = data.select(np.tile(np.arange(len(data)), POSES_PER_ROW))
-    low, high = one_turn(robot)
-    readings = rng.uniform(low, high, rows.readings.shape)
-    measured = core_set(robot, replace(rows, readings=readings), task.selection, task.groups)
-    frames = np.tile(np.eye(4), (len(task.groups), 1, 1))
-    points = rng.uniform(-ANY_TARGET_M, ANY_TARGET_M, (len(frames), len(task.selection.targets), 3))
-    setup = Setup(frames, points, frames[:, :3, :3].copy(), np.zeros((0, 3)))
-    return identify(task.arm, measured, setup).total_rank
-
-
-def _way_out_of_few(task: Task, needed: int) -> str:
-    """What to do where fewer than `needed` rows train."""
-    split = task.options.split
-    if not task.sizes:
-        return f"Measure at least {needed} poses to train on"
-    if split.train_size is not None or split.split_by or split.holdout_range is not None:
-        return f"Measure at least {needed} poses to train on, or use a larger --train-size"
-    share, poses = split.holdout, rows_needed(task.sizes, needed, split.holdout)
-    way_out = f"Measure at least {poses} poses: {share:.0%} are held out"
-    smaller = share_needed(task.sizes, needed, share)
-    if smaller is None:
-        return way_out
-    return f"{way_out}, or hold out less: --holdout {smaller:g} is enough for {sum(task.sizes)} poses"
-
-
-def _check_set_ups(task: Task, data: Measurements) -> None:
-    """Refuse a set-up whose rows cannot find its own frame and target."""
-    for group in task.groups:
-        rows = data.select(data.group == group)
-        values, unknowns = measured_values(task, rows), group_unknowns(task, rows)
-        if task.selection.distances or values > unknowns:
-            continue
-        raise WorkError(
-            f"{values} measured values in {count_of(len(rows), 'training row')} cannot determine the "
-            f"{unknowns} unknowns of frame and target of set-up {list_names([group])}",
-            where=", ".join(rows.files or data.files),
-            rule="In each set-up there must be more measured values than unknowns",
-            way_out=f"Measure more poses there{_or_hold_out_fewer(task)}. If device and target stood where "
-            'they did in another set-up, give the rows of both the same name in a column "group"',
-        )
-
-
-def _or_hold_out_fewer(task: Task) -> str:
-    return ", or hold out fewer of its rows (--holdout, or another --seed)" if task.sizes else ""
-
-
-def measured_values(task: Task, data: Measurements) -> int:
-    """Numbers that were measured of what is fitted."""
-    if task.selection.distances:
-        return distance_count(data)
-    return 3 * int(held_parts(data, task.selection).sum())
-
-
-def frame_unknowns(task: Task) -> int:
-    """Unknowns of the frame of one set-up: none where it is known, or only distances were measured."""
-    return 0 if task.arm.world_is_known or task.selection.distances else FRAME_UNKNOWNS
-
-
-def setup_unknowns(task: Task) -> int:
-    """Unknowns of all set-ups: frames, targets, orientations of targets; without anchors."""
-    frame = frame_unknowns(task)
-    points = 1 if task.selection.distances else len(task.selection.targets)
-    return len(task.groups) * (frame + 3 * points + (3 if task.selection.orientation else 0))
-
-
-def group_unknowns(task: Task, rows: Measurements) -> int:
-    """Unknowns of the one set-up of `rows`, as far as they measured of it: what was not measured is none."""
-    return frame_unknowns(task) + 3 * int(held_parts(rows, task.selection).any(axis=0).sum())
 
 
 @contextmanager

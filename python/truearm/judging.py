@@ -1,6 +1,6 @@
 """Errors of fitted models on rows, at the target that they are judged at."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -42,7 +42,8 @@ def check_judged(fitted: Measurements, judged: Measurements, selection: Selectio
         InputError: If nothing is left to judge; names targets or set-ups.
     """
     if not selection.judges_another:
-        return never_found(_lost(fitted, judged, selection), judged, selection)
+        lost = never_found(_lost(fitted, judged, selection), judged, selection)
+        return [*lost, *holding_nothing(judged, selection)]
     found, held = _groups_with(fitted, selection.judge), _groups_with(judged, selection.judge)
     missing = [group for group in fitted.groups if group not in found]
     words = (
@@ -56,11 +57,12 @@ def check_judged(fitted: Measurements, judged: Measurements, selection: Selectio
             rule="Where the judged target takes no part in the fit, a set-up needs rows with it",
             way_out="Measure it there, or judge at another target",
         )
+    nothing = holding_nothing(judged, selection, missing)
     if not missing:
-        return []
+        return nothing
     judging = [group for group in fitted.groups if group in found]
     text = f"{words[0].upper()}{words[1:]}: errors are those of the set-up {list_names(judging)} alone."
-    return [Notice("not_judged", text)]
+    return [Notice("not_judged", text), *nothing]
 
 
 def never_found(lost: Mask, judged: Measurements, selection: Selection) -> list[Notice]:
@@ -97,6 +99,17 @@ def never_found(lost: Mask, judged: Measurements, selection: Selection) -> list[
         else ""
     )
     return [Notice("not_judged", f"{words[0].upper()}{words[1:]}, and is not judged{rest}.")]
+
+
+def holding_nothing(judged: Measurements, selection: Selection, groups: Sequence[str] = ()) -> list[Notice]:
+    """A notice of judged rows that hold nothing that is judged; those of `groups` are told otherwise."""
+    targets = [selection.judge] if selection.judges_another else list(selection.targets)
+    seen = np.asarray(np.isfinite(judged.targets[:, targets]).all(axis=2))
+    empty = ~seen.any(axis=1) & ~np.isin(judged.group, groups)
+    if selection.distances or not empty.any():
+        return []
+    text = f"{count_of(int(empty.sum()), 'row')} of {len(empty)} to judge hold nothing that is judged."
+    return [Notice("not_judged", text)]
 
 
 def where_found(fitted: Measurements, judged: Measurements, selection: Selection) -> Measurements:

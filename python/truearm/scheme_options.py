@@ -39,7 +39,7 @@ class SchemeOptions:
         scheme_joints: Joints, from 1, whose values are divided into regions and index the network.
         demanded_mm: A region is not divided further where no row that judges it errs more.
         most_regions: Number of regions at the most.
-        region_rows: Rows that a region needs.
+        region_rows: Poses that a region needs; shots of a pose are one row.
         halving: Axis of each halving: "longest" side, or "best", the one that helps most.
         region_ceps: "shrunk" towards the parent as the rows tell, or "least_squares" as in the paper.
         train_on: Networks learn by (A5) from "ceps" of regions, or from "measurements", kept smooth.

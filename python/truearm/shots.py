@@ -1,51 +1,73 @@
-"""Shots of a pose that agree better with one another than with constants, which count them all the same."""
+"""How far shots of a pose count as measurements of their own: they share what the arm did not repeat."""
 
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from truearm.errors import Notice
-from truearm.lengths import length_mm
-from truearm.units import MM_PER_METRE
-from truearm.validation import at_first_measured
-from truearm.visits import means, pose_numbers
-
-if TYPE_CHECKING:
-    from truearm.calibration import Calibration
-
-KIND: Final = "shots_agree"
-FEWEST_POSES: Final = 10
-"""Poses of several shots from which on their scatter is told from what the model leaves."""
-AGREE: Final = 0.5
-"""Ratio of the scatter of shots to what the model leaves below which they are not counted rightly."""
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
 
-def shots_notices(found: "Calibration") -> list[Notice]:
-    """A notice where standard errors of constants that were fitted alone count shots of a pose as poses.
+@dataclass(frozen=True)
+class Scatter:
+    """What a model leaves of shots, as two variances.
 
-    What an arm does not repeat, and no model holds, all shots of a pose share.
+    Attributes:
+        shared: What all shots of a pose share: what the arm did not repeat, and what no model holds.
+        own: What each shot has of its own, the instrument's noise.
     """
-    rows = found.rows
-    if rows is None or found.variable is not None or found.selection.distances:
-        return []
-    missed = at_first_measured(rows.residual, rows.data, found.selection)
-    clear = (rows.score <= 1.0) & np.isfinite(missed).all(axis=1)
-    first = pose_numbers(rows.data.readings[clear], rows.data.group[clear])
-    _, number, count = np.unique(first, return_inverse=True, return_counts=True)
-    several = count > 1
-    if several.sum() < FEWEST_POSES:
-        return []
-    missed, mine = missed[clear], several[number]
-    apart = (missed - means(missed, number)[number])[mine]
-    shots, poses = int(mine.sum()), int(several.sum())
-    scatter_m = float(np.sqrt(np.square(apart).sum() / (3 * (shots - poses))))
-    left_m = float(np.sqrt(np.square(missed[mine]).sum() / (3 * shots)))
-    if scatter_m > AGREE * left_m:
-        return []
-    agree, left = (length_mm(MM_PER_METRE * value, 2) for value in (scatter_m, left_m))
-    text = (
-        f"Shots of a pose agree within {agree} in a coordinate, the model leaves {left}, which they share. "
-        "Fitted alone, constants take each shot for a measurement of its own: their standard errors are up "
-        f"to {np.sqrt(shots / poses):.1f} times too small."
-    )
-    return [Notice(KIND, text)]
+
+    shared: float
+    own: float
+
+    @classmethod
+    def of(cls, missed: Floats, poses: Rows, unknowns: int = 0) -> "Scatter":
+        """The variances within and between poses of errors (n, k), NaN where not measured.
+
+        Unknowns that were fitted to the rows have taken their part of what differs between poses.
+
+        Args:
+            missed: Measured minus predicted.
+            poses: Number of each row's pose (n,).
+            unknowns: How many were fitted.
+        """
+        value, cell = _cells(missed, poses)
+        count = np.bincount(cell)
+        mean = np.bincount(cell, value) / count
+        within = float(np.square(value - mean[cell]).sum())
+        own = within / max(len(value) - len(count), 1)
+        free = len(count) / max(len(count) - unknowns, 1)
+        between = float((count * np.square(mean)).sum()) * free
+        return cls(max((between - len(count) * own) / len(value), 0.0), own)
+
+    def counts(self, poses: Rows) -> Floats:
+        """How many measurements each row (n,) counts for: one where it is alone, or shots share nothing."""
+        _, pose, shots = np.unique(poses, return_inverse=True, return_counts=True)
+        whole = self.shared + self.own
+        share = self.shared / whole if whole > 0.0 else 0.0
+        return np.asarray(1.0 / (1.0 + (shots - 1.0) * share))[pose.reshape(-1)]
+
+
+def variance_factor(missed: Floats, poses: Rows, unknowns: int) -> float:
+    """By how much the covariance of a fit grows that took each shot for a measurement of its own.
+
+    Args:
+        missed: Residuals (n, k) over the standard deviations that the fit took for them, NaN where not
+            measured.
+        poses: Number of each row's pose (n,).
+        unknowns: How many were fitted.
+    """
+    if len(np.unique(poses)) == len(poses):
+        return 1.0
+    found = Scatter.of(missed, poses, unknowns)
+    _, cell = _cells(missed, poses)
+    count = np.bincount(cell)
+    return max(float((count * (count * found.shared + found.own)).sum()) / len(cell), 1.0)
+
+
+def _cells(missed: Floats, poses: Rows) -> tuple[Floats, Rows]:
+    """The known values (v,), and which of the quantities, each of a pose, each is a shot of (v,)."""
+    rows, columns = np.nonzero(np.isfinite(missed))
+    _, cell = np.unique(poses[rows] * missed.shape[1] + columns, return_inverse=True)
+    return missed[rows, columns], cell.reshape(-1).astype(np.int64)

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 
 from truearm._core import CoreError, Posterior
 from truearm.core_set import core_set
+from truearm.enough_values import FRAME_UNKNOWNS, frame_unknowns, setup_unknowns
 from truearm.errors import InputError, WorkError
 from truearm.fitting import (
-    FRAME_UNKNOWNS,
     KnownHyper,
     Task,
     feature_values,
     field_options,
-    frame_unknowns,
-    setup_unknowns,
 )
 from truearm.measured_parts import MeasuredParts
 from truearm.models import CONSTANT

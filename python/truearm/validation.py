@@ -94,6 +94,11 @@ class RowErrors:
         return np.asarray(np.linalg.norm(self.position, axis=1))
 
     @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which rows (n,) hold the judged target; of distances (d,) all."""
+        return np.asarray(np.isfinite(self.position).all(axis=1))
+
+    @property
     def turn_rad(self) -> Floats:
         """Angles of the orientation errors (n,); NaN where orientation took no part."""
         if self.orientation is None:
@@ -127,7 +132,7 @@ class Validation:
     Attributes:
         n_train: Rows that trained.
         n_train_poses: How many poses they are of: shots of the same pose count once.
-        n_holdout: Rows that were held out, or left out in turn.
+        n_holdout: Rows that were held out, or left out in turn, and hold what is judged.
         n_holdout_poses: How many poses those are of.
         holdout: Errors of "nominal", "constant" and, if fitted, "variable" on these rows.
         train: The same on training rows.
@@ -135,7 +140,7 @@ class Validation:
             model; None where there is none, or they hold nothing that was fitted.
         left_out: Whether each row was judged by what the other rows gave, as after an update; else the rows
             were held out of one fit.
-        n_planned: How many rows were held out because they were planned to validate.
+        n_planned: How many of them were held out because they were planned to validate.
         drift: What was taken out of all measurements, those that were held out too; None where nothing was.
     """
 
@@ -156,7 +161,7 @@ class Validation:
 
     @property
     def n_rows(self) -> int:
-        """How many rows there were: those that were left out in turn also trained."""
+        """How many rows trained or were judged: those that were left out in turn did both."""
         return self.n_holdout if self.left_out else self.n_train + self.n_holdout
 
     @property

@@ -30,6 +30,11 @@ def pose_count(data: Measurements) -> int:
     return len(np.unique(pose_numbers(data.readings, data.group)))
 
 
+def pose_counts(data: Measurements) -> tuple[int, ...]:
+    """How many poses the rows of each file are of."""
+    return tuple(pose_count(data.select(data.sources == file)) for file in data.files)
+
+
 def visit_numbers(readings: Floats, kin: NDArray[np.str_]) -> Rows:
     """Number of each row's visit to a pose (n,), rows in the order of measuring.
 
@@ -57,26 +62,46 @@ def one_row_a_visit(data: Measurements) -> Measurements:
     Visits whose rows do not hold the same points stay as they are as well.
     """
     visits = visit_numbers(data.readings, np.char.add(np.char.add(data.sources, "\n"), data.group))
-    seen: NDArray[np.bool_] = np.asarray(np.isfinite(data.targets).all(axis=2))
-    if data.orientations is not None:
-        seen = np.column_stack([seen, np.isfinite(data.orientations).all(axis=1)])
+    seen = _seen(data)
     _, first = np.unique(visits, return_index=True)
-    alike = (seen == seen[first][visits]).all(axis=1)
-    if holds_distances(data) or not alike.all() or len(first) == len(data):
+    if holds_distances(data) or not (seen == seen[first][visits]).all():
+        return data
+    return _one_row_each(data, visits)
+
+
+def one_row_a_pose(data: Measurements) -> Measurements:
+    """The mean of the rows of each pose that hold the same points, whenever they were measured."""
+    alike = np.column_stack([pose_numbers(data.readings, data.group), _seen(data)])
+    _, number = np.unique(alike, axis=0, return_inverse=True)
+    return _one_row_each(data, number.reshape(-1).astype(np.int64))
+
+
+def _seen(data: Measurements) -> NDArray[np.bool_]:
+    """Which targets each row holds, and last whether an orientation, if there are any."""
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(data.targets).all(axis=2))
+    if data.orientations is None:
+        return seen
+    return np.column_stack([seen, np.isfinite(data.orientations).all(axis=1)])
+
+
+def _one_row_each(data: Measurements, numbers: Rows) -> Measurements:
+    """The mean of the rows of each number (n,) from 0, which hold the same points; else the first of them."""
+    _, first = np.unique(numbers, return_index=True)
+    if len(first) == len(data):
         return data
     orientations = data.orientations
     if orientations is not None:
-        sign = np.where((orientations * orientations[first][visits]).sum(axis=1) < 0.0, -1.0, 1.0)
-        mean = means(orientations * sign[:, None], visits)
+        sign = np.where((orientations * orientations[first][numbers]).sum(axis=1) < 0.0, -1.0, 1.0)
+        mean = means(orientations * sign[:, None], numbers)
         orientations = mean / np.linalg.norm(mean, axis=1)[:, None]
     sigma = data.sigma_m
     if sigma is not None:
-        sigma = np.sqrt(means(np.square(sigma), visits) / np.bincount(visits))
+        sigma = np.sqrt(means(np.square(sigma), numbers) / np.bincount(numbers))
     shown = data.select(first)
     return replace(
         shown,
-        readings=means(data.readings, visits),
-        targets=means(data.targets, visits),
+        readings=means(data.readings, numbers),
+        targets=means(data.targets, numbers),
         orientations=orientations,
         sigma_m=sigma,
     )

@@ -66,7 +66,7 @@ DemandedMm: TypeAlias = Annotated[
     float, typer.Option(metavar="MM", help="Schemes: a region this accurate is not divided.")
 ]
 Regions: TypeAlias = Annotated[int, typer.Option(metavar="N", help="Schemes: regions at the most.")]
-RegionRows: TypeAlias = Annotated[int, typer.Option(metavar="N", help="Schemes: rows that a region needs.")]
+RegionRows: TypeAlias = Annotated[int, typer.Option(metavar="N", help="Schemes: poses that a region needs.")]
 RegionCeps: TypeAlias = Annotated[
     str,
     typer.Option(metavar="shrunk|least_squares", help="Schemes: shrunk to the parent, or as the paper."),

@@ -12,7 +12,7 @@ from truearm.cli.interrupt import ends_promptly
 from truearm.cli.next_commands import compensate_commands
 from truearm.cli.progress import told_stages
 from truearm.defaults import FIRST_TARGET, SEED
-from truearm.errors import count_of, typed
+from truearm.errors import typed
 
 if TYPE_CHECKING:
     from truearm.calibration import Calibration
@@ -31,7 +31,11 @@ def command(
     judge_target: Annotated[int, typer.Option(metavar="K", help="Judge at this target.")] = FIRST_TARGET,
     frame_rows: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Rows that find the frame and tool.  [default: a third, 400 at most]"),
+        typer.Option(
+            metavar="N",
+            help="Rows that find frame and tool, all shots of a pose with them.  [default: a third or more, "
+            "of 400 poses at most]",
+        ),
     ] = None,
     keep_tool: Annotated[
         bool, typer.Option("--keep-tool", help="Keep the tool; only the frame is found.")
@@ -77,9 +81,9 @@ def command(
     if keep_frames:
         how = "frame and tool kept"
     else:
-        how = f"{count_of(found.n_frame, 'row')} found {'the frame' if keep_tool else 'frame and tool'}"
-    say(f"{known.robot.name}: {how}, {count_of(found.n_judged, 'row')} judged.")
-    print_errors(found.errors, count_of(found.n_judged, "row"))
+        how = f"{found.rows_of_frame} found {'the frame' if keep_tool else 'frame and tool'}"
+    say(f"{known.robot.name}: {how}, {found.rows_judged} judged.")
+    print_errors(found.errors, found.rows_judged)
     others = " ".join(map(typed, measurements))
     update = f"truearm update {typed(calibration)} {others}{given_options(context, *NOT_OF_UPDATE)}"
     suggest(

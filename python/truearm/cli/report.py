@@ -10,7 +10,7 @@ from truearm.cli.console import print_json, say, say_wrapped, suggest, warn
 from truearm.cli.interrupt import ends_promptly
 from truearm.cli.progress import told_stages
 from truearm.defaults import SEED
-from truearm.errors import UsageError, count_of, typed
+from truearm.errors import UsageError, typed
 from truearm.files import check_output, write_whole
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ def command(
         int | None,
         typer.Option(
             metavar="N",
-            help="Rows of MEASUREMENTS that find frame and tool.  [default: a third, 400 at most]",
+            help="Rows of MEASUREMENTS that find frame and tool, all shots of a pose with them.  [default: "
+            "a third or more, of 400 poses at most]",
         ),
     ] = None,
     length_unit: LengthUnit = None,
@@ -83,7 +84,7 @@ def command(
     say_wrapped(made.verdict)
     if other is not None:
         say(f"On {', '.join(file.name for file in files)}:")
-        print_errors(other.errors, count_of(other.n_judged, "row"))
+        print_errors(other.errors, other.rows_judged)
     if made.advice:
         say("What would help most next:")
         for entry in made.advice:

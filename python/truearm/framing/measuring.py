@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from truearm._core import fit_constant
 from truearm.calibration import Calibration
 from truearm.core_set import Selection, core_set, select
+from truearm.enough_values import frame_unknowns
 from truearm.errors import WorkError
-from truearm.fitting import Task, core_errors, fit_options, frame_unknowns
+from truearm.fitting import Task, core_errors, fit_options
 from truearm.framing.agreement import check_agreement, far_rows
 from truearm.framing.calibrated import calibrated_poses
 from truearm.framing.identified_frame import IdentifiedFrame

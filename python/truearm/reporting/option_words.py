@@ -30,7 +30,7 @@ SCHEMES: Final[Mapping[str, str]] = {
     "scheme_joints": "joints that are divided",
     "demanded_mm": "accuracy that a region is not divided beyond, mm",
     "most_regions": "largest number of regions",
-    "region_rows": "rows that a region needs",
+    "region_rows": "poses that a region needs",
     "halving": "axis of each halving",
     "region_ceps": "fit of the regional parameters",
     "train_on": "what the network learns from",

@@ -6,7 +6,6 @@ import numpy as np
 
 from truearm.as_calibrated import NOT_AS_CALIBRATED
 from truearm.doubts import OF_NO_USE
-from truearm.errors import count_of
 from truearm.evaluation import Evaluation
 from truearm.reporting.advice import Advice
 from truearm.reporting.facts import ROWS, Facts
@@ -54,13 +53,13 @@ def other_data(facts: Facts) -> Section:
     held = facts.calibration.validation.holdout[facts.best].position.mean
     here, there = short(now, held)
     how = (
-        f"Frame and tool were found from {count_of(found.n_frame, 'other row')}"
+        f"Frame and tool were found from others, {found.rows_of_frame}"
         if found.n_frame
         else "Frame and tool were kept"
     )
     no_help = _no_help(found)
     table = Table(
-        f"{', '.join(facts.other_names)}: {count_of(found.n_judged, 'row')} judged, mm",
+        f"{', '.join(facts.other_names)}: {found.rows_judged} judged, mm",
         ["model", *HEADINGS],
         rows,
         says=f"{how}. The mean error of the {facts.best} model is {here} mm here, and {there} mm on the "

@@ -8,7 +8,7 @@ import numpy as np
 
 from truearm import kinds
 from truearm.calibration import Calibration
-from truearm.core_set import select
+from truearm.core_set import select_fitted
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, in_words, list_names
 from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
@@ -160,7 +160,8 @@ def update(
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
     data, unused = some_poses(one_row_a_visit(data))
     notices += [*unused, *silent_rows(calibration, data)]
-    task = _task(calibration, data, chosen, stages)
+    task, left_out = _task(calibration, data, chosen, stages)
+    notices += left_out
     if task.selection.orientation:
         check_turns(data, calibration.robot)
     unknowns = Unknowns.of(calibration, task, chosen, data)
@@ -253,7 +254,10 @@ def _verdict(changed: SquaresTest, rest: SquaresTest, level: float) -> Verdict:
     return "moved" if changed.p < _threshold(level) else "holds"
 
 
-def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, stages: Stages) -> Task:
+def _task(
+    calibration: Calibration, data: Measurements, options: UpdateOptions, stages: Stages
+) -> tuple[Task, list[Notice]]:
+    """What is compared, and a notice of what is not."""
     if calibration.scheme is not None:
         raise WorkError(
             f"this calibration is of the scheme {calibration.model_name}",
@@ -261,21 +265,13 @@ def _task(calibration: Calibration, data: Measurements, options: UpdateOptions, 
             way_out="Calibrate with --model variable or constant",
         )
     where = ", ".join(data.files)
-    selection = select(data, options.use)
-    if options.use is None and selection.orientation and not calibration.selection.orientation:
-        selection = select(data, "position")
-    if selection.orientation and not calibration.selection.orientation:
-        raise UsageError(
-            "orientations took no part in the calibration",
-            where=where,
-            rule="It does not tell how far they may scatter",
-            way_out="Leave --use pose out, or calibrate with orientations",
-        )
+    selection, left_out = select_fitted(data, options.use, calibration.selection)
     if selection.distances or calibration.selection.distances:
         raise InputError("distances were measured, not points", where=where, rule="An update needs points")
     if calibration.arm.world_is_known and len(data.groups) > 1:
         raise InputError(f"there are {len(data.groups)} set-ups", where=where, rule="The world is one")
-    return Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
+    task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
+    return task, left_out
 
 
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:

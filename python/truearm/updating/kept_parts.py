@@ -12,14 +12,15 @@ from truearm._core import Setup
 from truearm.calibration import Calibration
 from truearm.core_set import Selection
 from truearm.details import left_m
+from truearm.enough_values import setup_unknowns
 from truearm.errors import Notice, list_names
-from truearm.fitting import setup_unknowns
 from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
 from truearm.revision import Carried
 from truearm.uncertainty import task_of
 from truearm.updating.parts import places_of
-from truearm.updating.scene import Scene, sigmas_m
+from truearm.updating.scale import sigmas_m
+from truearm.updating.scene import Scene
 from truearm.updating.unknowns import OPEN
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from truearm._core import Setup
 from truearm.core_set import Selection
-from truearm.fitting import FRAME_UNKNOWNS
+from truearm.enough_values import FRAME_UNKNOWNS
 from truearm.identified import IdentifiedArm
 
 

@@ -11,7 +11,8 @@ from scipy.linalg import block_diag
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
 from truearm.core_set import core_set, rotations
-from truearm.fitting import Task, core_errors, fit_options, setup_unknowns
+from truearm.enough_values import setup_unknowns
+from truearm.fitting import Task, core_errors, fit_options
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix

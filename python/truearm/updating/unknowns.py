@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.core_set import Selection
-from truearm.fitting import FRAME_UNKNOWNS, Task
+from truearm.enough_values import FRAME_UNKNOWNS
+from truearm.fitting import Task
 from truearm.identified import IdentifiedArm
 from truearm.measured_parts import MeasuredParts
 from truearm.measurements import Measurements
