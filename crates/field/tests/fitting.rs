@@ -4,8 +4,8 @@
 mod common;
 
 use common::{
-    Arm, Fitted, Measure, Random, Truth, deviations, fit, fit_from, fitted, options, problem, root_mean_square,
-    six_axes, subset,
+    Arm, Fitted, Measure, Random, Truth, deviations, fit, fit_from, fitted, options, problem,
+    root_mean_square, six_axes, subset,
 };
 use truearm_estimate::{ConstantFit, EstimateError, MeasurementSet, Point, Problem, Setup};
 use truearm_field::{Drives, FieldError, FieldOptions, Input, fit_field, measurement_covariance};
