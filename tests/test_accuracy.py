@@ -96,7 +96,8 @@ def test_from_one_set_up_to_another(read):
     calibration = calibrated(read, UR10, "ur10_ipa_A.csv", train_size=300)
     _, other = read(UR10, "ur10_ipa_B.csv")
     found = ta.evaluate(calibration, other, use="position")
-    assert (found.n_frame, found.n_judged) == (400, 1095)
+    assert found.n_frame_poses == 400
+    assert (found.n_frame + found.n_judged, found.n_frame_poses + found.n_judged_poses) == (1495, 1202)
     assert found.errors["constant"].position.mean < 0.5
     assert found.errors["variable"].position.mean < 0.75 * found.errors["constant"].position.mean
 
