@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
-use std::ops::Range;
 use std::sync::Arc;
 
 use numpy::ndarray::Array3;
@@ -18,6 +17,7 @@ use truearm_field::{
     Posterior as CorePosterior, UPRIGHT, fit_field as fit, measurement_covariance, restore,
 };
 
+use crate::asked::{Asked, Copies};
 use crate::blocks::{block_from, block_into, sag_into, up_of};
 use crate::chain::{Chain, contiguous};
 use crate::door::{CoreError, Failure, in_parts, long, quick, with_threads};
@@ -320,31 +320,6 @@ impl Posterior {
 /// Configurations whose covariances are found between two looks at the signals; a multiple of the core's own batches.
 const AT_ONCE: usize = 512;
 
-/// What is asked of a posterior: inputs (n, I), Jacobians (n, m, P), set-up columns (n, m, s).
-#[derive(Clone, Copy)]
-struct Asked<'a> {
-    inputs: &'a [f64],
-    jacobian: &'a [f64],
-    setup: Option<&'a [f64]>,
-}
-
-impl<'a> Asked<'a> {
-    /// Configurations, n; one where the arrays are not of as many, so that the core sees them whole and refuses them.
-    fn poses(&self, core: &CorePosterior) -> usize {
-        let count = self.inputs.len() / core.training().input_count();
-        let even = |array: &[f64]| array.len().is_multiple_of(count) && count > 0;
-        if even(self.inputs) && even(self.jacobian) && self.setup.is_none_or(even) { count } else { 1 }
-    }
-
-    fn part(&self, part: &Range<usize>, whole: usize) -> Asked<'a> {
-        let of = |array: &'a [f64]| {
-            let each = array.len() / whole;
-            &array[part.start * each..part.end * each]
-        };
-        Asked { inputs: of(self.inputs), jacobian: of(self.jacobian), setup: self.setup.map(of) }
-    }
-}
-
 #[pymethods]
 impl Posterior {
     #[new]
@@ -395,9 +370,8 @@ impl Posterior {
         jacobian: PyReadonlyArray3<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let rows = jacobian.shape()[1];
-        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
-        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
-        let asked = Asked { inputs: &inputs, jacobian: &jacobian, setup: None };
+        let copies = Copies::of(&inputs, &jacobian, None);
+        let asked = copies.asked();
         let poses = asked.poses(self.core());
         let values = in_parts(py, poses, AT_ONCE, |part| {
             let Asked { inputs, jacobian, .. } = asked.part(&part, poses);
@@ -416,10 +390,8 @@ impl Posterior {
         setup: Option<PyReadonlyArray3<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
-        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
-        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
-        let setup_columns: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
-        let asked = Asked { inputs: &inputs, jacobian: &jacobian, setup: setup_columns.as_deref() };
+        let copies = Copies::of(&inputs, &jacobian, setup.as_ref());
+        let asked = copies.asked();
         let whole = asked.poses(self.core());
         let values = in_parts(py, whole, AT_ONCE, |part| {
             let Asked { inputs, jacobian, setup } = asked.part(&part, whole);
@@ -438,10 +410,9 @@ impl Posterior {
         setup: Option<PyReadonlyArray3<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
-        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
-        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
-        let setup: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
-        let values = quick(py, || self.core().joint_covariance(&inputs, &jacobian, setup.as_deref(), rows))?;
+        let copies = Copies::of(&inputs, &jacobian, setup.as_ref());
+        let Asked { inputs, jacobian, setup } = copies.asked();
+        let values = quick(py, || self.core().joint_covariance(inputs, jacobian, setup, rows))?;
         Ok(matrix(py, &values, poses * rows))
     }
 
@@ -456,11 +427,9 @@ impl Posterior {
         setup: Option<PyReadonlyArray3<'py, f64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (poses, rows) = (jacobian.shape()[0], jacobian.shape()[1]);
-        let inputs: Vec<f64> = inputs.as_array().iter().copied().collect();
-        let jacobian: Vec<f64> = jacobian.as_array().iter().copied().collect();
-        let setup: Option<Vec<f64>> = setup.map(|array| array.as_array().iter().copied().collect());
-        let found =
-            quick(py, || self.core().cross_covariance(first, &inputs, &jacobian, setup.as_deref(), rows))?;
+        let copies = Copies::of(&inputs, &jacobian, setup.as_ref());
+        let Asked { inputs, jacobian, setup } = copies.asked();
+        let found = quick(py, || self.core().cross_covariance(first, inputs, jacobian, setup, rows))?;
         Ok(matrix(py, &found, (poses - first) * rows))
     }
 

@@ -3,6 +3,7 @@
 use pyo3::PyClass;
 use pyo3::prelude::*;
 
+mod asked;
 mod blocks;
 mod chain;
 mod choice;
