@@ -85,15 +85,11 @@ fn inside(cells: &CellKernel, value: f64) -> f64 {
 pub struct OfCells<'a>(pub &'a Model);
 
 fn implied(cells: &CellKernel, a: f64, b: f64) -> f64 {
-    let grades = |value: f64| {
-        let mut grades = vec![0.0; cells.axis.count];
-        cells.axis.active(value).nonzero().for_each(|(cell, grade)| grades[cell] += grade);
-        grades
-    };
+    let grades = |value: f64| cells.axis.active(value).nonzero().collect::<Vec<(usize, f64)>>();
     let (a, b) = if a == b { (inside(cells, a), inside(cells, b)) } else { (a, b) };
     let (a, b) = (grades(a), grades(b));
-    let pairs = (0..a.len()).flat_map(|i| (0..b.len()).map(move |j| (i, j)));
-    pairs.map(|(i, j)| a[i] * cells.correlation[i.abs_diff(j)] * b[j]).sum()
+    let pairs = a.iter().flat_map(|x| b.iter().map(move |y| (x, y)));
+    pairs.map(|((i, x), (j, y))| x * cells.correlation[i.abs_diff(*j)] * y).sum()
 }
 
 impl Kernels for OfCells<'_> {
@@ -139,20 +135,9 @@ impl<'a, K: Kernels> Oracle<'a, K> {
 
     pub fn variances(&self, a: &[f64], b: &[f64]) -> Variances {
         let hyper = self.hyper;
+        let driven: Vec<f64> = (0..hyper.smooth.len()).map(|class| self.driven(class, a, b)).collect();
         let of = |column: &crate::Column| {
-            let mut sum = 0.0;
-            if column.driven {
-                let class = Class::of(column.parameter).index();
-                for k in 0..self.training.input_count() {
-                    sum += hyper.smooth[class].powi(2) * self.kernels.smooth(k, a[k], b[k]);
-                }
-                for (index, product) in hyper.products.iter().enumerate() {
-                    let factor =
-                        |(axis, &k): (usize, &usize)| self.kernels.product(index, axis, k, a[k], b[k]);
-                    let kernel: f64 = product.joints.iter().enumerate().map(factor).product();
-                    sum += product.amplitudes[class].powi(2) * kernel;
-                }
-            }
+            let mut sum = if column.driven { driven[Class::of(column.parameter).index()] } else { 0.0 };
             if let Some(k) = column.own {
                 if self.training.has_curve(k) {
                     sum += (hyper.own * self.lever(k)).powi(2) * self.kernels.own(k, a[k], b[k]);
@@ -172,6 +157,19 @@ impl<'a, K: Kernels> Oracle<'a, K> {
                 .collect(),
             varying: columns.iter().map(of).collect(),
         }
+    }
+
+    /// Of columns of a class that vary with all inputs.
+    fn driven(&self, class: usize, a: &[f64], b: &[f64]) -> f64 {
+        let hyper = self.hyper;
+        let one = |k: usize| hyper.smooth[class].powi(2) * self.kernels.smooth(k, a[k], b[k]);
+        let smooth: f64 = (0..self.training.input_count()).map(one).sum();
+        let several = |(index, product): (usize, &crate::hyper::Product)| {
+            let factor = |(axis, &k): (usize, &usize)| self.kernels.product(index, axis, k, a[k], b[k]);
+            let kernel: f64 = product.joints.iter().enumerate().map(factor).product();
+            product.amplitudes[class].powi(2) * kernel
+        };
+        smooth + hyper.products.iter().enumerate().map(several).sum::<f64>()
     }
 
     /// Sum of the products of a joint's levers.
@@ -205,7 +203,7 @@ impl<'a, K: Kernels> Oracle<'a, K> {
         let rows = training.row_count();
         let mut matrix = Mat::zeros(rows, rows);
         for i in 0..training.pose_count() {
-            for j in 0..training.pose_count() {
+            for j in 0..=i {
                 let v = self.variances(training.values_of(i), training.values_of(j));
                 let total: Vec<f64> = v.constant.iter().zip(&v.varying).map(|(a, b)| a + b).collect();
                 for r in training.rows(i) {
@@ -215,6 +213,7 @@ impl<'a, K: Kernels> Oracle<'a, K> {
                         if i == j {
                             matrix[(r, c)] += self.anew(training.jacobian_row(r), training.jacobian_row(c));
                         }
+                        matrix[(c, r)] = matrix[(r, c)];
                     }
                 }
             }
@@ -281,7 +280,9 @@ impl<'a, K: Kernels> Oracle<'a, K> {
         let told: Vec<Vec<f64>> = (0..rows)
             .map(|row| {
                 let unit: Vec<f64> = (0..rows).map(|other| f64::from(u8::from(other == row))).collect();
-                self.solution(&unit, training.values_of(0)).0
+                let alpha = self.factor().solve_vector(&unit);
+                let of = |p: usize| (0..rows).map(|r| training.jacobian_row(r)[p] * alpha[r]).sum::<f64>();
+                (0..columns).map(|p| prior[p] * of(p)).collect()
             })
             .collect();
         let entry = |i: usize, j: usize| {
