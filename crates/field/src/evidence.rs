@@ -20,6 +20,7 @@ use crate::hyper::{
     AT_CONSTANT, AT_OWN, AT_OWN_CYCLES, AT_OWN_LENGTH, AT_PRODUCTS, AT_REPEATABILITY, AT_SAG, AT_SMOOTH,
     AT_SMOOTH_LENGTH, AT_SMOOTH_LINE_LENGTH, Hyper, Product,
 };
+use crate::hyper_prior::HyperPrior;
 use crate::information::Slopes;
 use crate::pairs::{ByColumn, STEP, Step, add_products, step_at, write_covariance, write_step};
 use crate::projection::Projection;
@@ -101,9 +102,7 @@ impl<'a> Evidence<'a> {
             let slopes = Slopes { training, by_column, pairings, hyper, kernels, alpha: &restricted.alpha };
             slopes.information(&restricted.factor, restricted.root.as_ref())
         })?;
-        for (k, _, spread) in deviations(hyper) {
-            information[(k, k)] += spread.powi(-2);
-        }
+        HyperPrior::new(hyper).add_precision(&mut information);
         Ok(Informed { score, information })
     }
 
@@ -120,12 +119,10 @@ impl<'a> Evidence<'a> {
         let restricted = self.restricted(covariance, projected)?;
         let mut gradient = self.gradient(hyper, &kernels, &restricted);
         let further = further(&kernels, &restricted);
-        let mut value = restricted.value;
+        let prior = HyperPrior::new(hyper);
+        let value = restricted.value + prior.value();
         *self.room() = Some([restricted.factor.into_matrix(), restricted.projected]);
-        for (k, z, spread) in deviations(hyper) {
-            value -= 0.5 * z * z;
-            gradient[k] -= z / spread;
-        }
+        prior.add_gradient(&mut gradient);
         Ok((Score { value, gradient }, further))
     }
 
@@ -136,7 +133,7 @@ impl<'a> Evidence<'a> {
     pub fn value(&self, hyper: &Hyper) -> Result<f64, FieldError> {
         let projection = self.projection(hyper)?;
         let (_, value) = self.explained(&projection, &projection.root());
-        Ok(deviations(hyper).fold(value, |value, (_, z, _)| value - 0.5 * z * z))
+        Ok(value + HyperPrior::new(hyper).value())
     }
 
     /// What pulls at the rows, P r (R,): their residual over the covariance that it has under the hyper-parameters.
@@ -206,13 +203,6 @@ impl<'a> Evidence<'a> {
         }
         gradient
     }
-}
-
-/// How far each hyper-parameter with a prior is from its middle: its position, by how many spreads, and the spread.
-fn deviations(hyper: &Hyper) -> impl Iterator<Item = (usize, f64, f64)> {
-    let ranges = hyper.ranges().into_iter().zip(hyper.to_logs()).enumerate();
-    let known = ranges.filter(|(_, (range, _))| range.spread.is_finite());
-    known.map(|(k, (range, log))| (k, (log - range.start.ln()) / range.spread, range.spread))
 }
 
 /// P r, from the factor of K and Q.

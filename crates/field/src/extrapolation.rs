@@ -4,7 +4,7 @@
 //! are too sure of themselves. The tails of every input are left out in turn and predicted from the rest; the arm's
 //! standard deviation is scaled until 95 % of the predictions hold in four fifths of the tails. The errors of one tail are
 //! nearly one draw: what one needs tells nothing of what the next will, and the worst of many makes all others too
-//! wide. Where data is dense noise outweighs it.
+//! wide. A row tells of the factor what its variance is the arm's part of: a coarse one next to nothing, whatever it misses by chance.
 
 use truearm_estimate::Cancel;
 
@@ -52,11 +52,12 @@ fn factor_of_most(tails: &[Vec<LeftOut>]) -> f64 {
     factors.get(enough.saturating_sub(1)).copied().unwrap_or(1.0)
 }
 
-/// The least factor with which enough of a tail's predictions hold.
+/// The least factor with which enough of a tail's predictions hold, each for as much as it tells.
 fn factor(rows: &[LeftOut]) -> f64 {
+    let all: f64 = rows.iter().map(told).sum();
     let holds = |factor: f64| {
-        let within = rows.iter().filter(|row| is_within(row, factor)).count();
-        within as f64 >= HELD * rows.len() as f64
+        let within: f64 = rows.iter().filter(|row| is_within(row, factor)).map(told).sum();
+        within >= HELD * all
     };
     let (mut low, mut high) = (1.0, LARGEST);
     if holds(low) {
@@ -67,6 +68,11 @@ fn factor(rows: &[LeftOut]) -> f64 {
         if holds(middle) { high = middle } else { low = middle }
     }
     high
+}
+
+/// Twice the information of a row on the logarithm of the factor's square, at a factor of one.
+fn told(row: &LeftOut) -> f64 {
+    if row.known > 0.0 { (row.known / (row.noise + row.known)).powi(2) } else { 0.0 }
 }
 
 fn is_within(row: &LeftOut, factor: f64) -> bool {
@@ -111,6 +117,14 @@ mod tests {
             assert!((needed(10) - 2.0).abs() < 0.02, "{}", needed(10));
             assert!((needed(9) - 5.0).abs() < 0.02, "{}", needed(9));
         }
+    }
+
+    #[test]
+    fn rows_that_are_all_noise_do_not_count() {
+        let coarse = LeftOut { residual: 2.2 * 30.0, noise: 900.0, known: 1.0 };
+        let rows: Vec<LeftOut> = tail(1.5, 0.1).into_iter().take(19).chain((0..20).map(|_| coarse)).collect();
+        assert!((factor(&rows) - 1.5).abs() < 0.02, "{}", factor(&rows));
+        assert_eq!(factor(&[LeftOut { residual: 1.0, noise: 0.1, known: 0.0 }]), 1.0);
     }
 
     #[test]

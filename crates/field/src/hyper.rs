@@ -2,7 +2,7 @@
 //!
 //! Amplitudes and lengths are shared by the joints: one more per joint costs at thirty poses and gains nothing
 //! measurable at four hundred (docs/decisions/0003). What they do not repeat is each one's own, about a level that they share
-//! (docs/decisions/0040). Each has a wide log-normal prior centred on its start.
+//! (docs/decisions/0040). Each has a wide log-normal prior centred on its start, amplitudes about a factor that they share.
 
 use crate::kernel::{Input, InputKind};
 use crate::sag::UPRIGHT;
@@ -84,7 +84,7 @@ pub struct Range {
     pub start: f64,
     pub low: f64,
     pub high: f64,
-    /// Standard deviation of the logarithm about the start; infinite for a flat prior.
+    /// Standard deviation of the logarithm about the start, of amplitudes about what they share; infinite for a flat prior.
     pub spread: f64,
 }
 

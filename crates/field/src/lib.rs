@@ -37,6 +37,7 @@ mod gram;
 mod greedy;
 mod hyper;
 mod hyper_check;
+mod hyper_prior;
 mod information;
 mod joined;
 mod kernel;

@@ -8,6 +8,7 @@
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
+use crate::hyper_prior::HyperPrior;
 
 /// Step of the finite difference, in the logarithm: large against the evidence's rounding, small against the change of its
 /// curvature.
@@ -18,7 +19,7 @@ const STEP: f64 = 0.02;
 /// # Errors
 /// [`FieldError`] of the evidence.
 pub fn with_widenings(evidence: &Evidence, hyper: &Hyper) -> Result<Hyper, FieldError> {
-    let (logs, ranges) = (hyper.to_logs(), hyper.ranges());
+    let (logs, prior) = (hyper.to_logs(), HyperPrior::new(hyper));
     let here = evidence.score(hyper)?.gradient;
     let mut widenings = Vec::new();
     for k in hyper.amplitude_positions() {
@@ -26,8 +27,7 @@ pub fn with_widenings(evidence: &Evidence, hyper: &Hyper) -> Result<Hyper, Field
         moved[k] += STEP;
         let curvature = (here[k] - evidence.score(&hyper.with_logs(&moved))?.gradient[k]) / STEP;
         // The evidence never widens what the prior says.
-        let least = ranges[k].spread.powi(-2);
-        widenings.push(curvature.max(least).recip().exp());
+        widenings.push(curvature.max(prior.precision_of(k)).recip().exp());
     }
     Ok(hyper.with_widenings(&widenings))
 }

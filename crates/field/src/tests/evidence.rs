@@ -11,6 +11,7 @@ use super::sets::{
 use crate::FieldError;
 use crate::evidence::Evidence;
 use crate::hyper::Hyper;
+use crate::hyper_prior::HyperPrior;
 use crate::training::Training;
 use truearm_kinematics::lever_count;
 
@@ -159,10 +160,11 @@ fn check_information(training: &Training, hyper: &Hyper) {
             slope
         })
         .collect();
-    for (i, range) in hyper.ranges().iter().enumerate() {
+    let mut prior = Mat::zeros(logs.len(), logs.len());
+    HyperPrior::new(hyper).add_precision(&mut prior);
+    for i in 0..logs.len() {
         for j in 0..logs.len() {
-            let prior = if i == j && range.spread.is_finite() { range.spread.powi(-2) } else { 0.0 };
-            let wanted = 0.5 * (halves[i].transpose() * &halves[j])[(0, 0)] + prior;
+            let wanted = 0.5 * (halves[i].transpose() * &halves[j])[(0, 0)] + prior[(i, j)];
             let size = 0.5 * (halves[i].norm_l2() * halves[j].norm_l2());
             assert!(
                 (found[(i, j)] - wanted).abs() <= 1e-5 * size + 1e-9,

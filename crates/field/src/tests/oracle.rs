@@ -8,6 +8,7 @@ use truearm_estimate::dense::{Cholesky, column};
 
 use crate::cells::CellKernel;
 use crate::hyper::Hyper;
+use crate::hyper_prior::HyperPrior;
 use crate::kernel::InputKind;
 use crate::model::Model;
 use crate::training::{Class, Training};
@@ -241,13 +242,8 @@ impl<'a, K: Kernels> Oracle<'a, K> {
     pub fn evidence(&self) -> f64 {
         let factor = self.factor();
         let residual = &self.training.residual;
-        let mut value = -0.5 * (factor.log_determinant() + dot(residual, &factor.solve_vector(residual)));
-        for (range, log) in self.hyper.ranges().iter().zip(self.hyper.to_logs()) {
-            if range.spread.is_finite() {
-                value -= 0.5 * ((log - range.start.ln()) / range.spread).powi(2);
-            }
-        }
-        value
+        let explained = factor.log_determinant() + dot(residual, &factor.solve_vector(residual));
+        HyperPrior::new(self.hyper).value() - 0.5 * explained
     }
 
     /// Constants, set-up, and the varying part at a configuration.

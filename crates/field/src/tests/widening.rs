@@ -7,6 +7,8 @@ use super::sets::{few_driven, hyper, positions};
 use crate::data_space::DataSpace;
 use crate::evidence::Evidence;
 use crate::fit::fit_field;
+use crate::hyper::AT_SMOOTH;
+use crate::hyper_prior::HyperPrior;
 use crate::model::Model;
 use crate::posterior::Posterior;
 use crate::widening::with_widenings;
@@ -16,10 +18,13 @@ fn the_prior_alone_bounds_what_few_poses_leave_open() {
     let training = few_driven(3);
     let cancel = Cancel::default();
     let evidence = Evidence::new(&training, &cancel);
-    let wide = with_widenings(&evidence, &hyper(&training, 6)).unwrap();
-    let all: Vec<f64> = wide.smooth_widening.iter().chain(&wide.products[1].widening).copied().collect();
-    let most = std::f64::consts::E;
-    assert!(all.iter().all(|&w| (1.0..=most * (1.0 + 1e-12)).contains(&w)), "{all:?}");
+    let start = hyper(&training, 6);
+    let wide = with_widenings(&evidence, &start).unwrap();
+    let prior = HyperPrior::new(&start);
+    let most = |k: usize| prior.precision_of(AT_SMOOTH + k).recip().exp() * (1.0 + 1e-12);
+    let within = (0..3).all(|k| (1.0..=most(k)).contains(&wide.smooth_widening[k]));
+    assert!(within, "{:?}", wide.smooth_widening);
+    let all = [wide.smooth_widening, wide.products[1].widening].concat();
     assert!(all.iter().any(|&w| w > 2.0), "{all:?}");
 }
 
