@@ -14,8 +14,8 @@ from truearm.errors import Notice, count_of
 from truearm.programs.configuration import ANY
 from truearm.programs.layouts import of_pose
 from truearm.programs.listing import listed_target
-from truearm.programs.program import Program
-from truearm.programs.solving import are_singular, numbers_of
+from truearm.programs.program import Program, numbers_of
+from truearm.programs.solving import are_singular
 from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
