@@ -138,7 +138,7 @@ class Rewritten:
         kept: Targets that were refused and kept as they were, with the reason.
         listed: What was left as it was because it cannot be changed with certainty.
         inserted: How many waypoints were inserted.
-        deviating: Linear moves that deviate by more than was allowed, and got no waypoints.
+        deviating: Linear moves that deviate, or may, by more than was allowed, and got no waypoints.
         notices: What the user should know.
         facts: With what it was rewritten, for the report.
     """
