@@ -168,7 +168,7 @@ class Rewritten:
     facts: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        done = f"{int(self.changed.sum())} of {count_of(len(self.changed), 'target')} changed"
+        done = f"{int(self.changed.sum())} of {count_of(target_count(self.program), 'target')} changed"
         name = self.program.sources[0].path.name
         return f"<Rewritten {name}: {done}, {len(self.kept)} kept, {len(self.listed)} listed>"
 
