@@ -31,7 +31,8 @@ def left_open_mm(
         tool: Their tool.
     """
     numbers, of_joints = uses.environment[which], uses.of_joints[which]
-    variance = np.full(len(which), 0.0 if tool.covariance is None else np.trace(tool.covariance[:3, :3]))
+    of_tool = 0.0 if tool.covariance is None else float(np.trace(tool.covariance[:3, :3]))
+    variance: Floats = np.full(len(which), of_tool)
     for number in np.unique(numbers).tolist():
         here = numbers == number
         environment = program.environments[number]
