@@ -274,3 +274,11 @@ def test_settings_of_a_motion_are_those_that_it_states():
 )
 def test_ways_that_lead_to_a_motion_with_another_tool_or_base(lines, expected):
     assert changed(f"{ALREADY}{lines}\nEND\n") == expected
+
+
+@pytest.mark.parametrize("use", ["XP[1,2]", "XP[I,1]", "XP[2,2]"])
+@pytest.mark.parametrize("stored", [[(1, 1), (1, 2)], [(1, 2)]])
+def test_arrays_of_two_dimensions_are_told_as_such(use, stored):
+    dat = "DECL E6POS XP[2,2]\n" + "".join(f"XP[{i},{k}]={HERE}\n" for i, k in stored)
+    found = reasons(f"{ALREADY}PTP {use}\nEND\n", f"DEFDAT a\n{dat}ENDDAT\n")
+    assert set(found.values()) == {"arrays of more dimensions than one are not read"}

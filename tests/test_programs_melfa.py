@@ -24,6 +24,7 @@ from truearm.programs.layouts import EulerPose
 from truearm.programs.marks import mark_text
 from truearm.programs.melfa import MelfaBasic
 from truearm.programs.melfa_configuration import StructureFlags
+from truearm.programs.solving import AMBIGUOUS
 from truearm.programs.tables import Motion
 from truearm.programs.turning import ON_THE_EDGE, turns
 from truearm.robot import Robot
@@ -257,8 +258,9 @@ def test_written_again_it_is_never_a_turn_away(robot, degrees):
     text = f"1 Tool P_NTool\n2 Mov J1\n3 Mov P1\nJ1=({joints})\nP1={position(robot, q)}\n"
     result = rewritten(MELFA, text, robot, by=SHIFT)
     if result.changed.all():
-        said = says(MELFA, result.contents[0], robot)
-        assert np.abs(said - result.nominal - SHIFT).max() < 3e-4
+        again = rewritten(MELFA, result.contents[0], robot)
+        off = np.abs(again.nominal - result.nominal - SHIFT).max()
+        assert off < 3e-4 or [reason for *_, reason in reasons(again)] == [AMBIGUOUS]
     else:
         assert len(result.listed) == 1
 

@@ -81,3 +81,28 @@ def test_no_waypoint_is_written_without_configuration_data():
     )
     assert "nan" not in done.contents[0].decode()
     assert done.inserted == 0
+
+
+STORED = ",".join(numbers(q, tool=np.eye(4), placed=np.eye(4)) for q in (Q1, Q2))
+PATH = f"CONST robtarget pa{{2}}:=[{STORED}];\nVAR robtarget pb{{2}};\nVAR robtarget pc{{2,2}};"
+TO = "v100,fine,tool0"
+
+
+def test_asking_for_the_length_of_an_array_computes_with_none_of_its_targets():
+    body = f"FOR i FROM 1 TO Dim(pa,1) DO\nMoveAbsJ {joints()},{TO};\nMoveJ pa{{i}},{TO};\nENDFOR"
+    assert reasons(body, data=f"{DATA}\n{PATH}") == []
+    for other in ("n:=Dim(pa,1)+pa{1}.trans.x;", "Dim pa,1;", "n:=Distance(pa{1}.trans,pa{2}.trans);"):
+        assert len(reasons(f"{body}\n{other}", data=f"{DATA}\n{PATH}")) >= 2, other
+
+
+@pytest.mark.parametrize(
+    ("target", "reason"),
+    [
+        ("pb{1}", "its target is computed at run time"),
+        ("pb{i}", "its target is computed at run time"),
+        ("pc{1,2}", "arrays of more dimensions than one are not read"),
+        ("pd{1}", "it is not declared in this module"),
+    ],
+)
+def test_arrays_whose_targets_are_not_written_out(target, reason):
+    assert reasons(f"pb:=pa;\nMoveJ {target},{TO};", data=f"{DATA}\n{PATH}")[-1:] == [reason]

@@ -57,3 +57,19 @@ def test_a_short_line_that_turns_much_has_waypoints_no_closer_than_allowed():
     said = re.findall(rb"movel\(p\[(.*?)\]", done.contents[0])
     waypoint, end = (np.array([float(v) for v in one.split(b",")[:3]]) for one in said)
     assert 0.01 <= np.linalg.norm(end - waypoint) <= 0.025
+
+
+def test_a_line_from_where_the_arm_may_be_anywhere_is_named():
+    """The head of the loop is reached from its end, too."""
+    away = [0.7, *HOME[1:]]
+    head = f"def p():\n  set_tcp(p[0,0,0.2,0,0,0])\n  movej({HOME})\n"
+    lines = f"  movel({away})\n  movel({HOME})\n"
+    straight = densified(f"{head}{lines}end\n", 0.1, 10)
+    looped = densified(f"{head}  while True:\n{lines}  end\nend\n", 0.1, 10)
+    assert straight.deviating == ()
+    assert straight.inserted == 2 * looped.inserted > 0
+    (one,) = looped.deviating
+    reason = "where the arm comes from is not known"
+    assert (one.listed.line, one.deviation_mm, one.listed.reason) == (5, None, reason)
+    (notice,) = (notice for notice in looped.notices if notice.kind == "deviation")
+    assert f"line 5 (how far is not known; {reason})" in notice.message

@@ -22,6 +22,7 @@ from truearm.controller import Controller
 from truearm.errors import InputError
 from truearm.programs.densify import Spacing
 from truearm.programs.layouts import EulerPose
+from truearm.programs.solving import AMBIGUOUS
 from truearm.programs.tables import Motion
 from truearm.programs.tp import FanucTp
 from truearm.programs.tp_configuration import LETTERS, ORDERS
@@ -313,8 +314,9 @@ def test_written_again_it_is_never_a_turn_away(robot, degrees):
     text = program(["J P[1] 10% FINE"], [pose(robot, 1, np.where(turns(q) == ON_THE_EDGE, q + 1e-3, q))])
     result = rewritten(TP, text, robot, by=SHIFT)
     if result.changed[0]:
-        said = says(TP, result.contents[0], robot)[0]
-        assert np.abs(said - result.nominal[0] - SHIFT).max() < 3e-4
+        again = rewritten(TP, result.contents[0], robot)
+        off = np.abs(again.nominal[0] - result.nominal[0] - SHIFT).max()
+        assert off < 3e-4 or [reason for *_, reason in reasons(again)] == [AMBIGUOUS]
     else:
         assert len(result.listed) == 1
 

@@ -270,6 +270,12 @@ def test_without_set_tcp_the_frames_file_has_it(robot):
     assert np.abs(result.nominal - Q1).max() < 1e-7
 
 
+def test_seeds_are_no_targets_in_the_representation(robot):
+    stored = f"a_p = p[{pose_text(robot, Q1)}]\na_q = {Q1.tolist()}\nset_tcp(p[0, 0, 0.1203, 0, 0, 0])\n"
+    done = rewritten(UR, f"{stored}movej(get_inverse_kin(a_p, qnear=a_q))\n", robot, by=SHIFT)
+    assert repr(done) == "<Rewritten test.script: 1 of 1 target changed, 0 kept, 0 listed>"
+
+
 def test_before_its_first_set_tcp_a_program_has_the_tcp_of_the_installation(robot):
     text = f"movel(p[{pose_text(robot, Q1)}], qnear=[{', '.join(map(str, Q1))}])\n"
     text = f"movej([0.3, -1.3, 1.4, -1.7, -1.5, 0.4])\n{text}set_tcp(p[0, 0, 0.1, 0, 0, 0])\n{text}"

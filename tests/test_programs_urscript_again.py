@@ -82,6 +82,14 @@ def test_what_changes_no_variable_leaves_it_known(robot, between):
     np.testing.assert_allclose(result.nominal, [NEAR, Q1, Q2], atol=1e-7)
 
 
+@pytest.mark.parametrize("line", ["x = get_inverse_kin(p{0})", "x = p{0}", "textmsg(p{0})"])
+def test_a_pose_is_no_call_of_a_program_that_is_named_p(robot, line):
+    target = f"p[{pose_text(robot, Q1)}]"
+    lines = [f"movej({NEAR})", line.format(FIRST), f"movel({target})"]
+    text = "def p():\n  set_tcp(p[0, 0, 0.1203, 0, 0, 0])\n  " + "\n  ".join(lines) + "\nend\n"
+    assert rewritten(UR, text, robot, by=SHIFT).changed.all()
+
+
 def test_a_list_that_is_counted_is_not_changed(robot):
     text = f"i = [{NEAR}].length()\nplaces = [{NEAR}]\nn = places.length()\nmovej(places[0])\n"
     assert rewritten(UR, text, robot, by=SHIFT).changed.all()

@@ -15,6 +15,7 @@ from truearm.programs.frames import Frames
 from truearm.programs.languages import language_of
 from truearm.programs.marks import mark_text
 from truearm.programs.notices import (
+    POSE,
     frames_notices,
     language_notices,
     object_notices,
@@ -78,6 +79,7 @@ def compensate_program(
         declared,
         compensator,
         compensator.task,
+        compensator.task == "pose" and compensator.moving_count >= POSE,
         positions_only,
         beyond,
         compensator.limits.largest_std_mm,

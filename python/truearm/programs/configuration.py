@@ -16,9 +16,11 @@ from truearm.robot_data import RobotData
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 ANY: Final = -(2**31)
 EDGE_RAD: Final = np.deg2rad(0.01)
+"""A text's numbers are rounded: so near to a digit's edge, a joint may have been on the other side of it."""
 FULL_TURN: Final = 2.0 * np.pi
 
 
@@ -42,18 +44,26 @@ class Configuration(Protocol):
         ...
 
 
-def meant(configuration: Configuration, wanted: Integers, candidates: Floats) -> NDArray[np.bool_]:
-    """Which of the readings (m, N) agree with the digits (m, D) of their targets, (m,).
+def meant(
+    configuration: Configuration, wanted: Integers, candidates: Floats, edge_rad: Floats | float = EDGE_RAD
+) -> tuple[Bools, Bools]:
+    """Which of the readings (m, N) agree with the digits (m, D) of their targets.
 
-    The position in a text is rounded, so a joint within EDGE_RAD of a digit's edge agrees with the digits
-    on both sides of it.
+    Args:
+        configuration: How the digits follow from readings.
+        wanted: The digits, ANY where they are left open.
+        candidates: The readings.
+        edge_rad: A joint within this, (m, N) or one for all, of a digit's edge agrees with both sides of it.
+
+    Returns:
+        Which agree as they are, (m,), and which within `edge_rad`, (m,).
     """
     if len(candidates) == 0:
-        return np.zeros(0, dtype=bool)
-    shifts = (0.0, EDGE_RAD, -EDGE_RAD)
-    agrees = [configuration.digits(candidates + shift) == wanted for shift in shifts]
-    found: NDArray[np.bool_] = np.logical_or.reduce([wanted == ANY, *agrees]).all(axis=1)
-    return found
+        return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+    agrees = [configuration.digits(candidates + shift) == wanted for shift in (0.0, edge_rad, -edge_rad)]
+    exactly: Bools = ((wanted == ANY) | agrees[0]).all(axis=1)
+    found: Bools = np.logical_or.reduce([wanted == ANY, *agrees]).all(axis=1)
+    return exactly, found
 
 
 def configured(targets: Targets, layouts: Sequence[Layout]) -> list[int]:
@@ -112,7 +122,7 @@ class NearestTurns:
         return np.arange(len(branches)), turned
 
 
-def _turning(robot: RobotData) -> NDArray[np.bool_]:
+def _turning(robot: RobotData) -> Bools:
     """Joints (N,) of which a full turn more is the same pose: all that is coupled to them turns fully too."""
     revolute = np.array([kind == "revolute" for kind in robot.joints])
     same = np.where(revolute[:, None], robot.coupling % 1.0 == 0.0, robot.coupling == 0.0)

@@ -31,6 +31,7 @@ LEAST_SAMPLES: Final = 2 * WITHIN
 TURN_RAD: Final = np.deg2rad(5.0)
 """Of the tool from one sample to the next at most."""
 MOVES_NAMED: Final = 5
+FROM_ANYWHERE: Final = "where the arm comes from is not known"
 UNREACHED: Final = "the nominal arm does not reach all of the line"
 BLENDED: Final = "how far it is blended with its neighbours is not written as a number"
 NO_ROOM: Final = "what blends it with its neighbours leaves no room for waypoints"
@@ -63,7 +64,7 @@ class Spacing:
 
 @dataclass(frozen=True)
 class Deviating:
-    """A linear move that deviates by more than was allowed and got no waypoints.
+    """A linear move that deviates, or may, by more than was allowed and got no waypoints.
 
     Attributes:
         listed: Its statement, and why it got none.
@@ -80,7 +81,8 @@ class Inserted:
 
     Attributes:
         texts: What is inserted, and moves that their language cannot say with waypoints.
-        deviating: Moves that deviate by more and got no waypoints, those included, in the order of the text.
+        deviating: Moves that deviate, or may, by more and got no waypoints, those included, in the order of
+            the text.
     """
 
     texts: StepTexts
@@ -129,6 +131,9 @@ class Densifier:
     def insert(self, nominal: Floats, changed: Bools, tell: Callable[[int, int], None]) -> Inserted:
         """Waypoints for every linear move between two changed targets.
 
+        A move to a changed one from where the arm may be anywhere, as behind calls and at the heads of
+        loops, is told as one that may deviate.
+
         Args:
             nominal: Readings of all targets, (t, N).
             changed: Which are changed, (t,); so are places of a changed one with an offset, as in Offsets.
@@ -136,10 +141,11 @@ class Densifier:
         """
         moves = self._program.moves
         ends = np.stack([moves.before, moves.target], axis=1)
-        lines = (moves.motion == Motion.LINEAR) & (moves.before != NOWHERE) & changed[ends].all(axis=1)
+        lines = (moves.motion == Motion.LINEAR) & changed[moves.target]
+        anywhere = moves.before == NOWHERE
+        why = dict.fromkeys(np.flatnonzero(lines & anywhere).tolist(), FROM_ANYWHERE)
         stepped: list[list[LinearStep]] = []
-        why: dict[int, str] = {}
-        numbers = np.flatnonzero(lines).tolist()
+        numbers = np.flatnonzero(lines & ~anywhere & changed[moves.before]).tolist()
         for done, move in enumerate(numbers):
             tell(done, len(numbers))
             tool = self._program.environments[int(self._program.moves.environment[move])].tool

@@ -11,8 +11,8 @@ from truearm.inverse import Inverse
 from truearm.programs.configuration import ANY, Configuration, with_turns
 from truearm.programs.environment import Environment
 from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
-from truearm.programs.program import Program
-from truearm.programs.solving import AT_ONCE, are_singular, numbers_of
+from truearm.programs.program import Program, numbers_of
+from truearm.programs.solving import AT_ONCE, are_singular
 from truearm.programs.tables import all_ones, run_of
 from truearm.programs.uses import Uses
 from truearm.robot import Robot

@@ -65,6 +65,16 @@ class Frame:
         return covariance
 
     @property
+    def mistaken(self) -> Transform | None:
+        """Where a controller that takes the tool for `controller` has the flange: flange_from_flange (4, 4),
+        the true one from that with the true tool. None where the two tools are the same.
+        """
+        if self.true.tobytes() == self.controller.tobytes():
+            return None
+        moved: Transform = self.controller @ rigid_inverse(self.true)
+        return moved
+
+    @property
     def key(self) -> tuple[bytes, bytes, str, bytes]:
         """Equal for frames that are the same."""
         known = b"" if self.covariance is None else self.covariance.tobytes()
@@ -84,8 +94,8 @@ def author_of(robot: Robot, tool: Frame, displacement: Transform | None) -> Robo
         displacement: Of the work object, as in Environment; None for joint targets.
     """
     flange, base = robot.flange, robot.base
-    if tool.true.tobytes() != tool.controller.tobytes():
-        flange = flange @ tool.controller @ rigid_inverse(tool.true)
+    if tool.mistaken is not None:
+        flange = flange @ tool.mistaken
     elif displacement is None:
         return None
     if displacement is not None:

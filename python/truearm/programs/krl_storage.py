@@ -7,6 +7,7 @@ from typing import Final
 
 from truearm.programs.krl_values import Named, Structure, line_reader, named, names_in, structure
 from truearm.programs.lexing import Reader
+from truearm.programs.listing import DIMENSIONS
 from truearm.programs.source import Source
 
 DECLARED: Final = re.compile(
@@ -49,6 +50,7 @@ class KrlStorage:
         initial: Names that have their value before the program runs.
         parameters: Names of what routines are given.
         read: Names that the program computes with.
+        grids: Names of arrays of several dimensions.
     """
 
     def __init__(self) -> None:
@@ -57,6 +59,7 @@ class KrlStorage:
         self.initial: set[str] = set()
         self.parameters: set[str] = set()
         self.read: set[str] = set()
+        self.grids: set[str] = set()
 
     def gather(self, file: int, source: Source) -> None:
         """Take what a file stores.
@@ -87,8 +90,11 @@ class KrlStorage:
     def why_not(self, key: str) -> str:
         """Why the target under a name cannot be changed; empty if it can."""
         found = self.values.get(key)
-        if key.partition("[")[0] in self.parameters:
+        name = key.partition("[")[0]
+        if name in self.parameters:
             return PARAMETER
+        if name in self.grids:
+            return DIMENSIONS
         if not found:
             return NOT_HERE
         if len(found) > 1:
@@ -119,6 +125,7 @@ class KrlStorage:
             if variable is None:
                 return
             self.kinds.setdefault(variable.name, kind)
+            self._shaped(variable)
             if reader.accept("="):
                 self.initial.add(variable.key)
                 self._keep(file, variable, reader)
@@ -129,6 +136,7 @@ class KrlStorage:
         variable = named(reader)
         if variable is None:
             return
+        self._shaped(variable)
         if initial:
             self.initial.add(variable.key)
         if reader.accept("="):
@@ -136,6 +144,10 @@ class KrlStorage:
             return
         self.values.setdefault(variable.key, []).append((file, None))
         self.read |= names_in(reader.rest())
+
+    def _shaped(self, variable: Named) -> None:
+        if variable.several:
+            self.grids.add(variable.name)
 
     def _keep(self, file: int, variable: Named, reader: Reader) -> None:
         whole = reader.rest()

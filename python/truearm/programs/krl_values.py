@@ -81,13 +81,15 @@ class Named:
 
     Attributes:
         name: In small letters, such as "xp1" or "base_data".
-        index: The index; None where there is none, and "?" where it is computed.
+        index: The index; None where there is none, and "?" where it is computed, or they are several.
         at: Offset.
+        several: Whether the indices are several, the first of them a number.
     """
 
     name: str
     index: int | str | None
     at: int
+    several: bool = False
 
     @property
     def key(self) -> str:
@@ -152,12 +154,13 @@ def named(reader: Reader) -> Named | None:
         return Named(name.text.lower(), None, name.start)
     reader.expect("[")
     index: int | str = "?"
+    several = reader.kind() == "number" and reader.peek(1) == ","
     if reader.kind() == "number" and reader.peek(1) == "]":
         value = float(reader.take().text)
         index = int(value) if value.is_integer() else "?"
     _skip_to(reader, "]")
     reader.expect("]")
-    return Named(name.text.lower(), index, name.start)
+    return Named(name.text.lower(), index, name.start, several)
 
 
 def names_in(found: list[Token]) -> set[str]:

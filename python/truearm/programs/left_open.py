@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.programs.environment import Environment
+from truearm.programs.environment import Environment, Frame
 from truearm.programs.program import Program
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
@@ -14,7 +14,9 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-def left_open_mm(program: Program, uses: Uses, which: Integers, q: Floats, robot: Robot) -> Floats:
+def left_open_mm(
+    program: Program, uses: Uses, which: Integers, q: Floats, robot: Robot, tool: Frame
+) -> Floats:
     """Standard deviation that tool and work object leave of targets `which`, (n,), mm.
 
     The root of the sum of the variances of x, y and z, which counts the two as independent. A joint target
@@ -26,14 +28,14 @@ def left_open_mm(program: Program, uses: Uses, which: Integers, q: Floats, robot
         which: Numbers of targets (n,).
         q: Readings that their author meant (n, N).
         robot: The programming model.
+        tool: Their tool.
     """
     numbers, of_joints = uses.environment[which], uses.of_joints[which]
-    variance = np.zeros(len(which))
+    of_tool = 0.0 if tool.covariance is None else float(np.trace(tool.covariance[:3, :3]))
+    variance: Floats = np.full(len(which), of_tool)
     for number in np.unique(numbers).tolist():
         here = numbers == number
         environment = program.environments[number]
-        if environment.tool.covariance is not None:
-            variance[here] += np.trace(environment.tool.covariance[:3, :3])
         posed = here & ~of_joints
         if environment.work_object.covariance is not None and posed.any():
             variance[posed] += _of_object(environment, environment.work_object.covariance, robot, q[posed])

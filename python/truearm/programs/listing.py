@@ -6,6 +6,7 @@ from typing import Final
 from truearm.programs.program import Listed, Program
 
 NAMED: Final = 10
+DIMENSIONS: Final = "arrays of more dimensions than one are not read"
 
 
 def listed_target(program: Program, target: int, reason: str) -> Listed:

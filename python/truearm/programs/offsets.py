@@ -14,8 +14,8 @@ from truearm.errors import Notice, count_of
 from truearm.programs.configuration import ANY
 from truearm.programs.layouts import of_pose
 from truearm.programs.listing import listed_target
-from truearm.programs.program import Program
-from truearm.programs.solving import are_singular, numbers_of
+from truearm.programs.program import Program, numbers_of
+from truearm.programs.solving import are_singular
 from truearm.programs.tables import Targets
 from truearm.programs.uses import Uses
 from truearm.robot import Robot
@@ -78,8 +78,8 @@ class Offsets:
     others: Integers
 
     @classmethod
-    def of(cls, program: Program) -> "Offsets":
-        """Those of a program."""
+    def of(cls, program: Program, *, whole_poses: bool = True) -> "Offsets":
+        """Those of a program; `whole_poses` as in Models."""
         places: dict[tuple[int, int], int] = {}
         target_of = np.array(program.moves.target)
         count = len(program.targets)
@@ -91,7 +91,7 @@ class Offsets:
         moves_now = replace(program.moves, target=target_of)
         targets = _extended(program.targets, stands_for)
         apart = replace(program, targets=targets, moves=moves_now)
-        return cls(apart, Uses.of(apart), stands_for, count + np.arange(len(places)))
+        return cls(apart, Uses.of(apart, whole_poses=whole_poses), stands_for, count + np.arange(len(places)))
 
     def judged(self, known: Bools, corrected: Floats, controller: Robot, largest_mm: float) -> "Judged":
         """Whether the change of a target for its use as it stands suits its uses with offsets.

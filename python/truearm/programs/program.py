@@ -5,13 +5,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from truearm.programs.configuration import Configuration
 from truearm.programs.environment import Environment
 from truearm.programs.frames import Frames
-from truearm.programs.layouts import Layout
+from truearm.programs.layouts import JointLayout, Layout, PoseLayout
 from truearm.programs.source import Source
-from truearm.programs.tables import Motion, Moves, Targets
+from truearm.programs.tables import Motion, Moves, Targets, all_ones
 from truearm.robot import Robot
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, order=True)
@@ -229,3 +235,11 @@ class BlendsShortened:
 def motion_is_straight(motion: int) -> bool:
     """Whether a motion follows a line or an arc, on which a step would show."""
     return motion in (Motion.LINEAR, Motion.VIA, Motion.CIRCULAR)
+
+
+def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
+    """Numbers (n, width) of targets of one layout, in the layout's units."""
+    targets, width = program.targets, layout.width
+    numbers: Floats = targets.of(targets.values, which, width)
+    factors = targets.of(targets.factors, which, width)
+    return numbers if all_ones(factors) else numbers * factors

@@ -129,8 +129,13 @@ def given(found: Sequence[Token], receiver: str = "") -> Iterator[tuple[str, str
 
 
 def is_variable(found: Sequence[Token], place: int) -> bool:
-    r"""Whether a token may be a variable's name: not that of a component (.trans) or an option (\WObj)."""
-    return found[place].kind == "name" and (place == 0 or found[place - 1].text not in {".", "\\"})
+    r"""Whether a token may be the name of a variable whose value is used: not that of a component (.trans) or
+    an option (\WObj), nor of an array whose length alone is asked for, Dim(pa,1).
+    """
+    if found[place].kind != "name" or (place > 0 and found[place - 1].text in {".", "\\"}):
+        return False
+    around = [token.text.lower() for token in found[max(place - 2, 0) : place + 2]]
+    return [*around[:2], *around[3:]] != ["dim", "(", ","]
 
 
 def changed(

@@ -9,6 +9,7 @@ import numpy as np
 from truearm.programs.environment import Transform
 from truearm.programs.folding import constant
 from truearm.programs.lexing import Reader, Token
+from truearm.programs.listing import DIMENSIONS
 from truearm.programs.rapid_data import TWICE, Declarations
 from truearm.programs.rapid_values import (
     UNUSED_AXIS,
@@ -36,7 +37,6 @@ OFFSETS: Final = frozenset({"offs", "reltool"})
 NOT_HERE: Final = "it is not declared in this module"
 OTHER_ROUTINE: Final = "it is declared in another routine alone"
 COMPUTED: Final = "its target is computed at run time"
-DIMENSIONS: Final = "arrays of more dimensions than one are not read"
 EXTERNAL: Final = "external axes"
 DEEPEST: Final = 10
 
@@ -196,11 +196,12 @@ class RapidTargets:
         return Meant(targets, np.eye(4), np.eye(4)) if targets else why
 
     def _element(self, name: str, index: Sequence[Token]) -> Meant | str:
-        place = constant(index, self._declarations.numbers)
-        if place is not None:
-            return self._meant(self.stored(f"{name}{{{place:.0f}}}"))
-        keys = [key for key in self._declarations.data if key.startswith(f"{name}{{")]
-        return self._meant(*(self.stored(key) for key in keys))
+        place, data = constant(index, self._declarations.numbers), self._declarations.data
+        if place is None:
+            keys = [key for key in data if key.startswith(f"{name}{{")]
+        else:
+            keys = [key for key in (f"{name}{{{place:.0f}}}",) if key in data]
+        return self._meant(*(self.stored(key) for key in keys or [name]))
 
     def _offset(self, function: str, given: list[Argument], depth: int) -> Meant | str:
         inner = self.meant(given[0].tokens, depth + 1) if given else COMPUTED

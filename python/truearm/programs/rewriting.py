@@ -65,6 +65,8 @@ class Models:
         controller: What the controller computes with.
         compensator: From programming to calibrated.
         task: What it meets; another than "pose" needs to know the tool for joint targets as well.
+        whole_poses: Whether enough joints move to meet position and orientation: the correction of a joint
+            target does not depend on the tool then.
         positions_only: Whether the calibration was fitted to positions alone.
         beyond: In words, features that lie beyond what it was fitted to.
         largest_std_mm: Standard deviation that is allowed, tool and work object included; None for any.
@@ -75,6 +77,7 @@ class Models:
     controller: Controller
     compensator: Compensator
     task: str = "pose"
+    whole_poses: bool = True
     positions_only: bool = False
     beyond: tuple[str, ...] = ()
     largest_std_mm: float | None = None
@@ -123,7 +126,8 @@ class Rewritten:
         corrected: Readings that the program says now, (t, N); the nominal ones where it was left as it was.
         changed: Targets that were changed, (t,).
         correction_mm: How far the tool's target moved from where the program said it, for the controller's
-            tool, (t,); NaN where it was not changed.
+            tool, (t,); NaN where it was not changed. Like the next four, the largest where a joint target has
+            several tools.
         correction_mrad: How far it turned, (t,).
         std_mm: Standard deviation of the tool's place there, (t,): of the calibration, of the tool and, for
             Cartesian targets, of the work object, as far as the frames file tells theirs.
@@ -138,7 +142,7 @@ class Rewritten:
         kept: Targets that were refused and kept as they were, with the reason.
         listed: What was left as it was because it cannot be changed with certainty.
         inserted: How many waypoints were inserted.
-        deviating: Linear moves that deviate by more than was allowed, and got no waypoints.
+        deviating: Linear moves that deviate, or may, by more than was allowed, and got no waypoints.
         notices: What the user should know.
         facts: With what it was rewritten, for the report.
     """
@@ -164,7 +168,7 @@ class Rewritten:
     facts: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        done = f"{int(self.changed.sum())} of {count_of(len(self.changed), 'target')} changed"
+        done = f"{int(self.changed.sum())} of {count_of(target_count(self.program), 'target')} changed"
         name = self.program.sources[0].path.name
         return f"<Rewritten {name}: {done}, {len(self.kept)} kept, {len(self.listed)} listed>"
 
@@ -233,8 +237,9 @@ def rewrite(
     """
     if not choices.force:
         refuse_marked(program)
-    offsets = None if choices.offsets_mm is None else Offsets.of(program)
-    given = _Given(program, Uses.of(program))
+    alike = models.whole_poses
+    offsets = None if choices.offsets_mm is None else Offsets.of(program, whole_poses=alike)
+    given = _Given(program, Uses.of(program, whole_poses=alike))
     program, uses = (program, given.uses) if offsets is None else (offsets.program, offsets.uses)
     solved = solve_targets(
         program, uses, models.programming, models.inverse, lambda done, all_: tell("targets", done, all_)
@@ -268,6 +273,11 @@ class _Given(NamedTuple):
     uses: Uses
 
 
+def _with_largest(column: Floats, rows: slice | Integers, values: Floats) -> Floats:
+    """A column with `values` in some rows, where they are larger than what is there."""
+    return placed(column, rows, np.fmax(column[rows], values))
+
+
 @dataclass(eq=False)
 class _State:
     """What is known of the targets while they are corrected."""
@@ -293,9 +303,11 @@ class _State:
 
     def compensate(self) -> None:
         """Corrected readings of all known targets, tool by tool, in the order of the moves."""
+        moving = self.program.moves.moving
+        along = self.program.moves.target[moving]
+        with_tool = self.uses.tool_of[self.program.moves.environment[moving]]
         for number, example in enumerate(self.uses.tools):
-            along = self.program.moves.target[self.program.moves.moving]
-            which = along[self.known[along] & (self.uses.tool[along] == number)]
+            which = along[self.known[along] & (with_tool == number)]
             if len(which) == 0:
                 continue
             tool = self.program.environments[example].tool
@@ -308,7 +320,10 @@ class _State:
                 self._correct(which[displaced == place], tool, self.uses.displacements[place])
 
     def _correct(self, which: Integers, tool: Frame, displacement: Transform | None) -> None:
-        """Corrected readings of targets with one tool, in work objects that are displaced alike."""
+        """Corrected readings of targets with one tool, in work objects that are displaced alike.
+
+        Of joint targets with several tools what is largest counts.
+        """
         rows = run_of(which)
         found = self.models.compensator.joints(
             np.ascontiguousarray(self.nominal[rows]),
@@ -316,14 +331,14 @@ class _State:
             author=author_of(self.models.programming, tool, displacement),
         )
         self.corrected = placed(self.corrected, rows, found.q)
-        self.correction_mm = placed(self.correction_mm, rows, found.correction_mm)
-        self.correction_mrad = placed(self.correction_mrad, rows, found.correction_mrad)
-        self.residual_mm = placed(self.residual_mm, rows, found.residual_mm)
-        self.residual_mrad = placed(self.residual_mrad, rows, found.residual_mrad)
+        self.correction_mm = _with_largest(self.correction_mm, rows, found.correction_mm)
+        self.correction_mrad = _with_largest(self.correction_mrad, rows, found.correction_mrad)
+        self.residual_mm = _with_largest(self.residual_mm, rows, found.residual_mm)
+        self.residual_mrad = _with_largest(self.residual_mrad, rows, found.residual_mrad)
         self._take_refusals(which, found.refusals)
         refused = np.array(found.refused, dtype=bool)
         if found.std_mm is not None:
-            refused |= self._judge_std(which, found.std_mm, refused)
+            refused |= self._judge_std(which, found.std_mm, refused, tool)
         self.corrected[which[refused]] = self.nominal[which[refused]]
 
     def _take_refusals(self, which: Integers, refusals: Sequence[Refusal]) -> None:
@@ -338,12 +353,13 @@ class _State:
                 self.refused[target] = refusal.reason
                 self.codes.add(refusal.code)
 
-    def _judge_std(self, which: Integers, std_mm: Floats, refused: Bools) -> Bools:
+    def _judge_std(self, which: Integers, std_mm: Floats, refused: Bools, tool: Frame) -> Bools:
         """Take over standard deviations of targets, with tool and work object; which are too large."""
         rows, largest = run_of(which), self.models.largest_std_mm
-        added = left_open_mm(self.program, self.uses, which, self.nominal[rows], self.models.programming)
+        robot = self.models.programming
+        added = left_open_mm(self.program, self.uses, which, self.nominal[rows], robot, tool)
         whole = np.hypot(std_mm, added)
-        self.std_mm = placed(self.std_mm, rows, whole)
+        self.std_mm = _with_largest(self.std_mm, rows, whole)
         if largest is None:
             return np.zeros(len(which), dtype=bool)
         beyond = (whole > largest) & (added > 0.0) & ~refused

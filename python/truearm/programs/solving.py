@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.inverse import Inverse
-from truearm.programs.configuration import ANY, NearestTurns, meant, with_turns
-from truearm.programs.layouts import JointLayout, PoseLayout, of_joints, of_pose
-from truearm.programs.program import Program, motion_is_straight
-from truearm.programs.tables import NOWHERE, all_ones, placed, run_of
+from truearm.programs.configuration import ANY, EDGE_RAD, FULL_TURN, NearestTurns, meant, with_turns
+from truearm.programs.layouts import of_joints, of_pose
+from truearm.programs.program import Program, motion_is_straight, numbers_of
+from truearm.programs.rounding import rounded_rad
+from truearm.programs.tables import NOWHERE, placed, run_of
+from truearm.programs.turning import EDGE_RAD as COMPUTED_RAD
 from truearm.programs.uses import SEVERAL, UNUSED, Uses
 from truearm.robot import Robot
 
@@ -85,12 +87,18 @@ def solve_targets(
     return Solved(solver.q, solver.reasons)
 
 
-def numbers_of(program: Program, which: Integers, layout: JointLayout | PoseLayout) -> Floats:
-    """Numbers (n, width) of targets of one layout, in the layout's units."""
-    targets, width = program.targets, layout.width
-    numbers: Floats = targets.of(targets.values, which, width)
-    factors = targets.of(targets.factors, which, width)
-    return numbers if all_ones(factors) else numbers * factors
+class _Named(NamedTuple):
+    """Readings that configuration data names.
+
+    Attributes:
+        q: The readings, (k, N).
+        singular: Whether they lie at a singularity, (k,).
+        exact: Whether the data names them as they are, and not only as rounding may have changed them, (k,).
+    """
+
+    q: Floats
+    singular: Bools
+    exact: Bools
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +108,14 @@ class _Possible:
     Attributes:
         branches: One turn of each branch, (b, N).
         at_singularity: Whether these lie at a singularity, (b,).
-        named: Those that its configuration data names, (k, N); None where it has none.
-        singular: Whether the named ones lie at a singularity, (k,).
+        named: Those that its configuration data names; None where it has none.
         flange: Pose (4, 4) of the flange where infinitely many readings reach it, so that no list holds those
             that are meant; else None.
     """
 
     branches: Floats
     at_singularity: Bools
-    named: Floats | None
-    singular: Bools | None
+    named: _Named | None
     flange: Floats | None = None
 
 
@@ -190,7 +196,7 @@ class _Solver:
     def _possible(self, some: Integers, poses: dict[int, Floats]) -> dict[int, _Possible]:
         """What the readings of the targets `some` can be, with the poses of the flange at them."""
         if self.robot.joint_count > DETERMINED and self.program.configuration is None:
-            nothing = np.empty((0, self.robot.joint_count)), np.empty(0, dtype=bool), None, None
+            nothing = np.empty((0, self.robot.joint_count)), np.empty(0, dtype=bool), None
             return {number: _Possible(*nothing, poses[number]) for number in some.tolist()}
         branches = self.inverse.branches(np.stack([poses[number] for number in some.tolist()]))
         named = self._named(some, branches)
@@ -198,29 +204,52 @@ class _Solver:
         at_singularity = np.zeros(reached.shape, dtype=bool)
         at_singularity[reached] = are_singular(self.robot, branches[reached])
         return {
-            number: _Possible(solutions[finite], singular[finite], *named.get(row, (None, None)))
+            number: _Possible(solutions[finite], singular[finite], named.get(row))
             for row, (number, solutions, finite, singular) in enumerate(
                 zip(some.tolist(), branches, reached, at_singularity, strict=True)
             )
         }
 
-    def _named(self, some: Integers, branches: Floats) -> dict[int, tuple[Floats, Bools]]:
-        """By row: readings that the configuration data of the targets `some` names, and whether singular."""
-        configuration = self.program.configuration
+    def _named(self, some: Integers, branches: Floats) -> dict[int, _Named]:
+        """By row: readings that the configuration data of the targets `some` names."""
         wanted = self._wanted(some)
-        if configuration is None or wanted is None:
+        if self.program.configuration is None or wanted is None:
             return {}
         stated = (wanted != ANY).any(axis=1)
         rows, candidates = with_turns(branches, self.robot)
-        agree = stated[rows]
-        agree[agree] = meant(configuration, wanted[rows[agree]], candidates[agree])
-        rows, candidates = rows[agree], candidates[agree]
+        exact, agree = np.array(stated[rows]), np.array(stated[rows])
+        exact[agree], agree[agree] = meant(self.program.configuration, wanted[rows[agree]], candidates[agree])
+        rows, candidates, exact = rows[agree], candidates[agree], exact[agree]
+        near = self._near(some, rows, candidates, wanted, exact)
+        rows, candidates, exact = rows[near], candidates[near], exact[near]
         singular = are_singular(self.robot, candidates)
         places = np.searchsorted(rows, np.arange(len(some) + 1))
-        return {
-            int(row): (candidates[places[row] : places[row + 1]], singular[places[row] : places[row + 1]])
-            for row in np.flatnonzero(stated)
-        }
+        found = {}
+        for row in np.flatnonzero(stated).tolist():
+            here = slice(places[row], places[row + 1])
+            found[row] = _Named(candidates[here], singular[here], exact[here])
+        return found
+
+    def _near(
+        self, some: Integers, rows: Integers, candidates: Floats, wanted: Integers, exact: Bools
+    ) -> Bools:
+        """Which candidates (m, N) of the targets `some[rows]` are left where several agree with their data,
+        not all of them exactly: those that do within what the rounding of the text and the controller's
+        arithmetic leave open, if there are any.
+        """
+        left = np.ones(len(rows), dtype=bool)
+        count = len(some)
+        doubtful = np.bincount(rows, minlength=count) > np.bincount(rows[exact], minlength=count)
+        doubtful &= np.bincount(rows, minlength=count) > 1
+        asked = np.flatnonzero(doubtful[rows])
+        if len(asked) == 0 or self.program.configuration is None:
+            return left
+        open_rad = rounded_rad(self.program, self.uses, some[rows[asked]], candidates[asked], self.robot)
+        edge = np.fmin(open_rad + 2.0 * COMPUTED_RAD, EDGE_RAD)
+        _, near = meant(self.program.configuration, wanted[rows[asked]], candidates[asked], edge)
+        some_near = np.bincount(rows[asked[near]], minlength=count) > 0
+        left[asked] = near | ~some_near[rows[asked]]
+        return left
 
     def _wanted(self, some: Integers) -> Integers | None:
         """Digits (n, D) of targets' configuration data, ANY where open; None where no target has any."""
@@ -290,20 +319,20 @@ class _Solver:
         agree = not isinstance(stated, str) and np.abs(stated - found).max() <= SAME_RAD
         return found if agree else PERHAPS_HEEDED
 
-    def _stated(self, possible: _Possible, named: Floats, came: _Came) -> Floats | str:
+    def _stated(self, possible: _Possible, named: _Named, came: _Came) -> Floats | str:
         """The readings among those `named` that configuration data means, or why they are not known."""
-        if len(named) == 0:
+        if len(named.q) == 0:
             return NO_BRANCH
         before = came.before
-        place = the_nearest(named, before)
-        if place is None:
+        place = the_nearest(named.q, before)
+        if place is None or _may_be_turned(named, place):
             return AMBIGUOUS
-        found: Floats = named[place]
+        found: Floats = named.q[place]
         if came.straight and before is not None and np.abs(found - before).max() > CLOSE_RAD:
             _, every = self._nearest_turns(possible.branches, before)
             if not is_nearest(found, every, before):
                 return CONTRADICTS
-        return SINGULAR if possible.singular is not None and possible.singular.any() else found
+        return SINGULAR if named.singular.any() else found
 
     def _from_seed(self, flange: Floats, before: Floats | None) -> Floats | str:
         """The readings that a search from those before arrives at, where it arrives near by."""
@@ -337,6 +366,16 @@ def the_nearest(candidates: Floats, before: Floats | None) -> int | None:
     if distances is None or distances[place] > NEARER * distances[others].min():
         return None
     return place
+
+
+def _may_be_turned(named: _Named, place: int) -> bool:
+    """Whether other readings are whole turns from those at `place`, and the data, which tells the two apart,
+    is not certain enough to do so.
+    """
+    apart = (named.q - named.q[place]) / FULL_TURN
+    turns = np.rint(apart)
+    turned = (np.abs(apart - turns).max(axis=1) < SAME_RAD / FULL_TURN) & turns.any(axis=1)
+    return bool((turned & ~(named.exact & named.exact[place])).any())
 
 
 def is_nearest(found: Floats, candidates: Floats, before: Floats) -> bool:

@@ -26,6 +26,7 @@ from truearm.programs.urscript_syntax import (
     Statement,
     Token,
     expression,
+    opens_pose,
     statements,
 )
 
@@ -265,6 +266,7 @@ class Collected:
     def _used(self, tokens: Sequence[Token], at: int | None) -> list[str]:
         """Take note of calls among `tokens`, and of the variables if `at` says where; those variables."""
         used: list[str] = []
+        tokens = [token for place, token in enumerate(tokens) if not opens_pose(tokens, place)]
         texts = [token.text for token in tokens]
         skip_to = -1
         for place, token in enumerate(tokens):

@@ -152,6 +152,13 @@ def expression(tokens: Sequence[Token]) -> Node:
     return node
 
 
+def opens_pose(tokens: Sequence[Token], place: int) -> bool:
+    """Whether the token at `place` is the p of a pose written out, p[...], and no name."""
+    behind = tokens[place + 1 : place + 2]
+    adjacent = [token.start for token in behind if token.text == "["] == [tokens[place].end]
+    return tokens[place].text == "p" and adjacent
+
+
 class _Parser:
     """Precedence climbing over the tokens of one expression."""
 
@@ -200,7 +207,7 @@ class _Parser:
         raise NotReadable(token.start)
 
     def _behind_name(self, token: Token) -> Node:
-        if token.text == "p" and self._peek() == "[" and self._tokens[self._next].start == token.end:
+        if opens_pose(self._tokens, self._next - 1):
             self._take()
             parts, _, end = self._items("]")
             return Node("pose", token.start, end, "", parts)

@@ -1,12 +1,13 @@
 """What each target is used for: by which moves, with one tool, object and offset or with several."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.programs.environment import Transform
+from truearm.programs.environment import Environment, Transform
 from truearm.programs.layouts import of_joints
 from truearm.programs.program import Program, motion_is_straight
 from truearm.programs.tables import Motion, run_of
@@ -27,7 +28,7 @@ class Uses:
         moved: Targets that a motion goes to, (t,).
         mentioned: These, and those that a motion starts its search for joints from, (t,).
         environment: Number of the environment of each, (t,); -1 where there is none.
-        tool: Number of its tool among `tools`, (t,); -1 where there is none.
+        tool_of: Number of the tool of each environment among `tools`, (e,).
         tools: Number of an environment with each of the different tools.
         displaced: Number of what displaces its work object among `displacements`, (t,).
         displacements: What work objects are displaced by, (4, 4) each; the first is None, for nothing and for
@@ -41,7 +42,7 @@ class Uses:
     moved: Bools
     mentioned: Bools
     environment: Integers
-    tool: Integers
+    tool_of: Integers
     tools: tuple[int, ...]
     displaced: Integers
     displacements: tuple[Transform | None, ...]
@@ -51,8 +52,14 @@ class Uses:
     blended: Bools
 
     @classmethod
-    def of(cls, program: Program) -> "Uses":
-        """Those of `program`."""
+    def of(cls, program: Program, *, whole_poses: bool = True) -> "Uses":
+        """Those of `program`.
+
+        Args:
+            program: The program.
+            whole_poses: As in Models. Tools contradict each other for joint targets where a correction that
+                brings the flange to its place differs; without whole poses wherever they differ.
+        """
         targets, moves = program.targets, program.moves
         joints = np.array([of_joints(layout) for layout in program.layouts], dtype=bool)
         joint_targets = joints[targets.layout] if len(targets) else np.zeros(0, dtype=bool)
@@ -62,16 +69,18 @@ class Uses:
         moved[target] = True
         mentioned = np.array(moved)
         mentioned[run_of(moves.target)] = True
-        tool_of, tools = _tools(program)
+        tool_of, tools = _distinct([(*one.tool.key, one.problem) for one in program.environments])
+        flange_of, _ = _distinct([_of_flange(one) for one in program.environments])
         environment, several = _single(moves.environment[real], target, len(targets))
-        tool, several_tools = _single(tool_of[moves.environment[real]], target, len(targets))
+        needed = flange_of if whole_poses else tool_of
+        _, several_tools = _single(needed[moves.environment[real]], target, len(targets))
         displaced_by, displacements = _displacements(program)
         straight, blended = _along(program, real)
         return cls(
             moved,
             mentioned,
             environment,
-            tool,
+            tool_of,
             tools,
             np.where(joint_targets, 0, displaced_by[environment]),
             displacements,
@@ -94,18 +103,25 @@ def _all_or(chosen: Bools) -> slice | Bools:
     return slice(None) if chosen.all() else chosen
 
 
-def _tools(program: Program) -> tuple[Integers, tuple[int, ...]]:
-    """For each environment the number of its tool, and an environment of each tool."""
+def _distinct(keys: Sequence[object]) -> tuple[Integers, tuple[int, ...]]:
+    """For each environment the number of what `keys` tells of it, and an environment for each number."""
     known: dict[object, int] = {}
     examples: list[int] = []
     numbers = []
-    for place, environment in enumerate(program.environments):
-        key = (*environment.tool.key, environment.problem)
+    for place, key in enumerate(keys):
         if key not in known:
             known[key] = len(known)
             examples.append(place)
         numbers.append(known[key])
     return np.array(numbers, dtype=np.int64), tuple(examples)
+
+
+def _of_flange(environment: Environment) -> tuple[bytes, str]:
+    """What the correction of a joint target depends on where whole poses are met: not on the tool, only on
+    how far the controller's is from the true one.
+    """
+    moved = environment.tool.mistaken
+    return b"" if moved is None else moved.tobytes(), environment.problem
 
 
 def _displacements(program: Program) -> tuple[Integers, tuple[Transform | None, ...]]:
