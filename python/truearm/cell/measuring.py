@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.accepted import points_and_joints
+from truearm.cell.alone import alone
 from truearm.cell.at_rest import AtRest
 from truearm.cell.cell_file import Cell
 from truearm.cell.checks import last_check
@@ -101,14 +102,19 @@ class Process:
 
         Raises:
             StoppedError: If `halt` was called.
-            WorkError: If the frame is implausible, the cell drifts, the target is lost, or a device fails for
-                good.
+            WorkError: If the frame is implausible, the cell drifts, the target is lost, a device fails for
+                good, or another process drives the arm.
         """
         self._resume()
         end = self._end()
         if end is not None:
             self._check_drift()
             return end
+        with alone(self._cell):
+            return self._driven()
+
+    def _driven(self) -> str:
+        """Connect the devices and measure; they are stopped and let go of whatever happens."""
         self._go_on()
         skipped = self._stops.skipped()
         if skipped:
