@@ -31,16 +31,16 @@ def text(tmp_path, *, arm="arm", table="table"):
         ({"arm": "other"}, "drives this table"),
     ],
 )
-def test_a_second_process_does_not_drive_the_arm_of_another_session(other, message, tmp_path):
-    cell = Cell.from_toml(text(tmp_path))
-    cell.robot.connect = cell.robot.stop = Mock()
+def test_a_second_process_does_not_drive_the_arm_of_another_session(other, message, tmp_path, monkeypatch):
+    cell, connect = Cell.from_toml(text(tmp_path)), Mock()
+    monkeypatch.setattr(cell.robot, "connect", connect)
     with (
         alone(Cell.from_toml(text(tmp_path, **other))),
         open_session(tmp_path / "session.db", cell, POSES) as session,
         pytest.raises(WorkError, match=message),
     ):
         Process(cell, session, lambda _: None).run()
-    cell.robot.connect.assert_not_called()
+    connect.assert_not_called()
 
 
 def test_what_drives_an_arm_lets_go_of_it_and_leaves_others_alone(tmp_path, capsys):
