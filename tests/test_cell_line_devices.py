@@ -262,7 +262,7 @@ class Controller:
         share = np.clip((time.monotonic() - self.told_at - 0.25) / self._lasts_s, 0.0, 1.0)
         speed = np.full(6, 1.0 if 0.0 < share < 1.0 else 0.0)
         readings = share * self.target + self._noise * self._rng.normal(size=6)
-        return ur_packets.State(0.0, readings, speed, 30.0, ur_packets.NORMAL, self._mode)
+        return ur_packets.State(0.0, readings, speed, ur_packets.NORMAL, self._mode)
 
 
 def test_an_arm_whose_encoders_flicker_is_given_time_to_begin():
@@ -293,7 +293,7 @@ def test_what_the_script_port_says_is_read_so_that_it_goes_on_saying_it():
 
     class State(socketserver.BaseRequestHandler):
         def handle(self):
-            still = ur_packets.State(0.0, np.zeros(6), np.zeros(6), 30.0, ur_packets.NORMAL)
+            still = ur_packets.State(0.0, np.zeros(6), np.zeros(6), ur_packets.NORMAL)
             with contextlib.suppress(OSError):
                 while True:
                     self.request.sendall(ur_packets.build(still))

@@ -123,9 +123,7 @@ def test_virtual_answers_match_the_pattern_they_are_made_from(pattern):
 
 
 def test_packets_of_a_universal_robot_read_back_also_in_pieces():
-    states = [
-        ur_packets.State(k, np.full(6, 0.1 * k), np.zeros(6), 30.0, ur_packets.NORMAL) for k in range(3)
-    ]
+    states = [ur_packets.State(k, np.full(6, 0.1 * k), np.zeros(6), ur_packets.NORMAL) for k in range(3)]
     stream = b"".join(map(ur_packets.build, states))
     packet, rest = ur_packets.last_whole(stream[:-7])
     assert packet is not None

@@ -119,6 +119,23 @@ def test_registration_finds_the_frame_and_refuses_what_cannot_be():
         register_cell(cell, joints, points + 0.1)
 
 
+@pytest.mark.parametrize(
+    ("read", "told", "message"),
+    [
+        ("m", 1e3, r'times as far apart.*like mm, and are read as m\b.*State length_unit = "mm"'),
+        ("mm", 1e-3, 'like m, and are read as mm.*State length_unit = "m"'),
+        ("in", 25.4, 'like mm, and are read as in.*State length_unit = "mm"'),
+        ("mm", 1 / 304.8, "like ft, and are read as mm.*Have it say mm"),
+    ],
+)
+def test_an_instrument_in_another_unit_is_told_by_the_frame(read, told, message):
+    cell = Cell.from_toml(cell_text("tracker", sensor={"length_unit": read}))
+    joints = poses_of(cell, 8).readings
+    seen = cell.targets_in_base(joints) + 3e-3 * np.random.default_rng(0).normal(size=(8, 3))
+    with pytest.raises(WorkError, match=message):
+        register_cell(cell, joints, told * (seen + 3.0))
+
+
 def test_what_the_table_cannot_reach_is_skipped_with_the_reason(tmp_path):
     text = cell_text(process={"check_every": 0})
     poses = poses_of(Cell.from_toml(text), 8, seed=6)
@@ -275,3 +292,25 @@ def test_orientations_near_a_half_turn_are_averaged_in_files_of_any_name(tmp_pat
     wanted = Rotation.from_rotvec([np.pi, 0.0, 0.0])
     assert (found * wanted.inv()).magnitude() < 1e-9
     assert not (tmp_path / "a").exists()
+
+
+def test_turns_temperatures_and_features_are_means_of_the_readings_that_have_them(tmp_path):
+    told = [
+        (21.0, {"humidity": 40.0, "lost": np.nan}, np.eye(4)),
+        (None, {}, None),
+        (22.0, {"humidity": 42.0, "pressure": 990.0, "lost": np.inf}, np.eye(4)),
+        (np.nan, {"humidity": np.nan, "pressure": 992.0}, None),
+    ]
+    steps = [Step(0, "pose", 0, "", 0, np.zeros(5)), Step(1, "pose", 1, "", 0, np.zeros(5))]
+    with Session.create(tmp_path / "session.db", steps, {}) as known:
+        for attempt, (celsius, features, pose) in enumerate(told, start=1):
+            reading = Reading(np.ones(3), 1e-4, 0.0, True, "", "", pose, celsius, features)
+            known.add_reading(0, attempt, reading, np.zeros(5), np.zeros(3))
+        known.add_outcome(0, "measured", attempts=[1, 2, 3, 4])
+        known.add_reading(1, 1, Reading(np.ones(3), 1e-4, 0.0, True, ""), np.zeros(5), np.zeros(3))
+        known.add_outcome(1, "measured", attempts=[1])
+        table = accepted_table(known)
+    assert table[["temperature_c", "humidity", "pressure"]].to_numpy()[0].tolist() == [21.5, 41.0, 991.0]
+    assert np.isnan(table[["temperature_c", "humidity", "pressure"]].to_numpy()[1]).all()
+    assert "lost" not in table.columns
+    assert table[["qw", "qx", "qy", "qz"]].to_numpy()[0].tolist() == [1.0, 0.0, 0.0, 0.0]

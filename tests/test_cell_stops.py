@@ -158,12 +158,19 @@ class Instrument:
         return Reading(self._arm.position(self._readings), 1e-5, time.time(), True, "raw")
 
 
-def measured_with(folder, fails, count=12, *, tell=lambda _: None, recovery_s=2.0):
-    """A session of poses in which the first joint tells the number of the pose; how it ended."""
+def measured_with(folder, fails, count=12, *, tell=lambda _: None, recovery_s=2.0, repeats=()):
+    """A session of poses in which the first joint tells the number of the pose; how it ended.
+
+    The last poses are those of `repeats` again, from another side.
+    """
     cell = Cell.from_toml(f"{example('playback')}recovery_s = {recovery_s}\n")
     readings = np.random.default_rng(0).uniform(-1.0, 1.0, (count, 6))
     readings[:, 0] = 0.1 * np.arange(count)
-    poses = Poses(readings, np.zeros(count, dtype=np.int64), ("",) * count)
+    poses = Poses(
+        np.concatenate([readings, readings[list(repeats)]]),
+        np.repeat([0, 1], [count, len(repeats)]),
+        ("",) * (count + len(repeats)),
+    )
 
     def at(place):
         return fails(round(10.0 * place[0]))
@@ -267,6 +274,50 @@ def test_a_pose_at_which_the_arm_was_stopped_is_skipped_later(kind, stops, tmp_p
             measured_with(tmp_path, fails)
     assert measured_with(tmp_path, fails) == DONE
     assert list(skipped(tmp_path)) == [5]
+
+
+def test_no_step_leads_again_to_where_the_arm_stopped_itself(tmp_path):
+    told: list[str] = []
+
+    def fails(pose):
+        measuring = (tmp_path / "session.db").exists() and registered(tmp_path)
+        return ProtectiveStopError("the arm stopped", where="arm") if pose == 5 and measuring else None
+
+    with pytest.raises(ProtectiveStopError):
+        measured_with(tmp_path, fails, repeats=[4, 5])
+    ends = measured_with(tmp_path, fails, tell=lambda now: told.append(now.text), repeats=[4, 5])
+    assert ends == DONE
+    assert list(skipped(tmp_path)) == [5, 13]
+    assert told[0] == "2 steps to places that stops kept the arm from will be skipped"
+
+
+def test_a_contact_at_which_the_arm_stopped_itself_is_not_gone_to_again_nor_is_its_pose(tmp_path):
+    gone: list[int] = []
+
+    def fails(pose):
+        gone.append(pose)
+        return ProtectiveStopError("the arm stopped", where="arm") if pose == gone[0] else None
+
+    with pytest.raises(ProtectiveStopError):
+        measured_with(tmp_path, fails)
+    assert measured_with(tmp_path, fails) == DONE
+    assert gone.count(gone[0]) == 1
+    assert list(skipped(tmp_path)) == [gone[0]]
+
+
+def test_a_check_is_made_elsewhere_where_the_arm_stopped_itself_at_its_contact(tmp_path):
+    gone: list[int] = []
+
+    def fails(pose):
+        gone.append(pose)
+        measuring = (tmp_path / "session.db").exists() and registered(tmp_path)
+        return ProtectiveStopError("the arm stopped", where="arm") if pose == gone[0] and measuring else None
+
+    with pytest.raises(ProtectiveStopError):
+        measured_with(tmp_path, fails)
+    before = len(gone)
+    assert measured_with(tmp_path, fails) == DONE
+    assert gone[0] not in gone[before:]
 
 
 def registered(folder):

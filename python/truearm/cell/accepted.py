@@ -1,6 +1,7 @@
 """The accepted measurements of a session, as a table and as Measurements."""
 
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ def accepted_table(session: Session, kind: str = "pose", *, most: int | None = N
 
     Columns: pose (from 1, in the list of poses), q1 ... qN, x, y, z, sigma, qw ... qz where orientation was
     measured, approach, readings (how many were accepted), temperature_c where there is one, other features.
+    Orientation, temperature and features are means of those readings that have them.
     Where there are purposes, purpose too. sigma is that of the mean.
 
     Poses also have a group where the list of poses gave one, and where something moved: those between a check
@@ -93,18 +95,25 @@ def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
     merged |= {f"q{j + 1}": value for j, value in enumerate(joints.tolist())}
     merged |= {axis: float(np.mean([row[axis] for row in rows])) for axis in "xyz"}
     merged["sigma"] = float(np.mean([row["sigma"] for row in rows]) / np.sqrt(len(rows)))
-    if all(row["qw"] is not None for row in rows):
-        turns = np.array([[row[name] for name in TURN] for row in rows], dtype=np.float64)
+    turned = [[row[name] for name in TURN] for row in rows if row["qw"] is not None]
+    if turned:
+        turns = np.array(turned, dtype=np.float64)
         turns *= np.where(turns @ turns[0] < 0.0, -1.0, 1.0)[:, None]
         turn = turns.mean(axis=0)
         merged |= dict(zip(TURN, (turn / np.linalg.norm(turn)).tolist(), strict=True))
     merged |= {"approach": first["approach"], "readings": len(rows)}
-    if all(row["temperature_c"] is not None for row in rows):
-        merged["temperature_c"] = float(np.mean([row["temperature_c"] for row in rows]))
-    features = [json.loads(row["features"]) for row in rows]
-    common = [name for name in features[0] if all(name in each for each in features)]
-    merged |= {name: float(np.mean([each[name] for each in features])) for name in common}
-    return merged
+    further = [{"temperature_c": row["temperature_c"]} | json.loads(row["features"]) for row in rows]
+    return merged | _means(further)
+
+
+def _means(told: list[dict[str, float | None]]) -> dict[str, float]:
+    """Mean of each of several values by name, over those that are told and finite; without one, no mean."""
+    means = {}
+    for name in dict.fromkeys(name for each in told for name in each):
+        values = [value for each in told if (value := each.get(name)) is not None and math.isfinite(value)]
+        if values:
+            means[name] = math.fsum(values) / len(values)
+    return means
 
 
 def _with_group(table: pd.DataFrame, session: Session) -> pd.DataFrame:

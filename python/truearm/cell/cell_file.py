@@ -111,6 +111,7 @@ class SimulateSection(Section):
     table_mm: Annotated[float, Field(ge=0.0)] = 0.02
     panel_mm: Annotated[float, Field(ge=0.0)] = 0.05
     tracker_mm: Annotated[float, Field(ge=0.0)] = 0.02
+    servo_lag_s: Annotated[float, Field(ge=0.0)] = 0.05
     answer: str | None = None
     repeatable: bool = False
     faults: FaultsSection = FaultsSection()

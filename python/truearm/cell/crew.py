@@ -54,7 +54,7 @@ class Crew:
             self.raise_if_halted()
             with Calls(device):
                 action()
-        self._refuge = self._where()
+        self._refuge = self.where()
 
     def go(self, way: list[Floats], expected: Expected, world_from_base: Floats | None) -> Floats:
         """Bring the arm along readings to the last of them, and the sensor before its target.
@@ -78,7 +78,7 @@ class Crew:
                 self._cell.sensor.prepare(expected)
         else:
             self._with_table(self._table, way, expected, world_from_base)
-        return self._where()
+        return self.where()
 
     def _with_table(
         self, table: TablePanel, way: list[Floats], expected: Expected, world_from_base: Floats | None
@@ -129,7 +129,12 @@ class Crew:
                 self._cell.robot.move_joints(place)
             self._here = place
 
-    def _where(self) -> Floats:
+    def where(self) -> Floats:
+        """Where the arm is (N,), as its robot says.
+
+        Raises:
+            DeviceError: If it does not say it, or what it says is none.
+        """
         robot = self._cell.robot
         with Calls(robot):
             told = robot.read_joints()

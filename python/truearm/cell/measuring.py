@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.accepted import points_and_joints
+from truearm.cell.alone import alone
+from truearm.cell.at_rest import AtRest
 from truearm.cell.cell_file import Cell
 from truearm.cell.checks import last_check
 from truearm.cell.crew import Crew, places_on_the_way
@@ -18,9 +20,7 @@ from truearm.cell.device_errors import (
     Calls,
     DeviceError,
     DeviceSilentError,
-    EmergencyStopError,
     PortUnavailableError,
-    ProtectiveStopError,
     RefusedError,
     StoppedError,
 )
@@ -30,6 +30,7 @@ from truearm.cell.prediction import Prediction
 from truearm.cell.reading import Expected, Reading, checked_reading
 from truearm.cell.registering import register_cell
 from truearm.cell.session import Session, Step, Stored
+from truearm.cell.stops import Stops, kind_of
 from truearm.cell.stretches import boundaries, calibrate_so_far, good_enough
 from truearm.errors import WorkError, count_of
 from truearm.units import MM_PER_METRE, to_si
@@ -41,9 +42,6 @@ BEGINS_WITHIN_S: Final = 0.05
 LONGEST_RECOVERY_S: Final = 60.0
 # Steps in a row that are given up because devices fail there each time; then it is not the steps.
 GIVEN_UP_IN_A_ROW: Final = 3
-EMERGENCY, PROTECTIVE = "emergency stop", "protective stop"
-# Stops at a step after which it is not tried again.
-MOST_STOPS: Final = {PROTECTIVE: 1, EMERGENCY: 2}
 DONE: Final = "all poses are done"
 ACCURATE: Final = "the target accuracy is met"
 DONE_STEPS: Final = "SELECT coalesce(max(step), -1) + 1 FROM outcomes"
@@ -88,6 +86,7 @@ class Process:
         self._halted, self._ended = threading.Event(), threading.Event()
         self._crew = Crew(cell, session.add_event, self._halted)
         self._unseen, self._far, self._frozen = Unseen(session), Far(), Frozen()
+        self._stops = Stops(session)
         self._recoveries = self._given_up = 0
         self._total = session.rows("SELECT count(*) FROM steps")[0][0]
         self._poses = session.rows("SELECT count(*) FROM steps WHERE kind = 'pose'")[0][0]
@@ -103,15 +102,23 @@ class Process:
 
         Raises:
             StoppedError: If `halt` was called.
-            WorkError: If the frame is implausible, the cell drifts, the target is lost, or a device fails for
-                good.
+            WorkError: If the frame is implausible, the cell drifts, the target is lost, a device fails for
+                good, or another process drives the arm.
         """
         self._resume()
         end = self._end()
         if end is not None:
             self._check_drift()
             return end
+        with alone(self._cell):
+            return self._driven()
+
+    def _driven(self) -> str:
+        """Connect the devices and measure; they are stopped and let go of whatever happens."""
         self._go_on()
+        skipped = self._stops.skipped()
+        if skipped:
+            self._say(f"{count_of(skipped, 'step')} to places that stops kept the arm from will be skipped")
         try:
             self._connect()
             return self._steps()
@@ -162,24 +169,22 @@ class Process:
 
     def _do(self, step: Step) -> bool:
         """Measure a step until its readings can be believed, or it is given up; whether it is measured."""
-        stops = self._stops_at(step)
+        stops = self._stops.at(step)
         if stops:
             self._skip(step, stops)
             return False
         expected = self._prediction.expected(step)
         point, likely_m = self._prediction.point(expected), self._prediction.likely_m
         rules = Rules(self._process.contacts, self._process.attempts, self._agree_m, likely_m)
-        readings, placed, joints = self._known_of(step), False, step.readings
+        readings, placed = self._known_of(step), False
+        rest = AtRest(self._cell, self._agree_m, step.readings)
         verdict = judge(readings, point, rules)
         self._decide(step, verdict)
         while verdict.decision == "again":
             try:
                 if not placed:
-                    joints, placed = self._placed(step, expected, anew=verdict.suspicious), True
-                self._crew.raise_if_halted()
-                with Calls(self._cell.sensor):
-                    reading = checked_reading(self._cell.sensor.measure())
-                reading = self._frozen.judged(step, reading, point, likely_m)
+                    rest.arrived(self._placed(step, expected, anew=verdict.suspicious))
+                told, joints = self._told(), self._crew.where()
             except RefusedError as error:
                 return self._refused(step, error)
             except DeviceError as error:
@@ -187,13 +192,21 @@ class Process:
                     return False
                 placed = False
                 continue
+            reading = rest.judged(self._frozen.judged(step, told, point, likely_m), joints)
             self._works(reading)
             readings.append(_stored(len(readings) + 1, reading))
             verdict = judge(readings, point, rules)
-            self._keep(step, reading, joints, point, verdict, len(readings))
-            placed = reading.valid and not verdict.suspicious
+            self._keep(step, reading, rest.joints, point, verdict, len(readings))
+            # An arm that comes to rest is given time: sent there anew it would lag as much again.
+            placed = (reading.valid or rest.settles) and not verdict.suspicious
         self._tell(step, verdict)
         return self._counted(step, verdict, readings)
+
+    def _told(self) -> Reading:
+        """What the sensor says of the target now."""
+        self._crew.raise_if_halted()
+        with Calls(self._cell.sensor):
+            return checked_reading(self._cell.sensor.measure())
 
     def _works(self, reading: Reading) -> None:
         """Devices work where there is a reading, and the target is seen where it is valid."""
@@ -250,18 +263,6 @@ class Process:
         self._crew.raise_if_halted()
         self._skip(step, str(error))
         return False
-
-    def _stops_at(self, step: Step) -> str:
-        """Why a step is not tried again, where stops of the arm ended former processes; else empty.
-
-        A check is always tried again: nothing else says whether arm and instrument stand still.
-        """
-        if step.kind == "check" or not self._was_begun(step):
-            return ""
-        kinds = [row[0] for row in self._session.rows("SELECT kind FROM events WHERE step = ?", (step.step,))]
-        stops = {kind: kinds.count(kind) for kind in MOST_STOPS}
-        told = [kind for kind, most in MOST_STOPS.items() if stops[kind] >= most]
-        return f"{told[0]} on the way here before" if told else ""
 
     def _try_again(self, error: DeviceError, step: Step) -> bool:
         """Connect anew after a failure at a step; whether to try it again, as otherwise it is skipped.
@@ -321,7 +322,7 @@ class Process:
         while True:
             self._crew.raise_if_halted()
             self._recoveries += 1
-            self._session.add_event(_kind(error), str(error), None if step is None else step.step)
+            self._session.add_event(kind_of(error), str(error), None if step is None else step.step)
             if not error.recoverable or self._recoveries > self._process.recoveries:
                 raise error
             if wait_s and not isinstance(error, DeviceSilentError):
@@ -455,13 +456,6 @@ class Process:
         new = self._done - self._done_before
         left_s = (self._total - self._done) * (time.monotonic() - self._began) / new if new else None
         self._report(Progress(self._done, self._total, text, left_s))
-
-
-def _kind(error: DeviceError) -> str:
-    """The kind of event that an error of a device is."""
-    if isinstance(error, ProtectiveStopError):
-        return PROTECTIVE
-    return EMERGENCY if isinstance(error, EmergencyStopError) else "device"
 
 
 def _stored(attempt: int, reading: Reading) -> Stored:

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
+from truearm.cell.line_sensor import LineSensor
 from truearm.errors import WorkError
 from truearm.registration import register
 from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
-from truearm.units import MM_PER_METRE
+from truearm.units import MM_PER_INCH, MM_PER_METRE, STATED_LENGTH_UNITS
 
 Floats = NDArray[np.float64]
 
@@ -18,9 +19,12 @@ LEAST_POSES: Final = 4
 LEAST_SPREAD_M: Final = 0.03
 # The guess of the cell file is a standard deviation, so to speak.
 UNLIKELY: Final = 4.0
+UNITS_MM: Final = {"mm": 1.0, "cm": 10.0, "in": MM_PER_INCH, "ft": 12.0 * MM_PER_INCH, "m": MM_PER_METRE}
+ALIKE: Final = 1.2
+"""Within this factor an uncalibrated arm knows how far apart contacts are."""
+NEW_SESSION: Final = "then delete the session file and start again"
 WAY_OUT: Final = (
-    "Check the robot, the tool and [target], [world] and the panel's axes in the cell file; then delete the "
-    "session file and start again"
+    f"Check the robot, the tool and [target], [world] and the panel's axes in the cell file; {NEW_SESSION}"
 )
 
 
@@ -43,11 +47,14 @@ def register_cell(cell: Cell, joints: Floats, points: Floats) -> Registration:
     """Register from joints (n, N) and the points (n, 3) that were measured there.
 
     Raises:
-        WorkError: If there are too few or they are too much alike, if the residual is larger than an
-            uncalibrated arm explains, or if the frame is far from the guess of the cell file.
+        WorkError: If there are too few or they are too much alike, if they are in another unit, if the
+            residual is larger than an uncalibrated arm explains, or if the frame is far from the guess of the
+            cell file.
     """
-    _check_spread(points)
+    _check_number(points)
     in_base = cell.targets_in_base(joints)
+    _check_unit(cell, points, in_base)
+    _check_spread(points)
     nothing = np.empty((0, 3, 3))
     frame = register(in_base, points, nothing, nothing, 0.0)
     apart = in_base @ frame[:3, :3].T + frame[:3, 3] - points
@@ -58,7 +65,7 @@ def register_cell(cell: Cell, joints: Floats, points: Floats) -> Registration:
     return found
 
 
-def _check_spread(points: Floats) -> None:
+def _check_number(points: Floats) -> None:
     if len(points) < LEAST_POSES:
         raise WorkError(
             f"{len(points)} contacts for the frame succeeded",
@@ -66,6 +73,41 @@ def _check_spread(points: Floats) -> None:
             rule=f"{LEAST_POSES} are needed at least",
             way_out="truearm session show tells why the others failed",
         )
+
+
+def _check_unit(cell: Cell, points: Floats, in_base: Floats) -> None:
+    """Raise if points are as much farther apart than the nominal arm has them as two units differ."""
+    settings = cell.sensor_settings
+    stated = settings.length_unit if isinstance(settings, LineSensor.Settings) else "m"
+    apart, nominal = _apart(points), _apart(in_base)
+    if min(apart, nominal) <= 0.0:
+        return
+    off = {unit: abs(np.log(apart / nominal * size / UNITS_MM[stated])) for unit, size in UNITS_MM.items()}
+    told = min(off, key=off.__getitem__)
+    if told == stated or off[told] > np.log(ALIKE):
+        return
+    rule, way_out = "Points of a sensor are in m", "Mend its driver, or its file"
+    if isinstance(settings, LineSensor.Settings):
+        mend = (
+            f'State length_unit = "{told}" in [sensor]' if told in STATED_LENGTH_UNITS else "Have it say mm"
+        )
+        rule = "length_unit of [sensor] is the unit in which the instrument tells its points"
+        way_out = f"{mend}; {NEW_SESSION}"
+    raise WorkError(
+        f"the contacts lie {apart / nominal:.3g} times as far apart as the nominal arm has them: they look "
+        f"like {told}, and are read as {stated}",
+        where="registration",
+        rule=rule,
+        way_out=way_out,
+    )
+
+
+def _apart(points: Floats) -> float:
+    """How far points (n, 3) typically are from their middle, m; one that is far off does not count."""
+    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
+
+
+def _check_spread(points: Floats) -> None:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) / np.sqrt(len(points))
     if spread[1] < LEAST_SPREAD_M:
         raise WorkError(

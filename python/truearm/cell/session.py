@@ -191,6 +191,10 @@ class Session:
         while rows := self.rows(STEPS_LEFT, (STEPS_AT_ONCE,)):
             yield from _steps(rows)
 
+    def all_left(self) -> list[Step]:
+        """All steps that have no outcome."""
+        return _steps(self.rows(STEPS_LEFT, (-1,)))
+
     def steps(self, kind: str) -> list[Step]:
         """All steps of a kind."""
         return _steps(self.rows("SELECT * FROM steps WHERE kind = ? ORDER BY step", (kind,)))

@@ -113,7 +113,8 @@ class UniversalRobots(Managed):
         self._move(f"p[{','.join(f'{value:.6f}' for value in numbers)}]", None)
 
     def read_joints(self) -> Floats:
-        """See Robot."""
+        """See Robot. Of a state that came since: what came before may be as old as `timeout_s`."""
+        self._wait_for_next(self._state())
         return self._state().readings.copy()
 
     def stop(self) -> None:
@@ -168,10 +169,12 @@ class UniversalRobots(Managed):
         """Wait for the end of a motion; False if it never began, or ended elsewhere.
 
         An arm may be slower than it was told to be, as by its speed slider: it has time while it gets nearer.
+        It is there once it has been within THERE_RAD, and still, for `settle_s`: a servo creeps to its place.
         """
         begin = self._state()
         limit, left = self._limit(begin.readings, target), np.inf
-        until, last_moved, moved = time.monotonic() + limit, time.monotonic(), False
+        until, moved = time.monotonic() + limit, False
+        last_moved = came = time.monotonic()
         while time.monotonic() < until:
             state = self._state()
             # Encoders and speeds flicker; what has moved is farther off than they do.
@@ -181,11 +184,14 @@ class UniversalRobots(Managed):
                 last_moved = time.monotonic()
             still_s = time.monotonic() - last_moved
             away = 0.0 if target is None else float(np.abs(state.readings - target).max())
-            if target is not None and not moves and away < THERE_RAD:
+            if moves or away >= THERE_RAD:
+                came = time.monotonic()
+            if target is not None and time.monotonic() - came >= self._settings.settle_s:
                 return True
             if moves and (target is None or away < left - THERE_RAD):
                 left, until = away, time.monotonic() + limit
-            if still_s > self._settings.settle_s + (0.0 if moved else STARTS_WITHIN_S):
+            elsewhere = target is None or away >= THERE_RAD
+            if elsewhere and still_s > self._settings.settle_s + (0.0 if moved else STARTS_WITHIN_S):
                 return moved and target is None
             self._wait_for_next(state)
         raise DeviceSilentError(
@@ -197,7 +203,8 @@ class UniversalRobots(Managed):
     def _limit(self, here: Floats, target: Floats | None) -> float:
         way = np.pi if target is None else float(np.abs(target - here).max())
         ramp = self._settings.speed_rad_s / self._settings.acceleration_rad_s2
-        return self._settings.timeout_s + MOTION_MARGIN * (way / self._settings.speed_rad_s + ramp)
+        seconds = MOTION_MARGIN * (way / self._settings.speed_rad_s + ramp)
+        return self._settings.timeout_s + self._settings.settle_s + seconds
 
     def _wait_for_next(self, state: ur_packets.State) -> None:
         stream = self._connected()

@@ -17,7 +17,6 @@ LENGTH: Final = struct.Struct(">i")
 TIME_AT: Final = 4
 Q_ACTUAL_AT: Final = 252
 QD_ACTUAL_AT: Final = 300
-MOTOR_TEMPERATURE_AT: Final = 692
 ROBOT_MODE_AT: Final = 756
 SAFETY_MODE_AT: Final = 812
 SHORTEST: Final = 1044
@@ -59,7 +58,6 @@ class State:
         time_s: Since the controller was started.
         readings: Joint angles (6,), rad.
         speeds: Joint speeds (6,), rad/s.
-        temperature_c: Mean temperature of the motors.
         safety_mode: 1 normal, 2 reduced; above that the arm does not move.
         robot_mode: 7 where it runs; in any other mode the arm does not move.
     """
@@ -67,7 +65,6 @@ class State:
     time_s: float
     readings: Floats
     speeds: Floats
-    temperature_c: float
     safety_mode: float
     robot_mode: float = RUNNING
 
@@ -78,7 +75,6 @@ def parse(packet: bytes) -> State:
         time_s=ONE.unpack_from(packet, TIME_AT)[0],
         readings=np.array(SIX.unpack_from(packet, Q_ACTUAL_AT)),
         speeds=np.array(SIX.unpack_from(packet, QD_ACTUAL_AT)),
-        temperature_c=sum(SIX.unpack_from(packet, MOTOR_TEMPERATURE_AT)) / 6.0,
         safety_mode=ONE.unpack_from(packet, SAFETY_MODE_AT)[0],
         robot_mode=ONE.unpack_from(packet, ROBOT_MODE_AT)[0],
     )
@@ -91,7 +87,6 @@ def build(state: State) -> bytes:
     ONE.pack_into(packet, TIME_AT, state.time_s)
     SIX.pack_into(packet, Q_ACTUAL_AT, *state.readings)
     SIX.pack_into(packet, QD_ACTUAL_AT, *state.speeds)
-    SIX.pack_into(packet, MOTOR_TEMPERATURE_AT, *[state.temperature_c] * 6)
     ONE.pack_into(packet, ROBOT_MODE_AT, state.robot_mode)
     ONE.pack_into(packet, SAFETY_MODE_AT, state.safety_mode)
     return bytes(packet)

@@ -14,11 +14,12 @@ def command(
     Examples:
       truearm cell check cell.toml
     """
+    from truearm.cell.alone import alone
     from truearm.cell.cell_file import Cell
     from truearm.cell.protocols import Connected
 
     known = Cell.load(cell)
-    with Connected(known.sensor, known.robot):
+    with alone(known), Connected(known.sensor, known.robot):
         readings = known.robot.read_joints().tolist()
     if as_json:
         print_json({"robot": known.robot.address, "sensor": known.sensor.address, "readings": readings})

@@ -65,7 +65,7 @@ class VirtualLineRobot:
         if (target < low).any() or (target > high).any():
             return
         way = float(np.abs(target - self._world.arm.at(now)).max())
-        self._world.arm.go(target, way / SPEED_RAD_S, now)
+        self._world.arm.go(target, way / SPEED_RAD_S, now, self._world.settings.servo_lag_s)
         self._world.watch(now)
 
     def _answer(self, now: float) -> str:

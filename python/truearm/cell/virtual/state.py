@@ -1,5 +1,6 @@
 """What the processes of a virtual cell share: the clock, and where arm and table are and go to."""
 
+import math
 import mmap
 import time
 from collections.abc import Iterator
@@ -14,12 +15,15 @@ from truearm.cell.virtual.exclusive import exclusive
 
 Floats = NDArray[np.float64]
 
-SIZE: Final = 64
+SIZE: Final = 72
 MOST_JOINTS: Final = 8
 # Places in the shared array.
 BEGAN, SPEED, STOPPED, COLLISIONS, CONTACTS, MOTIONS = range(6)
 ARM, TABLE = 8, 40
 FROM, TO, BEGIN, END, CAME = 0, MOST_JOINTS, 2 * MOST_JOINTS, 2 * MOST_JOINTS + 1, 2 * MOST_JOINTS + 2
+LAG: Final = CAME + MOST_JOINTS
+# Behind so many lags less than a millionth of what a motion lagged is left.
+SETTLES_IN_LAGS: Final = 14.0
 
 
 class Shared:
@@ -80,7 +84,11 @@ class Shared:
 
 
 class Mover:
-    """Something that moves evenly from place to place: the arm's joints, or the carriage of the table."""
+    """Something that moves evenly from place to place: the arm's joints, or the carriage of the table.
+
+    Where a motion has a lag, it follows the even motion like a servo of the first order, and creeps to its
+    place when that has ended.
+    """
 
     def __init__(self, shared: Shared, offset: int, size: int) -> None:
         self._shared, self._offset, self._size = shared, offset, size
@@ -93,23 +101,21 @@ class Mover:
     def speed(self, now: float) -> Floats:
         """How fast it moves (size,), per second."""
         with self._shared.locked() as values:
-            begin, end = values[self._offset + BEGIN], values[self._offset + END]
-            if not begin <= now < end:
-                return np.zeros(self._size)
-            return np.asarray((self._slice(values, TO) - self._slice(values, FROM)) / (end - begin))
+            share_per_s = self._progress(values, now)[1]
+            return np.asarray(share_per_s * (self._slice(values, TO) - self._slice(values, FROM)))
 
     def ends(self) -> float:
-        """When the motion under way ends, or the last one ended."""
+        """When the motion under way ends, or the last one ended; with what it lags, but for a millionth."""
         with self._shared.locked() as values:
-            return float(values[self._offset + END])
+            return float(values[self._offset + END] + SETTLES_IN_LAGS * values[self._offset + LAG])
 
     def last_direction(self) -> Floats:
         """Signs (size,) of the last motion of each."""
         with self._shared.locked() as values:
             return self._slice(values, CAME).copy()
 
-    def go(self, place: Floats, seconds: float, now: float) -> float:
-        """Start a motion; when it will end."""
+    def go(self, place: Floats, seconds: float, now: float, lag_s: float = 0.0) -> float:
+        """Start a motion; when it is commanded to end, which it follows with a lag."""
         with self._shared.locked() as values:
             if values[STOPPED]:
                 return now
@@ -120,6 +126,7 @@ class Mover:
             moved = came != 0.0
             self._slice(values, CAME)[moved] = came[moved]
             values[self._offset + BEGIN], values[self._offset + END] = now, now + seconds
+            values[self._offset + LAG] = lag_s
             values[MOTIONS] += 1.0
             return now + seconds
 
@@ -130,14 +137,24 @@ class Mover:
             self._slice(values, FROM)[:] = here
             self._slice(values, TO)[:] = here
             values[self._offset + END] = min(float(values[self._offset + END]), now)
+            values[self._offset + LAG] = 0.0
 
     def _place(self, values: Floats, now: float) -> Floats:
-        begin, end = float(values[self._offset + BEGIN]), float(values[self._offset + END])
-        if now >= end:
-            return self._slice(values, TO).copy()
-        share = max(0.0, (now - begin) / (end - begin))
-        start = self._slice(values, FROM)
-        return np.asarray(start + share * (self._slice(values, TO) - start))
+        left = 1.0 - self._progress(values, now)[0]
+        place = self._slice(values, TO)
+        return np.asarray(place - left * (place - self._slice(values, FROM)))
+
+    def _progress(self, values: Floats, now: float) -> tuple[float, float]:
+        """Which share of the way is done, and how fast it grows, per second."""
+        begin, end, lag_s = (float(values[self._offset + part]) for part in (BEGIN, END, LAG))
+        seconds, since, behind = end - begin, max(0.0, now - begin), max(0.0, now - end)
+        if seconds <= 0.0:
+            return 1.0, 0.0
+        if lag_s <= 0.0:
+            return min(1.0, since / seconds), 1.0 / seconds if begin <= now < end else 0.0
+        faded = math.exp(-behind / lag_s)
+        caught_up = -math.expm1(-min(since, seconds) / lag_s) * faded
+        return min(since, seconds) / seconds - caught_up * lag_s / seconds, caught_up / seconds
 
     def _slice(self, values: Floats, part: int) -> Floats:
         first = self._offset + part

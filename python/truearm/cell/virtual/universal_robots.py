@@ -10,7 +10,7 @@ from truearm.cell import ur_packets
 from truearm.cell.virtual.faults import Faults
 from truearm.cell.virtual.state import STOPPED
 from truearm.cell.virtual.wires import Wire
-from truearm.cell.virtual.world import ROOM_C, World
+from truearm.cell.virtual.world import World
 from truearm.inverse import Inverse
 from truearm.rotations import quaternion_from_rotation_vector, rigid_inverse, transform_from_parts
 
@@ -64,7 +64,8 @@ class VirtualUr:
             return
         way = float(np.abs(target - here).max())
         if way > 0.0:
-            self._world.arm.go(target, way / speed + speed / acceleration, now)
+            lag_s = self._world.settings.servo_lag_s
+            self._world.arm.go(target, way / speed + speed / acceleration, now, lag_s)
             self._world.watch(now)
 
     def _readings(self, numbers: Floats, here: Floats) -> Floats | None:
@@ -86,6 +87,6 @@ class VirtualUrStream:
         """See Stream. A packet that is lost or late is not sent at all: the next one is as good."""
         mode = EMERGENCY if self._world.shared.flag(STOPPED) else ur_packets.NORMAL
         arm = self._world.arm
-        packet = ur_packets.build(ur_packets.State(now, arm.at(now), arm.speed(now), ROOM_C, mode))
+        packet = ur_packets.build(ur_packets.State(now, arm.at(now), arm.speed(now), mode))
         copies = [copy for late_s, copy in self._faults.carried(packet) if late_s == 0.0]
         return b"".join(copy if copy == packet else b"" for copy in copies[:1])
