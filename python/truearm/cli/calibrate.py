@@ -221,7 +221,7 @@ def print_places(output: Path) -> None:
 def print_results(calibration: "Calibration") -> None:
     """Print what was determined, the errors, and what stands out."""
     from truearm.cli.error_tables import print_errors
-    from truearm.summary import taken_out
+    from truearm.outlier_fate import taken_out
 
     validation, summary = calibration.validation, calibration.summary
     others = count_of(validation.n_holdout, "other")
@@ -325,17 +325,15 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
     from truearm.doubts import Outliers
+    from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT, fate_of_outliers
 
     if not outliers or calibration.rows is None:
         return
-    robust = calibration.options.robust != ROBUST
-    fate = "given less weight in the fit" if robust else "not taken out of the fit"
-    hint = "" if robust else " --robust huber gives them less weight."
-    if calibration.variable is not None:
-        fate, hint = (
-            "taken out of the fits",
-            " Constants, frame and tool are without them where they bend these.",
-        )
+    fate = fate_of_outliers(calibration)
+    hint = {
+        TAKEN_OUT: " Constants, frame and tool are without them where they bend these.",
+        FULL_WEIGHT: " --robust huber gives them less weight.",
+    }.get(fate, "")
     say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, calibration.rows.data.files)}.{hint}")
     without = Outliers.of(calibration)
     units = {"mm": without.means_mm, "mrad": without.means_mrad}

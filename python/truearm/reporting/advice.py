@@ -8,6 +8,7 @@ import numpy as np
 
 from truearm.doubts import (
     CONSTANT_BETTER,
+    EXCHANGED,
     FEW_VALUES,
     HELD_TOOL,
     HIDING,
@@ -72,7 +73,14 @@ def _would_fit(facts: Facts) -> Iterator[Advice]:
         yield Advice("would_fit", "Correct what does not fit.", words, np.inf)
 
 
+def _exchanged(facts: Facts) -> Iterator[Advice]:
+    if words := " ".join(filter(None, map(facts.noticed, EXCHANGED))):
+        yield Advice("exchanged", "Put right what is exchanged.", words, np.inf)
+
+
 def _checks(facts: Facts) -> Iterator[Advice]:
+    if any(_exchanged(facts)):
+        return
     words = to_check(None if any(_would_fit(facts)) else facts.outliers)
     yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())
 
@@ -328,6 +336,7 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
 
 RULES: Final = (
     _would_fit,
+    _exchanged,
     _outliers,
     _stood_still,
     _warm_up,
@@ -344,7 +353,7 @@ RULES: Final = (
     _what_varies,
 )
 RULES_OF_UPDATES: Final = (_no_longer_fits, _left_out, _unseen, _few_held)
-RULES_WITHOUT_HELP: Final = (_would_fit, _checks, _stood_still)
+RULES_WITHOUT_HELP: Final = (_would_fit, _exchanged, _checks, _stood_still)
 
 
 def _rules(facts: Facts) -> tuple[Callable[[Facts], Iterator[Advice]], ...]:
