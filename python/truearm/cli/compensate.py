@@ -59,9 +59,9 @@ def command(
     is left as it is and listed.
 
     Examples:
-      truearm compensate arm.calib weld.script --dry-run
+      truearm compensate arm.calib weld.script --dry-run --controller calibration.conf
       truearm compensate arm.calib weld.src -o out/ --controller nominal
-      truearm compensate arm.calib pick.mod -o out/ --frames frames.toml
+      truearm compensate arm.calib pick.mod -o out/ --controller nominal --frames frames.toml
     """
     from truearm.cli.rewritten import print_rewritten
     from truearm.limits import Task
