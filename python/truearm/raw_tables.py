@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, UsageError, count_of, did_you_mean
-from truearm.files import decode_text, read_bytes
+from truearm.files import decode_text, read_bytes, utf_16_of
 from truearm.missing_cells import without_missing
 from truearm.reading import (
     DELIMITERS,
@@ -327,6 +327,8 @@ def _decoded(content: bytes, marks: Marks, where: str) -> str:
         f"State what it is: {marks.options}encoding cp1252 for most files of Windows in western Europe, "
         f'{marks.options}encoding utf-16 for "Unicode text" of a spreadsheet'
     )
+    if utf_16 := utf_16_of(content):
+        state = f"State that: {marks.options}encoding {utf_16}"
     if encoding.casefold() in UTF_8:
         return decode_text(content, where=where, way_out=state)
     if content.startswith(codecs.BOM_UTF8):
