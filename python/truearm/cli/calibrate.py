@@ -140,17 +140,25 @@ def _calibrated(arm: "Robot", data: "Measurements", options: "Options", threads:
 
 
 def suggest_next(calibration: "Calibration", file: Path) -> None:
-    """Name the commands that come next: none that uses a calibration that does not help."""
+    """Name the commands that come next: none that uses a calibration that does not help.
+
+    Where compensation would refuse most measured rows, it is said why, and which option allows them.
+    """
     from truearm.doubts import OF_NO_USE, ORIENTATION_MISFIT
+    from truearm.reporting.facts import Facts
 
     if any(notice.kind in (*OF_NO_USE, ORIENTATION_MISFIT) for notice in calibration.notices):
         suggest(f"truearm report {typed(file)}")
-    elif calibration.selection.distances:
-        suggest(
-            *compensate_commands(calibration, file), f"truearm export {typed(file)} --to dh-toml -o arm.toml"
-        )
+        return
+    facts = Facts(calibration)
+    if facts.mostly_refused:
+        say_wrapped(facts.mostly_refused)
+    more = "" if facts.waypoints is None else facts.waypoints.allowing
+    compensate = compensate_commands(calibration, file, more)
+    if calibration.selection.distances:
+        suggest(*compensate, f"truearm export {typed(file)} --to dh-toml -o arm.toml")
     else:
-        suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate_commands(calibration, file))
+        suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate)
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:

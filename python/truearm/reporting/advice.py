@@ -78,6 +78,11 @@ def _exchanged(facts: Facts) -> Iterator[Advice]:
         yield Advice("exchanged", "Put right what is exchanged.", words, np.inf)
 
 
+def _refused(facts: Facts) -> Iterator[Advice]:
+    if words := facts.mostly_refused:
+        yield Advice("mostly_refused", "Compensation refuses most poses.", words, np.inf)
+
+
 def _checks(facts: Facts) -> Iterator[Advice]:
     if any(_exchanged(facts)):
         return
@@ -337,6 +342,7 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
 RULES: Final = (
     _would_fit,
     _exchanged,
+    _refused,
     _outliers,
     _stood_still,
     _warm_up,
@@ -352,7 +358,7 @@ RULES: Final = (
     _intervals,
     _what_varies,
 )
-RULES_OF_UPDATES: Final = (_no_longer_fits, _left_out, _unseen, _few_held)
+RULES_OF_UPDATES: Final = (_no_longer_fits, _refused, _left_out, _unseen, _few_held)
 RULES_WITHOUT_HELP: Final = (_would_fit, _exchanged, _checks, _stood_still)
 
 

@@ -105,7 +105,7 @@ def tone(facts: Facts) -> Tone:
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
         return "bad"
-    return "good" if after < GOOD * before else "fair"
+    return "good" if after < GOOD * before and not facts.mostly_refused else "fair"
 
 
 def cards(facts: Facts) -> list[Card]:
