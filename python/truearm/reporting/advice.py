@@ -21,6 +21,7 @@ from truearm.doubts import (
 from truearm.errors import count_of, short_names
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE, leaves_noise
+from truearm.outlier_fate import FULL_WEIGHT
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
@@ -80,7 +81,10 @@ def _exchanged(facts: Facts) -> Iterator[Advice]:
 
 def _refused(facts: Facts) -> Iterator[Advice]:
     if words := facts.mostly_refused:
-        yield Advice("mostly_refused", "Compensation refuses most poses.", words, np.inf)
+        # Outliers that stay in a fit may bend it so far.
+        bent = bool(facts.summary["outliers"]) and facts.outliers.fate == FULL_WEIGHT
+        weight = facts.mean_mm() if bent else np.inf
+        yield Advice("mostly_refused", "Compensation refuses most poses.", words, weight)
 
 
 def _checks(facts: Facts) -> Iterator[Advice]:
