@@ -63,9 +63,9 @@ def join_tables(first: RawTable, second: RawTable, on: str | None) -> RawTable:
 
 
 def _without_empty(table: RawTable, kept: int | None = None) -> RawTable:
-    """The table without rows that have no cell; so many at the beginning are `kept`, and all but the last."""
+    """The table without rows of which all cells are empty, or without those at its end, beyond the `kept`."""
     cells = np.array([table.texts(name) != "" for name in table.names])
-    held = cells.any(axis=0)
+    held: NDArray[np.bool_] = np.asarray(cells.any(axis=0))
     if kept is not None:
         held[: max(kept, int(np.flatnonzero(held).max(initial=-1)) + 1)] = True
     if held.all() or not held.any():
