@@ -22,6 +22,7 @@ from truearm.cli.lazy import LazyCommand
 from truearm.cli.progress import told_progress, told_stages
 from truearm.errors import Notice
 from truearm.library import library_names
+from truearm.programs.languages import language_of
 from truearm.simulation import VirtualArm
 
 PROGRAM = Path(sys.executable).parent / "truearm"
@@ -66,6 +67,12 @@ def test_help_has_examples_that_are_right(words, capsys):
         shown.append(known[: len(words)])
         LazyCommand(BY_WORDS[known]).load().make_context(known[-1], given[len(known) :])
     assert words in shown
+
+
+def test_examples_of_compensate_declare_the_controller_where_it_may_differ(capsys):
+    for example in examples_of(help_of(["compensate"], capsys)):
+        program = Path(example.split()[3])
+        assert not language_of(program, None).controller_differs or "--controller" in example, example
 
 
 @pytest.mark.parametrize("words", [words for words in BY_WORDS if words not in SERVICES], ids=" ".join)

@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 
 import truearm as ta
+from truearm.doubts import Outliers, to_check
+from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT
+from truearm.reporting.facts import Facts
+from truearm.reporting.provenance import provenance
 from truearm.simulation import VirtualArm
 
 ROWS = 80
 POINT = ["x", "y", "z"]
+BENDING = {10: 11, 11: 10, 40: 41, 41: 40}
 
 
 @pytest.fixture(scope="module")
@@ -18,6 +23,15 @@ def arm():
 @pytest.fixture(scope="module")
 def table(arm):
     return arm.measure_table(arm.poses(ROWS))
+
+
+@pytest.fixture(scope="module")
+def both(arm, table):
+    """Rows of two targets."""
+    second = VirtualArm(arm.robot, seed=5)
+    second.target_in_flange = arm.target_in_flange + np.array([0.05, 0.08, -0.03])
+    other = second.measure_table(arm.poses(ROWS), seed=1)
+    return table.assign(**{f"{axis}2": other[axis] for axis in POINT})
 
 
 def with_points_of(table, source):
@@ -42,6 +56,7 @@ def notices_of(arm, table):
 def test_rows_in_the_wrong_order_are_named(arm, table, source, words):
     notice = notices_of(arm, with_points_of(table, source))["rows_exchanged"]
     assert words in notice.message
+    assert "taken out of the fits" in notice.message
     assert set(notice.rows) == {row + 1 for row in source}
 
 
@@ -60,13 +75,51 @@ def test_a_point_noted_twice_is_no_exchange(arm, table):
     assert not {"rows_exchanged", "targets_exchanged"} & set(found)
 
 
-def test_exchanged_targets_of_a_row_are_named(arm, table):
-    second = VirtualArm(arm.robot, seed=5)
-    second.target_in_flange = arm.target_in_flange + np.array([0.05, 0.08, -0.03])
-    other = second.measure_table(arm.poses(ROWS), seed=1)
-    both = table.assign(**{f"{axis}2": other[axis] for axis in POINT})
-    here, there = POINT, [f"{axis}2" for axis in POINT]
-    both.loc[[12], here + there] = both.loc[[12], there + here].to_numpy()
-    notice = notices_of(arm, both)["targets_exchanged"]
+def test_exchanged_targets_of_a_row_are_named(arm, both):
+    changed, there = both.copy(), [f"{axis}2" for axis in POINT]
+    changed.loc[[12], POINT + there] = both.loc[[12], there + POINT].to_numpy()
+    notice = notices_of(arm, changed)["targets_exchanged"]
     assert "In row 13 points fit the places of other targets" in notice.message
     assert notice.rows == (13,)
+
+
+def constants_of(arm, table, **options):
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant", **options)
+    return found, {notice.kind: notice for notice in found.notices}
+
+
+def test_rows_that_bend_the_constants_are_named_as_exchanged(arm, table):
+    """A constant fit takes no row out: what is exchanged bends it until nothing fits anywhere."""
+    _, told = constants_of(arm, with_points_of(table, BENDING))
+    assert told["rows_exchanged"].rows == (11, 12, 41, 42)
+    assert "kept at full weight in the fit" in told["rows_exchanged"].message
+    assert "Put right first what is exchanged" in told["no_help"].message
+    assert "another robot" not in " ".join(map(str, told.values()))
+
+
+def test_targets_that_bend_the_constants_are_named_as_exchanged(arm, both):
+    changed, there = both.copy(), [f"{axis}2" for axis in POINT]
+    changed.loc[[10, 30, 50], POINT + there] = both.loc[[10, 30, 50], there + POINT].to_numpy()
+    _, told = constants_of(arm, changed)
+    assert told["targets_exchanged"].rows == (11, 31, 51)
+    assert "coupling" not in " ".join(map(str, told.values()))
+
+
+@pytest.mark.parametrize(
+    ("options", "fate"),
+    [
+        ({"robust": "cauchy"}, "given less weight in the fit"),
+        ({}, "kept at full weight in the fit"),
+    ],
+)
+def test_what_became_of_exchanged_rows_is_said_alike_everywhere(arm, table, options, fate):
+    found, told = constants_of(arm, with_points_of(table, {50: 51, 51: 50}), **options)
+    assert fate in told["rows_exchanged"].message
+    parts = provenance(Facts(found)).parts
+    (listed,) = (part for part in parts if getattr(part, "title", "") == "Outliers")
+    assert f"They were {fate}" in listed.says
+
+
+def test_outliers_of_constants_are_given_with_a_robust_way_out():
+    assert "--robust cauchy" in to_check(Outliers("row 3 (20.00 mm)", {}, fate=FULL_WEIGHT))
+    assert "--robust" not in to_check(Outliers("row 3 (20.00 mm)", {}, fate=TAKEN_OUT))

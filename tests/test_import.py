@@ -99,6 +99,9 @@ def test_other_encodings(tmp_path: Path) -> None:
 
 
 def test_a_byte_order_mark_is_no_part_of_a_name(tmp_path: Path) -> None:
+    for encoding in ("utf-16", "utf-16-le", "utf-16-be"):
+        with pytest.raises(InputError, match=f"UTF-16 text.*State that: --encoding {encoding}.$"):
+            read_raw(write(tmp_path, PLAIN, encoding), Marks())
     path = write(tmp_path, "\ufeff" + PLAIN, "utf-16-le")
     assert read_raw(path, Marks(encoding="utf-16-le")).names == ["J1", "J2", "px", "py", "pz"]
 

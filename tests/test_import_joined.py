@@ -41,6 +41,33 @@ def pair(folder: Path, joints: str = JOINTS, points: str = POINTS) -> tuple[Path
     return paths
 
 
+@pytest.mark.parametrize("on", ["nr=point", None])
+def test_rows_without_any_cell_take_no_part(tmp_path: Path, on: str | None) -> None:
+    """Spreadsheets leave empty rows behind, and one between blocks: they belong to nothing."""
+    rows = ["nr,J1,J2", "1,90,45", "2,-90,0", ",,", ",,"]
+    if on:
+        rows.insert(2, ",,")
+    joints, points = pair(tmp_path, "\n".join(rows), "point,px,py,pz\n1,0,0,1\n2,0,0,2\n")
+    found = import_table(joints, plan(second=points, on=on))
+    assert found.frame["z"].tolist() == [0.001, 0.002]
+    named = "rows 2, 4 and 5" if on else "rows 3 and 4"
+    assert found.left_out == [f"{named} of {joints}, as nothing is in them"]
+
+
+def test_rows_are_called_as_in_their_file_beside_empty_ones(tmp_path: Path) -> None:
+    joints, points = pair(tmp_path, "nr,J1,J2\n,,\n1,90,45\n1,0,0\n", POINTS)
+    with pytest.raises(InputError, match='says "1" in row 2 and "1" in row 3'):
+        import_table(joints, plan(second=points, on="nr=point"))
+
+
+def test_an_empty_row_is_no_gap_where_rows_go_one_by_one(tmp_path: Path) -> None:
+    """A point that was not measured stands in its place."""
+    points = "point,px,py,pz\n2.0,1500,2500,3500\n,,,\n7.0,0,0,1\n"
+    joints, points_file = pair(tmp_path, JOINTS, points)
+    found = import_table(joints, plan(second=points_file))
+    assert found.frame["z"].tolist() == [3.5, 0.001]
+
+
 def test_two_tables_are_joined_by_what_both_say(tmp_path: Path) -> None:
     joints, points = pair(tmp_path)
     kept = {"before": "T", "after": "T of points.csv"}

@@ -130,6 +130,10 @@ CONTENTS = {
     "web page": (b"<!DOCTYPE html><html>", "an HTML page, not CSV"),
     "URDF": (b"<?xml version='1.0'?><robot/>", "XML, not CSV"),
     "JSON": (b'{"q1": 0}', "JSON, not CSV"),
+    "UTF-16 without its mark": (
+        "q1,x\n1,2\n".encode("utf-16-le"),
+        "UTF-16 text, without a byte order mark. Save it as UTF-8, or .*csv --encoding utf-16-le.$",
+    ),
     "UTF-16": (
         "q1,x".encode("utf-16"),
         "UTF-16 text. Save it as UTF-8, or .*import .*csv --encoding utf-16.$",

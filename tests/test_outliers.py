@@ -136,7 +136,7 @@ def test_of_the_outliers_the_advice_has_the_largest_distance():
 @pytest.mark.parametrize(
     ("robust", "said", "advised"),
     [
-        ("none", "Outliers, not taken out of the fit:", True),
+        ("none", "Outliers, kept at full weight in the fit:", True),
         ("huber", "Outliers, given less weight in the fit:", False),
     ],
 )

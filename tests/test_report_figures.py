@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import truearm as ta
@@ -12,6 +13,7 @@ from truearm.cli import main
 from truearm.reporting.advice import advise
 from truearm.reporting.curves import in_words
 from truearm.reporting.facts import Facts
+from truearm.reporting.levers import taken_over
 from truearm.reporting.numbers import fixed, without_zeros
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
@@ -209,3 +211,28 @@ def test_a_gantry_is_not_told_to_turn_what_no_motion_turns():
     found = ta.calibrate(gantry, arm.measure(arm.poses(60)), model="constant")
     assert "alpha3" in found.identifiability.undetermined
     assert "unseen_parameters" not in [advice.kind for advice in advise(Facts(found), None)]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_targets_take_over_is_not_to_be_determined_on_the_last_axis_either(count):
+    """Off it, theta6 would be taken over by the targets in place of not being seen."""
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=2, imperfections=Imperfections(share=0.0))
+    poses, along = arm.poses(60), arm.robot.flange[:3, 2]
+    tables = []
+    for number in range(count):
+        arm.target_in_flange = (0.1 + 0.05 * number) * along
+        tables.append(arm.measure_table(poses, seed=number))
+    names = {axis: f"{axis}2" for axis in "xyz"}
+    table = pd.concat(
+        [tables[0], *(each[["x", "y", "z"]].rename(columns=names) for each in tables[1:])], axis=1
+    )
+    found = ta.calibrate(arm.robot, ta.Measurements.from_dataframe(table), model="constant")
+    assert "theta6" in found.identifiability.undetermined
+    assert "unseen_parameters" not in [advice.kind for advice in advise(Facts(found), None)]
+
+
+def test_in_the_modified_convention_targets_take_over_what_follows_the_last_axis():
+    arm = VirtualArm(ta.Robot.load("franka-panda"), seed=2, imperfections=Imperfections(share=0.0))
+    found = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), model="constant")
+    assert taken_over(Facts(found)) == {"theta7", "d7"}
+    assert not {"a7", "alpha7"} & set(found.identifiability.undetermined)

@@ -33,7 +33,7 @@ from truearm.drifting import Drift, drift_details, drift_notices, fit_settled
 from truearm.endpoints import at_tool
 from truearm.enough_values import group_unknowns
 from truearm.errors import InputError, Notice, UsageError, count_of
-from truearm.exchanged import exchanged_notices
+from truearm.exchanged import exchanges
 from truearm.fitted_rows import FittedRows, sides
 from truearm.fitting import (
     ENOUGH_FOR_HYPER,
@@ -56,7 +56,7 @@ from truearm.known_scale import KnownScale, common_share
 from truearm.lengths import length_mm
 from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
-from truearm.models import CONSTANT, NOMINAL, VARIABLE
+from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
 from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
@@ -176,20 +176,40 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
             shifted = fits_shifted(task, data)
     if shifted:
         doubted = _of_errors(task, found, data, None)
-        doubted[1:1] = shifted
-    elif any(notice.kind in (NO_HELP, FAR_FROM_NOMINAL) for notice in doubted):
+        return [*doubted[:1], *shifted, *doubted[1:]]
+    exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted))
+    if exchanged.notices:
+        told = replace(found, notices=exchanged.notices)
+        doubted = _of_errors(task, told, data, Outliers.of(told), exchanged.unbent)
+    wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
+    if any(notice.kind in wrong for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
-    return doubted if shifted else [*exchanged_notices(found), *doubted]
+    return [*exchanged.notices, *doubted]
 
 
-def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Outliers | None) -> list[Notice]:
-    """What the errors of a calibration say against it, and which outliers may be to blame."""
+def _is_in_doubt(doubted: Sequence[Notice]) -> bool:
+    """Whether errors or parameters are such that rows may be wrong of which none is an outlier."""
+    return any(notice.kind in {NO_HELP, SINGLE_ROWS, FAR_FROM_NOMINAL} for notice in doubted)
+
+
+def _of_errors(
+    task: Task,
+    found: Calibration,
+    data: Measurements,
+    outliers: Outliers | None,
+    unbent: ArmModel | None = None,
+) -> list[Notice]:
+    """What the errors of a calibration say against it, and which outliers may be to blame.
+
+    Constants that these did not bend are held against the table in place of its own, if there are such.
+    """
     judged, best = found.validation, found.model_name
     points = None if found.selection.distances else found.held
+    models = found.models if unbent is None else {**found.models, CONSTANT: unbent, best: unbent}
     return [
         *zero_notices(task, data, [found.models[name] for name in (NOMINAL, CONSTANT)]),
-        *doubts(task.arm, found.models, judged, best, distance_at_floor_mm(found), outliers),
+        *doubts(task.arm, models, judged, best, distance_at_floor_mm(found), outliers),
         *stated_too_large(data, judged, best, points),
         *constant_is_better(judged, best, points, outliers),
         *_rounded(found, data),

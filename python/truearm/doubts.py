@@ -18,6 +18,7 @@ from truearm.identified import IdentifiedArm
 from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel, leaves_noise
+from truearm.outlier_fate import FULL_WEIGHT, fate_of_outliers
 from truearm.parameters import KIND_COUNT, are_lengths
 from truearm.robot import Robot
 from truearm.stillness import still_warning
@@ -66,6 +67,9 @@ STATED_TOO_LARGE: Final = "stated_too_large"
 NO_HELP: Final = "no_help"
 NO_GAIN: Final = "no_gain"
 SINGLE_ROWS: Final = "single_rows"
+ROWS_EXCHANGED: Final = "rows_exchanged"
+TARGETS_EXCHANGED: Final = "targets_exchanged"
+EXCHANGED: Final = (ROWS_EXCHANGED, TARGETS_EXCHANGED)
 ORIENTATION_MISFIT: Final = "orientation_misfit"
 OF_NO_USE: Final = (NO_HELP, NO_GAIN, SINGLE_ROWS)
 CONSTANT_BETTER: Final = "constant_better"
@@ -99,6 +103,8 @@ class Outliers:
         judged: Which of them are judged, in words.
         entries: Each with file, row and distance_mm.
         means_mrad: As means_mm, of the orientation; empty where it was not fitted.
+        fate: What became of them in the fits, as fate_of_outliers has it.
+        exchanged: Whether some were found to be exchanged, which notices name.
     """
 
     named: str
@@ -106,6 +112,8 @@ class Outliers:
     judged: str = ""
     entries: Sequence[Mapping[str, Any]] = ()
     means_mrad: Mapping[str, float] = field(default_factory=dict)
+    fate: str = ""
+    exchanged: bool = False
 
     @classmethod
     def of(cls, calibration: "Calibration") -> "Outliers":
@@ -119,7 +127,8 @@ class Outliers:
         turns = {} if held is None else held.turns_without_mrad(found)
         judged = held.among(found, calibration.model_name) if held is not None and means else []
         named, among = (list_outliers(each, rows.data.files) for each in (found, judged))
-        return cls(named, means, among, found, turns)
+        exchanged = any(notice.kind in EXCHANGED for notice in calibration.notices)
+        return cls(named, means, among, found, turns, fate_of_outliers(calibration), exchanged)
 
 
 def doubts(
@@ -393,9 +402,12 @@ def gains_nothing(best: str) -> tuple[str, str]:
 
 def to_check(outliers: Outliers | None) -> str:
     """What to look at where a calibration does not help: first rows that are far off, if any are."""
+    if outliers is not None and outliers.exchanged:
+        return "Put right first what is exchanged, or leave it out, and calibrate again."
     if outliers is None or not outliers.named:
         return f"{CHECKS}."
-    return f"Look at these rows first, which alone may spoil the fit: {outliers.named}. {CHECKS}."
+    robust = ", and --robust cauchy gives hardly any weight" if outliers.fate == FULL_WEIGHT else ""
+    return f"Look at these rows first, which alone may spoil the fit{robust}: {outliers.named}. {CHECKS}."
 
 
 def nothing_to_gain(before_mm: float, after_mm: float, floor_mm: float) -> bool:

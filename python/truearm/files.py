@@ -16,6 +16,10 @@ NEW_FILE: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY",
 OPEN_HERE: Final = frozenset({Path("/dev/stdout"), Path("/dev/stderr")})
 """Names of what this process has open, whatever that is."""
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+MOSTLY: Final = 0.8
+"""Share of zeros among every second byte from which text is UTF-16: characters of Europe have one each."""
+LOOKED_AT: Final = 4096
+"""Bytes of a file, an even number, that tell how it is written."""
 ZIP = b"PK\x03\x04"
 _SIGNATURES = (
     (ZIP, "a ZIP archive, such as an Excel workbook"),
@@ -91,8 +95,9 @@ def decode_text(content: bytes, *, where: str, way_out: str = "Save it as UTF-8"
     for signature, kind in _SIGNATURES:
         if content.startswith(signature):
             raise InputError(f"this is {kind}, not text", where=where, way_out="Export it as text")
-    if content.startswith(UTF_16):
-        raise InputError("this is UTF-16 text", where=where, way_out=way_out)
+    if encoding := utf_16_of(content):
+        unmarked = "" if encoding == "utf-16" else ", without a byte order mark"
+        raise InputError(f"this is UTF-16 text{unmarked}", where=where, way_out=way_out)
     if b"\x00" in content:
         raise InputError("this is binary data, not text", where=where)
     try:
@@ -102,6 +107,17 @@ def decode_text(content: bytes, *, where: str, way_out: str = "Save it as UTF-8"
         raise InputError(
             f"line {line} holds bytes that are not UTF-8", where=where, way_out=way_out
         ) from None
+
+
+def utf_16_of(content: bytes) -> str:
+    """Which UTF-16 a content is, by its byte order mark or its zeros, as Python calls it; "" if none."""
+    if content.startswith(UTF_16):
+        return "utf-16"
+    even, odd = content[:LOOKED_AT:2], content[1:LOOKED_AT:2]
+    for encoding, high, low in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
+        if high.count(0) > MOSTLY * len(high) and 0 not in low:
+            return encoding
+    return ""
 
 
 def parsed(text: str, *, where: str) -> dict[str, Any]:

@@ -20,9 +20,10 @@ from truearm.columns import (
     StatedUnits,
 )
 from truearm.errors import InputError, Notice, UsageError, did_you_mean, list_names, list_rows, typed
+from truearm.joined_tables import join_tables
 from truearm.measured_fields import read_fields
 from truearm.measurements import Measurements
-from truearm.raw_tables import Marks, RawTable, join_tables, read_raw
+from truearm.raw_tables import Marks, RawTable, read_raw
 from truearm.reading import table_from_frame
 from truearm.rotation_columns import RotationColumns
 from truearm.units import ANGLE_UNITS, STATED_LENGTH_UNITS, to_si
@@ -131,8 +132,7 @@ def import_table(path: Path, plan: ImportPlan) -> Imported:
         columns = _by_target(columns, table)
     frame, empty = _with_measurements(pd.DataFrame(columns), table)
     _check(frame, table)
-    alone = [f"{rows}, as they are not in the other table" for rows in table.alone]
-    left_out, unused = [*alone, *empty], _unused(table, named, plan)
+    left_out, unused = [*table.left_out, *empty], _unused(table, named, plan)
     return Imported(frame.reset_index(drop=True), unused, left_out, table.remarks, _unsaid(table))
 
 

@@ -1,10 +1,10 @@
-"""Tables as other programs write them: marks, remarks and gaps as they are stated, one file or two."""
+"""Tables as other programs write them: marks, remarks and gaps as they are stated."""
 
 import codecs
 import csv
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.errors import InputError, UsageError, count_of, did_you_mean, list_names
-from truearm.files import decode_text, read_bytes
+from truearm.errors import InputError, UsageError, count_of, did_you_mean
+from truearm.files import decode_text, read_bytes, utf_16_of
 from truearm.missing_cells import without_missing
 from truearm.reading import (
     DELIMITERS,
@@ -38,10 +38,8 @@ BLANK: Final = " "
 UNNAMED: Final = "-"
 BLANKS: Final = re.compile(r"[ \t]+")
 NUMBER: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?")
-WHOLE: Final = re.compile(r"0*(\d+)(?:[.,]0*)?")
 NO_THOUSANDS: Final = "Write the numbers without marks between thousands"
 BYTE_ORDER_MARK: Final = "\ufeff"
-NAMED: Final = 5
 SHOWN: Final = 60
 """Characters of a line that are shown in a message."""
 
@@ -145,7 +143,7 @@ class RawTable:
         where: The file or files, for messages.
         parts: Each column.
         row_count: Number of rows.
-        alone: In words, which rows of two files are in one of them only.
+        left_out: In words, rows that are empty or, of two files, in one of them only.
         remarks: In words, how many lines were left out as remarks, a row of units, and a column that counts
             the rows.
         unsaid: What cells say where nothing was measured, as it was stated, and none says.
@@ -154,7 +152,7 @@ class RawTable:
     where: str
     parts: Mapping[str, Part]
     row_count: int
-    alone: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     unsaid: tuple[str, ...] = ()
 
@@ -244,46 +242,6 @@ def _check_quoted(table: Table, mark: str) -> None:
         )
 
 
-def join_tables(first: RawTable, second: RawTable, on: str | None) -> RawTable:
-    """Rows of two tables that belong together, in the order of the first.
-
-    Args:
-        first: One table.
-        second: The other. A column of a name that the first has too is called "NAME of FILE".
-        on: The column that says what belongs together, "NAME" or "NAME=ITS NAME IN THE SECOND"; None takes
-            the rows one by one. Its cells have to say the same, zeros before whole numbers and behind their
-            point apart.
-
-    Raises:
-        InputError: If a value of `on` is missing or there twice, or no row belongs to another; without `on`,
-            if one has more rows, or a column of both shows that their order differs.
-        UsageError: If a table has no such column.
-    """
-    if on is None:
-        _check_order(first, second)
-        rows = np.arange(first.row_count)
-        return _side_by_side(first, second, (rows, rows), "", [])
-    name, mark, other = on.partition("=")
-    theirs = other if mark else name
-    keys, others = _keys(first, first.existing(name)), _keys(second, second.existing(theirs))
-    places = {key: row for row, key in enumerate(others)}
-    both = [row for row, key in enumerate(keys) if key in places]
-    if not both:
-        raise InputError(
-            f'no value of "{name}" is in "{theirs}" of {second.where}',
-            where=first.where,
-            rule=f'It begins with "{first.texts(name)[0]}", the other with "{second.texts(theirs)[0]}"',
-            way_out="Name columns that say which rows belong together: --on COLUMN=ITS_OTHER_NAME",
-        )
-    known = set(keys)
-    alone = [
-        *_alone(first, name, [row for row, key in enumerate(keys) if key not in places]),
-        *_alone(second, theirs, [row for row, key in enumerate(others) if key not in known]),
-    ]
-    rows = np.array(both)
-    return _side_by_side(first, second, (rows, np.array([places[keys[row]] for row in both])), theirs, alone)
-
-
 def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
     """The line of names above the rows of a text that has none.
 
@@ -314,90 +272,6 @@ def _header(marks: Marks, text: str, delimiter: str, where: str) -> str:
     unnamed = iter(marks.unnamed)
     names = [next(unnamed) if name == UNNAMED else name.replace('"', '""') for name in marks.names]
     return delimiter.join(f'"{name}"' for name in names) + "\n"
-
-
-def _check_order(first: RawTable, second: RawTable) -> None:
-    """Raise InputError if rows cannot belong together one by one."""
-    if first.row_count != second.row_count:
-        raise InputError(
-            f"{count_of(first.row_count, 'row')}, and {second.row_count} in {second.where}",
-            where=first.where,
-            rule="Row by row, both must have as many",
-            way_out="Name the column that says which belong together: --on COLUMN",
-        )
-    for name in first.names:
-        if name not in second.parts:
-            continue
-        ours, theirs = ([_key(cell) for cell in table.texts(name).tolist()] for table in (first, second))
-        if ours != theirs and _tell_rows_apart(ours, theirs):
-            row = next(k for k, (one, other) in enumerate(zip(ours, theirs, strict=True)) if one != other)
-            raise InputError(
-                f'"{name}" says "{ours[row]}" in row {row + 1}, and "{theirs[row]}" in {second.where}',
-                where=first.where,
-                rule="Row by row, both must be in the same order",
-                way_out=f"Join them by it, where neither says a thing twice: --on {name}. If it does not "
-                "tell rows apart, rename it in one of them",
-            )
-
-
-def _tell_rows_apart(ours: Sequence[str], theirs: Sequence[str]) -> bool:
-    """Whether a column of as many rows in both tables says which rows are meant, and mostly the same ones.
-
-    One table where it says nothing twice is enough: in the other, a row may be named wrongly.
-    """
-    apart = max(len(set(ours)), len(set(theirs))) == len(ours)
-    return apart and 2 * len(set(ours) & set(theirs)) > len(ours)
-
-
-def _key(cell: str) -> str:
-    """What a cell says, without zeros before a whole number and behind its point."""
-    whole = WHOLE.fullmatch(cell)
-    return whole[1] if whole else cell
-
-
-def _keys(table: RawTable, name: str) -> list[str]:
-    """What tells the rows apart."""
-    said: list[str] = table.texts(name).tolist()
-    keys = [_key(cell) for cell in said]
-    rows: dict[str, int] = {}
-    for row, key in enumerate(keys, start=1):
-        if not key or key in rows:
-            before = rows.get(key, row)
-            twice = f'says "{said[before - 1]}" in row {before} and "{said[row - 1]}" in row {row}'
-            raise InputError(
-                f'column "{name}" {twice if key else f"is empty in row {row}"}',
-                where=table.where,
-                rule="Rows are told apart by it",
-                way_out="Correct it, or leave out --on where the rows of both files are in the same order",
-            )
-        rows[key] = row
-    return keys
-
-
-def _side_by_side(
-    first: RawTable, second: RawTable, rows: tuple[Integers, Integers], key: str, alone: list[str]
-) -> RawTable:
-    parts = {name: part._replace(rows=part.rows[rows[0]]) for name, part in first.parts.items()}
-    for name, part in second.parts.items():
-        if name == key:
-            continue
-        here = name if name not in first.parts else f"{name} of {Path(second.where).name}"
-        if here in parts:
-            raise UsageError(f'"{here}" is a column of both tables', where=first.where, way_out="Rename one")
-        parts[here] = part._replace(rows=part.rows[rows[1]])
-    where = f"{first.where} with {second.where}, rows as joined"
-    unsaid = tuple(word for word in first.unsaid if word in second.unsaid)
-    return RawTable(where, parts, len(rows[0]), alone, [*first.remarks, *second.remarks], unsaid)
-
-
-def _alone(table: RawTable, name: str, rows: Sequence[int]) -> list[str]:
-    """In words, rows of a table that the other has not."""
-    if not rows:
-        return []
-    keys = table.texts(name)
-    named = list_names([str(keys[row]) for row in rows[:NAMED]])
-    more = f" and {len(rows) - NAMED} more" if len(rows) > NAMED else ""
-    return [f"{count_of(len(rows), 'row')} of {table.where} ({name} {named}{more})"]
 
 
 def _with_points(table: Table, name: str, options: str) -> Table:
@@ -453,6 +327,8 @@ def _decoded(content: bytes, marks: Marks, where: str) -> str:
         f"State what it is: {marks.options}encoding cp1252 for most files of Windows in western Europe, "
         f'{marks.options}encoding utf-16 for "Unicode text" of a spreadsheet'
     )
+    if utf_16 := utf_16_of(content):
+        state = f"State that: {marks.options}encoding {utf_16}"
     if encoding.casefold() in UTF_8:
         return decode_text(content, where=where, way_out=state)
     if content.startswith(codecs.BOM_UTF8):

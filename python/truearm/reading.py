@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.errors import InputError, list_rows, typed
-from truearm.files import UTF_16, ZIP, decode_text, name_in_text, read_bytes
+from truearm.files import LOOKED_AT, ZIP, decode_text, name_in_text, read_bytes, utf_16_of
 from truearm.units import HEADER_UNITS, bare_unit
 
 Floats = NDArray[np.float64]
@@ -31,8 +31,6 @@ NAMELESS: Final = (
     'leave columns out, with: truearm import FILE --skip-lines 1 --columns "{}" ...'
 )
 SHOWN_NAMES: Final = 4
-LOOKED_AT: Final = 4096
-"""Bytes of a file in another encoding, an even number, from which its marks are told."""
 UNIT_WORDS: Final = frozenset(("", "-", "1", "c", "°c", "degc", "k", "kg", "s", "ms", *HEADER_UNITS))
 """What stands below the names of columns where a row says their units."""
 SAID: Final = "q1_deg and x_mm"
@@ -245,13 +243,14 @@ def _import_command(path: Path, text: str, encoding: str = "") -> str:
 
 def _way_out_of_encoding(path: Path, content: bytes) -> str:
     """What is said where `content` is not UTF-8: how to bring it in if it begins as a table does."""
-    encoding = "utf-16" if content.startswith(UTF_16) else "cp1252"
+    utf_16 = utf_16_of(content)
+    encoding = utf_16 or "cp1252"
     text = content[:LOOKED_AT].decode(encoding, errors="replace")
     save = "Save it as UTF-8"
     if not any(mark in "".join(text.lstrip().splitlines()[:1]) for mark in DELIMITERS):
         return save
     command = _import_command(path, text, encoding)
-    if encoding == "utf-16":
+    if utf_16:
         return f"{save}, or convert it with: {command}"
     return f"{save}, or convert it, if it comes from Windows in western Europe, with: {command}"
 

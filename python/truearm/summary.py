@@ -91,12 +91,6 @@ def distance_at_floor_mm(calibration: "Calibration") -> float:
     return mean_distance(whole_noise_mm(calibration), distances=calibration.selection.distances)
 
 
-def taken_out(calibration: "Calibration") -> int:
-    """How many outliers the fits of the variable model are without; none of models that keep them."""
-    rows = calibration.rows
-    return 0 if calibration.variable is None or rows is None else len(rows.outliers())
-
-
 def saw_orientations(calibration: "Calibration") -> bool:
     """Whether rows hold orientations, used or not; not known of a calibration without its rows."""
     return calibration.rows is not None and calibration.rows.data.orientations is not None

@@ -140,17 +140,25 @@ def _calibrated(arm: "Robot", data: "Measurements", options: "Options", threads:
 
 
 def suggest_next(calibration: "Calibration", file: Path) -> None:
-    """Name the commands that come next: none that uses a calibration that does not help."""
+    """Name the commands that come next: none that uses a calibration that does not help.
+
+    Where compensation would refuse most measured rows, it is said why, and which option allows them.
+    """
     from truearm.doubts import OF_NO_USE, ORIENTATION_MISFIT
+    from truearm.reporting.facts import Facts
 
     if any(notice.kind in (*OF_NO_USE, ORIENTATION_MISFIT) for notice in calibration.notices):
         suggest(f"truearm report {typed(file)}")
-    elif calibration.selection.distances:
-        suggest(
-            *compensate_commands(calibration, file), f"truearm export {typed(file)} --to dh-toml -o arm.toml"
-        )
+        return
+    facts = Facts(calibration)
+    if facts.mostly_refused:
+        say_wrapped(facts.mostly_refused)
+    more = "" if facts.waypoints is None else facts.waypoints.allowing
+    compensate = compensate_commands(calibration, file, more)
+    if calibration.selection.distances:
+        suggest(*compensate, f"truearm export {typed(file)} --to dh-toml -o arm.toml")
     else:
-        suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate_commands(calibration, file))
+        suggest(f"truearm evaluate {typed(file)} OTHER.csv", *compensate)
 
 
 def _holdout(share: float | None, holdout_range: str | None) -> float:
@@ -221,7 +229,7 @@ def print_places(output: Path) -> None:
 def print_results(calibration: "Calibration") -> None:
     """Print what was determined, the errors, and what stands out."""
     from truearm.cli.error_tables import print_errors
-    from truearm.summary import taken_out
+    from truearm.outlier_fate import taken_out
 
     validation, summary = calibration.validation, calibration.summary
     others = count_of(validation.n_holdout, "other")
@@ -325,17 +333,15 @@ def _print_scheme(calibration: "Calibration", ratios: dict[str, float] | None) -
 
 def _print_outliers(outliers: list[dict[str, Any]], calibration: "Calibration") -> None:
     from truearm.doubts import Outliers
+    from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT, fate_of_outliers
 
     if not outliers or calibration.rows is None:
         return
-    robust = calibration.options.robust != ROBUST
-    fate = "given less weight in the fit" if robust else "not taken out of the fit"
-    hint = "" if robust else " --robust huber gives them less weight."
-    if calibration.variable is not None:
-        fate, hint = (
-            "taken out of the fits",
-            " Constants, frame and tool are without them where they bend these.",
-        )
+    fate = fate_of_outliers(calibration)
+    hint = {
+        TAKEN_OUT: " Constants, frame and tool are without them where they bend these.",
+        FULL_WEIGHT: " --robust huber gives them less weight.",
+    }.get(fate, "")
     say_wrapped(f"Outliers, {fate}: {list_outliers(outliers, calibration.rows.data.files)}.{hint}")
     without = Outliers.of(calibration)
     units = {"mm": without.means_mm, "mrad": without.means_mrad}

@@ -59,9 +59,10 @@ def command(
     is left as it is and listed.
 
     Examples:
-      truearm compensate arm.calib weld.script --dry-run
-      truearm compensate arm.calib weld.src -o out/ --controller nominal
-      truearm compensate arm.calib pick.mod -o out/ --frames frames.toml
+      truearm compensate arm.calib weld.src --controller nominal --dry-run
+      truearm compensate arm.calib up.script --controller calibration.conf -o out/
+      truearm compensate arm.calib pick.mod -o out/ --controller nominal
+      truearm compensate arm.calib pick.prg -o out/ --frames frames.toml
     """
     from truearm.cli.rewritten import print_rewritten
     from truearm.limits import Task

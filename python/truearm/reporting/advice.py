@@ -8,6 +8,7 @@ import numpy as np
 
 from truearm.doubts import (
     CONSTANT_BETTER,
+    EXCHANGED,
     FEW_VALUES,
     HELD_TOOL,
     HIDING,
@@ -20,6 +21,7 @@ from truearm.doubts import (
 from truearm.errors import count_of, short_names
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE, leaves_noise
+from truearm.outlier_fate import FULL_WEIGHT
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
 from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
@@ -72,7 +74,22 @@ def _would_fit(facts: Facts) -> Iterator[Advice]:
         yield Advice("would_fit", "Correct what does not fit.", words, np.inf)
 
 
+def _exchanged(facts: Facts) -> Iterator[Advice]:
+    if words := " ".join(filter(None, map(facts.noticed, EXCHANGED))):
+        yield Advice("exchanged", "Put right what is exchanged.", words, np.inf)
+
+
+def _refused(facts: Facts) -> Iterator[Advice]:
+    if words := facts.mostly_refused:
+        # Outliers that stay in a fit may bend it so far.
+        bent = bool(facts.summary["outliers"]) and facts.outliers.fate == FULL_WEIGHT
+        weight = facts.mean_mm() if bent else np.inf
+        yield Advice("mostly_refused", "Compensation refuses most poses.", words, weight)
+
+
 def _checks(facts: Facts) -> Iterator[Advice]:
+    if any(_exchanged(facts)):
+        return
     words = to_check(None if any(_would_fit(facts)) else facts.outliers)
     yield Advice("find_the_reason", "Find out what is wrong.", words, 20.0 * facts.mean_mm())
 
@@ -328,6 +345,8 @@ def _what_varies(facts: Facts) -> Iterator[Advice]:
 
 RULES: Final = (
     _would_fit,
+    _exchanged,
+    _refused,
     _outliers,
     _stood_still,
     _warm_up,
@@ -343,8 +362,8 @@ RULES: Final = (
     _intervals,
     _what_varies,
 )
-RULES_OF_UPDATES: Final = (_no_longer_fits, _left_out, _unseen, _few_held)
-RULES_WITHOUT_HELP: Final = (_would_fit, _checks, _stood_still)
+RULES_OF_UPDATES: Final = (_no_longer_fits, _refused, _left_out, _unseen, _few_held)
+RULES_WITHOUT_HELP: Final = (_would_fit, _exchanged, _checks, _stood_still)
 
 
 def _rules(facts: Facts) -> tuple[Callable[[Facts], Iterator[Advice]], ...]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truearm.reporting.numbers import lean
-from truearm.reporting.style import SEQUENTIAL, colour_of, dash_of, marker_of
+from truearm.reporting.style import PLAIN, SEQUENTIAL, colour_of, dash_of, marker_of
 
 Floats = NDArray[np.float64]
 Trace = dict[str, Any]
@@ -92,6 +92,7 @@ def colour_bar(title: str) -> dict[str, Any]:
         "title": {"text": title, "side": "right", "font": {"color": "@ink", "size": 11}},
         "thickness": 12,
         "outlinewidth": 0,
+        "exponentformat": PLAIN,
         "tickfont": {"color": "@muted"},
     }
 

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.compensation import Compensated, Compensator
+from truearm.compensation import Compensated
 from truearm.errors import count_of, short_names
-from truearm.limits import Limits, Task
+from truearm.limits import Task
 from truearm.measurements import Measurements
 from truearm.reporting.charts import axis
 from truearm.reporting.facts import ROWS, Facts
@@ -17,38 +17,26 @@ from truearm.reporting.parts import Figure, Part, Section, Table, Text
 
 Floats = NDArray[np.float64]
 
-MOST_POSES: Final = 2000
 LARGEST: Final = 6
-FULL_POSE: Final = 6
-AXIS: Final = 5
 
 
 def compensation(facts: Facts) -> Section:
     """The poses that were measured, corrected as waypoints of a program."""
     title = "Compensation"
-    calibration, rows = facts.calibration, facts.calibration.rows
+    calibration, rows, made = facts.calibration, facts.calibration.rows, facts.waypoints
     if calibration.scheme is not None:
         words = f"Compensation takes constant and variable models; this one is {facts.best}."
         return Section(title, [Text(words)])
-    if rows is None:
+    if rows is None or made is None:
         return Section(
             title, [Text("The measurements were left out of this file: there are no poses to correct.")]
         )
-    data = rows.data.select(np.arange(min(len(rows.data), MOST_POSES)))
-    task = _task(len(facts.joints))
-    alone = Limits(change_mm_per_mm=None, change_mrad_per_rad=None)
-    found = Compensator(calibration, task=task, limits=alone, features=facts.features or None).joints(
-        data.readings, tool=None if facts.names_tool else facts.point
-    )
+    data, task, found = made.data, made.task, made.found
     point = "flange" if calibration.selection.distances else "measured target"
     whose = "robot file's tool" if facts.names_tool else f"{point}, as the robot file names no tool"
     words = _overall(found, (task, f"the {whose}"), len(rows.data)) + facts.at_features
     parts: list[Part] = [Text(words), *_sizes(facts, found)]
     return Section(title, [*parts, *largest(facts, data, found), *_refusals(data, found)])
-
-
-def _task(joints: int) -> Task:
-    return "pose" if joints >= FULL_POSE else "axis" if joints == AXIS else "position"
 
 
 def _overall(found: Compensated, asked: tuple[Task, str], count: int) -> str:

@@ -17,6 +17,7 @@ from truearm.held_rows import HeldRows
 from truearm.models import NOMINAL, ArmModel
 from truearm.one_turn import one_turn
 from truearm.reporting.numbers import listed, shown_readings, significant, unit_of
+from truearm.reporting.waypoints import Waypoints
 from truearm.stillness import still_warning
 from truearm.summary import WAVE, distance_at_floor_mm
 from truearm.units import MM_PER_METRE
@@ -207,6 +208,16 @@ class Facts:
             return "readings on a grid" if self.noticed(ON_A_GRID) else ""
         steps = grid_steps(self.readings, self.joints)
         return grid_words(steps, self.joints) if steps else ""
+
+    @cached_property
+    def waypoints(self) -> Waypoints | None:
+        """The measured poses as waypoints; None of schemes, and where rows were left out of the file."""
+        return Waypoints.of(self)
+
+    @property
+    def mostly_refused(self) -> str:
+        """That compensation refuses most measured poses, and why, in words; empty where it does not."""
+        return "" if self.waypoints is None else self.waypoints.mostly_refused
 
     def noticed(self, kind: str) -> str:
         """The calibration's notice of a kind; empty where there is none."""

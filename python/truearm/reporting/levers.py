@@ -4,12 +4,14 @@ from typing import Final
 
 import numpy as np
 
-from truearm.parameters import KIND_COUNT
+from truearm.parameters import KIND_COUNT, THETA, D
 from truearm.reporting.facts import Facts
 from truearm.units import MM_PER_METRE
 
 ON_THE_AXIS_MM: Final = 5.0
 """Targets nearer to the last joint's axis than this hardly show how it turns."""
+BEHIND_ITS_JOINT: Final = {"standard": tuple(range(KIND_COUNT)), "modified": (THETA, D)}
+"""Kinds of a row that stand behind its joint."""
 
 
 def target_lever_mm(facts: Facts) -> float | None:
@@ -25,19 +27,15 @@ def target_lever_mm(facts: Facts) -> float | None:
 
 
 def taken_over(facts: Facts) -> set[str]:
-    """Names of the parameters that the target takes over; none where it is on the last axis or not seen.
+    """Names of the parameters that free targets take over, however many and wherever they are; none for
+    distances.
 
-    Behind an axis that slides it takes them over wherever it is: no motion turns the link.
+    What stands behind the last joint moves all targets alike, whatever the pose: the whole last link in the
+    standard convention, in the modified one what follows its axis.
     """
     if facts.calibration.selection.distances:
         return set()
-    lever = target_lever_mm(facts)
-    return of_last_link(facts) if lever is None or lever >= ON_THE_AXIS_MM else set()
-
-
-def of_last_link(facts: Facts) -> set[str]:
-    """Names of the last link's parameters: no pose tells them from where the target sits on it."""
-    candidates = facts.calibration.arm.candidates
-    last = facts.calibration.arm.table.size // KIND_COUNT - 1
-    pairs = zip(candidates.names, candidates.columns, strict=True)
-    return {name for name, column in pairs if column // KIND_COUNT == last}
+    arm = facts.calibration.arm
+    last, behind = arm.table.size // KIND_COUNT - 1, BEHIND_ITS_JOINT[arm.robot.convention]
+    pairs = zip(arm.candidates.names, arm.candidates.columns, strict=True)
+    return {name for name, column in pairs if column - KIND_COUNT * last in behind}

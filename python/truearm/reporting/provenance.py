@@ -6,11 +6,11 @@ from typing import Any
 
 from truearm.errors import count_of, short_names
 from truearm.options import Options
+from truearm.outlier_fate import fate_of_outliers, taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed
 from truearm.reporting.option_words import in_words, shown_options
 from truearm.reporting.parts import Part, Section, Table, Text
-from truearm.summary import taken_out
 
 
 def provenance(facts: Facts) -> Section:
@@ -103,7 +103,7 @@ def _outliers(facts: Facts) -> list[Table]:
         ]
         for entry in found
     ]
-    fate = "taken out of the fits" if taken_out(facts.calibration) else "kept in the fit"
+    fate = fate_of_outliers(facts.calibration)
     table = Table(
         "Outliers",
         ["row", "file", "distance, mm", *(["turn, mrad"] if turned else []), "score"],

@@ -49,6 +49,9 @@ MARKERS: Final[Mapping[str, str]] = {"nominal": "diamond-open", "constant": "squ
 SEQUENTIAL: Final = "Cividis"
 DIVERGING: Final = [[0.0, "@low"], [0.5, "@middle"], [1.0, "@high"]]
 
+PLAIN: Final = "none"
+"""Numbers of ticks without prefixes: a title names the unit."""
+
 _AXIS: Final = {
     "gridcolor": "@grid",
     "linecolor": "@muted",
@@ -56,7 +59,7 @@ _AXIS: Final = {
     "tickfont": {"color": "@muted"},
     "title": {"font": {"color": "@ink", "size": 12}, "standoff": 8},
     "automargin": True,
-    "exponentformat": "none",
+    "exponentformat": PLAIN,
     "ticks": "outside",
     "tickcolor": "@grid",
 }
@@ -66,6 +69,7 @@ _SCENE_AXIS: Final = {
     "linecolor": "@muted",
     "tickfont": {"color": "@muted", "size": 10},
     "title": {"font": {"color": "@ink", "size": 12}},
+    "exponentformat": PLAIN,
     "showbackground": False,
     "nticks": 6,
 }

@@ -7,10 +7,10 @@ import numpy as np
 from truearm.doubts import NEAR_MM, gains_nothing, helps, nothing_to_gain
 from truearm.errors import count_of
 from truearm.models import NOMINAL, leaves_noise
+from truearm.outlier_fate import taken_out
 from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, short
 from truearm.reporting.parts import Card, Head, Table, Tone
-from truearm.summary import taken_out
 from truearm.validation import Statistics
 
 GOOD: Final = 0.6
@@ -105,7 +105,7 @@ def tone(facts: Facts) -> Tone:
         return "bad"
     if facts.update is not None and facts.update["verdict"] == "field":
         return "bad"
-    return "good" if after < GOOD * before else "fair"
+    return "good" if after < GOOD * before and not facts.mostly_refused else "fair"
 
 
 def cards(facts: Facts) -> list[Card]:
