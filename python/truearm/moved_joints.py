@@ -132,7 +132,7 @@ def _with_columns(columns: list[Moved]) -> Notice:
     which = "NAME, of one that is known where programs run" if several else columns[0].name
     text = (
         f"Errors go with {names}, as of joints that move with {'them' if several else 'it'}, and no pose "
-        "explains it: it is taken for noise, and intervals are too narrow. Calibrate with --features "
+        "explains it: it is taken for noise, and intervals may be too narrow. Calibrate with --features "
         f"{which}."
     )
     return Notice(UNUSED_COLUMN, text)
@@ -142,8 +142,8 @@ def _while_measured(moved: Moved) -> Notice:
     text = (
         "The joints moved while they were measured, whatever the pose, as those of an arm that warms up: "
         f"from the first row to the last the target by {length_mm(moved.mean_mm, 2)} on average. It is taken "
-        "for noise, and intervals are too narrow. Warm the arm up before measuring, or note its temperature "
-        "in a column and calibrate with --features. Rows are taken to be in the order of measuring: if they "
-        "are not, give --drift none."
+        "for noise, and intervals may be too narrow. Warm the arm up before measuring, or note its "
+        "temperature in a column and calibrate with --features. Rows are taken to be in the order of "
+        "measuring: if they are not, give --drift none."
     )
     return Notice(JOINTS_MOVED, text)

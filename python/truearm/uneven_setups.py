@@ -29,6 +29,9 @@ LEAST_KEPT: Final = 0.05
 MOSTLY: Final = 0.5
 """A set-up states its noise whose sigma is so large a part of its scatter."""
 
+LITTLE_MM: Final = 0.001
+"""A sigma for rows whose noise is that which all have: every row of the column needs one."""
+
 
 @dataclass(frozen=True)
 class Scattering:
@@ -59,7 +62,7 @@ class Scattering:
 
     def beside(self, other: "Scattering") -> str:
         """What its rows should state beside the scatter that another has as well, in words."""
-        return f"about {length_mm(float(np.sqrt(self.mm**2 - other.mm**2)), 2)} for the rows of {self.name}"
+        return f"about {length_mm(float(np.sqrt(self.mm**2 - other.mm**2)), 2)} in the rows of {self.name}"
 
 
 def uneven_setups(found: Calibration, fitted: FittedRows, seen: Whitened) -> list[Notice]:
@@ -87,8 +90,10 @@ def uneven_setups(found: Calibration, fitted: FittedRows, seen: Whitened) -> lis
     text = (
         f"{what} set-ups that scatter differently, as those of different instruments do: "
         f"{'; '.join(each.times(best) for each in worse)}. Where rows do not state how far they may be off "
-        "all count the same, and the good ones are spoilt: state it in a column sigma_mm, "
-        f"{'; '.join(each.beside(best) for each in worse)}, and calibrate again.{or_else}"
+        "all count the same, and the good ones are spoilt. Give a column sigma_mm: "
+        f"{', '.join(each.beside(best) for each in worse)}, in the others what their instrument's data sheet "
+        f"says, or little ({LITTLE_MM:g} mm), since what all rows have in common is found beside it."
+        f"{or_else}"
     )
     return [Notice(UNEVEN_SETUPS, text)]
 
