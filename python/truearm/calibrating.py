@@ -130,8 +130,7 @@ def calibrate(
         astray = _astray(task, (trained, final), drift.taken_out(given).select(split.holdout), held)
     if astray:
         final, order = trained, split.train
-    searched = trained if _keeps_hyper(trained) else final
-    constant, variable, measured = _details(task, final, searched)
+    constant, variable, measured = _details(task, final, trained if _keeps_hyper(trained) else final)
     found = Calibration(
         robot=robot,
         options=chosen,
@@ -157,8 +156,8 @@ def calibrate(
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable, measured),
     )
-    doubted = _doubts(task, found, given, stages)
-    return replace(found, notices=(*found.notices, *doubted, *_of_left(found, drift.progress[order])))
+    told = [*_doubts(task, found, given, stages), *_of_left(found, drift.progress[order])]
+    return replace(found, notices=(*found.notices, *told))
 
 
 def _of_left(found: Calibration, progress: Floats) -> list[Notice]:
