@@ -57,6 +57,7 @@ from truearm.lengths import length_mm
 from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT, NOMINAL, VARIABLE, ArmModel
+from truearm.moved_joints import moved_joints
 from truearm.options import Options
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
@@ -71,10 +72,14 @@ from truearm.standard_errors import counted_covariance, standard_errors
 from truearm.summary import distance_at_floor_mm, whole_noise_mm
 from truearm.turning_sense import check_turns
 from truearm.uncertainty import SetupPlace, VariableSpread, noises_of
+from truearm.uneven_setups import uneven_setups
 from truearm.unexplained import unexplained
 from truearm.units import MM_PER_METRE
 from truearm.validation import Validation
 from truearm.visits import pose_count, pose_counts
+from truearm.whitened import Whitened
+
+Floats = NDArray[np.float64]
 
 STUCK: Final = 0.2
 """Ratio of what constants leave below which those of the training rows were no minimum to judge."""
@@ -125,8 +130,7 @@ def calibrate(
         astray = _astray(task, (trained, final), drift.taken_out(given).select(split.holdout), held)
     if astray:
         final, order = trained, split.train
-    searched = trained if _keeps_hyper(trained) else final
-    constant, variable, measured = _details(task, final, searched)
+    constant, variable, measured = _details(task, final, trained if _keeps_hyper(trained) else final)
     found = Calibration(
         robot=robot,
         options=chosen,
@@ -152,7 +156,16 @@ def calibrate(
         seconds=trained.seconds,
         fitted_spread=_fitted_spread(task, final, variable, measured),
     )
-    return replace(found, notices=(*found.notices, *_doubts(task, found, given, stages)))
+    told = [*_doubts(task, found, given, stages), *_of_left(found, drift.progress[order])]
+    return replace(found, notices=(*found.notices, *told))
+
+
+def _of_left(found: Calibration, progress: Floats) -> list[Notice]:
+    """What is left of the rows tells beside noise; `progress` (n,) is that of the fitted rows."""
+    if found.rows is None or found.scheme is not None or found.selection.distances:
+        return []
+    seen = Whitened.of(found, found.rows, progress)
+    return [*uneven_setups(found, found.rows, seen), *moved_joints(found, seen, progress)]
 
 
 def _of_split(task: Task, given: Measurements, split: Split) -> list[Notice]:

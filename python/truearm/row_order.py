@@ -9,6 +9,7 @@ from truearm.defaults import NO_DRIFT
 from truearm.errors import Notice
 from truearm.fitting import Task
 from truearm.measurements import Measurements
+from truearm.robot import Robot
 from truearm.visits import visit_numbers
 
 Floats = NDArray[np.float64]
@@ -37,7 +38,8 @@ def order_notices(task: Task, data: Measurements, progress: Floats) -> list[Noti
     """
     if task.options.drift == NO_DRIFT:
         return []
-    shares = {group: _share(places(task, data, progress, group)[0]) for group in task.groups}
+    ordered = {group: places(task, data, progress, group)[0] for group in task.groups}
+    shares = {group: share_explained(poses, np.arange(float(len(poses)))) for group, poses in ordered.items()}
     told = [f"{share:.0%} in {group}" for group, share in shares.items() if share > FOLLOWED]
     if not told:
         return []
@@ -62,9 +64,13 @@ def places(task: Task, data: Measurements, progress: Floats, group: str) -> tupl
     own = own[np.argsort(progress[own], kind="stable")]
     _, first = np.unique(visit_numbers(data.readings[own], data.group[own]), return_index=True)
     own = own[first]
-    readings = data.readings[own]
-    flange = task.arm.robot.flange_chain.position(task.arm.robot.joints_from_readings(readings))
-    return np.hstack([readings, flange]), progress[own]
+    return poses_of(task.arm.robot, data.readings[own]), progress[own]
+
+
+def poses_of(robot: Robot, readings: Floats) -> Floats:
+    """Joint readings and the nominal place of the flange (v, N + 3), rad and m."""
+    flange = robot.flange_chain.position(robot.joints_from_readings(readings))
+    return np.hstack([readings, flange])
 
 
 def poses_change(poses: Floats, when: Floats, between: tuple[float, float]) -> bool:
@@ -83,17 +89,16 @@ def poses_change(poses: Floats, when: Floats, between: tuple[float, float]) -> b
     return bool(((apart > SURELY * error) & (apart > LARGE * poses.std(axis=0))).any())
 
 
-def _share(poses: Floats) -> float:
-    """Share of the variance of their numbers that a linear function of poses (v, F) has beyond chance."""
+def share_explained(poses: Floats, values: Floats) -> float:
+    """Share of the variance of values (v,) that a linear function of poses (v, F) has beyond chance."""
     count = len(poses)
     if count < FEWEST_VISITS:
         return 0.0
     wide = poses[:, np.ptp(poses, axis=0) > 0.0]
     basis = np.column_stack([np.ones(count), (wide - wide.mean(axis=0)) / wide.std(axis=0)])
-    numbers = np.arange(count, dtype=np.float64)
-    fitted, _, rank, _ = np.linalg.lstsq(basis, numbers, rcond=None)
+    fitted, _, rank, _ = np.linalg.lstsq(basis, values, rcond=None)
     free = count - int(rank)
     if free < 1:
         return 0.0
-    left = np.square(numbers - basis @ fitted).sum() / free
-    return float(max(0.0, 1.0 - left / numbers.var(ddof=1)))
+    left = np.square(values - basis @ fitted).sum() / free
+    return float(max(0.0, 1.0 - left / values.var(ddof=1)))

@@ -21,6 +21,7 @@ from truearm.doubts import (
 from truearm.errors import count_of, short_names
 from truearm.grids import BETWEEN
 from truearm.models import CONSTANT, VARIABLE, leaves_noise
+from truearm.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
 from truearm.outlier_fate import FULL_WEIGHT
 from truearm.reporting.facts import Facts
 from truearm.reporting.known import Known, Stretch, weakest
@@ -28,6 +29,7 @@ from truearm.reporting.levers import ON_THE_AXIS_MM, taken_over, target_lever_mm
 from truearm.reporting.numbers import fixed, listed, percent, short, shown_readings
 from truearm.row_order import ORDER_OF_POSES
 from truearm.summary import saw_orientations
+from truearm.uneven_setups import UNEVEN_SETUPS
 
 MOST: Final = 4
 AT_THE_FLOOR: Final = 1.25
@@ -205,6 +207,21 @@ def _warm_up(facts: Facts) -> Iterator[Advice]:
     yield Advice("warm_up", "Let the set-up warm up.", words, left_in - steady)
 
 
+def _unused_column(facts: Facts) -> Iterator[Advice]:
+    if words := facts.noticed(UNUSED_COLUMN):
+        yield Advice(UNUSED_COLUMN, "Calibrate with the column.", words, 2.0 * facts.mean_mm())
+
+
+def _joints_moved(facts: Facts) -> Iterator[Advice]:
+    if words := facts.noticed(JOINTS_MOVED):
+        yield Advice(JOINTS_MOVED, "Let the arm warm up.", words, facts.mean_mm())
+
+
+def _uneven_setups(facts: Facts) -> Iterator[Advice]:
+    if words := facts.noticed(UNEVEN_SETUPS):
+        yield Advice(UNEVEN_SETUPS, "State sigma_mm.", words, 2.0 * facts.mean_mm())
+
+
 def _stood_still(facts: Facts) -> Iterator[Advice]:
     if facts.still:
         yield Advice("joint_stood_still", "Move every joint.", facts.still, 10.0 * facts.mean_mm())
@@ -350,6 +367,9 @@ RULES: Final = (
     _outliers,
     _stood_still,
     _warm_up,
+    _joints_moved,
+    _unused_column,
+    _uneven_setups,
     _on_a_grid,
     _at_few_values,
     _held_one_way,

@@ -1,0 +1,96 @@
+"""Joints that move with a column of the file, or while they are measured, are told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import truearm as ta
+from truearm.moved_joints import JOINTS_MOVED, UNUSED_COLUMN
+from truearm.reporting.report import report
+from truearm.simulation import Imperfections, VirtualArm
+from truearm.whitened import Whitened
+
+ROWS = 60
+WARM = 15.0 * (1.0 - np.exp(-3.0 * np.linspace(0.0, 1.0, ROWS)))
+"""How much warmer an arm is at each row than at the first, K."""
+PER_KELVIN = np.array([12.0, -9.0, 7.0, 10.0, -8.0, 6.0]) * 1e-6
+"""How far its joints turn from their readings, rad."""
+
+
+@pytest.fixture(scope="module")
+def arm():
+    plain = Imperfections(share=0.0, noise_mm=0.02)
+    return VirtualArm(ta.Robot.load("ur10"), seed=4, imperfections=plain)
+
+
+def told(arm, turned, columns, **options):
+    """Notices of joints that move, of a calibration where joints turned (n, N) from their readings."""
+    readings = arm.poses(ROWS)
+    features = pd.DataFrame({"humidity": np.random.default_rng(0).normal(50.0, 3.0, ROWS), **columns})
+    data = replace(arm.measure(readings + turned), readings=readings, features=features)
+    found = ta.calibrate(arm.robot, data, refit=False, holdout=0.1, **options)
+    return {notice.kind: str(notice) for notice in found.notices}, found
+
+
+def test_the_column_that_errors_go_with_is_named(arm):
+    notices, found = told(arm, np.outer(WARM, PER_KELVIN), {"temperature_C": 20.0 + WARM})
+    said = notices[UNUSED_COLUMN]
+    assert "--features temperature_C" in said
+    assert "humidity" not in said
+    assert JOINTS_MOVED not in notices
+    assert said in {advice.words for advice in report(found).advice}
+
+
+def test_joints_that_move_while_they_are_measured_are_told(arm):
+    turned = np.outer(WARM, PER_KELVIN)
+    notices, _ = told(arm, turned, {})
+    assert UNUSED_COLUMN not in notices
+    assert "--drift none" in notices[JOINTS_MOVED]
+    assert JOINTS_MOVED not in told(arm, turned, {}, drift="none")[0]
+
+
+def test_a_column_that_is_used_is_not_told(arm):
+    columns = {"temperature_C": 20.0 + WARM}
+    notices, _ = told(arm, np.outer(WARM, PER_KELVIN), columns, features=["temperature_C"])
+    assert not {UNUSED_COLUMN, JOINTS_MOVED} & set(notices)
+
+
+def test_an_arm_that_gives_way_under_loads_names_their_column(arm):
+    load = np.tile([0.0, 5.0, 10.0], ROWS // 3)
+    lever = arm.robot.joint_jacobian(arm.poses(ROWS))[:, 2]
+    notices, _ = told(arm, -3e-5 * lever * load[:, None], {"payload_kg": load})
+    assert "--features payload_kg" in notices[UNUSED_COLUMN]
+
+
+def test_an_arm_that_does_not_move_is_not_doubted(arm):
+    columns = {"temperature_C": 20.0 + WARM, "load_kg": np.random.default_rng(1).choice([0.0, 5.0], ROWS)}
+    notices, _ = told(arm, np.zeros((ROWS, 6)), columns)
+    assert not {UNUSED_COLUMN, JOINTS_MOVED} & set(notices)
+
+
+def test_what_chance_explains_is_as_likely_as_it_is():
+    """Residuals of a fit with 40 unknowns; of columns that explain nothing each chance is as frequent."""
+    rng = np.random.default_rng(3)
+    visits, width = 40, 3
+    fitted, _ = np.linalg.qr(rng.normal(size=(visits * width, 40)))
+    taken, found = fitted @ fitted.T, []
+    for _ in range(200):
+        noise = rng.normal(size=visits * width)
+        left = (noise - taken @ noise).reshape(visits, width)
+        root, held = np.broadcast_to(np.eye(width), (visits, width, width)), np.ones_like(left, dtype=bool)
+        seen = Whitened(np.arange(visits), left, held, root, taken, np.zeros((visits, width, 6)))
+        found.append(seen.explained(rng.normal(size=(visits, width, 6)))[0])
+    assert np.quantile(found, [0.1, 0.5, 0.9]) == pytest.approx([0.1, 0.5, 0.9], abs=0.08)
+
+
+def test_what_columns_do_is_found_with_its_size():
+    rng = np.random.default_rng(3)
+    columns, by = rng.normal(size=(50, 3, 2)), np.array([0.5, -1.0])
+    noise = 0.1 * rng.normal(size=(50, 3))
+    root, held = np.broadcast_to(np.eye(3), (50, 3, 3)), np.ones((50, 3), dtype=bool)
+    seen = Whitened(np.arange(50), columns @ by + noise, held, root, np.zeros((150, 150)), columns)
+    chance, found = seen.explained(columns)
+    assert chance < 1e-20
+    assert found == pytest.approx(by, abs=0.05)
