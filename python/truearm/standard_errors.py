@@ -77,7 +77,7 @@ def _in_common(task: Task, fits: Fits, precisions: Floats) -> Floats:
 def _squares(rows: Floats) -> Floats:
     """Sum (u, u) of the products of rows (..., u) with themselves."""
     flat = rows.reshape(-1, rows.shape[-1])
-    return flat.T @ flat
+    return np.asarray(flat.T @ flat)
 
 
 def standard_errors(task: Task, fits: Fits, covariance: Floats) -> Floats:

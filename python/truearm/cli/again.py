@@ -204,7 +204,7 @@ def _why_apart(report: Mapping[str, Any], before: "Calibration", since: "Sequenc
     if before.arm.world_is_known:
         return _why_two_worlds(data) or (BASE_ANEW if found_anew else "")
     older, *later = map(_stated_groups, data)
-    common = older & set().union(*later)
+    common = older & set[str]().union(*later)
     return BESIDE.format(groups=list_names(sorted(common))) if common and found_anew else ""
 
 
@@ -212,7 +212,11 @@ def _why_two_worlds(data: "Sequence[Measurements]") -> str:
     """Why rows are no single set-up, which they are to be where the world is the frame; "" where they are."""
     files = [name for rows in data if rows.default_group is not None for name in rows.files]
     names = list_names(dict.fromkeys(name for rows in data for name in rows.groups))
-    return ONE_SET_UP.format(groups=names) if len(set().union(*map(_stated_groups, data), files)) > 1 else ""
+    return (
+        ONE_SET_UP.format(groups=names)
+        if len(set[str]().union(*map(_stated_groups, data), files)) > 1
+        else ""
+    )
 
 
 def _stated_groups(data: "Measurements") -> set[str]:

@@ -64,5 +64,7 @@ def _motions(calibration: Calibration, poses: Floats) -> Floats:
     points, turns = poses[:, :3, 3], poses[:, :3, :3]
     axes = np.eye(3)
     about = np.cross(axes[None], points[:, None]).swapaxes(1, 2)
-    of_base = [] if calibration.arm.world_is_known else [np.broadcast_to(axes, turns.shape), about]
-    return np.concatenate([*of_base, turns], axis=2).reshape(3 * len(poses), -1)
+    of_base: list[Floats] = (
+        [] if calibration.arm.world_is_known else [np.broadcast_to(axes, turns.shape), about]
+    )
+    return np.asarray(np.concatenate([*of_base, turns], axis=2).reshape(3 * len(poses), -1))
