@@ -196,6 +196,22 @@ def test_another_robot_is_doubted():
     assert "another robot" in doubt
 
 
+def test_an_arm_of_ten_metres_may_be_off_by_more_than_a_small_one():
+    robot = ta.Robot.load("ur10")
+    table = robot.table.copy()
+    table[:, 1:3] *= 7.0
+    large = ta.Robot.from_table("gantry", table, joints=robot.joints, limits=robot.limits)
+    arm = VirtualArm(large, seed=4, imperfections=Imperfections(length_mm=5.0, share=0.0))
+    found = ta.calibrate(large, arm.measure(arm.poses(60)), model="constant")
+    change_mm = 1e3 * np.abs(found.model.constants - table)[:, 1:3]
+    assert change_mm.max() > 10.0
+    assert notice_of(found, "far_from_nominal") == ""
+    table[1, 2] += 0.2
+    other = ta.Robot.from_table("sibling", table, joints=robot.joints, limits=robot.limits)
+    doubt = notice_of(ta.calibrate(other, arm.measure(arm.poses(60)), model="constant"), "far_from_nominal")
+    assert "a2 is " in doubt
+
+
 def refusal(robot, data, **options):
     """What is said where so few rows are calibrated from; empty where they are enough."""
     try:

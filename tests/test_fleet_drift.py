@@ -34,6 +34,24 @@ def test_a_scara_whose_joint_was_mastered_anew_has_drifted_and_another_has_not(s
     assert drift_of(previous, same, others)["share_beyond"] < 1.0 - CLEARLY
 
 
+@pytest.mark.parametrize("moved", [False, True])
+def test_where_an_update_knew_base_and_flange_and_the_new_calibration_does_not_nothing_has_drifted(moved):
+    """A first joint that a kept frame told stands for a turn of the base where the frame is another."""
+    arm = VirtualArm(ta.Robot.load("rv-m2"), seed=2)
+    first = ta.calibrate(arm.robot, arm.measure(arm.poses(40)), model="constant")
+    shift = np.array([0.3, 0.0, 0.0, 0.0, 0.2])
+    new = remastered(arm, arm.poses(15, seed=9), shift, seed=9)
+    previous = ta.update(first, new, keep_frame=True, keep_tool=True).calibration
+    arm.world_from_base = lifted(0.5) @ arm.world_from_base
+    rows = remastered(arm, arm.poses(40, seed=4), [0.3, 0.3 * moved, 0.0, 0.0, 0.2], seed=4)
+    now = ta.calibrate(arm.robot, rows, model="constant")
+    assert {"theta1", "theta5"} <= set(previous.constant.names) - set(now.constant.names)
+    found = drift_of(previous, now, rows)
+    assert (found["mean_mm"] > 0.8) == moved
+    assert (found["share_beyond"] > 0.5) == moved
+    assert bool(found["moved"]) == moved
+
+
 def lifted(z_m):
     """A turned transform (4, 4) that lifts."""
     turned = np.eye(4)

@@ -46,6 +46,19 @@ def test_commands_reach_what_they_are_meant_for():
     assert reached == pytest.approx(calibration.robot.position(q), abs=1e-9)
 
 
+@pytest.mark.parametrize("behind_a_link", [True, False])
+def test_what_is_not_explained_is_what_the_posterior_has_anew_at_every_pose(behind_a_link):
+    """Drives whose curves go with readings repeat by their readings, too."""
+    calibration = calibrated(behind_a_link)
+    spread = calibration.spread
+    jacobian = calibration.parameter_jacobian(
+        calibration.rows.data.readings, tool=calibration.model.setup.targets[0, 0]
+    )
+    noise = spread.noise(jacobian, np.zeros(3, dtype=np.bool_)) / spread.inflation**2
+    told_mm = 1e3 * np.sqrt(np.trace(noise, axis1=1, axis2=2).mean() / 3.0)
+    assert calibration.summary["noise_mm"] == pytest.approx(told_mm, rel=1e-3)
+
+
 def test_the_report_names_readings():
     html = report(calibrated(True)).html
     assert "reading 2" in html

@@ -1,5 +1,6 @@
 """Commands that commands propose: typed as they stand, they work."""
 
+import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,8 @@ import pytest
 import truearm as ta
 from tests.remastered import remastered_table
 from truearm.cli import calibrate, main, session_export
-from truearm.cli.again import calibrate_again, calibrate_anew, option_words, plan_anew
+from truearm.cli.again import calibrate_again, calibrate_anew, plan_anew
+from truearm.cli.command_words import option_words
 from truearm.errors import typed
 from truearm.options import Options
 from truearm.simulation import VirtualArm
@@ -176,6 +178,70 @@ def test_a_second_update_adds_its_file_to_those_before(measured, tmp_path, monke
     assert files_of(calibrate_again(twice.without_rows(), None, "MORE.csv")) == ["OLD.csv", "MORE.csv"]
 
 
+KEPT = {"keep_frame": True, "keep_tool": True}
+
+
+@pytest.mark.parametrize(
+    ("later", "words"),
+    [
+        ({**KEPT, "offset_deg": 2.0}, ["--offset-deg", "2.0", "--keep-frame", "--keep-tool"]),
+        (KEPT, ["--keep-frame", "--keep-tool"]),
+    ],
+)
+def test_updates_are_made_again_with_their_options_as_far_as_they_were_made_alike(
+    later, words, measured, tmp_path, monkeypatch, capsys
+):
+    """What was kept tells the first joint: found anew it would be lost."""
+    monkeypatch.chdir(tmp_path)
+    once = updated(measured, tmp_path, moved=True, group="cell", **KEPT)
+    arm = VirtualArm(once.robot, seed=1)
+    table = remastered_table(arm, arm.poses(15, seed=5), [0.0, 0.6, 0.0, 0.0, 0.0], seed=5)
+    table.assign(group="cell").to_csv("newer.csv", index=False)
+    ta.update(once, ta.Measurements.read_csv("newer.csv"), **later).calibration.save("twice.calib")
+    assert main(["plan", "--next", "4", "--from", "twice.calib", "-o", "more.csv"]) == 0
+    told = capsys.readouterr().out
+    alike = later == KEPT
+    old, files = ("OLD2.calib", ["new.csv", "newer.csv"]) if alike else ("OLD.calib", ["newer.csv"])
+    command = proposed(told, f"update {old}")
+    assert command[3:] == [*files, "MEASUREMENTS.csv", *words, "-o", "NEW.calib"]
+    assert ("updated from with other options" in " ".join(told.split())) != alike
+    now, then = re.search(r"workspace: ([\d.]+) mm now, ([\d.]+) mm when", " ".join(told.split())).groups()
+    assert float(then) < float(now)
+    assert told.count("truearm update --roll-back") == len(files)
+
+
+def test_proposals_that_make_nothing_surer_are_no_proposals(measured, tmp_path, monkeypatch, capsys):
+    """A file of an earlier version does not tell that frame and tool were kept."""
+    monkeypatch.chdir(tmp_path)
+    known = updated(measured, tmp_path, moved=True, group="cell", **KEPT)
+    report = {name: told for name, told in known.revision.report.items() if name != "options"}
+    replace(known, revision=replace(known.revision, report=report)).save("old.calib")
+    assert main(["plan", "--next", "1", "--from", "old.calib", "-o", "more.csv"]) == 0
+    told = capsys.readouterr().out
+    assert "no less uncertain than old.calib is" in " ".join(told.split())
+    assert "truearm update" not in told
+
+
+def test_in_the_world_commands_are_of_one_set_up(measured, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arm = VirtualArm(measured[0], seed=1)
+    arm.world_from_base = np.eye(4)
+    arm.measure_table(arm.poses(40)).to_csv("old.csv", index=False)
+    later = arm.measure_table(arm.poses(15, seed=9), seed=9)
+    later.to_csv("new.csv", index=False)
+    before = ta.calibrate(arm.robot, ta.Measurements.read_csv("old.csv"), model="constant", frame="world")
+    found = ta.update(before, ta.Measurements.read_csv("new.csv"), keep_tool=True)
+    found.calibration.save("new.calib")
+    assert main(["plan", "--next", "3", "--from", "new.calib", "-o", "more.csv"]) == 0
+    told = capsys.readouterr().out
+    assert 'these are of "old" and "new"' in " ".join(told.split())
+    assert "when these are measured too" in " ".join(told.split())
+    later.assign(group="new").iloc[::-1].to_csv("MEASUREMENTS.csv", index=False)
+    for words in (proposed(told, "update --roll-back"), proposed(told, "update OLD.calib")):
+        assert main(words[1:]) == 0
+    assert "calibrate rv-m2 MEASUREMENTS.csv" in told
+
+
 @pytest.mark.parametrize(("times", "planned"), [(1, 60), (2, 80), (9, 200)])
 def test_as_many_poses_are_planned_anew_as_an_arm_was_calibrated_from(times, planned, measured, tmp_path):
     robot, old, later, _ = measured
@@ -195,8 +261,10 @@ def test_options_that_the_command_lacks_are_named(measured):
     made = ta.calibrate(robot, ta.Measurements.from_dataframe(old), model="constant", prior_mm=3.0, rate=0.25)
     again = calibrate_again(made, "rv-m2", "MORE.csv")
     assert again.notes == (
+        'The rows of "data" came from no file: write them to "data.csv" first.',
         "The command has no option for prior_mm=3.0, rate=0.25: calibrate from Python to keep that.",
     )
+    assert files_of(again) == ["data.csv", "MORE.csv"]
     assert "prior" not in again.command
 
 

@@ -1,6 +1,7 @@
 """Standard errors of constants hold what these take over of what varies, and survive files and updates."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,6 +72,24 @@ def test_without_a_field_they_are_those_of_the_fit():
         details.standard_errors, np.sqrt(np.diagonal(details.covariance)[: len(details.names)])
     )
     assert 0.5 < root_mean_square(off_by(calibration, arm) / details.standard_errors) < 1.5
+
+
+@pytest.mark.parametrize(("slip_m", "least", "most"), [(5e-5, 0.8, 1.1), (0.0, 0.5, 0.65)])
+def test_three_targets_tell_as_much_as_one_of_what_they_have_in_common(slip_m, least, most):
+    """Where each errs for itself they tell as three measurements do."""
+    arm = VirtualArm(ta.Robot.load("rv-m2"), imperfections=Imperfections(share=0.0, noise_mm=0.01))
+    q, place = arm.poses(40), arm.target_in_flange
+    slips = slip_m * np.random.default_rng(0).normal(size=(len(q), 3))
+    points = []
+    for seed, shift in enumerate(0.02 * np.eye(3)):
+        arm.target_in_flange = place + shift
+        points.append(arm.measure(q, seed=seed).targets[:, 0] + slips)
+    wide = replace(arm.measure(q), targets=np.stack(points, axis=1))
+    alone = replace(wide, targets=wide.targets[:, :1])
+    three, one = (ta.calibrate(arm.robot, rows, model="constant").constant for rows in (wide, alone))
+    errors = [dict(zip(each.names, each.standard_errors, strict=True)) for each in (three, one)]
+    ratios = [errors[0][name] / errors[1][name] for name in one.names]
+    assert least < np.median(ratios) < most
 
 
 def test_a_file_keeps_them(yielding, tmp_path):

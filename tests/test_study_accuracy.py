@@ -122,6 +122,18 @@ def test_a_method_that_cannot_be_fitted_says_why_and_stops_no_other(file, tmp_pa
     assert str(file.parent) not in text
 
 
+def test_groups_are_of_set_ups_and_joints_too(table, tmp_path, capsys):
+    file, layer = tmp_path / "arm.csv", 0.5 * (np.arange(POSES) // 8)
+    table.assign(group=np.where(np.arange(POSES) < 40, "east", "west"), q1=layer).to_csv(file, index=False)
+    sets = parse_sets([f"ur10={file}"], None)
+    for columns in (("q1",), ("group", "q1")):
+        cell = list_cells(sets, Asked(("groups",), columns, ("30",), (7,)))[0]
+        split = divide(sets[0], cell.cut, 7)
+        assert not set(layer[split.train]) & set(layer[split.holdout])
+    assert study(file, tmp_path / "out", *FAST, "--splits", "groups", "--split-by", "group") == 1
+    assert "fewer than 5 held-out rows of set-ups that train" in _words(capsys.readouterr().err)
+
+
 @pytest.mark.parametrize(
     ("rows", "given", "words"),
     [

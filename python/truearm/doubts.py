@@ -31,9 +31,11 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 FAR_M: Final = 0.01
+FAR_SHARE: Final = 2e-3
 FAR_RAD: Final = 0.1
-"""Lengths of arms are off by a millimetre or two, angles by milliradians, those of joints that were never
-mastered by a little more; siblings of one family differ by a centimetre and more."""
+"""Lengths of arms are off by a millimetre or two, those of arms beyond some five metres by that much of each
+metre; angles by milliradians, those of joints that were never mastered by a little more. Siblings of one
+family differ by a centimetre and more."""
 LARGE_MM: Final = 10.0
 """No arm that fits its table misses by so much once it is calibrated."""
 LARGE_MRAD: Final = 50.0
@@ -484,7 +486,8 @@ def _share_of_far(arm: IdentifiedArm, found: Floats) -> Floats:
     length = are_lengths(range(KIND_COUNT))
     change = found - arm.table
     change[:, ~length] = np.arctan2(np.sin(change[:, ~length]), np.cos(change[:, ~length]))
-    share = np.abs(change) / np.where(length, FAR_M, FAR_RAD)
+    far_m = max(FAR_M, FAR_SHARE * float(np.abs(arm.robot.table[:, length]).sum()))
+    share = np.abs(change) / np.where(length, far_m, FAR_RAD)
     if arm.world_is_known:
         share[0] = 0.0
     return share

@@ -54,6 +54,10 @@ class WorkError(InputError):
     """The input is well formed, and still the work could not be done."""
 
 
+class TooFewError(InputError):
+    """Measurements that are right, and fewer than the work needs."""
+
+
 @dataclass(frozen=True)
 class Notice:
     """Something the user should know that stops nothing.

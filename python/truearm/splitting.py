@@ -281,10 +281,8 @@ def _drawn_keys(data: Measurements, rows: Rows, rule: SplitRule, rng: np.random.
 
 
 def _key_columns(data: Measurements, names: Sequence[str]) -> NDArray[np.float64]:
-    """Columns (n, k) to split by: features, or what was read as group or joints."""
-    known = {f"q{j + 1}": data.readings[:, j] for j in range(data.joint_count)}
-    known["group"] = np.unique(data.group, return_inverse=True)[1].astype(np.float64)
-    known |= {str(name): data.features[name].to_numpy(np.float64) for name in data.features.columns}
+    """Columns (n, k) to split by."""
+    known = split_columns(data)
     for name in names:
         if name not in known:
             raise UsageError(
@@ -301,6 +299,13 @@ def _key_columns(data: Measurements, names: Sequence[str]) -> NDArray[np.float64
                 rule="Rows are divided by the values of this column",
             )
     return np.column_stack([known[name] for name in names])
+
+
+def split_columns(data: Measurements) -> dict[str, NDArray[np.float64]]:
+    """What rows can be split by, a number for each row (n,): features, group and joints."""
+    known = {f"q{j + 1}": data.readings[:, j] for j in range(data.joint_count)}
+    known["group"] = np.unique(data.group, return_inverse=True)[1].astype(np.float64)
+    return known | {str(name): data.features[name].to_numpy(np.float64) for name in data.features.columns}
 
 
 def _first_of_kin(data: Measurements) -> Rows:

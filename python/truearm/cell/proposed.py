@@ -35,6 +35,7 @@ from truearm.proposing import (
 from truearm.robot import Robot
 from truearm.stillness import still_joints
 from truearm.units import MM_PER_METRE
+from truearm.updating import UpdateOptions
 
 Floats = NDArray[np.float64]
 
@@ -58,6 +59,7 @@ class ProposalOptions:
             each target that the calibration found in the set-up, or the cell's.
         update_of: The calibration that will be updated from the next poses; None where one is made from all.
         update_rows: What was measured since that one, which takes part.
+        update_options: How it will be updated; the defaults without.
     """
 
     count: int
@@ -67,6 +69,7 @@ class ProposalOptions:
     rules: tuple[Rule, ...] = ()
     update_of: Calibration | None = None
     update_rows: tuple[Measurements, ...] = ()
+    update_options: UpdateOptions | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,11 @@ class Proposed:
     found: NextPoses | Acceptance
     shown: str
     lowest_m: float
+
+    @property
+    def teaches(self) -> bool:
+        """Whether less is uncertain once the poses are measured, as far as that can be told."""
+        return not isinstance(self.found, NextPoses) or self.found.teach
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values: motion times, and the expected deviations or what is noticed."""
@@ -129,7 +137,8 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
     found = next_poses(candidates, workspace, options.count)
     if options.update_of is not None:
         chosen = replace(candidates, readings=candidates.readings[found.rows])
-        expected = expected_by_update(chosen, workspace, options.update_of, options.update_rows)
+        known = options.update_of, options.update_rows, options.update_options
+        expected = expected_by_update(chosen, workspace, *known)
         found = replace(found, expected_mm=expected)
     proposed = _ordered(candidates, found, found.rows, "train", options, cell)
     return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))

@@ -28,8 +28,12 @@ if TYPE_CHECKING:
 NUMBERS: Final = (20, 40, 60, 100, 200)
 MEASURED: Final = "Measure them; then:"
 ANEW: Final = (
-    "An update of the calibration before finds offsets, frame and tool from all rows since. What varies "
-    "can only be learned anew from as many poses as before."
+    "An update of the calibration before finds what moved from all rows since. What varies can only be "
+    "learned anew from as many poses as before."
+)
+WORSE: Final = (
+    "Such an update is expected to leave no less uncertain than {file} is: it may find less than the updates "
+    "before did. Keep that, or calibrate anew."
 )
 PICTURES: Final = (".png", ".svg", ".pdf")
 
@@ -226,7 +230,7 @@ def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: 
     if asked.acceptance is not None:
         suggest(f"truearm update {typed(asked.calibration)} {NEW_FILE}", when=MEASURED)
     else:
-        _suggest_again(again, calibration, asked.calibration)
+        _suggest_again(again, calibration, asked.calibration, proposed)
 
 
 def _cell_of(calibration: "Calibration", file: Path | None) -> "Cell | None":
@@ -250,7 +254,7 @@ def _save(plan: "Plan | Proposed", output: Path | None, picture: Path | None) ->
         draw(plan, picture)
 
 
-def _suggest_again(again: Again, calibration: "Calibration", file: Path) -> None:
+def _suggest_again(again: Again, calibration: "Calibration", file: Path, proposed: "Proposed") -> None:
     update = f"truearm update {typed(file)} {NEW_FILE}"
     if not again.apart:
         say_wrapped(f"Older rows count only if the arm has not changed since: {update} tells.")
@@ -260,7 +264,9 @@ def _suggest_again(again: Again, calibration: "Calibration", file: Path) -> None
         suggest(again.command, when="Then calibrate:" if again.notes else "Then calibrate from all:")
         return
     say_wrapped(ANEW)
-    if again.holds:
+    if not proposed.teaches:
+        say_wrapped(WORSE.format(file=typed(file)))
+    elif again.holds:
         suggest(*again.updates(file, NEW_FILE), when=MEASURED)
     suggest(plan_anew(calibration), calibrate_anew(calibration).command, when="To calibrate anew:")
 

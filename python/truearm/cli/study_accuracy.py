@@ -177,12 +177,13 @@ def _words(given: str | None) -> tuple[str, ...]:
 
 def _warn_of(study: "Study") -> None:
     """Read all sets before any work, and say what is to be known of them; refuse what none can answer."""
+    from truearm.splitting import split_columns
     from truearm.studies.accuracy.cells import check_askable
     from truearm.studies.accuracy.sets import read_set
 
     for one in study.sets:
         warn(read_set(one).notices)
-    columns = {name for one in study.sets for name in read_set(one).data.features.columns}
+    columns = {name for one in study.sets for name in split_columns(read_set(one).data)}
     for name in study.asked.split_by:
         if name not in columns:
             raise UsageError(f'no set has a column "{name}"', where="--split-by")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.errors import InputError, WorkError
+from truearm.fleet.gauge import as_placed_in
 from truearm.identified import Frame
 from truearm.measurements import Measurements
 from truearm.models import CONSTANT
@@ -99,12 +100,9 @@ def _features(calibration: Calibration, data: Measurements) -> dict[str, Floats]
 
 def _change_m(previous: Calibration, now: Calibration, data: Measurements) -> Floats:
     """How far positions (n,) moved, m."""
-    before, after = (
-        calibration.position(
-            data.readings, tool=_tool(calibration, now.robot), features=_features(calibration, data)
-        )
-        for calibration in (previous, now)
-    )
+    q, tool, features = data.readings, _tool(previous, now.robot), _features(previous, data)
+    before = as_placed_in(now, previous, q, tool, features).position(q, tool=tool, features=features)
+    after = now.position(q, tool=_tool(now, now.robot), features=_features(now, data))
     if not now.arm.world_is_known:
         moved = now.robot.base @ np.linalg.inv(previous.robot.base)
         before = before @ moved[:3, :3].T + moved[:3, 3]

@@ -9,12 +9,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
-from truearm.errors import InputError
+from truearm.errors import TooFewError
 from truearm.measurements import Measurements
 from truearm.proposing.candidates import Candidates
 from truearm.proposing.next_poses import deviation_mm
 from truearm.rotations import quaternion_from_matrix
-from truearm.updating import update
+from truearm.updating import UpdateOptions, update
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +22,11 @@ PREDICTED: Final = "as predicted"
 
 
 def expected_by_update(
-    candidates: Candidates, workspace: Floats, before: Calibration, rows: Sequence[Measurements] = ()
+    candidates: Candidates,
+    workspace: Floats,
+    before: Calibration,
+    rows: Sequence[Measurements] = (),
+    options: UpdateOptions | None = None,
 ) -> Floats:
     """Expected standard deviation as in NextPoses, now and after an update from all candidates, mm.
 
@@ -31,18 +35,20 @@ def expected_by_update(
         workspace: Readings (t, N) at which the error counts.
         before: The calibration that is updated.
         rows: Measurements that it is updated from beside.
+        options: How it is updated; the defaults without.
 
     Returns:
         Two numbers; the first alone where the rows are too few for an update.
 
     Raises:
+        InputError: If it cannot be updated from these for another reason.
         WorkError: If a calibration has no standard deviations.
     """
     where = replace(candidates, readings=workspace, group=candidates.set_up)
     now = deviation_mm(where)
     try:
-        found = update(before, [*rows, _as_predicted(candidates)])
-    except InputError:
+        found = update(before, [*rows, _as_predicted(candidates)], options)
+    except TooFewError:
         return np.array([now])
     return np.array([now, deviation_mm(replace(where, calibration=found.calibration))])
 

@@ -28,6 +28,11 @@ class NextPoses:
     rows: NDArray[np.int64]
     expected_mm: Floats
 
+    @property
+    def teach(self) -> bool:
+        """Whether less is expected once they are measured than before, as far as that can be told."""
+        return len(self.expected_mm) == 1 or bool(self.expected_mm[-1] < self.expected_mm[0])
+
 
 def next_poses(candidates: Candidates, workspace: Floats, count: int) -> NextPoses:
     """Choose `count` candidates one after the other, each that which leaves the workspace the least variance.

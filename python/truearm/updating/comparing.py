@@ -1,7 +1,7 @@
 """Update a calibration with 10 to 20 new poses: what moved, and whether the old one still holds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -9,7 +9,16 @@ import numpy as np
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import select_fitted
-from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, in_words, list_names
+from truearm.errors import (
+    InputError,
+    Notice,
+    TooFewError,
+    UsageError,
+    WorkError,
+    count_of,
+    in_words,
+    list_names,
+)
 from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
 from truearm.measurements import Measurements
@@ -238,7 +247,8 @@ class _Found:
             outliers=tuple(outliers),
             notices=notices,
         )
-        new = updated(kept, found, judged, told.to_dict(), notices)
+        report = {**told.to_dict(), "options": asdict(self.options)}
+        new = updated(kept, found, judged, report, notices)
         return replace(told, calibration=new)
 
 
@@ -296,7 +306,7 @@ def _check_enough(data: Measurements, task: Task, unknowns: Unknowns) -> None:
     if scene_values > wanted:
         return
     per_pose = max(scene_values // max(len(data), 1), 1)
-    raise InputError(
+    raise TooFewError(
         f"{scene_values} measured values in {count_of(len(data), 'pose')} cannot tell {wanted} unknowns of "
         "offsets, frame and tool",
         where=", ".join(data.files),
@@ -314,7 +324,7 @@ def _check_groups(data: Measurements, task: Task) -> None:
     for group in task.groups:
         count = int((seen & (data.group == group)).sum())
         if count < fewest:
-            raise InputError(
+            raise TooFewError(
                 f"{count_of(count, 'pose')} of set-up {list_names([group])}",
                 where=", ".join(data.files),
                 rule=f"An update needs at least {fewest} of each, outliers not counted",

@@ -10,13 +10,14 @@ from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
 from truearm.defaults import HOLDOUT
 from truearm.errors import InputError, UsageError, did_you_mean, list_names
 from truearm.measurements import Measurements
-from truearm.splitting import HoldoutRange, Split, SplitRule, split_rows
+from truearm.splitting import HoldoutRange, Split, SplitRule, split_columns, split_rows
 from truearm.stillness import still_joints
 from truearm.studies.accuracy.sets import DataSet, Read, read_set
 
@@ -152,11 +153,14 @@ def rows_of(data_set: DataSet, cut: Cut, seed: int, poses: int) -> Split:
 
 def _divided(data: Measurements, cut: Cut, seed: int) -> Split:
     """Rows divided by what the cut says; which set-ups train is asked later, of the rows that are taken."""
+    known = split_columns(data)
     data = replace(data, group=np.full_like(data.group, ""))
     if cut.kind == "tails":
         rule = SplitRule(seed=seed, holdout_range=HoldoutRange.parse(cut.detail))
     elif cut.kind == "groups":
-        rule = SplitRule(seed=seed, split_by=tuple(cut.detail.split(",")))
+        names = cut.detail.split(",")
+        data = replace(data, features=pd.DataFrame({name: known[name] for name in names}))
+        rule = SplitRule(seed=seed, split_by=tuple(names))
     elif cut.kind == "clusters":
         data = replace(data, features=data.features.assign(**{CLUSTER_COLUMN: _clusters(data, seed)}))
         rule = SplitRule(seed=seed, split_by=(CLUSTER_COLUMN,))
@@ -180,9 +184,10 @@ def _tail(joint: int, turn: int) -> HoldoutRange:
 
 def _has_groups(data: Measurements, split_by: Sequence[str]) -> bool:
     """Whether the columns are there and most rows are equal in them to others."""
-    if not all(name in data.features.columns for name in split_by):
+    known = split_columns(data)
+    if not all(name in known for name in split_by):
         return False
-    shared = data.features.duplicated(list(split_by), keep=False).mean()
+    shared = pd.DataFrame({name: known[name] for name in split_by}).duplicated(keep=False).mean()
     return bool(shared > MOST_SHARED)
 
 
