@@ -297,21 +297,6 @@ def test_orientation_and_its_target_are_updated():
         check_offset(offset, shift, errors=5.0)
 
 
-def test_the_world_as_frame_finds_the_base_again():
-    arm = VirtualArm.paper(seed=3, imperfections=Imperfections(share=0.0, noise_mm=0.02))
-    arm.world_from_base = np.eye(4)
-    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), frame="world", model="constant")
-    arm.world_from_base = np.eye(4)
-    arm.world_from_base[:3, 3] = 0.002, 0.001, -0.001
-    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9)
-    found = ta.update(calibration, data)
-    assert found.verdict == "moved"
-    assert found.frames == ()
-    assert error_mm(found.calibration, arm, SHIFT) < 0.1
-    with pytest.raises(ta.UsageError, match="the base is part of the arm"):
-        ta.update(calibration, data, keep_frame=True)
-
-
 def test_an_update_is_saved_with_what_was_before(known, moved, tmp_path):
     arm, calibration = known
     calibration.save(tmp_path / "old.calib")

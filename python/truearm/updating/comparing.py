@@ -48,13 +48,15 @@ class Update:
 
     Attributes:
         calibration: With offsets, frames and tools estimated again; the old one is kept in it.
-        verdict: "holds": the old calibration still does. "moved": offsets or tool changed, and the field
-            still fits. "field": what is left is more than field and noise may leave.
+        verdict: "holds": the old calibration still does. "moved": offsets, tool or the base of a known
+            world changed, and the field still fits. "field": what is left is more than field and noise may
+            leave.
         level: Share of unchanged arms that are not said to hold. `changed` and `rest` share it.
         offsets: Of the joints.
-        frames: Motions of the set-ups' frames, where the calibration knows them.
+        frames: Motions of the set-ups' frames, where the calibration knows them; in a known world that of
+            the base.
         tools: Motions of the targets, where the calibration knows them.
-        changed: The test of offsets and tool.
+        changed: The test of offsets and tool, and of the base of a known world.
         rest: The test of what is left.
         before: Errors of the old calibration at each pose, its frame found from the others.
         after: The same with offsets and tool found from the others too.
@@ -89,20 +91,27 @@ class Update:
     @property
     def estimated(self) -> tuple[str, ...]:
         """What was estimated: "offsets", and unless kept "frame" (in a known world "base") and "tool"."""
-        frame = "base" if self.calibration.arm.world_is_known else "frame"
-        free = (shown for name, shown in (("frame", frame), ("tool", "tool")) if name not in self.kept)
-        return ("offsets", *free)
+        return ("offsets", *(name for name in (self._frame, "tool") if name not in self.kept))
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """What of "frame" and "tool" was kept as it was."""
-        parts = (("frame", self.frames), ("tool", self.tools))
+        """What of "frame" (in a known world "base") and "tool" was kept as it was."""
+        parts = ((self._frame, self.frames), ("tool", self.tools))
         return tuple(name for name, found in parts if found and all(motion.kept for motion in found))
 
     @property
     def tested(self) -> tuple[str, ...]:
-        """What was tested for a change: "offsets", and "tool" unless it was kept or is another one."""
-        return ("offsets", "tool") if any(motion.p is not None for motion in self.tools) else ("offsets",)
+        """What was tested for a change: "offsets", and unless kept the "base" of a known world, and "tool"
+        unless it is another one.
+        """
+        parts = ((self._frame, self.frames), ("tool", self.tools))
+        compared = (name for name, found in parts if any(motion.p is not None for motion in found))
+        return ("offsets", *compared)
+
+    @property
+    def _frame(self) -> str:
+        """What says where the arm stands: "frame", or in a known world "base"."""
+        return "base" if self.calibration.arm.world_is_known else "frame"
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the calibration."""
@@ -172,7 +181,7 @@ def update(
         _ = calibration.spread
     with stages("finding what moved"):
         rows = _Rows.of(Scene(task, data, calibration, unknowns))
-        held = untold(rows.scene, rows.scatter, rows.start)
+        held = untold(rows.scene, rows.scatter, rows.scene.unchanged(rows.start))
         if held:
             rows = _Rows.of(Scene(task, data, calibration, unknowns.holding(held)))
         rows, outliers = _without_outliers(calibration, rows)
@@ -210,10 +219,11 @@ class _Found:
         unknowns, level = scene.unknowns, self.options.level
         found = estimate(scene, scatter, start, unknowns.free)
         _check_plausible(scene, found, notices)
-        anew = unknowns.free & unknowns.nuisance
+        anew = unknowns.free & unknowns.anew
         still = estimate(scene, scatter, scene.unchanged(start), anew)
-        judge = Judge(level, known_scale(self.calibration).freedom)
-        changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
+        known = known_scale(self.calibration).freedom
+        changed, rest = change_test(still, unknowns, known), rest_test(found, unknowns, known)
+        judge = Judge.of(changed, _threshold(level), unknowns, known)
         verdict = _verdict(changed, rest, level)
         if verdict == "field":
             # What is left says itself how much it scatters, and the calibration no longer does.
@@ -275,10 +285,9 @@ def _task(
 
 
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:
-    asked = [name for name in ("keep_frame", "keep_tool") if getattr(options, name)]
+    kept = ("keep_tool",) if task.arm.world_is_known else ("keep_frame", "keep_tool")
+    asked = [name for name in kept if getattr(options, name)]
     strange = [g for g, known in zip(task.groups, unknowns.known, strict=True) if known is None]
-    if options.keep_frame and task.arm.world_is_known:
-        raise UsageError("the frame is kept", rule="With the world as frame the base is part of the arm")
     if asked and strange:
         raise UsageError(
             f"the calibration knows no frame and tool of set-up {list_names(strange)} that could be kept",
