@@ -25,6 +25,8 @@ from truearm.updating.unknowns import Unknowns, is_part_of
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+FINEST: Final = 1e-8
+"""No device tells points or turns of an arm more finely, m and rad."""
 RANK: Final = 1e-9
 """Columns reach no farther than this share of the farthest in directions that they do not have."""
 
@@ -170,11 +172,15 @@ class Scene:
         return _without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
 
     def scatter(self, state: State) -> Floats:
-        """Covariance (R, R) of what rows show anew: noise, and what the device says of itself."""
+        """Covariance (R, R) of what rows show anew: noise, and what the device says of itself.
+
+        Noise of computed rows is next to nothing; that they are off by less than FINEST tells of no arm.
+        """
         noise = self._calibration.spread.noise(self.arm_jacobian(state), self.orientation)
         seen = self.seen.reshape(-1)
         own = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
-        whole = block_diag(*(noise + own))
+        finest = FINEST**2 * np.eye(len(self.orientation))
+        whole = block_diag(*(noise + own + finest))
         return np.asarray(whole[np.ix_(seen, seen)])
 
     def _stated_beyond_noise(self) -> Floats:
