@@ -58,7 +58,7 @@ def test_joint_1_is_told_where_the_base_is_kept(known):
 
 
 def test_a_base_that_moved_is_found_with_the_offsets(known):
-    arm, calibration = known
+    _, calibration = known
     moved = virtual_arm()
     moved.world_from_base[:3, 3] = 0.002, 0.0, -0.001
     found = ta.update(calibration, remastered(moved, moved.poses(15, seed=9), SHIFT, seed=9))

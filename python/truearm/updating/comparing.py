@@ -149,8 +149,8 @@ def update(
 
     Args:
         calibration: With its measurements.
-        data: New measurements of the same arm, of 10 to 20 poses all over the workspace. Of more than 500 so
-            many are used, spread evenly.
+        data: New measurements of the same arm, of 10 to 20 poses all over the workspace. Of more than 1500
+            measured values (500 points) so many are used, spread evenly over the poses.
         options: What may have moved; defaults without them.
         stages: Called with the name of each stage; gives a context manager that surrounds it.
         **more: The same options as keywords, such as keep_frame=True.
@@ -167,10 +167,12 @@ def update(
     data, together = points_together(data.deduplicated())
     notices += together
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
-    data, unused = some_poses(one_row_a_visit(data))
-    notices += [*unused, *silent_rows(calibration, data)]
+    data = one_row_a_visit(data)
     task, left_out = _task(calibration, data, chosen, stages)
-    notices += left_out
+    data, unused = some_poses(data, task.selection)
+    if unused:
+        task, left_out = _task(calibration, data, chosen, stages)
+    notices += [*unused, *silent_rows(calibration, data), *left_out]
     if task.selection.orientation:
         check_turns(data, calibration.robot)
     unknowns = Unknowns.of(calibration, task, chosen, data)
