@@ -6,7 +6,7 @@ import pytest
 import truearm as ta
 from tests.remastered import remastered
 from truearm.simulation import Imperfections, VirtualArm
-from truearm.update_words import untested_words
+from truearm.update_words import of_known_world, untested_words
 
 SHIFT = np.array([0.0, 0.6, 0.0, 0.9, 0.0, 0.0])
 FIRST = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -91,3 +91,4 @@ def test_a_shift_that_the_base_does_not_have_is_no_offset_of_joint_1(known):
     moved.world_from_base[:3, 3] = 0.0, 0.001, 0.0
     found = ta.update(calibration, moved.measure(moved.poses(15, seed=9), seed=9))
     assert (found.verdict, found.offsets[0].told) == ("field", False)
+    assert "along the sixth" in of_known_world(found.to_dict())

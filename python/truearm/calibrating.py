@@ -53,6 +53,7 @@ from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge, where_found
 from truearm.known_scale import KnownScale, common_share
+from truearm.known_world import another_frame
 from truearm.lengths import length_mm
 from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
@@ -177,10 +178,18 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     if shifted:
         doubted = _of_errors(task, found, data, None)
         doubted[1:1] = shifted
+    elif framed := _framed(task, found):
+        doubted[1:1] = framed
     elif any(notice.kind in (NO_HELP, FAR_FROM_NOMINAL) for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
     return doubted if shifted else [*exchanged_notices(found), *doubted]
+
+
+def _framed(task: Task, found: Calibration) -> list[Notice]:
+    """Whether rows of a known world would fit far better with a frame that is found."""
+    left = left_m(found.constant, found.variable)
+    return [] if found.rows is None else another_frame(task, found.rows.fitted, left)
 
 
 def _of_errors(task: Task, found: Calibration, data: Measurements, outliers: Outliers | None) -> list[Notice]:

@@ -11,6 +11,22 @@ OPTIONS: Final = {
 """Of what a joint may be confounded with: the option that keeps it, and when that is right."""
 
 
+FIVE_OF_SIX: Final = (
+    "As a row of the table the base has five of the six freedoms of a frame: constants do not correct a "
+    "shift along the sixth, the y axis of most bases."
+)
+
+
+def of_known_world(told: Mapping[str, Any]) -> str:
+    """What may look like a field that changed where the world is known, in sentences; "" where it is not.
+
+    Args:
+        told: What `Update.to_dict` gives.
+    """
+    is_known = any(motion.get("part") == "base" for motion in told["frames"])
+    return f"{FIVE_OF_SIX} If the device was shifted so, nothing else fits." if is_known else ""
+
+
 def follows_words(joint: int, followed: int) -> str:
     """That one motor explains the changes of two coupled joints, counted from 1, in a sentence."""
     return (

@@ -179,7 +179,7 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
 def _verdict(found: "Update") -> str:
     """What was found, in a sentence or two."""
     from truearm.reporting.numbers import listed
-    from truearm.update_words import untested_joints, way_out_of_keeping
+    from truearm.update_words import of_known_world, untested_joints, way_out_of_keeping
 
     untested = untested_joints(found.to_dict())
     if found.verdict == "holds":
@@ -189,12 +189,12 @@ def _verdict(found: "Update") -> str:
             f"{listed(found.tested, 'or').capitalize()} changed. All else still fits, so the updated "
             f"calibration replaces the old one. {untested}"
         ).strip()
-    kept = way_out_of_keeping(found.kept)
+    kept, base = way_out_of_keeping(found.kept), of_known_world(found.to_dict())
     return (
         f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "
-        f"{kept and f'{kept}. '}Check that these are measurements of this arm. If they are, measure anew and "
-        "calibrate. If the measuring device scatters more than when the arm was calibrated, say so in a "
-        "column sigma_mm and update again."
+        f"{kept and f'{kept}. '}{base and f'{base} '}Check that these are measurements of this arm. If they "
+        "are, measure anew and calibrate. If the measuring device scatters more than when the arm was "
+        "calibrated, say so in a column sigma_mm and update again."
     )
 
 

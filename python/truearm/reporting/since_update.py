@@ -8,7 +8,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
-from truearm.update_words import follows_words, motion_name, untested_joints, untested_words
+from truearm.update_words import follows_words, motion_name, of_known_world, untested_joints, untested_words
 from truearm.validation import Validation
 
 VERDICTS: Final = {
@@ -37,6 +37,8 @@ def _overall(told: Mapping[str, Any]) -> str:
         tested=listed(told["tested"], "or").capitalize(), estimated=listed(told["estimated"]).capitalize()
     )
     left = f", of which {len(told['outliers'])} were left out as outliers," if told["outliers"] else ""
+    if told["verdict"] == "field" and (base := of_known_world(told)):
+        words = f"{words} {base}"
     if untested := untested_joints(told):
         words = f"{words} {untested}"
     change, rest = (probability(told[test]["p"]) for test in ("changed", "rest"))

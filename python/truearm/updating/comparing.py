@@ -9,9 +9,11 @@ import numpy as np
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import select_fitted
+from truearm.doubts import LARGE_MM
 from truearm.errors import InputError, Notice, UsageError, WorkError, count_of, in_words, list_names
 from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
@@ -276,6 +278,7 @@ def _task(
             rule="An update needs standard deviations, and schemes do not tell them",
             way_out="Calibrate with --model variable or constant",
         )
+    _check_of_use(calibration)
     where = ", ".join(data.files)
     selection, left_out = select_fitted(data, options.use, calibration.selection)
     if selection.distances or calibration.selection.distances:
@@ -284,6 +287,18 @@ def _task(
         raise InputError(f"there are {len(data.groups)} set-ups", where=where, rule="The world is one")
     task = Task(calibration.arm, selection, data.groups, calibration.options, stages=stages)
     return task, left_out
+
+
+def _check_of_use(calibration: Calibration) -> None:
+    """Raise WorkError where a calibration is so far off that nothing is unlike what it expects."""
+    judged = calibration.validation
+    left_mm = judged.holdout[calibration.model_name].position.mean
+    if left_mm >= LARGE_MM:
+        raise WorkError(
+            f"this calibration misses {judged.judged} rows of its own by {length_mm(left_mm, 3)} on average",
+            rule="It expects so little that no measurements are unlike it",
+            way_out="Calibrate anew when the reason is found: truearm report CALIB names what to check",
+        )
 
 
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:
