@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import truearm as ta
@@ -110,3 +111,14 @@ def test_an_altered_and_a_truncated_calibration(folder, tmp_path, capsys):
 def test_wrong_usage(options, status, words, capsys):
     assert main(["evaluate", "arm.calib", "other.csv", *options]) == status
     assert words in capsys.readouterr().err
+
+
+def test_rows_find_the_tool_alone_where_the_world_is_known(capsys):
+    arm = VirtualArm.paper(seed=3)
+    arm.world_from_base = np.eye(4)
+    ta.calibrate(arm.robot, arm.measure(arm.poses(40)), frame="world", model="constant").save("world.calib")
+    arm.measure_table(arm.poses(30, seed=1), seed=1).to_csv("world.csv", index=False)
+    assert main(["evaluate", "world.calib", "world.csv"]) == 0
+    assert "rows found the tool, " in capsys.readouterr().out
+    assert main(["evaluate", "world.calib", "world.csv", "--keep-tool"]) == 0
+    assert "frame and tool kept, " in capsys.readouterr().out

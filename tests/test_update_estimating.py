@@ -1,10 +1,12 @@
-"""What an update finds when poses are left out, against the same found from the other poses alone."""
+"""What an update finds when poses are left out, against the others alone; and from rows without noise."""
 
 import numpy as np
 import pytest
 
+import truearm as ta
 from truearm._core import Setup
 from truearm.errors import WorkError
+from truearm.simulation import Imperfections, VirtualArm
 from truearm.updating.estimating import MOST_PARTS, Estimate, folds, left_out, posterior, solved, surprise
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Linear, State
@@ -75,3 +77,26 @@ def test_a_covariance_that_is_none_is_refused_with_the_way_out():
     with pytest.raises(WorkError, match="not positive definite") as refused:
         _ = Scatter(-np.eye(3)).precision
     assert "measured several times without noise" in str(refused.value)
+
+
+def test_rows_without_noise_leave_the_prior_what_they_do_not_tell():
+    exact, std, free = 1e-11, np.array([1.0, 1.0]), np.array([True, True])
+    linear = Linear(np.full(4, 2.0), np.ones((4, 2)), np.array([0.5, -0.5]), np.arange(4))
+    scatter = Scatter(exact**2 * np.eye(4))
+    found = posterior(linear, scatter, std, free)
+    np.testing.assert_allclose(found, 0.5 * np.array([[1.0, -1.0], [-1.0, 1.0]]), atol=1e-9)
+    np.testing.assert_allclose(solved(linear, scatter, std, free), [0.5, 1.5], atol=1e-9)
+
+
+def test_computed_orientations_are_updated():
+    computed = Imperfections(share=0.0, noise_mm=0.01, noise_mrad=0.0)
+    arm = VirtualArm(ta.Robot.load("ur10"), seed=2, imperfections=computed)
+    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(30), orientation=True), model="constant")
+    shift = np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    table = arm.measure_table(arm.poses(15, seed=9) + np.radians(shift), seed=9, orientation=True)
+    for joint, column in enumerate(arm.poses(15, seed=9).T, start=1):
+        table[f"q{joint}"] = column
+    found = ta.update(calibration, ta.Measurements.from_dataframe(table))
+    assert found.verdict == "moved"
+    assert found.offsets[1].change == pytest.approx(0.1, abs=1e-3)
+    assert all(np.isfinite(offset.std) for offset in found.offsets if offset.std is not None)

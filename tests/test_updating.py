@@ -18,13 +18,14 @@ from tests.remastered import (
 )
 from tests.report_support import words_of
 from truearm._core import setup_jacobian, step_setup
+from truearm.core_set import Selection
 from truearm.errors import Notice
 from truearm.programs.notices import update_notices
 from truearm.reporting.facts import Facts
 from truearm.reporting.report import report
 from truearm.simulation import Imperfections, VirtualArm
 from truearm.solving import beyond_learnt
-from truearm.updating.some_poses import MOST_POSES, some_poses
+from truearm.updating.some_poses import FEWEST_OF_A_GROUP, MOST_VALUES, some_poses
 from truearm.updating.squares import SquaresTest
 
 
@@ -297,21 +298,6 @@ def test_orientation_and_its_target_are_updated():
         check_offset(offset, shift, errors=5.0)
 
 
-def test_the_world_as_frame_finds_the_base_again():
-    arm = VirtualArm.paper(seed=3, imperfections=Imperfections(share=0.0, noise_mm=0.02))
-    arm.world_from_base = np.eye(4)
-    calibration = ta.calibrate(arm.robot, arm.measure(arm.poses(60)), frame="world", model="constant")
-    arm.world_from_base = np.eye(4)
-    arm.world_from_base[:3, 3] = 0.002, 0.001, -0.001
-    data = remastered(arm, arm.poses(15, seed=9), SHIFT, seed=9)
-    found = ta.update(calibration, data)
-    assert found.verdict == "moved"
-    assert found.frames == ()
-    assert error_mm(found.calibration, arm, SHIFT) < 0.1
-    with pytest.raises(ta.UsageError, match="the base is part of the arm"):
-        ta.update(calibration, data, keep_frame=True)
-
-
 def test_an_update_is_saved_with_what_was_before(known, moved, tmp_path):
     arm, calibration = known
     calibration.save(tmp_path / "old.calib")
@@ -448,9 +434,19 @@ def test_of_thousands_of_poses_some_are_used_of_every_setup(known):
     both = ta.Measurements.concatenate(
         [replace(many, group=np.full(1500, "a")), replace(few, group=np.full(30, "b"))]
     )
-    used, notices = some_poses(both)
-    assert (used.group == "a").sum() == MOST_POSES // 2
+    used, notices = some_poses(both, Selection((0,)))
+    most = MOST_VALUES // 3
+    assert (used.group == "a").sum() == most // 2
     assert (used.group == "b").sum() == 30
     assert set(used.rows[used.group == "a"]) >= {1, 1500}
-    assert str(notices[0]).startswith(f"{MOST_POSES // 2 + 30} of 1530 poses are used")
-    assert some_poses(few) == (few, [])
+    assert str(notices[0]).startswith(f"{most // 2 + 30} of 1530 poses are used")
+    assert some_poses(few, Selection((0,))) == (few, [])
+
+
+def test_poses_of_many_values_are_fewer_but_never_less_than_twenty(known):
+    arm, _ = known
+    data = arm.measure(arm.poses(600, seed=9), seed=9)
+    used, _ = some_poses(data, Selection((0, 1, 2, 3), orientation=True))
+    assert len(used) == MOST_VALUES // 15
+    used, _ = some_poses(data, Selection(tuple(range(MOST_VALUES))))
+    assert len(used) == FEWEST_OF_A_GROUP

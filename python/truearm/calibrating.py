@@ -53,6 +53,7 @@ from truearm.identified import IdentifiedArm
 from truearm.intervals import interval_coverage
 from truearm.judging import check_judged, judge, where_found
 from truearm.known_scale import KnownScale, common_share
+from truearm.known_world import another_frame
 from truearm.lengths import length_mm
 from truearm.measured_parts import MeasuredParts, sureness
 from truearm.measurements import Measurements
@@ -190,12 +191,14 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
     if shifted:
         doubted = _of_errors(task, found, data, None)
         return [*doubted[:1], *shifted, *doubted[1:]]
-    exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted))
+    framed = _framed(task, found)
+    exchanged = exchanges(task, found, doubted=_is_in_doubt(doubted) and not framed)
     if exchanged.notices:
         told = replace(found, notices=exchanged.notices)
         doubted = _of_errors(task, told, data, Outliers.of(told), exchanged.unbent)
+    doubted[1:1] = framed
     wrong = {FAR_FROM_NOMINAL} if exchanged.notices else {NO_HELP, FAR_FROM_NOMINAL}
-    if any(notice.kind in wrong for notice in doubted):
+    if not framed and any(notice.kind in wrong for notice in doubted):
         with stages("trying other conventions"):
             doubted[1:1] = fits_otherwise(task, data)
     return [*exchanged.notices, *doubted]
@@ -204,6 +207,12 @@ def _doubts(task: Task, found: Calibration, data: Measurements, stages: Stages) 
 def _is_in_doubt(doubted: Sequence[Notice]) -> bool:
     """Whether errors or parameters are such that rows may be wrong of which none is an outlier."""
     return any(notice.kind in {NO_HELP, SINGLE_ROWS, FAR_FROM_NOMINAL} for notice in doubted)
+
+
+def _framed(task: Task, found: Calibration) -> list[Notice]:
+    """Whether rows of a known world would fit far better with a frame that is found."""
+    left = left_m(found.constant, found.variable)
+    return [] if found.rows is None else another_frame(task, found.rows.fitted, left)
 
 
 def _of_errors(

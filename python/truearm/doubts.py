@@ -80,7 +80,8 @@ ROWS_SHIFTED: Final = "rows_shifted"
 FAR_FROM_NOMINAL: Final = "far_from_nominal"
 FITS_OTHERWISE: Final = "fits_otherwise"
 COMPUTED: Final = "computed"
-WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE)
+ANOTHER_FRAME: Final = "another_frame"
+WOULD_FIT: Final = (ROWS_SHIFTED, FITS_OTHERWISE, ANOTHER_PLACE, ANOTHER_FRAME)
 """What the measurements would fit, where a calibration does not help."""
 ON_A_GRID: Final = "on_a_grid"
 FEW_VALUES: Final = "few_values"

@@ -90,13 +90,14 @@ class Evaluation:
     """Errors on other measurements.
 
     Attributes:
-        n_frame: Rows that found frame and tool.
+        n_frame: Rows that found what was not kept.
         n_frame_poses: How many poses they are of: shots of the same pose count once.
         n_judged: Rows that were judged and hold what is judged.
         n_judged_poses: How many poses those are of.
         errors: Errors of "nominal", "constant" and, if there is one, "variable".
         notices: What the user should know.
         rows: The rows that were to be judged, each with its errors, NaN where nothing is judged.
+        finds: What was found: "frame", but in a known world, and "tool", as far as they were not kept.
     """
 
     n_frame: int
@@ -106,6 +107,7 @@ class Evaluation:
     errors: Mapping[str, Errors]
     notices: tuple[Notice, ...] = ()
     rows: HeldRows | None = None
+    finds: tuple[str, ...] = ("frame", "tool")
 
     def __repr__(self) -> str:
         divided = f"frame of {self.rows_of_frame}, {self.rows_judged} judged"
@@ -113,7 +115,7 @@ class Evaluation:
 
     @property
     def rows_of_frame(self) -> str:
-        """How many found frame and tool: "50 rows", or "5 poses (50 rows)"."""
+        """How many found what was not kept: "50 rows", or "5 poses (50 rows)"."""
         return rows_in_words(self.n_frame, self.n_frame_poses)
 
     @property
@@ -189,7 +191,14 @@ def evaluate(
     statistics = {name: found.statistics() for name, found in errors.items()}
     known = chosen_rows.select(errors[best].measured)
     counts = len(frame), pose_count(data.select(frame)), len(known), pose_count(known)
-    return Evaluation(*counts, statistics, tuple(notices), held)
+    return Evaluation(*counts, statistics, tuple(notices), held, _finds(task, chosen))
+
+
+def _finds(task: Task, options: EvaluationOptions) -> tuple[str, ...]:
+    """What the rows of the frame find."""
+    frame = not (options.keep_frames or task.arm.world_is_known)
+    tool = not (options.keep_tool or options.keep_frames)
+    return (*["frame"] * frame, *["tool"] * tool)
 
 
 def _selection(
@@ -308,8 +317,7 @@ def _gross(
 
     Where frame and tool are found, a robust fit says where the first of them belong.
     """
-    finds = {"finds_tool": not (options.keep_tool or options.keep_frames)}
-    finds["finds_frame"] = not (options.keep_frames or task.arm.world_is_known)
+    finds = {f"finds_{part}": part in _finds(task, options) for part in ("frame", "tool")}
     of_frame = Expected(task, calibration, model, frame, **finds)
     judged = Expected(task, calibration, model, held[0], **finds)
     once = replace(of_frame, data=frame.select(np.unique(pose_numbers(frame.readings, frame.group))))

@@ -67,11 +67,11 @@ class FittedRows:
             width = 1 if selection.distances else fits.constant.residuals.size // len(fits.data)
             residual = fits.constant.residuals.reshape(-1, width)
             score = _judge_constant(fits, residual, selection)
-            distance = np.zeros(len(side)) if selection.distances else _farthest(residual, selection)
+            distance = np.zeros(len(side)) if selection.distances else farthest_m(residual, selection)
             found = cls(fits.data, side, fits.constant.weights, residual, score, distance)
         else:
             variable = fits.variable
-            distance = np.maximum(variable.distances, _farthest(variable.residuals, selection))
+            distance = np.maximum(variable.distances, farthest_m(variable.residuals, selection))
             found = cls(fits.data, side, variable.weights, variable.residuals, variable.scores, distance)
         return replace(found, orientation=selection.orientation)
 
@@ -166,7 +166,7 @@ def sides(count: int, split: Split) -> NDArray[np.int64]:
     return side
 
 
-def _farthest(residual: Floats, selection: Selection) -> Floats:
+def farthest_m(residual: Floats, selection: Selection) -> Floats:
     """How far the farthest target of each row (n,) is from where the model has it, m."""
     count = len(selection.targets)
     return np.asarray(np.linalg.norm(residual[:, : 3 * count].reshape(-1, count, 3), axis=2).max(axis=1))

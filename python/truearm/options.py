@@ -43,7 +43,7 @@ class Options:
         refit: Whether the calibration is fitted to all rows after validation.
         features: Columns that the field depends on beside the joints.
         frame: "free" for an unknown world_from_base of each set-up; "world" for none and a base that is
-            corrected like a link.
+            corrected like a link, in five of the six freedoms of a frame.
         judge_target: Measured target, from 1, at which errors are judged; one other than the first takes
             no part in the fit.
         degree: Degree of the memberships, 2 or 3.

@@ -5,9 +5,26 @@ from typing import Any, Final
 
 OPTIONS: Final = {
     "frame": ("--keep-frame", "the device stands where it stood"),
+    "base": ("--keep-frame", "device and base stand where they stood"),
     "tool": ("--keep-tool", "the target sits where it sat"),
 }
 """Of what a joint may be confounded with: the option that keeps it, and when that is right."""
+
+
+FIVE_OF_SIX: Final = (
+    "As a row of the table the base has five of the six freedoms of a frame: constants do not correct a "
+    "shift along the sixth, the y axis of most bases."
+)
+
+
+def of_known_world(told: Mapping[str, Any]) -> str:
+    """What may look like a field that changed where the world is known, in sentences; "" where it is not.
+
+    Args:
+        told: What `Update.to_dict` gives.
+    """
+    is_known = any(motion.get("part") == "base" for motion in told["frames"])
+    return f"{FIVE_OF_SIX} If the device was shifted so, nothing else fits." if is_known else ""
 
 
 def follows_words(joint: int, followed: int) -> str:
@@ -42,8 +59,13 @@ def untested_words(told: Mapping[str, Any], groups: Sequence[str]) -> str:
     return " ".join(_reason(told, groups, reason, joints) for reason, joints in by_reason.items())
 
 
+def motion_name(part: str, group: str) -> str:
+    """What moved: "base", or "tool of east"."""
+    return part if part == "base" else f"{part} of {group}"
+
+
 def way_out_of_keeping(kept: tuple[str, ...]) -> str:
-    """What to do where what was kept may have moved: "frame", "tool"."""
+    """What to do where what was kept may have moved: "frame", "base", "tool"."""
     if not kept:
         return ""
     chosen = [OPTIONS[name] for name in kept]
@@ -64,7 +86,8 @@ def _reason(told: Mapping[str, Any], groups: Sequence[str], reason: str, joints:
 
 def _may_be_kept(told: Mapping[str, Any], groups: Sequence[str], part: str) -> bool:
     """Whether all frames are known and could be kept, or all tools, which are not said to be others."""
-    known = {motion["group"] for motion in told[f"{part}s"] if part == "frame" or motion["p"] is not None}
+    motions = told["tools" if part == "tool" else "frames"]
+    known = {motion["group"] for motion in motions if part != "tool" or motion["p"] is not None}
     return known.issuperset(groups)
 
 

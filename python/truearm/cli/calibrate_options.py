@@ -52,7 +52,7 @@ Features: TypeAlias = Annotated[
     str | None, typer.Option(metavar="COL,COL", help="Columns that parameters may vary with.")
 ]
 Frame: TypeAlias = Annotated[
-    str, typer.Option(metavar="free|world", help="world: the base is corrected, not fitted.")
+    str, typer.Option(metavar="free|world", help="world: the base is corrected, in five of six freedoms.")
 ]
 NoRefit: TypeAlias = Annotated[bool, typer.Option("--no-refit", help="Keep the fit to the training rows.")]
 Strip: TypeAlias = Annotated[

@@ -78,11 +78,7 @@ def command(
     if as_json:
         print_json(found.to_dict())
         return
-    if keep_frames:
-        how = "frame and tool kept"
-    else:
-        how = f"{found.rows_of_frame} found {'the frame' if keep_tool else 'frame and tool'}"
-    say(f"{known.robot.name}: {how}, {found.rows_judged} judged.")
+    say(f"{known.robot.name}: {_found_words(found)}, {found.rows_judged} judged.")
     print_errors(found.errors, found.rows_judged)
     others = " ".join(map(typed, measurements))
     update = f"truearm update {typed(calibration)} {others}{given_options(context, *NOT_OF_UPDATE)}"
@@ -90,6 +86,14 @@ def command(
         f"truearm report {typed(calibration)} {others} -o other.html",
         *_next_commands(found, known, calibration, update),
     )
+
+
+def _found_words(found: "Evaluation") -> str:
+    """What the rows of the frame found, if anything."""
+    if not found.finds:
+        return "frame and tool kept"
+    the = "the " if len(found.finds) == 1 else ""
+    return f"{found.rows_of_frame} found {the}{' and '.join(found.finds)}"
 
 
 def _next_commands(found: "Evaluation", known: "Calibration", file: Path, update: str) -> list[str]:

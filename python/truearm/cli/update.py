@@ -179,28 +179,28 @@ def _suggest(found: "Update", known: "Calibration", old: Path, place: Path | Non
 def _verdict(found: "Update") -> str:
     """What was found, in a sentence or two."""
     from truearm.reporting.numbers import listed
-    from truearm.update_words import untested_joints, way_out_of_keeping
+    from truearm.update_words import of_known_world, untested_joints, way_out_of_keeping
 
     untested = untested_joints(found.to_dict())
     if found.verdict == "holds":
         return f"The calibration still holds: no significant change was found. {untested}".strip()
     if found.verdict == "moved":
         return (
-            f"{' or '.join(found.tested).capitalize()} changed. All else still fits, so the updated "
+            f"{listed(found.tested, 'or').capitalize()} changed. All else still fits, so the updated "
             f"calibration replaces the old one. {untested}"
         ).strip()
-    kept = way_out_of_keeping(found.kept)
+    kept, base = way_out_of_keeping(found.kept), of_known_world(found.to_dict())
     return (
         f"The calibration itself no longer fits: {listed(found.estimated)} do not explain what was measured. "
-        f"{kept and f'{kept}. '}Check that these are measurements of this arm. If they are, measure anew and "
-        "calibrate. If the measuring device scatters more than when the arm was calibrated, say so in a "
-        "column sigma_mm and update again."
+        f"{kept and f'{kept}. '}{base and f'{base} '}Check that these are measurements of this arm. If they "
+        "are, measure anew and calibrate. If the measuring device scatters more than when the arm was "
+        "calibrated, say so in a column sigma_mm and update again."
     )
 
 
 def _print(found: "Update") -> None:
     from truearm.reporting.numbers import listed, probability
-    from truearm.update_words import follows_words, untested_words
+    from truearm.update_words import follows_words, motion_name, untested_words
 
     say_wrapped(f"{found.calibration.robot.name}, {found.n_poses} poses. {_verdict(found)}")
     print_table(
@@ -211,9 +211,9 @@ def _print(found: "Update") -> None:
             say_wrapped(follows_words(offset.joint, offset.follows))
     if untested := untested_words(found.to_dict(), found.calibration.groups):
         say_wrapped(untested)
-    for name, motions in (("Frame", found.frames), ("Tool", found.tools)):
-        for motion in motions:
-            say(f"{name} of {motion.group}: {_motion(motion)}.")
+    for motion in (*found.frames, *found.tools):
+        named = motion_name(motion.part, motion.group)
+        say(f"{named[:1].upper()}{named[1:]}: {_motion(motion)}.")
     if any(motion.moved for motion in found.tools):
         say_wrapped(
             "If it is another target, or was taken off, give --new-tool: that is no change of the arm."

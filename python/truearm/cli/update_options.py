@@ -14,7 +14,7 @@ Output: TypeAlias = Annotated[
     typer.Option("-o", "--output", metavar="NEW.calib|DIR", help="Where the updated calibration goes."),
 ]
 KeepFrame: TypeAlias = Annotated[
-    bool, typer.Option("--keep-frame", help="The device stands where it stood: determines joint 1 too.")
+    bool, typer.Option("--keep-frame", help="Device and base stand where they stood: determines joint 1.")
 ]
 KeepTool: TypeAlias = Annotated[
     bool, typer.Option("--keep-tool", help="The target sits where it sat: determines the last joint too.")

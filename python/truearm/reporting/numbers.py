@@ -78,9 +78,9 @@ def probability(p: float) -> str:
     return f"{p:.2g}" if p >= LEAST_TOLD else f"< {LEAST_TOLD:g}"
 
 
-def listed(words: Sequence[str]) -> str:
-    """Words with commas and "and"."""
-    return ", ".join(words[:-1]) + (" and " if len(words) > 1 else "") + words[-1]
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """Words with commas and "and", or another word before the last."""
+    return ", ".join(words[:-1]) + (f" {last} " if len(words) > 1 else "") + words[-1]
 
 
 def shown_readings(readings: Floats, joints: Sequence[str]) -> Floats:

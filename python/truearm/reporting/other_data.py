@@ -52,9 +52,10 @@ def other_data(facts: Facts) -> Section:
     now = errors[facts.best].position.mean
     held = facts.calibration.validation.holdout[facts.best].position.mean
     here, there = short(now, held)
+    verb = "was" if len(found.finds) == 1 else "were"
     how = (
-        f"Frame and tool were found from others, {found.rows_of_frame}"
-        if found.n_frame
+        f"{' and '.join(found.finds).capitalize()} {verb} found from others, {found.rows_of_frame}"
+        if found.n_frame and found.finds
         else "Frame and tool were kept"
     )
     no_help = _no_help(found)

@@ -8,7 +8,7 @@ from truearm.reporting.facts import Facts
 from truearm.reporting.numbers import fixed, listed, probability, signed
 from truearm.reporting.parts import Part, Section, Table, Text
 from truearm.reporting.verdict import HEADINGS, STATISTICS
-from truearm.update_words import follows_words, untested_joints, untested_words
+from truearm.update_words import follows_words, motion_name, of_known_world, untested_joints, untested_words
 from truearm.validation import Validation
 
 VERDICTS: Final = {
@@ -34,16 +34,18 @@ def since_update(facts: Facts) -> Section:
 
 def _overall(told: Mapping[str, Any]) -> str:
     words = VERDICTS[told["verdict"]].format(
-        tested=" or ".join(told["tested"]).capitalize(), estimated=listed(told["estimated"]).capitalize()
+        tested=listed(told["tested"], "or").capitalize(), estimated=listed(told["estimated"]).capitalize()
     )
     left = f", of which {len(told['outliers'])} were left out as outliers," if told["outliers"] else ""
+    if told["verdict"] == "field" and (base := of_known_world(told)):
+        words = f"{words} {base}"
     if untested := untested_joints(told):
         words = f"{words} {untested}"
     change, rest = (probability(told[test]["p"]) for test in ("changed", "rest"))
     return (
         f"{words} From {count_of(told['n_poses'], 'pose')}{left} the update estimated "
         f"{listed(told['estimated'])}; all other parameters, constant and variable, are those of the "
-        f"calibration before. Test for a change of {' or '.join(told['tested'])}: p {change}. Test of the "
+        f"calibration before. Test for a change of {listed(told['tested'], 'or')}: p {change}. Test of the "
         f"residuals that remain: p {rest}. The two share the level of significance, "
         f"{100.0 * told['level']:g} %: each counts where p is below {told['level'] / 2.0:g}."
     )
@@ -76,9 +78,9 @@ def _offsets(told: Mapping[str, Any], groups: Sequence[str]) -> Table:
 
 
 def _motions(told: Mapping[str, Any]) -> list[Table]:
-    """Frames and tools, as far as the calibration before knew them."""
+    """Frames or base, and tools, as far as the calibration before knew them."""
     rows = [
-        [f"{name} of {motion['group']}", *_motion(motion)]
+        [motion_name(motion.get("part", name), motion["group"]), *_motion(motion)]
         for name, key in (("frame", "frames"), ("tool", "tools"))
         for motion in told[key]
     ]

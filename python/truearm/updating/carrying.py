@@ -7,7 +7,6 @@ import numpy as np
 from truearm.revision import Carried
 from truearm.updating.estimating import Estimate, posterior
 from truearm.updating.scene import RANK, Scene
-from truearm.updating.unknowns import OPEN
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +23,7 @@ def carried(scene: Scene, found: Estimate) -> Carried:
     known = posterior(linear, found.scatter, unknowns.std, unknowns.free)
     gain = known @ linear.jacobian.T @ found.scatter.precision
     left = np.eye(len(known)) - gain @ linear.jacobian
-    anew = unknowns.std >= OPEN
+    anew = unknowns.anew
     taken = np.zeros_like(gain)
     taken[anew] = np.linalg.pinv(linear.jacobian[:, anew], rcond=RANK)
     own: NDArray[np.float64] = (left * unknowns.std**2) @ left.T + gain @ scene.scatter(state) @ gain.T

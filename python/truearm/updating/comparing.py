@@ -9,6 +9,7 @@ import numpy as np
 from truearm import kinds
 from truearm.calibration import Calibration
 from truearm.core_set import select_fitted
+from truearm.doubts import LARGE_MM
 from truearm.errors import (
     InputError,
     Notice,
@@ -21,6 +22,7 @@ from truearm.errors import (
 )
 from truearm.fitted_rows import known_rows, overwhelming
 from truearm.fitting import Stages, Task, no_stages
+from truearm.lengths import length_mm
 from truearm.measurements import Measurements
 from truearm.plausibility import check_against
 from truearm.points_together import points_together
@@ -57,13 +59,15 @@ class Update:
 
     Attributes:
         calibration: With offsets, frames and tools estimated again; the old one is kept in it.
-        verdict: "holds": the old calibration still does. "moved": offsets or tool changed, and the field
-            still fits. "field": what is left is more than field and noise may leave.
+        verdict: "holds": the old calibration still does. "moved": offsets, tool or the base of a known
+            world changed, and the field still fits. "field": what is left is more than field and noise may
+            leave.
         level: Share of unchanged arms that are not said to hold. `changed` and `rest` share it.
         offsets: Of the joints.
-        frames: Motions of the set-ups' frames, where the calibration knows them.
+        frames: Motions of the set-ups' frames, where the calibration knows them; in a known world that of
+            the base.
         tools: Motions of the targets, where the calibration knows them.
-        changed: The test of offsets and tool.
+        changed: The test of offsets and tool, and of the base of a known world.
         rest: The test of what is left.
         before: Errors of the old calibration at each pose, its frame found from the others.
         after: The same with offsets and tool found from the others too.
@@ -98,20 +102,27 @@ class Update:
     @property
     def estimated(self) -> tuple[str, ...]:
         """What was estimated: "offsets", and unless kept "frame" (in a known world "base") and "tool"."""
-        frame = "base" if self.calibration.arm.world_is_known else "frame"
-        free = (shown for name, shown in (("frame", frame), ("tool", "tool")) if name not in self.kept)
-        return ("offsets", *free)
+        return ("offsets", *(name for name in (self._frame, "tool") if name not in self.kept))
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """What of "frame" and "tool" was kept as it was."""
-        parts = (("frame", self.frames), ("tool", self.tools))
+        """What of "frame" (in a known world "base") and "tool" was kept as it was."""
+        parts = ((self._frame, self.frames), ("tool", self.tools))
         return tuple(name for name, found in parts if found and all(motion.kept for motion in found))
 
     @property
     def tested(self) -> tuple[str, ...]:
-        """What was tested for a change: "offsets", and "tool" unless it was kept or is another one."""
-        return ("offsets", "tool") if any(motion.p is not None for motion in self.tools) else ("offsets",)
+        """What was tested for a change: "offsets", and unless kept the "base" of a known world, and "tool"
+        unless it is another one.
+        """
+        parts = ((self._frame, self.frames), ("tool", self.tools))
+        compared = (name for name, found in parts if any(motion.p is not None for motion in found))
+        return ("offsets", *compared)
+
+    @property
+    def _frame(self) -> str:
+        """What says where the arm stands: "frame", or in a known world "base"."""
+        return "base" if self.calibration.arm.world_is_known else "frame"
 
     def to_dict(self) -> dict[str, Any]:
         """JSON values, without the calibration."""
@@ -149,8 +160,8 @@ def update(
 
     Args:
         calibration: With its measurements.
-        data: New measurements of the same arm, of 10 to 20 poses all over the workspace. Of more than 500 so
-            many are used, spread evenly.
+        data: New measurements of the same arm, of 10 to 20 poses all over the workspace. Of more than 1500
+            measured values (500 points) so many are used, spread evenly over the poses.
         options: What may have moved; defaults without them.
         stages: Called with the name of each stage; gives a context manager that surrounds it.
         **more: The same options as keywords, such as keep_frame=True.
@@ -167,10 +178,12 @@ def update(
     data, together = points_together(data.deduplicated())
     notices += together
     notices += [*known_rows(calibration, data), *rows_beyond_learnt(calibration, data)]
-    data, unused = some_poses(one_row_a_visit(data))
-    notices += [*unused, *silent_rows(calibration, data)]
+    data = one_row_a_visit(data)
     task, left_out = _task(calibration, data, chosen, stages)
-    notices += left_out
+    data, unused = some_poses(data, task.selection)
+    if unused:
+        task, left_out = _task(calibration, data, chosen, stages)
+    notices += [*unused, *silent_rows(calibration, data), *left_out]
     if task.selection.orientation:
         check_turns(data, calibration.robot)
     unknowns = Unknowns.of(calibration, task, chosen, data)
@@ -181,7 +194,7 @@ def update(
         _ = calibration.spread
     with stages("finding what moved"):
         rows = _Rows.of(Scene(task, data, calibration, unknowns))
-        held = untold(rows.scene, rows.scatter, rows.start)
+        held = untold(rows.scene, rows.scatter, rows.scene.unchanged(rows.start))
         if held:
             rows = _Rows.of(Scene(task, data, calibration, unknowns.holding(held)))
         rows, outliers = _without_outliers(calibration, rows)
@@ -219,10 +232,11 @@ class _Found:
         unknowns, level = scene.unknowns, self.options.level
         found = estimate(scene, scatter, start, unknowns.free)
         _check_plausible(scene, found, notices)
-        anew = unknowns.free & unknowns.nuisance
+        anew = unknowns.free & unknowns.anew
         still = estimate(scene, scatter, scene.unchanged(start), anew)
-        judge = Judge(level, known_scale(self.calibration).freedom)
-        changed, rest = change_test(still, unknowns, judge.known), rest_test(found, unknowns, judge.known)
+        known = known_scale(self.calibration).freedom
+        changed, rest = change_test(still, unknowns, known), rest_test(found, unknowns, known)
+        judge = Judge.of(changed, _threshold(level), unknowns, known)
         verdict = _verdict(changed, rest, level)
         if verdict == "field":
             # What is left says itself how much it scatters, and the calibration no longer does.
@@ -274,6 +288,7 @@ def _task(
             rule="An update needs standard deviations, and schemes do not tell them",
             way_out="Calibrate with --model variable or constant",
         )
+    _check_of_use(calibration)
     where = ", ".join(data.files)
     selection, left_out = select_fitted(data, options.use, calibration.selection)
     if selection.distances or calibration.selection.distances:
@@ -284,11 +299,22 @@ def _task(
     return task, left_out
 
 
+def _check_of_use(calibration: Calibration) -> None:
+    """Raise WorkError where a calibration is so far off that nothing is unlike what it expects."""
+    judged = calibration.validation
+    left_mm = judged.holdout[calibration.model_name].position.mean
+    if left_mm >= LARGE_MM:
+        raise WorkError(
+            f"this calibration misses {judged.judged} rows of its own by {length_mm(left_mm, 3)} on average",
+            rule="It expects so little that no measurements are unlike it",
+            way_out="Calibrate anew when the reason is found: truearm report CALIB names what to check",
+        )
+
+
 def _check_kept(calibration: Calibration, task: Task, unknowns: Unknowns, options: UpdateOptions) -> None:
-    asked = [name for name in ("keep_frame", "keep_tool") if getattr(options, name)]
+    kept = ("keep_tool",) if task.arm.world_is_known else ("keep_frame", "keep_tool")
+    asked = [name for name in kept if getattr(options, name)]
     strange = [g for g, known in zip(task.groups, unknowns.known, strict=True) if known is None]
-    if options.keep_frame and task.arm.world_is_known:
-        raise UsageError("the frame is kept", rule="With the world as frame the base is part of the arm")
     if asked and strange:
         raise UsageError(
             f"the calibration knows no frame and tool of set-up {list_names(strange)} that could be kept",

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from truearm.errors import WorkError
 from truearm.update_words import way_out_of_keeping
@@ -100,19 +101,41 @@ def _stepped(scene: Scene, scatter: Scatter, state: State, free: Mask) -> tuple[
 def posterior(linear: Linear, scatter: Scatter, std: Floats, free: Mask) -> Floats:
     """Covariance (u, u) of the unknowns, zero for those that are not free."""
     covariance = np.zeros((len(std), len(std)))
-    scaled = scatter.whitened(linear.jacobian[:, free] * std[free])
-    inverse = np.linalg.inv(scaled.T @ scaled + np.eye(scaled.shape[1]))
-    covariance[np.ix_(free, free)] = inverse * np.outer(std[free], std[free])
+    spread = std[free, None] * _Least.of(linear, scatter, std, free).inverse
+    covariance[np.ix_(free, free)] = spread @ spread.T
     return covariance
 
 
 def solved(linear: Linear, scatter: Scatter, std: Floats, free: Mask) -> Floats:
     """The step (u,) to the most likely values of the free unknowns."""
-    scaled = scatter.whitened(linear.jacobian[:, free] * std[free])
-    right = scaled.T @ scatter.whitened(linear.residual) - linear.departure[free] / std[free]
+    least = _Least.of(linear, scatter, std, free)
+    right = np.concatenate([scatter.whitened(linear.residual), -linear.departure[free] / std[free]])
     step = np.zeros(len(std))
-    step[free] = std[free] * np.linalg.solve(scaled.T @ scaled + np.eye(scaled.shape[1]), right)
+    step[free] = std[free] * (least.inverse @ (least.directions.T @ right))
     return step
+
+
+@dataclass(frozen=True, eq=False)
+class _Least:
+    """Least squares of whitened rows and of the prior's rows below, for k unknowns in prior deviations.
+
+    By QR: of exact rows the squares, as normal equations have them, leave nothing of the prior.
+
+    Attributes:
+        directions: Orthonormal directions (R + k, k) of both.
+        inverse: What unit lengths along them are of the unknowns (k, k), upper triangular.
+    """
+
+    directions: Floats
+    inverse: Floats
+
+    @classmethod
+    def of(cls, linear: Linear, scatter: Scatter, std: Floats, free: Mask) -> "_Least":
+        """That of the free unknowns."""
+        scaled = scatter.whitened(linear.jacobian[:, free] * std[free])
+        prior = np.eye(scaled.shape[1])
+        directions, triangle = np.linalg.qr(np.vstack([scaled, prior]))
+        return cls(directions, np.asarray(solve_triangular(triangle, prior)))
 
 
 def left_out(found: Estimate, std: Floats, free: Mask) -> Floats:
@@ -129,31 +152,31 @@ def folds(found: Estimate, std: Floats, free: Mask) -> Iterator[tuple[NDArray[np
     """Poses that are left out together, and the step (u,) that the others make of the free unknowns.
 
     With P the inverse of the covariance of all values, that of the others alone is `P - P_o^T P_oo^-1 P_o`,
-    o being the values left out: one inverse serves all parts.
+    o being the values left out: one inverse serves all parts. Unknowns are taken along the directions in
+    which all values and the prior tell one unit of each.
     """
     linear, precision = found.linear, found.scatter.precision
-    scaled = linear.jacobian[:, free] * std[free]
-    pulls = precision @ np.column_stack([scaled, linear.residual])
-    whole = scaled.T @ pulls
+    inverse = _Least.of(linear, found.scatter, std, free).inverse
+    along = (linear.jacobian[:, free] * std[free]) @ inverse
+    pulls = precision @ np.column_stack([along, linear.residual])
+    right = along.T @ pulls[:, -1] - inverse.T @ (linear.departure[free] / std[free])
     poses = np.unique(linear.pose)
     for part in range(min(MOST_PARTS, len(poses))):
         left = poses[part::MOST_PARTS]
         out = np.isin(linear.pose, left)
-        own = np.linalg.solve(precision[np.ix_(out, out)], pulls[out])
-        rest = whole - pulls[out, :-1].T @ own
+        taken = pulls[out, :-1].T @ np.linalg.solve(precision[np.ix_(out, out)], pulls[out])
         step = np.zeros(len(std))
-        right = rest[:, -1] - linear.departure[free] / std[free]
-        step[free] = std[free] * np.linalg.solve(rest[:, :-1] + np.eye(len(rest)), right)
+        moved = np.linalg.solve(np.eye(len(inverse)) - taken[:, :-1], right - taken[:, -1])
+        step[free] = std[free] * (inverse @ moved)
         yield left, step
 
 
 def surprise(found: Estimate, std: Floats, free: Mask) -> tuple[Floats, NDArray[np.int64]]:
     """Of each pose (n,) how unlikely it is given all others: squared standardised length, and its values."""
     linear, precision = found.linear, found.scatter.precision
-    scaled = linear.jacobian[:, free] * std[free]
-    pulls = precision @ scaled
-    known = pulls @ np.linalg.solve(scaled.T @ pulls + np.eye(pulls.shape[1]), pulls.T)
-    inverse = precision - known
+    along = (linear.jacobian[:, free] * std[free]) @ _Least.of(linear, found.scatter, std, free).inverse
+    pulls = precision @ along
+    inverse = precision - pulls @ pulls.T
     pull = inverse @ (linear.residual + linear.jacobian[:, free] @ linear.departure[free])
     poses = np.unique(linear.pose)
     squares = np.empty(len(poses))

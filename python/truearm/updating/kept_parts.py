@@ -21,7 +21,6 @@ from truearm.uncertainty import task_of
 from truearm.updating.parts import places_of
 from truearm.updating.scale import sigmas_m
 from truearm.updating.scene import Scene
-from truearm.updating.unknowns import OPEN
 
 Floats = NDArray[np.float64]
 AXES = 3
@@ -158,7 +157,7 @@ class KeptParts:
             for k, number in enumerate(unknowns.known)
             if number is not None
             and groups[k] not in self.moved
-            and not (unknowns.tool & (unknowns.std >= OPEN))[unknowns.group(k)].any()
+            and not (unknowns.tool & unknowns.anew)[unknowns.group(k)].any()
         }
 
     @property

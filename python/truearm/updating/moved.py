@@ -1,6 +1,6 @@
 """What moved, in numbers for people: offsets of joints, frames and tools."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
@@ -11,7 +11,7 @@ from truearm.units import MM_PER_METRE, RADIANS_PER_DEGREE
 from truearm.updating.estimating import Estimate, posterior
 from truearm.updating.scattering import Scatter
 from truearm.updating.scene import Scene, State
-from truearm.updating.squares import student_p, wald
+from truearm.updating.squares import SquaresTest, student_p, wald
 from truearm.updating.unknowns import Unknowns
 
 Floats = NDArray[np.float64]
@@ -19,6 +19,8 @@ Mask = NDArray[np.bool_]
 
 TOLD: Final = 0.5
 """An offset is told when its standard error is below this share of the prior's deviation."""
+STEP: Final = 1e-6
+"""For derivatives, in rad and m."""
 NO_CHANGE: Final = 0.5
 """A joint value that changed by less than this share of its reading's change may not have changed."""
 
@@ -28,12 +30,18 @@ class Judge:
     """What is too large to be chance.
 
     Attributes:
-        level: Share of unmoved ones that are said to have moved.
+        level: Share of unmoved joints, frames and tools that are said to have moved, of each; zero where the
+            test of all of them finds no change.
         known: Degrees of freedom that the scale of standard errors is known from.
     """
 
     level: float
     known: int
+
+    @classmethod
+    def of(cls, changed: SquaresTest, level: float, unknowns: Unknowns, known: int) -> "Judge":
+        """One for the parts of what was tested at a level, which they share where that found a change."""
+        return cls(level / unknowns.count_compared if changed.p < level else 0.0, known)
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,7 @@ class Offset:
         change: In that unit.
         std: Standard error in that unit; None where it is not told.
         p: How often an unmoved joint shows as large a change; None where it is not told.
-        moved: Whether that is too rare.
+        moved: Whether that is too rare, for one among all that was tested, and these did change.
         told: Whether the poses tell it; where they do not, the offset is held as it was.
         confounded: What it cannot be told from: "frame", "tool", "frame and tool", or "" for the others.
         follows: The coupled joint, from 1, whose change alone makes this one; None where there is none.
@@ -69,18 +77,20 @@ class Offset:
 
 @dataclass(frozen=True)
 class Motion:
-    """How far a frame or a tool moved.
+    """How far a frame, a tool, or the base of a known world moved.
 
     Attributes:
+        part: "frame", "base" or "tool".
         group: Name of the set-up.
         shift_mm: Of the frame's origin in its own axes, or of each target in the flange's (k, 3).
         shift_std_mm: Standard errors of it.
         turn_deg: Rotation vector (3,); None where it is not known.
         turn_std_deg: Standard errors of it.
         p: How often an unmoved one shows as much; None for what was found anew.
-        moved: Whether that is too rare.
+        moved: Whether that is too rare, for one among all that was tested, and these did change.
     """
 
+    part: str
     group: str
     shift_mm: tuple[tuple[float, ...], ...]
     shift_std_mm: tuple[tuple[float, ...], ...]
@@ -131,10 +141,7 @@ def untold(scene: Scene, scatter: Scatter, state: State) -> dict[int, str]:
 
 
 def offsets(scene: Scene, found: Estimate, held: dict[int, str], judge: Judge) -> tuple[Offset, ...]:
-    """Changes of all joints' offsets, those that are `held` for not being told among them.
-
-    The level is shared among the joints.
-    """
+    """Changes of all joints' offsets, those that are `held` for not being told among them."""
     kinds = scene.task.arm.robot.joints
     std = np.sqrt(np.diag(found.covariance))
     result = []
@@ -145,9 +152,7 @@ def offsets(scene: Scene, found: Estimate, held: dict[int, str], judge: Judge) -
             continue
         change, error = float(found.state.arm[joint]), float(std[joint])
         p = student_p(change / error, judge.known)
-        result.append(
-            Offset(joint + 1, unit, scale * change, scale * error, p, p < judge.level / len(kinds), told=True)
-        )
+        result.append(Offset(joint + 1, unit, scale * change, scale * error, p, p < judge.level, told=True))
     coupled = _Coupled(scene.task.arm.robot.coupling, found, judge)
     return tuple(replace(offset, follows=coupled.followed(result, offset)) for offset in result)
 
@@ -174,23 +179,27 @@ class _Coupled:
         count = len(row)
         changes, covariance = self.found.state.arm[:count], self.found.covariance[:count, :count]
         left, error = float(row @ changes), float(np.sqrt(row @ covariance @ row))
-        is_chance = student_p(left / error, self.judge.known) >= self.judge.level / count
+        is_chance = student_p(left / error, self.judge.known) >= self.judge.level
         is_small = abs(left) < NO_CHANGE * abs(row[joint] * changes[joint])
         return others[0] if is_chance and is_small else None
 
 
 def motions(scene: Scene, found: Estimate, judge: Judge) -> tuple[tuple[Motion, ...], tuple[Motion, ...]]:
-    """Motions of the frames, and of the tools, of the set-ups that the calibration knows."""
-    frames, tools = [], []
+    """Motions of the frames, and of the tools, of the set-ups that the calibration knows.
+
+    In a known world the base takes the place of the frames.
+    """
     judged = _Judged(scene, found, judge)
+    frames, tools = [judged.base()] if scene.task.arm.world_is_known else [], []
     for number, group in enumerate(scene.task.groups):
         place = scene.unknowns.group(number)
         frame, tool = scene.motion(found.state, number)
         if frame is not None:
-            frames.append(judged.motion(group, frame, slice(place.start, place.start + len(frame)), 1))
+            own = slice(place.start, place.start + len(frame))
+            frames.append(judged.motion("frame", group, frame, own))
         if tool is not None:
             own = slice(place.stop - len(tool), place.stop)
-            tools.append(judged.motion(group, tool, own, len(scene.task.selection.targets)))
+            tools.append(judged.motion("tool", group, tool, own))
     return tuple(frames), tuple(tools)
 
 
@@ -202,14 +211,29 @@ class _Judged:
     found: Estimate
     judge: Judge
 
-    def motion(self, group: str, change: Floats, place: slice, points: int) -> Motion:
-        """That of a frame or a tool: `points` shifts, then a turn if there is one."""
+    def motion(self, part: str, group: str, change: Floats, place: slice) -> Motion:
+        """That of a frame or a tool."""
         covariance = self.found.covariance[place, place]
-        std = np.sqrt(np.diag(covariance))
-        tested = bool((std > 0.0).all()) and not self.scene.unknowns.nuisance[place].any()
+        tested = self.scene.unknowns.is_compared(place)
         p = wald(change, covariance, self.judge.known).p if tested else None
+        return self._told(part, group, change, covariance, p)
+
+    def base(self) -> Motion:
+        """That of the base of a known world, whose row has five of the six freedoms."""
+        own = np.flatnonzero(self.scene.unknowns.base)
+        change, covariance = self.found.state.arm[own], self.found.covariance[np.ix_(own, own)]
+        motion, by_row = _linearised(self.scene.base_motion, change)
+        tested = self.scene.unknowns.is_compared(own)
+        p = wald(change, covariance, self.judge.known).p if tested else None
+        return self._told("base", self.scene.task.groups[0], motion, by_row @ covariance @ by_row.T, p)
+
+    def _told(self, part: str, group: str, change: Floats, covariance: Floats, p: float | None) -> Motion:
+        """A motion: shifts, then a turn if there is one."""
+        points = len(self.scene.task.selection.targets) if part == "tool" else 1
+        std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         has_turn = len(change) > 3 * points
         return Motion(
+            part,
             group,
             _rows(MM_PER_METRE * change[: 3 * points]),
             _rows(MM_PER_METRE * std[: 3 * points]),
@@ -220,13 +244,18 @@ class _Judged:
         )
 
 
+def _linearised(function: Callable[[Floats], Floats], at: Floats) -> tuple[Floats, Floats]:
+    """Values (k,) of a function of a few unknowns (u,), and its derivatives (k, u)."""
+    ways = STEP * np.eye(len(at))
+    slopes = [(function(at + way) - function(at - way)) / (2.0 * STEP) for way in ways]
+    return function(at), np.column_stack(slopes)
+
+
 def _confounded(unknowns: Unknowns, covariance: Floats, joint: int) -> str:
-    """Of frame and tool what would have to be known for an offset to be told."""
-    parts: Sequence[tuple[str, Mask]] = (
-        ("frame", unknowns.frame),
-        ("tool", unknowns.tool),
-        ("frame and tool", unknowns.frame | unknowns.tool),
-    )
+    """Of frame, or base, and tool what would have to be known for an offset to be told."""
+    parts = list(unknowns.parts)
+    names, masks = zip(*parts, strict=True)
+    parts.append((" and ".join(names), np.logical_or.reduce(masks)))
     for name, chosen in parts:
         known = chosen & unknowns.free
         if not known.any():

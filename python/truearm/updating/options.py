@@ -15,9 +15,11 @@ class UpdateOptions:
     Attributes:
         offset_deg: Standard deviation of the change of a revolute joint's offset.
         offset_mm: The same of a prismatic joint.
-        tool_mm: The same of each coordinate of the measured target in the flange frame.
+        tool_mm: The same of each coordinate of the measured target in the flange frame, and of the base of a
+            known world, whose turns are as uncertain as offsets.
         tool_deg: The same of the orientation of the target, about each axis.
-        keep_frame: Whether the measuring device stands where it stood; else its frame is found anew.
+        keep_frame: Whether the measuring device stands where it stood, or in a known world the base; else its
+            frame is found anew, and the base compared.
         keep_tool: Whether the target sits where it sat.
         new_tool: Whether it is another target, or was taken off: what it shows of itself then says nothing.
         level: Share of the unchanged arms of which it may be said that something changed.

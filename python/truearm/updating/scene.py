@@ -11,7 +11,8 @@ from scipy.linalg import block_diag
 from truearm._core import Problem, Setup, fit_constant, linearise, setup_jacobian, step_setup
 from truearm.calibration import Calibration
 from truearm.core_set import core_set, rotations
-from truearm.enough_values import setup_unknowns
+from truearm.dh_row import row_transform
+from truearm.enough_values import FRAME_UNKNOWNS, setup_unknowns
 from truearm.fitting import Task, core_errors, fit_options
 from truearm.judging import model_inputs
 from truearm.measurements import Measurements
@@ -19,11 +20,13 @@ from truearm.rotations import rigid_inverse, rotation_vector_from_matrix
 from truearm.uncertainty import noises_of, task_of
 from truearm.updating.parts import part_of, places_of
 from truearm.updating.scale import sigmas_m
-from truearm.updating.unknowns import OPEN, Unknowns, is_part_of
+from truearm.updating.unknowns import Unknowns, is_part_of
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+FINEST: Final = 1e-8
+"""No device tells points or turns of an arm more finely, m and rad."""
 RANK: Final = 1e-9
 """Columns reach no farther than this share of the farthest in directions that they do not have."""
 
@@ -75,7 +78,7 @@ class Scene:
         model = calibration.model
         self._calibration, self._about = calibration, about
         self.task, self.data, self.unknowns = task, data, unknowns
-        self._known = model.setup
+        self._known, self._row_of_base = model.setup, model.constants[0]
         if is_part_of(task.selection, calibration.selection):
             self._known = part_of(model.setup, task.selection, calibration.selection)
         self.inputs = model_inputs(task.arm, data, task.options.features)
@@ -88,7 +91,7 @@ class Scene:
 
     def first(self) -> State:
         """Nothing moved but what is found anew; all else is where the calibration has it."""
-        setup = self._with_known(self.found_free, self.unknowns.std >= OPEN)
+        setup = self._with_known(self.found_free, self.unknowns.anew)
         return State(np.zeros(len(self.unknowns.arm_names)), setup)
 
     def about(self, setup: Setup) -> "Scene":
@@ -107,7 +110,7 @@ class Scene:
 
     def unchanged(self, state: State) -> State:
         """The state in which only what says nothing about a change may differ from what was known."""
-        return State(np.zeros_like(state.arm), self._with_known(state.setup, self.unknowns.nuisance))
+        return State(np.zeros_like(state.arm), self._with_known(state.setup, self.unknowns.anew))
 
     def moved(self, state: State, step: Floats) -> State:
         """The state after a step (u,)."""
@@ -138,7 +141,7 @@ class Scene:
             place = self.unknowns.group(k)
             gentle = self._between(about, k, state.setup, k)
             known = gentle if number is None else self._between(self._known, number, state.setup, k)
-            found[place] = np.where(self.unknowns.std[place] >= OPEN, gentle, known)
+            found[place] = np.where(self.unknowns.anew[place], gentle, known)
         return found
 
     def motion(self, state: State, number: int) -> tuple[Floats | None, Floats | None]:
@@ -147,8 +150,13 @@ class Scene:
         if known is None:
             return None, None
         moved = self._between(self._known, known, state.setup, number)
-        frame = 0 if self.task.arm.world_is_known else 6
+        frame = 0 if self.task.arm.world_is_known else FRAME_UNKNOWNS
         return (moved[:frame] if frame else None), moved[frame:]
+
+    def base_motion(self, change: Floats) -> Floats:
+        """How far (6,) changes (5,) of its row move the base of a known world."""
+        convention, row = self.task.arm.robot.convention, self._row_of_base
+        return motion_between(row_transform(row, convention), row_transform(row + change, convention))
 
     def covariance(self, state: State) -> Floats:
         """Covariance (R, R) of the residuals of an unchanged arm, without what is found anew.
@@ -160,15 +168,19 @@ class Scene:
         whole = self._calibration.spread.joint(
             self.inputs, self.arm_jacobian(state), self.tied_jacobian(state)
         )
-        anew, seen = self.linear(state).jacobian[:, self.unknowns.std >= OPEN], self.seen.reshape(-1)
+        anew, seen = self.linear(state).jacobian[:, self.unknowns.anew], self.seen.reshape(-1)
         return _without(whole[np.ix_(seen, seen)], anew) + self.scatter(state)
 
     def scatter(self, state: State) -> Floats:
-        """Covariance (R, R) of what rows show anew: noise, and what the device says of itself."""
+        """Covariance (R, R) of what rows show anew: noise, and what the device says of itself.
+
+        Noise of computed rows is next to nothing; that they are off by less than FINEST tells of no arm.
+        """
         noise = self._calibration.spread.noise(self.arm_jacobian(state), self.orientation)
         seen = self.seen.reshape(-1)
         own = self._stated_beyond_noise()[:, None, None] * np.diag(~self.orientation)
-        whole = block_diag(*(noise + own))
+        finest = FINEST**2 * np.eye(len(self.orientation))
+        whole = block_diag(*(noise + own + finest))
         return np.asarray(whole[np.ix_(seen, seen)])
 
     def _stated_beyond_noise(self) -> Floats:
@@ -220,8 +232,7 @@ class Scene:
         """How far set-up k is from set-up `number` of another state (W,)."""
         parts = []
         if not self.task.arm.world_is_known:
-            between = rigid_inverse(before.frames[number]) @ now.frames[k]
-            parts += [between[:3, 3], rotation_vector_from_matrix(between[:3, :3])]
+            parts.append(motion_between(before.frames[number], now.frames[k]))
         parts.append((now.targets[k] - before.targets[number]).reshape(-1))
         if self._turns:
             turn = before.rotations[number].T @ now.rotations[k]
@@ -248,7 +259,7 @@ class Scene:
                 group = unknowns.group(k)
                 rows = np.arange(group.start, group.stop) - first
                 columns = places_of(self.task.arm, self.task.selection, calibration.selection)
-                found[rows, number * width + columns] = unknowns.std[group] < OPEN
+                found[rows, number * width + columns] = ~unknowns.anew[group]
         return found
 
     def _setup_jacobian(self, state: State) -> Floats:
@@ -256,6 +267,12 @@ class Scene:
         own = setup_jacobian(self.problem, self._moved_parameters(state), state.setup)
         chosen = self.number[:, None] == np.arange(len(self.task.groups))
         return np.asarray((own[:, :, None] * chosen[:, None, :, None]).reshape(*own.shape[:2], -1))
+
+
+def motion_between(before: Floats, after: Floats) -> Floats:
+    """How far a frame moved (6,) between two transforms (4, 4): shift in its own axes, rotation vector."""
+    between = rigid_inverse(before) @ after
+    return np.concatenate([between[:3, 3], rotation_vector_from_matrix(between[:3, :3])])
 
 
 def _without(covariance: Floats, columns: Floats) -> Floats:

@@ -1,26 +1,30 @@
-"""How many poses an update uses: its time grows with the third power of their number."""
+"""How many poses an update uses: its time grows with the third power of the number of their values."""
 
 from typing import Final
 
 import numpy as np
 
+from truearm.core_set import Selection
 from truearm.errors import Notice
 from truearm.measurements import Measurements
 from truearm.nominal_misfit import some_rows
 
-MOST_POSES: Final = 500
-"""They tell offsets, frame and tool far better than the calibration's field is known."""
+MOST_VALUES: Final = 1500
+"""They tell offsets, frame and tool far better than the calibration's field is known: 500 points."""
 FEWEST_OF_A_GROUP: Final = 20
 
 
-def some_poses(data: Measurements) -> tuple[Measurements, list[Notice]]:
-    """At most 500 poses, spread evenly over each set-up in the order of measuring; and that so few are used.
+def some_poses(data: Measurements, selection: Selection) -> tuple[Measurements, list[Notice]]:
+    """At most 1500 values, spread evenly over the poses of each set-up in the order of measuring; and that so
+    few are used.
 
-    Each set-up has the same share at the most, and never less than twenty of its poses.
+    Each set-up has the same share at the most, and never less than twenty of its poses. A pose has three
+    values of each target that is used, and three of an orientation.
     """
-    if len(data) <= MOST_POSES:
+    most = MOST_VALUES // (3 * (len(selection.targets) + selection.orientation))
+    if len(data) <= most:
         return data, []
-    share = max(MOST_POSES // len(data.groups), FEWEST_OF_A_GROUP)
+    share = max(most // len(data.groups), FEWEST_OF_A_GROUP)
     chosen = [some_rows(np.flatnonzero(data.group == group), share) for group in data.groups]
     rows = np.sort(np.concatenate(chosen))
     if len(rows) == len(data):

@@ -49,9 +49,9 @@ def change_test(unchanged: Estimate, unknowns: Unknowns, known: int) -> SquaresT
 
     What says nothing about a change, such as a frame that is found anew, is projected out.
     """
-    residual, nuisance = _whitened(unchanged, unknowns, unknowns.nuisance)
-    _, change = _whitened(unchanged, unknowns, unknowns.free & ~unknowns.nuisance)
-    out = _basis(nuisance, NEGLIGIBLE)
+    residual, anew = _whitened(unchanged, unknowns, unknowns.anew)
+    _, change = _whitened(unchanged, unknowns, unknowns.free & ~unknowns.anew)
+    out = _basis(anew, NEGLIGIBLE)
     left = residual - out @ (out.T @ residual)
     told = _basis(change - out @ (out.T @ change), TOLD)
     return SquaresTest.of(told.T @ left, told.shape[1], known)

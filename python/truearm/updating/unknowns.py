@@ -14,7 +14,7 @@ from truearm.fitting import Task
 from truearm.identified import IdentifiedArm
 from truearm.measured_parts import MeasuredParts
 from truearm.measurements import Measurements
-from truearm.parameters import KIND_COUNT, KINDS, THETA, D
+from truearm.parameters import KIND_COUNT, KINDS, THETA, D, are_lengths
 from truearm.units import to_si
 from truearm.updating.options import UpdateOptions
 
@@ -23,6 +23,8 @@ Mask = NDArray[np.bool_]
 
 OPEN: Final = 1.0
 """What is found anew is known to a metre and a radian, as in the fits."""
+BASE: Final = "base_"
+"""Names of the unknowns of the base begin so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,18 +77,41 @@ class Unknowns:
         return np.asarray(self.std > 0.0)
 
     @property
-    def nuisance(self) -> Mask:
-        """Which say nothing about what changed (u,): what is found anew, and the base of a known world."""
-        base = np.array([name.startswith("base") for name in self.arm_names])
-        found = self.std >= OPEN
-        found[: len(base)] |= base
+    def anew(self) -> Mask:
+        """Which are found anew (u,): they are not compared, and say nothing about what changed."""
+        return np.asarray(self.std >= OPEN)
+
+    @property
+    def base(self) -> Mask:
+        """Which are of the base (u,), a row of the arm where the world is known."""
+        found = np.zeros(len(self.std), dtype=np.bool_)
+        found[: len(self.arm_names)] = [name.startswith(BASE) for name in self.arm_names]
         return found
 
     @property
+    def parts(self) -> tuple[tuple[str, Mask], ...]:
+        """What an offset may be confounded with, each with its unknowns (u,), as far as there are any."""
+        named = (("frame", self.frame), ("base", self.base), ("tool", self.tool))
+        return tuple((name, chosen) for name, chosen in named if chosen.any())
+
+    @property
     def kept(self) -> tuple[str, ...]:
-        """What of "frame" and "tool" is kept in all set-ups."""
-        parts = (("frame", self.frame), ("tool", self.tool))
-        return tuple(name for name, chosen in parts if chosen.any() and not self.std[chosen].any())
+        """What of "frame", or in a known world "base", and "tool" is kept in all set-ups."""
+        return tuple(name for name, chosen in self.parts if not self.std[chosen].any())
+
+    def is_compared(self, own: NDArray[np.int64] | slice) -> bool:
+        """Whether these unknowns are estimated, and not found anew."""
+        return bool(self.free[own].all()) and not self.anew[own].any()
+
+    @property
+    def count_compared(self) -> int:
+        """How many joints, bases, frames and tools are compared, at least one."""
+        whole = np.arange(len(self.std))
+        parts = [*whole[self.arm & ~self.base][:, None], whole[self.base]]
+        for number in range(len(self.known)):
+            own = whole[self.group(number)]
+            parts += [own[self.frame[own]], own[self.tool[own]]]
+        return max(sum(self.is_compared(own) for own in parts if len(own)), 1)
 
     def holding(self, numbers: Iterable[int]) -> "Unknowns":
         """The same with some unknowns of the arm held where they were."""
@@ -141,13 +166,18 @@ def arm_directions(arm: IdentifiedArm) -> tuple[Floats, tuple[str, ...]]:
     found = np.zeros((arm.table.size, len(columns) + len(base)))
     found[columns, : len(columns)] = arm.robot.coupling
     found[base, len(columns) + np.arange(len(base))] = 1.0
-    return found, (*names, *(f"base_{KINDS[kind]}" for kind in base))
+    return found, (*names, *(f"{BASE}{KINDS[kind]}" for kind in base))
 
 
 def arm_std(arm: IdentifiedArm, name: str, options: UpdateOptions) -> float:
-    """Prior standard deviation of one of the arm's unknowns, rad or m."""
-    if name.startswith("base"):
-        return OPEN
+    """Prior standard deviation of one of the arm's unknowns, rad or m; zero for what is kept.
+
+    The base of a known world may turn as offsets do, and shift as the tool does: it is compared.
+    """
+    if name.startswith(BASE):
+        is_length = are_lengths([KINDS.index(name.removeprefix(BASE))])[0]
+        moved = to_si(options.tool_mm, "mm") if is_length else to_si(options.offset_deg, "deg")
+        return 0.0 if options.keep_frame else moved
     prismatic = arm.robot.joints[int(name.removeprefix("joint")) - 1] == "prismatic"
     return to_si(options.offset_mm, "mm") if prismatic else to_si(options.offset_deg, "deg")
 

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from truearm.calibration import Calibration
 from truearm.details import ConstantDetails
 from truearm.errors import Notice, in_words
-from truearm.fitted_rows import TRAINED, FittedRows
+from truearm.fitted_rows import TRAINED, FittedRows, farthest_m
 from truearm.held_rows import HeldRows
 from truearm.judging import judge
 from truearm.models import NOMINAL, ArmModel
@@ -149,6 +149,6 @@ def _rows(scene: Scene, found: Estimate, kept: KeptParts) -> FittedRows:
         np.ones(len(scene.data)),
         residual,
         np.zeros(len(scene.data)),
-        np.linalg.norm(left[:, :3], axis=1),
+        farthest_m(residual, kept.selection),
         orientation=kept.selection.orientation,
     )
