@@ -139,36 +139,36 @@ class Motion:
         sides = poses.approach.tolist()
         return [Step(k, "pose", k, poses.purpose[k], sides[k], poses.readings[k]) for k in range(len(poses))]
 
-    def stops(self, poses: Poses) -> Floats:
-        """Readings (s, N) that the arm goes through from the first pose on, whether or not rules allow it."""
-        steps = self.steps(poses)
-        if self.cell is None:
-            return np.array([at for step in steps for at in self.run_up.places(step.readings, step.approach)])
-        walk = Walk(self.cell)
-        for step in steps:
-            if step.kind == "pose":
-                walk.register()
-            walk.problem_of_way(step)
-        return np.array(walk.stops or [poses.readings[0]])
-
     def passage(self, poses: Poses, unreached: list[int]) -> "Passage":
         """How the arm gets from pose to pose, some of which (from 0) it does not get to."""
         lowest_m = min(lowest(self.arm, poses.readings, tool=tool) for tool in self.tools)
-        on_ways = self.ways.lowest_m(self.stops(poses))
-        return Passage(lowest_m, on_ways, unreached, self._blocked_besides(poses), self.passes_table)
+        legs = self._legs(poses)
+        stops = [at for _, way in legs for at in way]
+        on_ways = self.ways.lowest_m(np.array(stops or poses.readings[:1]))
+        return Passage(lowest_m, on_ways, unreached, self._blocked_besides(legs), self.passes_table)
 
-    def _blocked_besides(self, poses: Poses) -> int:
-        """To how many contacts for the frame and checks, and poses behind these, rules allow no way."""
-        if self.cell is None or self.passes_table or self.ways.clear(self.stops(poses)):
-            return 0
+    def _legs(self, poses: Poses) -> list[tuple[Step, list[Floats]]]:
+        """Each step, and readings (N,) that the arm goes through to it, whether or not rules allow it."""
+        steps = self.steps(poses)
+        if self.cell is None:
+            return [(step, self.run_up.places(step.readings, step.approach)) for step in steps]
+        walk, legs = Walk(self.cell), []
+        for step in steps:
+            if step.kind == "pose":
+                walk.register()
+            gone = len(walk.stops)
+            walk.problem_of_way(step)
+            legs.append((step, walk.stops[gone:]))
+        return legs
+
+    def _blocked_besides(self, legs: list[tuple[Step, list[Floats]]]) -> int:
+        """On how many ways to contacts for the frame and checks, or on from these, a rule is broken."""
+        blocked, before = 0, "pose"
         here: list[Floats] = []
-        blocked = 0
-        before = ""
-        for step in self.steps(poses):
-            way = self.run_up.places(step.readings, step.approach)
-            if step.kind != "pose" or before not in ("", "pose"):
-                blocked += not self.ways.clear(np.array([*here, *way]))
-            here, before = [step.readings], step.kind
+        for step, way in legs:
+            if not before == step.kind == "pose":
+                blocked += bool(way) and not self.ways.clear(np.array([*here, *way]))
+            here, before = way[-1:] or here, step.kind
         return blocked
 
 
