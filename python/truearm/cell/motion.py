@@ -152,7 +152,7 @@ class Motion:
         steps = self.steps(poses)
         if self.cell is None:
             return [(step, self.run_up.places(step.readings, step.approach)) for step in steps]
-        walk, legs = Walk(self.cell), []
+        walk, legs = Walk(self.cell), list[tuple[Step, list[Floats]]]()
         for step in steps:
             if step.kind == "pose":
                 walk.register()

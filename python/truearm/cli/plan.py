@@ -77,14 +77,14 @@ def command(
     _check_counts({"--next": next_count, "--acceptance": acceptance, "--count": count})
     target = output or option.OUTPUT
     _check_outputs(target, picture, robot, known, cell)
-    rules, sizes = room(floor_mm, box_mm), {"link_radius_mm": link_radius_mm}
+    rules = room(floor_mm, box_mm)
     if known is not None or next_count is not None or acceptance is not None:
         if count is not None:
             raise UsageError(
                 "--count is given where poses are proposed", rule="--next or --acceptance says how many"
             )
         _propose(
-            _Asked(robot, known, next_count, acceptance, group, cell, seed, order, rules, sizes),
+            _Asked(robot, known, next_count, acceptance, group, cell, seed, order, rules, link_radius_mm),
             output,
             picture,
             as_json,
@@ -95,7 +95,7 @@ def command(
     known_cell = None if cell is None else Cell.load(cell)
     arm = _arm_of(robot, known_cell)
     number = count or option.COUNT
-    options = PlanOptions(number, criterion, seed, order, sigma_mm, rules, **sizes)  # type: ignore[arg-type]
+    options = PlanOptions(number, criterion, seed, order, sigma_mm, rules, link_radius_mm)  # type: ignore[arg-type]
     with ends_promptly():
         with told_stages()("choosing poses"):
             plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
@@ -187,7 +187,7 @@ class _Asked:
     seed: int
     order: str
     rules: "tuple[Rule, ...]"
-    sizes: Mapping[str, float | None]
+    link_radius_mm: float | None
 
 
 def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: bool) -> None:
@@ -214,7 +214,13 @@ def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: 
     number = asked.next_count or asked.acceptance or 0
     again = calibrate_again(calibration, asked.robot, NEW_FILE)
     options = ProposalOptions(
-        number, asked.seed, asked.order, asked.group, asked.rules, *again.update, **asked.sizes
+        number,
+        asked.seed,
+        asked.order,
+        asked.group,
+        asked.rules,
+        *again.update,
+        link_radius_mm=asked.link_radius_mm,
     )
     with ends_promptly():
         with told_stages()("choosing poses"):
