@@ -10,6 +10,7 @@ from tests.cell_support import cell_text, poses_of
 from truearm.cell import Cell
 from truearm.cell.clearance import Clearance
 from truearm.cell.examples import example
+from truearm.cell.motion import Motion
 from truearm.cell.plan import PlanOptions, plan_poses
 from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
@@ -34,6 +35,10 @@ def at_random(cell):
     return poses_of(cell, 30, seed=1)
 
 
+def motion_of(cell, *rules):
+    return Motion(cell.arm, cell, rules, [cell.flange_from_target])
+
+
 def refused(cell, poses):
     return [each for each in rehearse(cell, poses).refused if each.step.kind == "pose"]
 
@@ -45,14 +50,14 @@ def test_ways_between_poses_are_rehearsed(cell, at_random):
 
 
 def test_poses_are_put_off_until_there_is_a_way(cell, at_random):
-    poses, left = within_reach(cell, at_random)
+    poses, left = within_reach(motion_of(cell), at_random)
     assert sorted(map(tuple, poses.readings)) == sorted(map(tuple, at_random.readings))
     assert len(refused(cell, poses)) == len(left) < len(refused(cell, at_random))
 
 
 def test_what_is_measured_again_comes_behind_its_first_time(cell, at_random):
     twice = Poses(np.repeat(at_random.readings, 2, axis=0), np.tile([1, -1], 30), ("train", "repeat") * 30)
-    poses, left = within_reach(cell, twice)
+    poses, left = within_reach(motion_of(cell), twice)
     seen: set[tuple[float, ...]] = set()
     for readings, purpose in zip(poses.readings[: 60 - len(left)], poses.purpose, strict=False):
         assert (purpose == "repeat") == (tuple(readings) in seen)
@@ -61,7 +66,7 @@ def test_what_is_measured_again_comes_behind_its_first_time(cell, at_random):
 
 def test_a_plan_has_a_way_to_each_pose(cell, tmp_path, capsys, monkeypatch):
     plan = plan_poses(cell.arm, PlanOptions(count=20), cell=cell)
-    assert plan.unreached == []
+    assert plan.passage.unreached == []
     assert refused(cell, plan.poses) == []
     monkeypatch.chdir(tmp_path)
     (tmp_path / "cell.toml").write_text(example("ur"))
@@ -149,4 +154,6 @@ def test_no_table_no_problem():
     walk.register()
     assert walk.problem_of_way(Step(0, "pose", 0, "", 1, np.zeros(tracker.arm.joint_count))) == ""
     poses = Poses(np.zeros((2, 6)), np.zeros(2, dtype=np.int64), ("", ""))
-    assert within_reach(tracker, poses) == (poses, [])
+    kept, left = within_reach(motion_of(tracker), poses)
+    np.testing.assert_array_equal(kept.readings, poses.readings)
+    assert left == []

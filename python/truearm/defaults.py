@@ -11,6 +11,9 @@ SEED: Final = 7
 THERE_AND_BACK: Final = "there-and-back"
 """Order in which planned poses are measured."""
 
+LINK_RADIUS_MM: Final = 40.0
+"""Half the thickness of an arm's links where nothing else is known: that of a small arm's forearm."""
+
 LARGEST_MM: Final = 5.0
 """Shift of the tool that a correction may be."""
 

@@ -80,7 +80,7 @@ def check_values(
         options: The dataclass.
         choices: What the fields may hold that are one of a few.
         positive: Names of the numbers that are above zero and finite, or None.
-        not_negative: Names of those that are zero or more, and finite.
+        not_negative: Names of those that are zero or more, and finite, or None.
 
     Raises:
         UsageError: If a field holds anything else.
@@ -90,7 +90,7 @@ def check_values(
     for name in positive:
         check_positive(getattr(options, name), name)
     for name in not_negative:
-        if not 0 <= (value := getattr(options, name)) < math.inf:
+        if (value := getattr(options, name)) is not None and not 0 <= value < math.inf:
             raise UsageError(f"{value:g}", where=name, rule="Zero or more, and finite")
 
 

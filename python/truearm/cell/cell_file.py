@@ -13,9 +13,12 @@ from pydantic import BaseModel, Field, field_validator
 from truearm._core import Chain
 from truearm.cell.drivers import ROBOTS, SENSORS, driver_and_settings
 from truearm.cell.protocols import Robot, Sensor
+from truearm.cell.run_up import RunUp
 from truearm.cell.schema import Positive, Quaternion, Section, Share, Vector3, checked
+from truearm.defaults import LINK_RADIUS_MM
 from truearm.errors import InputError
 from truearm.files import parsed, read_text
+from truearm.planning.accessibility import AboveFloor, Rule
 from truearm.robot import Robot as Arm
 from truearm.rotations import UNIT_TOLERANCE, rotation_onto, transform_from_parts
 from truearm.units import to_si
@@ -52,12 +55,17 @@ class TargetSection(Section):
 
 
 class ClearanceSection(Section):
-    """Sizes that keep the arm's links and the table's arm apart."""
+    """Sizes that keep the arm's links and the table's arm apart, and where the floor is."""
 
-    link_radius_mm: Positive = 40.0
+    link_radius_mm: Positive = LINK_RADIUS_MM
     column_radius_mm: Positive = 15.0
     column_mm: Positive = 600.0
     margin_mm: Positive = 10.0
+    floor_mm: float | None = None
+
+    def rules(self) -> list[Rule]:
+        """That arm and tool stay above the floor, if it is stated where that is."""
+        return [] if self.floor_mm is None else [AboveFloor(to_si(self.floor_mm, "mm"))]
 
 
 class ProcessSection(Section):
@@ -81,6 +89,10 @@ class ProcessSection(Section):
     model: Literal["constant", "variable"] = "variable"
     target_mm: Positive | None = None
     seconds_per_pose: Positive = 5.0
+
+    def run_up(self, arm: Arm) -> RunUp:
+        """How far beside a pose the joints of an arm start."""
+        return RunUp(arm, self.approach_deg, self.approach_mm)
 
 
 class FaultsSection(Section):
@@ -195,10 +207,12 @@ class Cell:
             readings: Where they are to come to (N,).
             side: 1 from lower readings, -1 from higher ones.
         """
-        process = self.file.process
-        turned, slid = to_si(process.approach_deg, "deg"), to_si(process.approach_mm, "mm")
-        away = np.array([turned if kind == "revolute" else slid for kind in self.arm.joints])
-        return np.asarray(np.clip(readings - side * away, *self.arm.limits.T))
+        return self.run_up.beside(readings, side)
+
+    @property
+    def run_up(self) -> RunUp:
+        """How far beside a pose joints start that are to come from one side."""
+        return self.file.process.run_up(self.arm)
 
     def target_seen_from(self, frame_from_base: Floats) -> Seen:
         """What gives the nominal target (3,), m, and the direction of the tool there (3,), of readings (N,).

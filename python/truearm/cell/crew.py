@@ -23,7 +23,7 @@ LETS_GO_WITHIN_S: Final = 0.7
 
 def places_on_the_way(cell: Cell, readings: Floats, side: int) -> list[Floats]:
     """Readings to go through to a pose, so that every joint comes from a side: 1, -1, or 0 for any."""
-    return [readings] if side == 0 else [cell.beside(readings, side), readings]
+    return cell.run_up.places(readings, side)
 
 
 class Crew:

@@ -1,7 +1,7 @@
 """Which poses to measure: those that determine most, others to judge by, and some again, in a good order."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truearm.cell.cell_file import Cell
+from truearm.cell.motion import Motion, Passage
 from truearm.cell.ordering import motion_seconds, paper_order, short_order, there_and_back
 from truearm.cell.poses_file import Poses
 from truearm.cell.prediction import Prediction
@@ -21,7 +22,7 @@ from truearm.errors import UsageError, WorkError, count_of
 from truearm.identified import IdentifiedArm
 from truearm.kinds import check_values, settle
 from truearm.one_turn import one_turn
-from truearm.planning.accessibility import Rule, accessible, lowest
+from truearm.planning.accessibility import Rule
 from truearm.planning.choosing import (
     CRITERIA,
     SETUP_KINDS,
@@ -39,6 +40,10 @@ Floats = NDArray[np.float64]
 
 CHOICES: Final = 4
 """How often poses are chosen where the arm does not get to some of them."""
+STARTS: Final = 3
+"""From so many starts poses are exchanged: of 20 poses of the RV-M2 o4 is a tenth larger than from one."""
+HUBS: Final = 4
+"""From so many poses, from the middle on, the others of a pool are to have a way."""
 DRAWN_AT_ONCE: Final = 200
 POOL_PER_POSE: Final = 12
 POOL_PER_NUMBER: Final = 3
@@ -66,6 +71,8 @@ class PlanOptions:
         order: "there-and-back", "short" or "paper".
         sigma_mm: Standard deviation of a measured coordinate, for the expected accuracy.
         rules: What every pose has to keep to, of truearm.planning.accessibility or functions like these.
+        link_radius_mm: Half the thickness of links that are not to meet; 0 where they may, the cell's, or 40,
+            by default.
     """
 
     count: int = 60
@@ -74,11 +81,13 @@ class PlanOptions:
     order: str = THERE_AND_BACK
     sigma_mm: float = 0.1
     rules: tuple[Rule, ...] = ()
+    link_radius_mm: float | None = None
 
     def __post_init__(self) -> None:
-        settle(self, whole=("count", "seed"), numbers=("sigma_mm",))
+        settle(self, whole=("count", "seed"), numbers=("sigma_mm", "link_radius_mm"))
         choices = {"order": ORDERS, "criterion": CRITERIA}
-        check_values(self, choices=choices, positive=("sigma_mm",), not_negative=("seed",))
+        not_negative = ("seed", "link_radius_mm")
+        check_values(self, choices=choices, positive=("sigma_mm",), not_negative=not_negative)
         if self.count < 1:
             raise UsageError(count_of(self.count, "pose"), rule="At least one is planned")
 
@@ -93,8 +102,7 @@ class Plan:
         choice: What the choice did to the indices.
         seconds: Time of the motions of the joints in each order by name, with the poses that are repeated.
         expected: Expected standard deviation of the calibrated position over the pool, mm, by number.
-        lowest_m: The lowest place of the arm and its tool, in the base frame.
-        unreached: Which poses (from 0) the arm does not get to past the table, wherever it comes from.
+        passage: How the arm gets from pose to pose.
     """
 
     poses: Poses
@@ -102,8 +110,7 @@ class Plan:
     choice: Choice
     seconds: dict[str, float]
     expected: dict[int, float]
-    lowest_m: float
-    unreached: list[int]
+    passage: Passage
 
 
 def plan_poses(
@@ -123,11 +130,12 @@ def plan_poses(
     """
     flange_from_target = arm.tool if cell is None else cell.flange_from_target
     size = max(LEAST_POOL, POOL_PER_POSE * options.count, POOL_PER_NUMBER * max(numbers, default=0))
-    pool = measurable_pool(arm, cell, size, options.seed, options.rules)
+    motion = Motion.of(arm, cell, options.rules, [flange_from_target], options.link_radius_mm)
+    pool = measurable_pool(motion, size, options.seed)
     wanted = ChoiceOptions(criterion=options.criterion, tool=flange_from_target)
     identified, asked = IdentifiedArm(arm), [options.count] if options.count <= MOST_TOLD else []
     told = sorted({*numbers, *asked}) if numbers else []
-    arranged = _arranged(identified, pool, options, wanted, cell)
+    arranged = _arranged(identified, pool, options, wanted, motion)
     poses = arranged.orders[options.order]
     return Plan(
         poses,
@@ -135,8 +143,7 @@ def plan_poses(
         arranged.choice,
         {name: seconds_of(each) for name, each in arranged.orders.items()},
         {n: expected_mm(identified, pool, n, wanted, options.sigma_mm) for n in told},
-        lowest(arm, poses.readings, tool=flange_from_target),
-        arranged.unreached,
+        motion.passage(poses, arranged.unreached),
     )
 
 
@@ -150,28 +157,36 @@ class _Arranged:
 
 
 def _arranged(
-    arm: IdentifiedArm, pool: Floats, options: PlanOptions, wanted: ChoiceOptions, cell: Cell | None
+    arm: IdentifiedArm, pool: Floats, options: PlanOptions, wanted: ChoiceOptions, motion: Motion
 ) -> _Arranged:
     """Choose and order poses of a pool; others come in the place of those to which there is no way."""
     repeats = min(max(LEAST_REPEATED, round(REPEATED_SHARE * options.count)), options.count)
     for last in [*[False] * (CHOICES - 1), True]:
-        choice = choose(arm, pool, options.count, wanted)
+        choice = choose(arm, pool, options.count, replace(wanted, starts=STARTS))
         rows, purposes = _with_others(pool, choice.rows)
-        points = targets_of(
-            arm.robot, pool[rows], arm.robot.tool if cell is None else cell.flange_from_target
-        )
+        points = targets_of(arm.robot, pool[rows], motion.tools[0])
         orders = {
             name: in_order(pool[rows], purposes, order, repeats)[0]
             for name, order in orders_of(points, pool[rows]).items()
         }
-        unreached: list[int] = []
-        if cell is not None:
-            orders[options.order], unreached = within_reach(cell, orders[options.order])
+        orders[options.order], unreached = within_reach(motion, orders[options.order])
         if last or not unreached:
             break
-        without = orders[options.order].readings[unreached]
-        pool = pool[~(pool[:, None] == without).all(axis=2).any(axis=1)]
+        pool = _with_ways(pool, orders[options.order].readings, unreached, motion)
     return _Arranged(choice, orders, unreached)
+
+
+def _with_ways(pool: Floats, readings: Floats, unreached: list[int], motion: Motion) -> Floats:
+    """Poses of a pool without those of the readings (n, N) that are not reached.
+
+    Where no table is on the way, without those too that seem to have no way from any of a few of the others.
+    """
+    pool = pool[~(pool[:, None] == readings[unreached]).all(axis=2).any(axis=1)]
+    reached = np.delete(readings, unreached, axis=0)
+    if motion.passes_table or not len(reached):
+        return pool
+    ways = [motion.ways.seem_clear(pool, reached[row]) for row in fill(reached, HUBS)]
+    return pool[np.any(ways, axis=0)]
 
 
 def seconds_of(poses: Poses) -> float:
@@ -205,30 +220,23 @@ def expected_mm(
     return float(MM_PER_METRE * np.sqrt(np.square(spread).sum() / len(pool)))
 
 
-def measurable_pool(
-    arm: Robot,
-    cell: Cell | None,
-    size: int,
-    seed: int,
-    rules: Sequence[Rule] = (),
-    held: Mapping[int, float] = NONE_HELD,
-) -> Floats:
+def measurable_pool(motion: Motion, size: int, seed: int, held: Mapping[int, float] = NONE_HELD) -> Floats:
     """Readings (size, N) drawn evenly within the limits, all of which keep to the rules and can be measured.
 
-    Joints, by their number from 1, are held at readings, rad or m.
+    Joints start beside them within the limits, from either side. Those in `held`, by their number from 1, are
+    held at readings, rad or m.
 
     Raises:
         WorkError: If there are too few.
     """
-    tool = arm.tool if cell is None else cell.flange_from_target
+    cell = motion.cell
     prediction = None if cell is None else Prediction(cell)
     found: list[Floats] = []
     drawn = 0
-    for block in _drawn(arm, seed):
+    for block in _drawn(motion, seed):
         for joint, reading in held.items():
             block[:, joint - 1] = reading
-        allowed = accessible(arm, block, rules, tool=tool)
-        for readings in block[allowed]:
+        for readings in block[motion.allowed(block)]:
             step = Step(0, "pose", 0, "", 0, readings)
             if cell is None or prediction is None or not problem_of(cell, prediction, step):
                 found.append(readings)
@@ -240,15 +248,15 @@ def measurable_pool(
     raise WorkError(
         f"{len(found)} of {drawn} random poses can be measured",
         rule=f"A pool of {size} is needed",
-        way_out=f"Look at {'' if cell is None else OF_CELL}--floor-mm, --box-mm and the joints' limits, or "
-        "ask for fewer poses",
+        way_out=f"Look at {'' if cell is None else OF_CELL}--floor-mm, --box-mm, --link-radius-mm and the "
+        "joints' limits, or ask for fewer poses",
     )
 
 
-def _drawn(arm: Robot, seed: int) -> Iterator[Floats]:
+def _drawn(motion: Motion, seed: int) -> Iterator[Floats]:
     """Readings (DRAWN_AT_ONCE, N) within the limits and one turn, MOST_DRAWS in all."""
-    rng = np.random.default_rng(seed)
-    low, high = one_turn(arm)
+    rng, arm = np.random.default_rng(seed), motion.arm
+    low, high = motion.run_up.room(*one_turn(arm))
     for _ in range(MOST_DRAWS // DRAWN_AT_ONCE):
         yield rng.uniform(low, high, (DRAWN_AT_ONCE, arm.joint_count))
 

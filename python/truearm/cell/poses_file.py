@@ -29,12 +29,15 @@ class Poses:
         approach: From which side joints come (n,): 1 from lower readings, -1 from higher, 0 from anywhere.
         purpose: What each is for (n,), such as "train", "validate" or "repeat".
         group: Set-up of a calibration that they are meant for; None for any.
+        at_limits: Which poses (from 0) come from anywhere only because a joint is at its limit on the side
+            that the file asks for.
     """
 
     readings: Floats
     approach: NDArray[np.int64]
     purpose: tuple[str, ...]
     group: str | None = None
+    at_limits: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.readings)
@@ -43,7 +46,8 @@ class Poses:
     def read_csv(cls, path: str | Path, arm: Robot) -> "Poses":
         """Read a file with columns q1 ... qN, units in their names or rad and m.
 
-        Columns approach, purpose and group may be there.
+        Columns approach, purpose and group may be there. A pose with a joint at its limit, on the side from
+        which joints are to come, comes from anywhere.
 
         Raises:
             InputError: If a column is missing, a value breaks a rule, a pose is beyond the joint limits, or
@@ -74,8 +78,11 @@ class Poses:
                 where=str(path),
                 rule="1 from lower readings, -1 from higher ones, 0 from anywhere",
             )
+        end = np.where(approach[:, None] > 0.0, low, high)
+        at_limits = (approach != 0.0) & (readings == end).any(axis=1)
         purpose = tuple(table.texts(PURPOSE).tolist()) if PURPOSE in table.names else ("",) * len(readings)
-        return cls(readings, approach.astype(np.int64), purpose, _group(table))
+        sides = np.where(at_limits, 0, approach).astype(np.int64)
+        return cls(readings, sides, purpose, _group(table), tuple(np.flatnonzero(at_limits).tolist()))
 
 
 def _group(table: Table) -> str | None:

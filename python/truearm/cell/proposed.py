@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from truearm.calibration import Calibration
 from truearm.cell.cell_file import Cell
+from truearm.cell.motion import Motion, Passage
 from truearm.cell.plan import (
     LEAST_POOL,
     POOL_PER_POSE,
@@ -23,7 +24,7 @@ from truearm.defaults import THERE_AND_BACK
 from truearm.endpoints import at_target
 from truearm.errors import UsageError
 from truearm.measurements import Measurements
-from truearm.planning.accessibility import Mask, Places, Rule, accessible, lowest
+from truearm.planning.accessibility import Rule
 from truearm.proposing import (
     Acceptance,
     Candidates,
@@ -60,6 +61,8 @@ class ProposalOptions:
         update_of: The calibration that will be updated from the next poses; None where one is made from all.
         update_rows: What was measured since that one, which takes part.
         update_options: How it will be updated; the defaults without.
+        link_radius_mm: Half the thickness of links that are not to meet; 0 where they may, the cell's, or 40,
+            by default.
     """
 
     count: int
@@ -70,6 +73,7 @@ class ProposalOptions:
     update_of: Calibration | None = None
     update_rows: tuple[Measurements, ...] = ()
     update_options: UpdateOptions | None = None
+    link_radius_mm: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +86,7 @@ class Proposed:
         seconds: Time of the motions of the joints in each order by name.
         found: What was chosen, and what is expected of it.
         shown: What each pose is taken to be measured with, in words.
-        lowest_m: The lowest place of the arm and its tool, in the base frame.
+        passage: How the arm gets from pose to pose.
     """
 
     poses: Poses
@@ -90,7 +94,7 @@ class Proposed:
     seconds: dict[str, float]
     found: NextPoses | Acceptance
     shown: str
-    lowest_m: float
+    passage: Passage
 
     @property
     def teaches(self) -> bool:
@@ -102,7 +106,7 @@ class Proposed:
         told: dict[str, Any] = {
             "count": len(self.poses),
             "motion_s": self.seconds,
-            "lowest_mm": MM_PER_METRE * self.lowest_m,
+            **self.passage.to_dict(),
             "measured": self.shown,
         }
         if isinstance(self.found, NextPoses):
@@ -125,22 +129,16 @@ def propose_next(calibration: Calibration, options: ProposalOptions, *, cell: Ce
     Raises:
         WorkError: If the sensor reaches too few poses, or the calibration has no standard deviations.
     """
-    candidates = _candidates(calibration, options, cell)
-    workspace = measurable_pool(
-        calibration.robot,
-        cell,
-        WORKSPACE,
-        options.seed + 1,
-        _rules(calibration, options, cell),
-        _held(calibration),
-    )
+    motion = _motion(calibration, options, cell)
+    candidates = _candidates(calibration, options, motion)
+    workspace = measurable_pool(motion, WORKSPACE, options.seed + 1, _held(calibration))
     found = next_poses(candidates, workspace, options.count)
     if options.update_of is not None:
         chosen = replace(candidates, readings=candidates.readings[found.rows])
         known = options.update_of, options.update_rows, options.update_options
         expected = expected_by_update(chosen, workspace, *known)
         found = replace(found, expected_mm=expected)
-    proposed = _ordered(candidates, found, found.rows, "train", options, cell)
+    proposed = _ordered(candidates, found, found.rows, "train", options, motion)
     return replace(proposed, poses=replace(proposed.poses, group=candidates.set_up))
 
 
@@ -148,9 +146,10 @@ def propose_acceptance(
     calibration: Calibration, options: ProposalOptions, *, cell: Cell | None = None
 ) -> Proposed:
     """The poses that check the calibration best; arguments and errors as for propose_next."""
-    candidates = _candidates(calibration, options, cell)
+    motion = _motion(calibration, options, cell)
+    candidates = _candidates(calibration, options, motion)
     found = acceptance_poses(candidates, options.count)
-    return _ordered(candidates, found, found.rows, "acceptance", options, cell)
+    return _ordered(candidates, found, found.rows, "acceptance", options, motion)
 
 
 def kept_still(calibration: Calibration) -> dict[int, float]:
@@ -191,7 +190,7 @@ def check_same_tables(arm: Robot, known: Robot, whose: str) -> None:
         )
 
 
-def _candidates(calibration: Calibration, options: ProposalOptions, cell: Cell | None) -> Candidates:
+def _candidates(calibration: Calibration, options: ProposalOptions, motion: Motion) -> Candidates:
     if options.count > MOST_PROPOSED:
         raise UsageError(
             f"{options.count} poses",
@@ -199,20 +198,14 @@ def _candidates(calibration: Calibration, options: ProposalOptions, cell: Cell |
             way_out="Measure some, calibrate and ask again, or plan afresh with truearm plan ROBOT -n N",
         )
     size = min(max(LEAST_POOL, POOL_PER_POSE * options.count), MOST_CANDIDATES)
-    rules = _rules(calibration, options, cell)
-    pool = measurable_pool(calibration.robot, cell, size, options.seed, rules, _held(calibration))
+    pool = measurable_pool(motion, size, options.seed, _held(calibration))
     return Candidates(calibration, pool, options.group)
 
 
-def _rules(calibration: Calibration, options: ProposalOptions, cell: Cell | None) -> tuple[Rule, ...]:
-    """The rules, kept to with each target that is measured."""
+def _motion(calibration: Calibration, options: ProposalOptions, cell: Cell | None) -> Motion:
+    """The motion within the rules, which are kept to with each target that is measured."""
     tools = _tools(calibration, options.group, cell)
-
-    def with_each(places: Places) -> Mask:
-        allowed = [accessible(places.robot, places.readings, options.rules, tool=tool) for tool in tools]
-        return np.asarray(np.all(allowed, axis=0))
-
-    return (with_each,) if options.rules else ()
+    return Motion.of(calibration.robot, cell, options.rules, tools, options.link_radius_mm)
 
 
 def _tools(calibration: Calibration, group: str | None, cell: Cell | None) -> list[Floats]:
@@ -240,16 +233,15 @@ def _ordered(
     rows: NDArray[np.int64],
     purpose: str,
     options: ProposalOptions,
-    cell: Cell | None,
+    motion: Motion,
 ) -> Proposed:
     arm = candidates.calibration.robot
     readings = candidates.readings[rows]
-    tools = _tools(candidates.calibration, options.group, cell)
+    tools = motion.tools
     points = targets_of(arm, readings, tools[0])
     orders = orders_of(points, readings)
     lists = {name: in_order(readings, [purpose] * len(rows), each, 0)[0] for name, each in orders.items()}
-    if cell is not None:
-        lists[options.order] = within_reach(cell, lists[options.order])[0]
+    lists[options.order], unreached = within_reach(motion, lists[options.order])
     poses, seconds = lists[options.order], {name: seconds_of(each) for name, each in lists.items()}
     return Proposed(
         poses,
@@ -257,5 +249,5 @@ def _ordered(
         seconds,
         found,
         candidates.shown,
-        min(lowest(arm, readings, tool=tool) for tool in tools),
+        motion.passage(poses, unreached),
     )

@@ -1,4 +1,4 @@
-"""An order of planned poses in which the arm gets from each to the next past the table."""
+"""An order of planned poses in which the arm gets from each to the next, past the table and within rules."""
 
 from dataclasses import replace
 from typing import Final
@@ -6,13 +6,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truearm.cell.cell_file import Cell
+from truearm.cell.motion import FreeWalk, Motion
 from truearm.cell.poses_file import Poses
 from truearm.cell.rehearsal import Walk
-from truearm.cell.sequence import steps_of
 from truearm.cell.session import Step
-from truearm.cell.table_panel import TablePanel
-from truearm.errors import InputError
 
 Order = NDArray[np.int64]
 
@@ -20,36 +17,99 @@ Order = NDArray[np.int64]
 ROUNDS: Final = 4
 
 
-def within_reach(cell: Cell, poses: Poses) -> tuple[Poses, list[int]]:
-    """Put poses to which there is no way from the one before off until there is one.
+def within_reach(motion: Motion, poses: Poses) -> tuple[Poses, list[int]]:
+    """Put poses to which there is no way from the one before where there is one.
 
     A pose that is measured again comes behind its first time.
 
     Returns:
         The poses, and which of them (from 0), the last ones, there is no way to wherever the arm comes from.
     """
+    if not motion.passes_table:
+        order, waiting = _put_elsewhere(motion, poses)
+        return _arranged(poses, [*order, *waiting]), list(range(len(order), len(poses)))
     left: list[int] = []
-    if not isinstance(cell.sensor, TablePanel) or cell.file.world is None:
-        return poses, left
     for _ in range(ROUNDS):
-        order, left = _walked(cell, poses)
-        if np.array_equal(order, np.arange(len(poses))):
+        order, waiting = _put_off(motion, poses)
+        left = list(range(len(order), len(poses)))
+        if [*order, *waiting] == list(range(len(poses))):
             break
-        poses = replace(
-            poses,
-            readings=poses.readings[order],
-            approach=poses.approach[order],
-            purpose=tuple(poses.purpose[k] for k in order),
-        )
+        poses = _arranged(poses, [*order, *waiting])
     return poses, left
 
 
-def _walked(cell: Cell, poses: Poses) -> tuple[Order, list[int]]:
-    """Rows of poses in the order in which the arm gets to them, and those last ones to which it does not."""
-    walk = Walk(cell)
-    for step in _contacts(cell, poses):
-        walk.problem_of_way(step)
-    walk.register()
+def _arranged(poses: Poses, order: list[int]) -> Poses:
+    return replace(
+        poses,
+        readings=poses.readings[order],
+        approach=poses.approach[order],
+        purpose=tuple(poses.purpose[k] for k in order),
+    )
+
+
+def _put_elsewhere(motion: Motion, poses: Poses) -> tuple[list[int], list[int]]:
+    """Rows of poses in an order in which rules allow all ways, and those for which there is no place in it.
+
+    A pose without a way from the one before goes between two others, where the way is longest least.
+    """
+    walk, order, waiting = _from_the_first(motion, poses)
+    left: list[int] = []
+    for k in waiting:
+        place = _place_for(walk, poses, k, order)
+        if place is None:
+            left.append(k)
+        else:
+            order.insert(place, k)
+    return order, left
+
+
+def _from_the_first(motion: Motion, poses: Poses) -> tuple[FreeWalk, list[int], list[int]]:
+    """A walk to the poses that can be gone to one after another, their rows, and those of the others.
+
+    It begins at the first pose from which half of the others are gone to.
+    """
+    rows = list(range(len(poses)))
+    for begin in [*range(ROUNDS), 0]:
+        walk, order = FreeWalk(motion.run_up, motion.ways), list[int]()
+        waiting = rows[:begin] + _gone_to(walk, poses, rows[begin:], order)
+        if len(order) >= len(waiting):
+            break
+    return walk, order, waiting
+
+
+def _place_for(walk: FreeWalk, poses: Poses, k: int, order: list[int]) -> int | None:
+    """Where in an order a pose has a way to it and on from it, the shortest ones; None for nowhere."""
+    readings, there = poses.readings, poses.readings[k]
+    alike = [at for at, row in enumerate(order) if np.array_equal(readings[row], there)]
+    is_again = any(np.array_equal(row, there) for row in readings[:k])
+    if is_again and not alike:
+        return None
+    first, last = (alike[0] + 1, len(order)) if is_again else (0, min(alike, default=len(order)))
+    ways = np.abs(readings[order] - there).max(axis=1, initial=0.0)
+    between = np.abs(np.diff(readings[order], axis=0)).max(axis=1, initial=0.0)
+    longer = np.r_[0.0, ways] + np.r_[ways, 0.0] - np.r_[0.0, between, 0.0]
+    for place in np.argsort(longer, kind="stable").tolist():
+        if not first <= place <= last:
+            continue
+        before, behind = order[max(0, place - 1) : place], order[place : place + 1]
+        if walk.is_clear([readings[row] for row in before], there, int(poses.approach[k])) and all(
+            walk.is_clear([there], readings[row], int(poses.approach[row])) for row in behind
+        ):
+            return place
+    return None
+
+
+def _put_off(motion: Motion, poses: Poses) -> tuple[list[int], list[int]]:
+    """Rows of poses in the order in which the arm gets to them, and those to which it does not.
+
+    A pose to which there is no way is put off until there is one.
+    """
+    walk = motion.walk()
+    if isinstance(walk, Walk):
+        for step in motion.steps(poses):
+            if step.kind == "registration":
+                walk.problem_of_way(step)
+        walk.register()
     order: list[int] = []
     waiting: list[int] = []
     for k in range(len(poses)):
@@ -58,11 +118,10 @@ def _walked(cell: Cell, poses: Poses) -> tuple[Order, list[int]]:
     while len(waiting) < before:
         before = len(waiting)
         waiting = _gone_to(walk, poses, waiting, order)
-    reached = len(order)
-    return np.array(order + waiting, dtype=np.int64), list(range(reached, len(poses)))
+    return order, waiting
 
 
-def _gone_to(walk: Walk, poses: Poses, waiting: list[int], order: list[int]) -> list[int]:
+def _gone_to(walk: Walk | FreeWalk, poses: Poses, waiting: list[int], order: list[int]) -> list[int]:
     """Go to those of the waiting poses that can be gone to, which are added to an order; the others."""
     left: list[int] = []
     for k in waiting:
@@ -74,12 +133,3 @@ def _gone_to(walk: Walk, poses: Poses, waiting: list[int], order: list[int]) -> 
         else:
             order.append(k)
     return left
-
-
-def _contacts(cell: Cell, poses: Poses) -> list[Step]:
-    """The contacts for the frame; none where the poses are too few to be measured alone."""
-    try:
-        steps = steps_of(poses, cell.file.process)
-    except InputError:
-        return []
-    return [step for step in steps if step.kind == "registration"]

@@ -4,7 +4,9 @@ Ways from each step to the next are tried as the process tries them. The arm is 
 of its driver, or with all joints at zero where that has none, and the table at the beginning of its ranges.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +22,12 @@ from truearm.cell.sequence import steps_of
 from truearm.cell.session import Step
 from truearm.cell.table_panel import TablePanel
 from truearm.cell.ways import Ways
+from truearm.planning.joint_ways import JointWays
 from truearm.units import MM_PER_METRE, to_si
 
 Floats = NDArray[np.float64]
+
+BROKEN: Final = "arm or tool would leave the room on the way there, from the step before"
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +39,17 @@ class Planned:
         beside: Where the joints start (N,) so that all come from one side; None where any will do.
         point_in_world: Where its target is expected (3,), m; None where that is not known.
         problem: Why it cannot be measured; empty where it can.
+        nearer: Joints, from 1, that start nearer to it than others, since a limit is in the way.
+        lowest_m: The lowest place of arm and tool on the way to it, in the base frame; None where the cell
+            file has no floor, or it is not gone to.
     """
 
     step: Step
     beside: Floats | None
     point_in_world: Floats | None
     problem: str
+    nearer: tuple[int, ...] = ()
+    lowest_m: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +71,7 @@ def rehearse(cell: Cell, poses: Poses) -> Rehearsal:
     Raises:
         InputError: If there are fewer poses than registration needs.
     """
-    prediction, walk = Prediction(cell), Walk(cell)
+    prediction, walk, lowest = Prediction(cell), Walk(cell), _lowest_of(cell)
     planned = []
     for step in steps_of(poses, cell.file.process):
         if step.kind == "pose":
@@ -69,22 +79,38 @@ def rehearse(cell: Cell, poses: Poses) -> Rehearsal:
         expected = prediction.expected(step)
         known = np.isfinite(expected.radius_m) and prediction.world_from_base is not None
         problem = problem_of(cell, prediction, step) if known else ""
+        gone = len(walk.stops)
         problem = problem or walk.problem_of_way(step)
         beside = cell.beside(step.readings, step.approach) if step.approach else None
-        planned.append(Planned(step, beside, expected.point_in_world if known else None, problem))
+        nearer = np.flatnonzero(cell.run_up.shortened(step.readings, step.approach)) + 1
+        point = expected.point_in_world if known else None
+        low = None if problem else lowest(walk.stops[max(0, gone - 1) :])
+        planned.append(Planned(step, beside, point, problem, tuple(nearer.tolist()), low))
     possible = len(planned) - len([each for each in planned if each.problem])
     return Rehearsal(planned, cell.file.process.seconds_per_pose * possible)
 
 
-class Walk:
-    """Arm and table as they go from step to step, in thought."""
+def _lowest_of(cell: Cell) -> Callable[[list[Floats]], float | None]:
+    """What tells how low an arm gets on a way through readings (N,), where there is a floor."""
+    ways = JointWays(cell.arm, (), [cell.flange_from_target])
+    has_floor = cell.file.clearance.floor_mm is not None
+    return lambda stops: ways.lowest_m(np.array(stops)) if has_floor and stops else None
 
-    def __init__(self, cell: Cell) -> None:
-        self._cell, self._prediction = cell, Prediction(cell)
+
+class Walk:
+    """Arm and table as they go from step to step, in thought, where `ways` allow it too if they are given.
+
+    Attributes:
+        stops: Readings (N,) that the arm went through so far.
+    """
+
+    def __init__(self, cell: Cell, ways: JointWays | None = None) -> None:
+        self._cell, self._prediction, self._allowed = cell, Prediction(cell), ways
         table = cell.sensor if isinstance(cell.sensor, TablePanel) else None
         self._table, self._ways = table, None if table is None else Ways(cell, table)
         self._here = self._refuge = _at_first(cell)
         self._carriage = np.zeros(3) if table is None else table.released(np.zeros(3))
+        self.stops: list[Floats] = []
 
     def register(self) -> None:
         """From now on the frame is as good as known, and targets are no farther off than expected."""
@@ -97,13 +123,14 @@ class Walk:
         Sensors that stay away have no problem.
         """
         frame = self._prediction.world_from_base
+        way = places_on_the_way(self._cell, step.readings, step.approach)
         if self._table is None or self._ways is None or frame is None:
+            self.stops += way
             return ""
         expected = self._prediction.expected(step)
-        way = places_on_the_way(self._cell, step.readings, step.approach)
         try:
             carriage = self._table.carriage_for(expected)
-            self._ways.to(
+            found = self._ways.to(
                 way,
                 expected,
                 here=self._here,
@@ -113,6 +140,9 @@ class Walk:
             )
         except RefusedError as error:
             return f"{error.what}, from the step before"
+        if self._allowed is not None and not self._allowed.clear(np.array([self._here, *found.arm])):
+            return BROKEN
+        self.stops += found.arm
         self._here, self._carriage = step.readings, carriage
         return ""
 

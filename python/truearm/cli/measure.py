@@ -9,12 +9,15 @@ from truearm.cli.arguments import AsJson, CellFile
 from truearm.cli.console import print_json, say, say_wrapped, suggest, tell, warn
 from truearm.cli.interrupt import end_at_once
 from truearm.cli.measure_progress import Teller
-from truearm.errors import count_of, typed
+from truearm.errors import Notice, count_of, list_rows, typed
 from truearm.units import MM_PER_METRE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from truearm.cell.cell_file import Cell
-    from truearm.cell.rehearsal import Rehearsal
+    from truearm.cell.poses_file import Poses
+    from truearm.cell.rehearsal import Planned, Rehearsal
 
 
 def command(
@@ -52,6 +55,7 @@ def command(
 
     known = Cell.load(cell)
     wanted = Poses.read_csv(poses, known.arm)
+    warn(_told_at_limits(wanted))
     if dry_run:
         _print_rehearsal(known, rehearse(known, wanted), as_json=as_json)
         if not as_json:
@@ -73,11 +77,42 @@ def command(
     suggest(f"truearm session export {typed(output)} -o measurements.csv")
 
 
+def _told_at_limits(poses: "Poses") -> list[Notice]:
+    if not poses.at_limits:
+        return []
+    what = list_rows([pose + 1 for pose in poses.at_limits], "pose")
+    return [
+        Notice(
+            "at_limits",
+            f"{what}: a joint is at its limit on the side from which it is to come. Joints come there from "
+            "anywhere, and the column approach is 0.",
+        )
+    ]
+
+
 def _away(cell: "Cell") -> str:
     """How far beside a pose the joints of an arm start, in words."""
     process = cell.file.process
     ways = {"revolute": f"{process.approach_deg:g} deg", "prismatic": f"{process.approach_mm:g} mm"}
     return " and ".join(way for kind, way in ways.items() if kind in cell.arm.joints)
+
+
+def _nearer(beside: "Sequence[Planned]") -> str:
+    """Which joints start nearer to which poses, as far as their limits allow, in words."""
+    poses: dict[int, set[int]] = {}
+    for each in beside:
+        for joint in each.nearer:
+            poses.setdefault(joint, set()).add(each.step.pose + 1)
+    words = [f"joint {joint} at {list_rows(sorted(at), 'pose')}" for joint, at in sorted(poses.items())]
+    return f"; nearer, since a limit is in the way, {', '.join(words)}" if words else ""
+
+
+def _below(cell: "Cell", planned: "Planned") -> str:
+    """How low the arm gets on the way to a step, in words, where that is below the floor."""
+    floor_mm = cell.file.clearance.floor_mm
+    if planned.lowest_m is None or floor_mm is None or MM_PER_METRE * planned.lowest_m >= floor_mm:
+        return ""
+    return f"  below the floor on the way, z = {MM_PER_METRE * planned.lowest_m:.0f} mm"
 
 
 def _print_rehearsal(cell: "Cell", plan: "Rehearsal", *, as_json: bool) -> None:
@@ -93,6 +128,7 @@ def _print_rehearsal(cell: "Cell", plan: "Rehearsal", *, as_json: bool) -> None:
                 if each.point_in_world is None
                 else (MM_PER_METRE * each.point_in_world).tolist(),
                 "problem": each.problem,
+                "lowest_mm": None if each.lowest_m is None else MM_PER_METRE * each.lowest_m,
             }
             for each in plan.steps
         ]
@@ -106,14 +142,21 @@ def _print_rehearsal(cell: "Cell", plan: "Rehearsal", *, as_json: bool) -> None:
     )
     beside = [each for each in plan.steps if each.beside is not None]
     if beside:
-        say_wrapped(f"At {len(beside)} of them all joints start {_away(cell)} beside the pose.")
+        say_wrapped(f"At {len(beside)} of them joints start {_away(cell)} beside the pose{_nearer(beside)}.")
     for each in plan.steps:
         place = (
             ""
             if each.point_in_world is None
             else " ".join(f"{MM_PER_METRE * x:7.1f}" for x in each.point_in_world)
         )
-        problem = f"  cannot be measured: {each.problem}" if each.problem else ""
+        problem = f"  cannot be measured: {each.problem}" if each.problem else _below(cell, each)
         say(f"{each.step.kind:>12} {each.step.pose + 1:5d}  {place}{problem}")
     if plan.refused:
         say_wrapped(f"{len(plan.refused)} of {len(plan.steps)} cannot be measured and would be skipped.")
+    below = [each for each in plan.steps if _below(cell, each)]
+    if below:
+        text = (
+            f"On the way to {len(below)} of {len(plan.steps)} arm or tool goes below the floor of the cell "
+            "file, which the process does not look at: plan poses with --cell, or leave these out."
+        )
+        warn([Notice("below_floor", text)])

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Final
 from truearm.cli import plan_options as option
 from truearm.cli.again import NEW_FILE, Again, calibrate_again, calibrate_anew, plan_anew
 from truearm.cli.arguments import AsJson
-from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest, warn
+from truearm.cli.console import print_json, print_table, say, say_wrapped, suggest
 from truearm.cli.interrupt import ends_promptly
+from truearm.cli.plan_ways import tell_ways
 from truearm.cli.progress import told_stages
 from truearm.defaults import THERE_AND_BACK
-from truearm.errors import Notice, UsageError, count_of, list_names, list_rows, typed
+from truearm.errors import UsageError, count_of, list_names, typed
 from truearm.files import check_output, refuse_same
 from truearm.units import MM_PER_METRE
 
@@ -51,6 +52,7 @@ def command(
     order: option.Order = THERE_AND_BACK,
     sigma_mm: option.SigmaMm = 0.1,
     floor_mm: option.FloorMm = None,
+    link_radius_mm: option.LinkRadiusMm = None,
     box_mm: option.BoxMm = None,
     seed: option.Seed = 0,
     picture: option.Picture = None,
@@ -86,7 +88,7 @@ def command(
                 "--count is given where poses are proposed", rule="--next or --acceptance says how many"
             )
         _propose(
-            _Asked(robot, known, next_count, acceptance, group, cell, seed, order, rules),
+            _Asked(robot, known, next_count, acceptance, group, cell, seed, order, rules, link_radius_mm),
             output,
             picture,
             as_json,
@@ -97,7 +99,7 @@ def command(
     known_cell = None if cell is None else Cell.load(cell)
     arm = _arm_of(robot, known_cell)
     number = count or option.COUNT
-    options = PlanOptions(number, criterion, seed, order, sigma_mm, rules)  # type: ignore[arg-type]
+    options = PlanOptions(number, criterion, seed, order, sigma_mm, rules, link_radius_mm)  # type: ignore[arg-type]
     with ends_promptly():
         with told_stages()("choosing poses"):
             plan = plan_poses(arm, options, cell=known_cell, numbers=NUMBERS)
@@ -189,6 +191,7 @@ class _Asked:
     seed: int
     order: str
     rules: "tuple[Rule, ...]"
+    link_radius_mm: float | None
 
 
 def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: bool) -> None:
@@ -214,7 +217,15 @@ def _propose(asked: _Asked, output: Path | None, picture: Path | None, as_json: 
     choose = propose_next if asked.acceptance is None else propose_acceptance
     number = asked.next_count or asked.acceptance or 0
     again = calibrate_again(calibration, asked.robot, NEW_FILE)
-    options = ProposalOptions(number, asked.seed, asked.order, asked.group, asked.rules, *again.update)
+    options = ProposalOptions(
+        number,
+        asked.seed,
+        asked.order,
+        asked.group,
+        asked.rules,
+        *again.update,
+        link_radius_mm=asked.link_radius_mm,
+    )
     with ends_promptly():
         with told_stages()("choosing poses"):
             proposed = choose(calibration, options, cell=cell)
@@ -277,7 +288,7 @@ def _print_proposed(
     told = proposed.to_dict()
     say(f"{count_of(told['count'], 'pose')}: {output}")
     say_wrapped(_motion(proposed.seconds, joints))
-    say_wrapped(_lowest(proposed.lowest_m))
+    tell_ways(proposed.passage)
     if "noticed" not in told:
         before, after = told["expected_before_mm"], told["expected_after_mm"]
         then = f", {after[-1]:.3f} mm when these are measured too" if after else ""
@@ -316,18 +327,6 @@ def _print_features(features: Sequence[str]) -> None:
         say_wrapped(f"Note {list_names(features)} at each pose, {where}: the calibration varies with that.")
 
 
-def _told_unreached(poses: list[int]) -> list[Notice]:
-    if not poses:
-        return []
-    return [
-        Notice(
-            "unreached",
-            f"{list_rows([pose + 1 for pose in poses], 'pose')}: link or tool would meet the table on every "
-            "way there from the other poses; truearm measure --dry-run tells what would be skipped.",
-        )
-    ]
-
-
 def _motion(seconds: "dict[str, float]", joints: "tuple[str, ...]") -> str:
     from truearm.cell.plan import JOINT_SPEED_RAD_S
 
@@ -341,11 +340,6 @@ def _motion(seconds: "dict[str, float]", joints: "tuple[str, ...]") -> str:
     )
 
 
-def _lowest(height_m: float) -> str:
-    height = f"{MM_PER_METRE * height_m:.0f} mm"
-    return f"The lowest place of arm and tool is at z = {height} in the base frame (--floor-mm is a bound)."
-
-
 def _print(plan: "Plan", output: Path, order: str, joints: "tuple[str, ...]", *, as_json: bool) -> None:
     purposes = {name: plan.poses.purpose.count(name) for name in ("train", "validate", "repeat")}
     if as_json:
@@ -356,10 +350,9 @@ def _print(plan: "Plan", output: Path, order: str, joints: "tuple[str, ...]", *,
                 "before": plan.choice.before,
                 "after": plan.choice.after,
                 "motion_s": plan.seconds,
-                "lowest_mm": MM_PER_METRE * plan.lowest_m,
                 "order": order,
                 "expected_mm": {str(n): value for n, value in plan.expected.items()},
-                "unreached": [pose + 1 for pose in plan.unreached],
+                **plan.passage.to_dict(),
             }
         )
         return
@@ -375,8 +368,7 @@ def _print(plan: "Plan", output: Path, order: str, joints: "tuple[str, ...]", *,
         f"(index O1). Condition number {kappa} (columns at 300 mm)."
     )
     say_wrapped(_motion(plan.seconds, joints))
-    warn(_told_unreached(plan.unreached))
-    say_wrapped(_lowest(plan.lowest_m))
+    tell_ways(plan.passage)
     rows = [[str(n), f"{value:.3f}"] for n, value in plan.expected.items()]
     say("Expected standard deviation of the calibrated position, from constants alone:")
     print_table(("poses", "mm"), rows)

@@ -6,6 +6,7 @@ from typing import Annotated, Final, TypeAlias
 import typer
 
 from truearm.cli.arguments import ROBOT_HELP, robots_like
+from truearm.defaults import LINK_RADIUS_MM
 
 RobotOrNone: TypeAlias = Annotated[
     str | None,
@@ -52,12 +53,24 @@ FloorMm: TypeAlias = Annotated[
     float | None,
     typer.Option(
         metavar="MM",
-        help="Height in the base frame that arm and tool, with --from the measured targets, stay above.",
+        help="Height in the base frame that arm and tool, with --from the measured targets, stay above, at "
+        "the poses and on the joints' straight ways from each to the next.",
+    ),
+]
+LinkRadiusMm: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        min=0.0,
+        metavar="MM",
+        help="Half the thickness of the links, which do not meet one another; 0 where they may.  "
+        f"[default: {LINK_RADIUS_MM:g}, or the cell file's]",
     ),
 ]
 BoxMm: TypeAlias = Annotated[
     str | None,
-    typer.Option(metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the targets."),
+    typer.Option(
+        metavar="X,Y,Z,X,Y,Z", help="Corners of a box in the base frame that keeps the targets at the poses."
+    ),
 ]
 Seed: TypeAlias = Annotated[int, typer.Option(min=0, help="Seed of the candidates.")]
 Picture: TypeAlias = Annotated[

@@ -16,6 +16,7 @@ from truearm.planning.accessibility import (
 from truearm.planning.choosing import Choice, ChoiceOptions, choose
 from truearm.planning.configurations import Configuration
 from truearm.planning.dividing import DividedSpace, DivisionOptions, divide_space
+from truearm.planning.folding import ClearOfItself
 from truearm.planning.pool import Pool, PoolOptions, draw_pool, needed_pool
 from truearm.planning.spaces import CartesianSpace, JointSpace, Space, SphericalSpace
 from truearm.planning.workspace import Workspace
@@ -25,6 +26,7 @@ __all__ = [
     "CartesianSpace",
     "Choice",
     "ChoiceOptions",
+    "ClearOfItself",
     "Configuration",
     "DividedSpace",
     "DivisionOptions",

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Final
+from functools import cached_property, lru_cache
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,24 +50,29 @@ class Places:
         """Tool points (n, 3), m."""
         return self.base_from_tool[:, :3, 3]
 
+    @cached_property
+    def corners(self) -> Floats:
+        """Origins (n, N + 2, 3) of the base, of the frames of the links, and of the tool."""
+        values = self.robot.joints_from_readings(self.readings)
+        corners = [np.broadcast_to(self.robot.base[:3, 3], self.point.shape)]
+        corners += [link_frames(self.robot, values, k + 1)[:, :3, 3] for k in range(self.robot.joint_count)]
+        return np.stack([*corners, self.point], axis=1)
+
     @property
-    def moving_points(self) -> Floats:
-        """Those of `arm_points` (n, k, 3) beyond the links that stand on the floor themselves."""
-        return self.arm_points[:, STEPS_ALONG_LINK * standing_links(self.robot) :]
+    def lowest(self) -> Floats:
+        """Heights (n,) of the lowest place beyond the links that stand on the floor themselves, m."""
+        return np.asarray(self.corners[:, standing_links(self.robot) :, 2].min(axis=1))
 
     @cached_property
     def arm_points(self) -> Floats:
         """Points (n, k, 3) along the straight lines between the frames of the links and the tool."""
-        values = self.robot.joints_from_readings(self.readings)
-        corners = [np.broadcast_to(self.robot.base[:3, 3], self.point.shape)]
-        corners += [link_frames(self.robot, values, k + 1)[:, :3, 3] for k in range(self.robot.joint_count)]
-        corners.append(self.point)
-        line = np.stack(corners, axis=1)
+        line = self.corners
         part = np.linspace(0.0, 1.0, STEPS_ALONG_LINK)[:, None]
         pieces = line[:, :-1, None] * (1.0 - part) + line[:, 1:, None] * part
         return np.asarray(pieces.reshape(len(line), -1, 3))
 
 
+@lru_cache(maxsize=8)
 def standing_links(robot: Robot) -> int:
     """Links from the base on that no joint lifts, the first one always among them.
 
@@ -84,6 +89,7 @@ def standing_links(robot: Robot) -> int:
 
 
 Rule = Callable[[Places], Mask]
+"""Of places to true or false. One whose attribute `holds_on_ways` is true holds on ways between poses too."""
 
 
 def accessible(
@@ -223,6 +229,8 @@ class KeepOut:
     high: ArrayLike
     margin_m: float = 0.0
 
+    holds_on_ways: ClassVar[bool] = True
+
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
         low, high = np.asarray(self.low) - self.margin_m, np.asarray(self.high) + self.margin_m
@@ -240,9 +248,11 @@ class AboveFloor:
 
     height_m: float
 
+    holds_on_ways: ClassVar[bool] = True
+
     def __call__(self, places: Places) -> Mask:
         """Of each pose."""
-        return np.asarray((places.moving_points[:, :, 2] >= self.height_m).all(axis=1))
+        return np.asarray(places.lowest >= self.height_m)
 
 
 def lowest(robot: Robot, readings: Floats, *, tool: Floats) -> float:
@@ -253,7 +263,7 @@ def lowest(robot: Robot, readings: Floats, *, tool: Floats) -> float:
         readings: Poses (n, N), one at the least.
         tool: Transform (4, 4) from flange to tool.
     """
-    return float(Places(robot, readings, tool).moving_points[:, :, 2].min())
+    return float(Places(robot, readings, tool).lowest.min())
 
 
 def either(*rules: Rule) -> Rule:

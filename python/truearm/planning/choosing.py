@@ -1,6 +1,6 @@
 """The choice of the poses that determine the parameters best."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Final, Literal
@@ -36,6 +36,7 @@ class ChoiceOptions:
         passes: Passes of the exchange at the most.
         tool: What is measured: a point (3,) in the flange frame or a transform (4, 4) from it; the robot
             file's tool by default.
+        starts: From how many starts poses are exchanged; the best end counts. All but the first are drawn.
     """
 
     criterion: Criterion = "kappa"
@@ -44,11 +45,12 @@ class ChoiceOptions:
     pose: bool = False
     passes: int = 20
     tool: ArrayLike | None = None
+    starts: int = 1
 
     def __post_init__(self) -> None:
-        kinds.settle(self, whole=("passes",), numbers=("limit",), flags=("pose",))
+        kinds.settle(self, whole=("passes", "starts"), numbers=("limit",), flags=("pose",))
         kinds.check_values(
-            self, choices={"criterion": CRITERIA}, positive=("limit",), not_negative=("passes",)
+            self, choices={"criterion": CRITERIA}, positive=("limit", "starts"), not_negative=("passes",)
         )
         if self.names is not None:
             object.__setattr__(self, "names", kinds.words(self.names, "names"))
@@ -119,15 +121,24 @@ def choose(
         "criterion": chosen.criterion,
         "limit": chosen.limit,
         "given": None if measured is None else np.ascontiguousarray(measured),
-        "start": None,
         "passes": chosen.passes,
     }
+    wanted, rng = np.ascontiguousarray(jacobian[:, :, kept]), np.random.default_rng(0)
+    drawn = [rng.permutation(len(readings))[:count].astype(np.int64) for _ in range(chosen.starts - 1)]
     try:
-        core = choose_poses(np.ascontiguousarray(jacobian[:, :, kept]), count, how)
+        ends = [choose_poses(wanted, count, {**how, "start": start}) for start in (None, *drawn)]
     except CoreError as error:
         raise WorkError(str(error)) from error
-    rows = np.array(core.chosen, dtype=np.int64)
-    return Choice(rows, core.before, core.after, core.exchanges, core.well_conditioned)
+    best = max(ends, key=lambda end: _merit(end.after, chosen.criterion))
+    rows = np.array(best.chosen, dtype=np.int64)
+    return Choice(rows, ends[0].before, best.after, best.exchanges, best.well_conditioned)
+
+
+def _merit(indices: Mapping[str, float], criterion: Criterion) -> float:
+    """What is largest of the best poses."""
+    if criterion == "kappa":
+        return -indices["kappa"]
+    return indices["log_det" if criterion == "d" else criterion]
 
 
 def check_some(names: Sequence[str], option: str) -> None:
