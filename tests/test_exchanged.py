@@ -7,6 +7,7 @@ import truearm as ta
 from truearm.doubts import Outliers, to_check
 from truearm.outlier_fate import FULL_WEIGHT, TAKEN_OUT
 from truearm.reporting.facts import Facts
+from truearm.reporting.parts import Table
 from truearm.reporting.provenance import provenance
 from truearm.simulation import VirtualArm
 
@@ -116,7 +117,7 @@ def test_what_became_of_exchanged_rows_is_said_alike_everywhere(arm, table, opti
     found, told = constants_of(arm, with_points_of(table, {50: 51, 51: 50}), **options)
     assert fate in told["rows_exchanged"].message
     parts = provenance(Facts(found)).parts
-    (listed,) = (part for part in parts if getattr(part, "title", "") == "Outliers")
+    (listed,) = (part for part in parts if isinstance(part, Table) and part.title == "Outliers")
     assert f"They were {fate}" in listed.says
 
 

@@ -72,7 +72,8 @@ def test_a_plan_is_clear_of_itself(name):
 @pytest.mark.parametrize("name", library_names())
 def test_most_poses_of_each_arm_are_clear_of_itself(name):
     arm = Robot.load(name)
-    drawn = np.random.default_rng(0).uniform(*np.clip(arm.limits.T, -np.pi, np.pi), (400, arm.joint_count))
+    low, high = np.clip(arm.limits.T, -np.pi, np.pi)
+    drawn = np.random.default_rng(0).uniform(low, high, (400, arm.joint_count))
     assert accessible(arm, drawn, [ClearOfItself(0.04)]).mean() > 0.7
 
 

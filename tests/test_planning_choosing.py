@@ -66,7 +66,8 @@ def test_an_index_is_not_lowered(pool, criterion):
 @pytest.mark.parametrize("criterion", ["o4", "kappa"])
 def test_the_best_of_several_starts_counts(criterion):
     arm = IdentifiedArm(RV_M2)
-    drawn = np.random.default_rng(2).uniform(*RV_M2.limits.T, (400, RV_M2.joint_count))
+    low, high = RV_M2.limits.T
+    drawn = np.random.default_rng(2).uniform(low, high, (400, RV_M2.joint_count))
     one, several = (choose(arm, drawn, 20, ChoiceOptions(criterion, starts=count)) for count in (1, 3))
     assert several.after["kappa"] < 0.97 * one.after["kappa"]
     assert several.after["o4"] > 1.03 * one.after["o4"]

@@ -43,6 +43,7 @@ def test_the_command_that_comes_next_allows_what_would_be_refused(turned, tmp_pa
 
 def test_where_most_is_corrected_nothing_is_said():
     facts = Facts(small_calibration("constant"))
+    assert facts.waypoints is not None
     assert (facts.mostly_refused, facts.waypoints.allowing) == ("", "")
 
 

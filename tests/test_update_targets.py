@@ -53,6 +53,7 @@ def test_more_targets_of_a_pose_tell_hardly_more_of_the_joints_that_carry_it(kno
 def test_rows_tell_how_far_the_farthest_target_is(known):
     arm, calibration = known
     rows = ta.update(calibration, with_targets(arm, 12, 10)).calibration.rows
+    assert rows is not None
     each = np.linalg.norm(rows.residual.reshape(12, 3, 3), axis=2)
     assert (each[:, 0] < each.max(axis=1)).any()
     np.testing.assert_allclose(rows.distance_m, each.max(axis=1))

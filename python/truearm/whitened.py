@@ -126,7 +126,8 @@ def _visits(fitted: FittedRows, selection: Selection, progress: Floats) -> tuple
     parts = held_parts(fitted.data, selection)[:, :-1]
     _, group = np.unique(fitted.data.group, return_inverse=True)
     order = np.lexsort((progress, group.reshape(-1)))
-    order = order[(fitted.weight >= TRUSTED)[order] & parts.any(axis=1)[order]]
+    counts: Mask = np.asarray((fitted.weight >= TRUSTED) & parts.any(axis=1))
+    order = order[counts[order]]
     visits = visit_numbers(fitted.data.readings[order], fitted.data.group[order])
     held = np.repeat(parts, AXES, axis=1)[order].astype(np.float64)
     share = means(held, visits)

@@ -35,7 +35,6 @@ from truearm.proposing import (
 )
 from truearm.robot import Robot
 from truearm.stillness import still_joints
-from truearm.units import MM_PER_METRE
 from truearm.updating import UpdateOptions
 
 Floats = NDArray[np.float64]

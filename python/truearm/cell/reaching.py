@@ -88,7 +88,8 @@ def _place_for(walk: FreeWalk, poses: Poses, k: int, order: list[int]) -> int | 
     ways = np.abs(readings[order] - there).max(axis=1, initial=0.0)
     between = np.abs(np.diff(readings[order], axis=0)).max(axis=1, initial=0.0)
     longer = np.r_[0.0, ways] + np.r_[ways, 0.0] - np.r_[0.0, between, 0.0]
-    for place in np.argsort(longer, kind="stable").tolist():
+    places: list[int] = np.argsort(longer, kind="stable").tolist()
+    for place in places:
         if not first <= place <= last:
             continue
         before, behind = order[max(0, place - 1) : place], order[place : place + 1]

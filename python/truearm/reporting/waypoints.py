@@ -94,7 +94,7 @@ class Waypoints:
 
     @property
     def _way_out(self) -> str:
-        if self.main_code in BOUNDS:
+        if self.main_code is not None and self.main_code in BOUNDS:
             option, look = BOUNDS[self.main_code]
             return f"{look[:1].upper()}{look[1:]}; {option} allows more."
         less = "" if self.task == LESS else f"; --task {LESS} asks for less than {self.task}"
