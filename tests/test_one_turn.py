@@ -47,7 +47,7 @@ def test_a_plan_goes_all_along_a_rail_and_beyond_half_a_turn() -> None:
     robot = arm(
         ("prismatic", 0.0, 9.0), ("revolute", 0.8, 5.4), ("revolute", 3.5, 6.0), ("revolute", -1.0, 1.0)
     )
-    planned = plan_poses(robot, PlanOptions(count=30))
+    planned = plan_poses(robot, PlanOptions(count=30, link_radius_mm=0.0))
     q = np.asarray(planned.poses.readings)
     low, high = robot.limits.T
     assert ((q >= low) & (q <= high)).all()
