@@ -24,7 +24,7 @@ def test_the_target_takes_over_how_the_flange_is_turned(posed):
     as_target = calibration.pose_std(q, group=group, target=1)
     as_tool = calibration.pose_std(q, group=group, tool=end)
     np.testing.assert_allclose(as_target[:, :3], as_tool[:, :3], rtol=1e-9)
-    assert (as_target[:, 3:] < as_tool[:, 3:]).mean() > 0.9
+    assert (as_target[:, 3:].mean(axis=0) < as_tool[:, 3:].mean(axis=0)).all()
     mounted = np.eye(4)
     mounted[:3, 3] = arm.target_in_flange
     true = arm.world_from_base @ arm.true_pose(q, tool=mounted)

@@ -41,8 +41,10 @@ def test_an_instrument_that_scatters_more_is_told_with_the_sigma_to_state(arm, m
     assert ("--model variable" in said) == (model == "constant")
     about = re.search(r"about ([\d.]+) mm in the rows of camera", said)
     assert about is not None
-    assert float(about[1]) == pytest.approx(0.5, rel=0.5)
+    # What varies with the pose takes up some of so much noise.
+    assert float(about[1]) < 0.75
     if model == "constant":
+        assert float(about[1]) > 0.25
         assert said in {advice.words for advice in report(found).advice}
 
 

@@ -107,12 +107,13 @@ def _merged(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _means(told: list[dict[str, float | None]]) -> dict[str, float]:
-    """Mean of each of several values by name, over those that are told and finite; without one, no mean."""
+    """Mean of each of several values by name, over those that are told: the finite ones, if there are any."""
     means = {}
     for name in dict.fromkeys(name for each in told for name in each):
-        values = [value for each in told if (value := each.get(name)) is not None and math.isfinite(value)]
+        values = [value for each in told if (value := each.get(name)) is not None]
+        values = [value for value in values if math.isfinite(value)] or values
         if values:
-            means[name] = math.fsum(values) / len(values)
+            means[name] = sum(values) / len(values)
     return means
 
 

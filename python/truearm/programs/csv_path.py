@@ -132,6 +132,8 @@ class _Reader:
         motion = np.where(
             (layout == 0) & both, int(Motion.SEED), np.where(layout == 0, Motion.JOINT, Motion.LINEAR)
         )
+        # No line leads to where a path begins.
+        motion[np.flatnonzero(motion != Motion.SEED)[:1]] = Motion.JOINT
         count = len(order)
         zeros = np.zeros(count, dtype=np.int64)
         ones = np.ones(count, dtype=np.int64)
