@@ -1,5 +1,6 @@
 """Shared settings and fixtures."""
 
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,12 +8,18 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from truearm.workers.local import THREAD_VARIABLES
+
 ROOT = Path(__file__).resolve().parents[1]
 SHARED_DATA = ROOT.parent / "shared" / "data"
 
 # One machine, one answer: a test that failed yesterday fails today, and a slow machine is no failure.
 settings.register_profile("truearm", derandomize=True, deadline=None, max_examples=50)
 settings.load_profile("truearm")
+
+# Tests that run side by side share the processors already.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1") | os.environ)
 
 
 @pytest.fixture(scope="session", autouse=True)
