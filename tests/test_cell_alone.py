@@ -1,6 +1,6 @@
 """An arm, and a table, are driven by one process at a time, whatever session that one writes."""
 
-from unittest.mock import Mock
+from unittest.mock import Mock, patch
 
 import numpy as np
 import pytest
@@ -56,5 +56,5 @@ def test_what_drives_an_arm_lets_go_of_it_and_leaves_others_alone(tmp_path, caps
 
 def test_recordings_are_played_side_by_side():
     cell = Cell.from_toml(cell_text("playback"))
-    with alone(cell), alone(cell):
-        pass
+    with patch("truearm.cell.alone.FileLock") as lock, alone(cell), alone(cell):
+        lock.assert_not_called()

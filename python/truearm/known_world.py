@@ -35,6 +35,7 @@ def another_frame(task: Task, rows: Measurements, left_m: float) -> list[Notice]
     try:
         found_m = fit_rows(replace(task, arm=arm, options=options), rows).constant.noise[0]
     except (InputError, WorkError):
+        # Rows in which no frame can be found are no nearer to one.
         return []
     if found_m > BETTER * left_m:
         return []
